@@ -53,8 +53,8 @@
 
 pub use rohrpost_config::Installation;
 pub use rohrpost_mailbox::{
-    Class, CreateError, Full, Interest, ModuleState, Name, Node, ParticipantInfo, Priority, Ready, Shape, SystemTime,
-    Watch,
+    Class, CreateError, Interest, ModuleState, Name, Node, OverflowPolicy, ParticipantInfo, Priority, Ready, Shape,
+    SystemTime, Watch,
 };
 pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]

@@ -93,7 +93,7 @@ const LONG: &[(&str, usize)] = &[
     ("mailbox/src/slots.rs", 423),
     ("mailbox/src/system_time.rs", 449),
     ("modules/src/call/link.rs", 428),
-    ("modules/src/call/once_simulation.rs", 418),
+    ("modules/src/call/deduplicator_simulation.rs", 418),
     ("modules/src/output/way.rs", 434),
     ("modules/src/runtime/context.rs", 418),
     ("modules/tests/launch.rs", 404),

@@ -4,7 +4,7 @@
 
 mod support;
 
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use support::{bench, children, interrupt, left_behind, rows, run, wait_for};
@@ -45,7 +45,7 @@ fn network() -> BTreeSet<String> {
 
 #[test]
 fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let before = network();
         let (output, prefix) = run("lan", &["--quick", "--json"]);
         let rows = rows(&output);

@@ -4,7 +4,7 @@
 
 mod support;
 
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
@@ -37,7 +37,7 @@ fn case_of(row: &Map<String, Value>) -> String {
 
 #[test]
 fn every_case_runs_and_every_line_is_complete() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let (output, prefix) = run("tdma", &["--quick", "--json"]);
         let rows = rows(&output);
         for (case, who) in ROWS {

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 Bytes are those of bodies: a package has 16 bytes of head besides. It reads counters in shared memory, on another node by \
 way of that node's launch: nothing is subscribed to, and the module is sent nothing. Smallest and largest are those of the whole seconds that the window touches.")]
 pub(super) struct Arguments {
-    /// Module or face, such as mapper.0.
+    /// Module or alias, such as mapper.0.
     name: String,
     /// Data; without it, all packages in and out.
     data: Option<String>,

@@ -109,7 +109,7 @@ impl Asked<'_> {
             match child.phase {
                 Phase::Running if child.lives == life => return self.at_work(&child, before),
                 Phase::Stopped => return Err(format!("somebody has stopped {text} meanwhile").into()),
-                // It had its life, or could not even be begun.
+                // It had its incarnation, or could not even be begun.
                 _ if child.lives > life || child.lives == life && child.phase == Phase::Waiting => {
                     return Err(format!("{text} was started, and ended by itself: {}", child.last_end).into());
                 }

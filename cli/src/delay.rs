@@ -22,7 +22,7 @@ A package waits from being published to being taken. The mean is exact; p50 and 
 right to a quarter or so; the longest is that of the mailbox's whole life. It reads counters, on other nodes by way of their \
 launches: the modules are sent nothing.")]
 pub(super) struct Arguments {
-    /// Module or face, such as mapper.0.
+    /// Module or alias, such as mapper.0.
     name: String,
     #[command(flatten)]
     target: Target,

@@ -6,12 +6,12 @@ mod asked;
 mod beyond;
 mod copy;
 mod drawing;
-mod ears;
 mod folder;
-mod lives;
+mod incarnations;
 mod losses;
+mod masters;
 mod nodes;
-mod reigns;
+mod sealed_capture;
 mod takeover;
 
 use super::launch::{View, end};

@@ -18,7 +18,7 @@ It reads what the module counts in shared memory, on another node by way of that
 to, and the module is sent nothing. Rate and standard \
 deviation are exact; minimum and maximum are those of the whole seconds that the window touches.")]
 pub(super) struct Arguments {
-    /// Module or face, such as odometry.0.
+    /// Module or alias, such as odometry.0.
     name: String,
     /// Data; without it, all that the module publishes.
     data: Option<String>,

@@ -1,6 +1,6 @@
 //! `rohrpost list`.
 
-use super::sight::Silence;
+use super::observer::Silence;
 use super::summary::{Losses, ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
 use super::target::{Running, Target};

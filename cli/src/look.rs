@@ -1,18 +1,18 @@
 //! How tools look at nodes and at their modules: at their own node in its shared memory, at others by way of their launches. Nothing waits
 //! longer than [`PATIENCE`]; a node that does not answer is silent, and that is told.
 
-use crate::sight::{PATIENCE, Silence, silence};
+use crate::observer::{PATIENCE, Silence, silence};
 use crate::target::Running;
 use crate::terminal::Failure;
 use rohrpost::ToolLink;
 use rohrpost::common::GET_DATA;
 use rohrpost::description::noted;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
-use rohrpost::launcher::{Look, launcher_of};
+use rohrpost::launcher::{SnapshotRequest, launcher_of};
 use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
-use rohrpost::survey::{MailboxLook, Scope, Seen, Survey, look_at_all};
+use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
 use rohrpost_mailbox::{InspectError, Name};
 
 impl Running {
@@ -22,7 +22,9 @@ impl Running {
         let launchers: Vec<Name> = others.iter().filter_map(|node| launcher_of(&self.installation, node)).collect();
         let seen = match &launchers[..] {
             [] => Vec::new(),
-            launchers => self.ask(|tool| look_at_all(&mut tool.link, launchers, Look::Survey(scope), PATIENCE))?,
+            launchers => {
+                self.ask(|tool| look_at_all(&mut tool.link, launchers, SnapshotRequest::Survey(scope), PATIENCE))?
+            }
         };
         let mut seen = seen.into_iter();
         let look = |node: &&str| {
@@ -32,9 +34,9 @@ impl Running {
                 return Ok(Ok(survey));
             }
             Ok(match seen.next() {
-                Some(Ok(Seen::Survey(survey))) => Ok(*survey),
+                Some(Ok(Snapshot::Survey(survey))) => Ok(*survey),
                 Some(Err(failure)) => Err(silence(&self.installation, node, &failure)),
-                Some(Ok(Seen::Mailbox(_))) | None => Err(Silence::new(node, "it was not asked")),
+                Some(Ok(Snapshot::Mailbox(_))) | None => Err(Silence::new(node, "it was not asked")),
             })
         };
         nodes.iter().map(look).collect()
@@ -127,22 +129,22 @@ impl Running {
     }
 
     /// Looks at a mailbox, on whichever node it is; none when that has none of this name.
-    pub(super) fn inspect(&self, name: Name) -> Result<Option<MailboxLook>, Failure> {
+    pub(super) fn inspect(&self, name: Name) -> Result<Option<MailboxSnapshot>, Failure> {
         let node = self.node_of(name);
         if node == self.node_name {
-            return match MailboxLook::new(&self.node, name) {
+            return match MailboxSnapshot::new(&self.node, name) {
                 Ok(look) => Ok(Some(look)),
                 Err(InspectError::Missing(_)) => Ok(None),
                 Err(error @ InspectError::Bad(..)) => Err(self.told(name, &error)),
             };
         }
         let launchers: Vec<Name> = launcher_of(&self.installation, node).into_iter().collect();
-        let what = Look::Mailbox(name.raw());
+        let what = SnapshotRequest::Mailbox(name.raw());
         let seen = self.ask(|tool| look_at_all(&mut tool.link, &launchers, what, PATIENCE))?.pop();
         match seen {
-            Some(Ok(Seen::Mailbox(look))) => Ok(look.map(|look| *look)),
+            Some(Ok(Snapshot::Mailbox(look))) => Ok(look.map(|look| *look)),
             Some(Err(failure)) => Err(silence(&self.installation, node, &failure).text().into()),
-            Some(Ok(Seen::Survey(_))) | None => Err(format!("node {node} showed something else").into()),
+            Some(Ok(Snapshot::Survey(_))) | None => Err(format!("node {node} showed something else").into()),
         }
     }
 
@@ -155,7 +157,7 @@ impl Running {
         described.map_err(|error| self.told(module, &error))
     }
 
-    /// The module or face that a user names, or a program run by hand: one of the configuration, with mailboxes here, of another system,
+    /// The module or alias that a user names, or a program run by hand: one of the configuration, with mailboxes here, of another system,
     /// or of this one and registered at the TCP router.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
         let module = self.installation.classes.parse_name(text)?.module();
@@ -169,6 +171,6 @@ impl Running {
 
     /// Asks from the tool's place on its own node.
     fn ask<T>(&self, ask: impl FnOnce(&mut ToolLink) -> T) -> Result<T, Failure> {
-        self.sight.with(|| self.join(PATIENCE), ask)
+        self.observer.with(|| self.join(PATIENCE), ask)
     }
 }

@@ -6,11 +6,11 @@ use super::target::{Running, Target};
 use super::units::fine;
 use crate::terminal::{Failure, say};
 use rohrpost::Name;
-use rohrpost::survey::{MailboxLook, Scope, purpose};
+use rohrpost::survey::{MailboxSnapshot, Scope, purpose};
 use rohrpost_config::{Installation, nearest};
 use rohrpost_mailbox::{
-    ClassTraffic, Full, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, Party, Priority, SlotInfo, WaitingPackage,
-    saturating_sum,
+    ClassTraffic, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, OverflowPolicy, Party, Priority, SlotInfo,
+    WaitingPackage, saturating_sum,
 };
 use serde::Serialize;
 use std::process::ExitCode;
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
 
 /// All that can be seen, as programs read it.
 #[derive(Serialize)]
-struct Seen {
+struct MailboxView {
     mailbox: String,
     module: String,
     purpose: &'static str,
@@ -123,7 +123,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     let name = running.installation.classes.parse_name(&arguments.name)?;
     let look = running.inspect(name)?.ok_or_else(|| missing(&running, name, &arguments.name))?;
-    let seen = Seen::new(&running, &look);
+    let seen = MailboxView::new(&running, &look);
     say(if arguments.json { serde_json::to_string(&seen)? } else { print(&running.installation, &look.detail, &seen) });
     Ok(ExitCode::SUCCESS)
 }
@@ -149,8 +149,8 @@ fn missing(running: &Running, name: Name, text: &str) -> Failure {
     format!("node {node} has no mailbox `{text}`; {nearest}`rohrpost list --mailboxes` lists all").into()
 }
 
-impl Seen {
-    fn new(running: &Running, look: &MailboxLook) -> Self {
+impl MailboxView {
+    fn new(running: &Running, look: &MailboxSnapshot) -> Self {
         let (installation, detail) = (&running.installation, &look.detail);
         let (info, shape) = (&detail.info, &detail.info.shape);
         let party = |party: &Party| PartyLine::new(installation, look, party);
@@ -187,7 +187,7 @@ fn lost(classes: &[ClassTraffic], cause: Loss) -> u64 {
 }
 
 impl PartyLine {
-    fn new(installation: &Installation, look: &MailboxLook, party: &Party) -> Self {
+    fn new(installation: &Installation, look: &MailboxSnapshot, party: &Party) -> Self {
         Self {
             module: (party.module != Name::NONE).then(|| installation.classes.format(party.module)),
             pid: party.pid,
@@ -241,7 +241,7 @@ fn bars(latency: &Latency) -> Vec<Bar> {
 }
 
 impl SlotLine {
-    fn new(installation: &Installation, look: &MailboxLook, slot: usize, seen: &SlotInfo) -> Self {
+    fn new(installation: &Installation, look: &MailboxSnapshot, slot: usize, seen: &SlotInfo) -> Self {
         let class = |priority: Priority| class_name(installation, Some(rohrpost::Class(priority.0)));
         let state = |state, waiting: Option<&WaitingPackage>| Self {
             slot,
@@ -287,12 +287,12 @@ impl SlotLine {
     }
 }
 
-fn print(installation: &Installation, detail: &MailboxDetail, seen: &Seen) -> String {
+fn print(installation: &Installation, detail: &MailboxDetail, seen: &MailboxView) -> String {
     let shape = &detail.info.shape;
     let when_full = match shape.full {
-        Full::Displace => "displace: the least important gives way to what is more important",
-        Full::Latest => "latest: what is of the same state gives way to the newer",
-        Full::Reject => "reject: what comes then is refused",
+        OverflowPolicy::Displace => "displace: the least important gives way to what is more important",
+        OverflowPolicy::Latest => "latest: what is of the same state gives way to the newer",
+        OverflowPolicy::Reject => "reject: what comes then is refused",
     };
     let receiver = match &seen.receiver {
         None => "nobody yet".into(),

@@ -29,6 +29,7 @@ mod mailbox;
 mod manager;
 mod net;
 mod new;
+mod observer;
 mod param;
 mod ping;
 mod published;
@@ -37,7 +38,6 @@ mod round;
 mod router;
 mod run;
 mod send;
-mod sight;
 mod slots;
 mod speech;
 mod status;
@@ -113,7 +113,7 @@ enum Command {
     Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
-    /// Look whether this computer lets a robot run in time.
+    /// SnapshotRequest whether this computer lets a robot run in time.
     Doctor(doctor::Arguments),
     /// Measure how this computer hands packages over.
     Bench(bench::Arguments),

@@ -1,6 +1,6 @@
 //! `rohrpost ping`: how long a module takes to answer.
 
-mod ways;
+mod round_trip;
 
 use super::table::time;
 use super::target::{Running, Target};
@@ -10,10 +10,10 @@ use rohrpost::common::TimeReport;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_mailbox::{Latency, ModuleState};
+use round_trip::{Moments, RoundTrip, WaySum};
 use serde_json::json;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-use ways::{Moments, WaySum, Ways};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -24,7 +24,7 @@ then is in it, as is being waited for behind more important classes. The ways th
 off they may be; between nodes that do not have the master's time, or where that is too unsure, it says so instead. p50 and p99 \
 come from a histogram and are right to a quarter or so; the others are exact. The exit code is 1 if nothing was answered.")]
 pub(super) struct Arguments {
-    /// Module or face, such as motor.0.
+    /// Module or alias, such as motor.0.
     name: String,
     #[command(flatten)]
     target: Target,
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             Ok(there) => {
                 let pace = tool.clock.record().map_or(1.0, |record| record.pace_ppb as f64 / 1e9);
                 let moments = Moments { before: &before, there: &there, after: &after };
-                let ways = Ways::new(&moments, running.is_own(module), pace);
+                let ways = RoundTrip::new(&moments, running.is_own(module), pace);
                 rounds.answered(took, ways.as_ref().ok());
                 tell_answer(arguments, rounds.sent, took, &ways)
             }
@@ -86,7 +86,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn tell_answer(arguments: &Arguments, number: u64, took: Duration, ways: &Result<Ways, String>) -> bool {
+fn tell_answer(arguments: &Arguments, number: u64, took: Duration, ways: &Result<RoundTrip, String>) -> bool {
     let name = &arguments.name;
     if arguments.json {
         let (ways, why) = (ways.as_ref().ok(), ways.as_ref().err());
@@ -142,7 +142,7 @@ struct Rounds {
 }
 
 impl Rounds {
-    fn answered(&mut self, took: Duration, ways: Option<&Ways>) {
+    fn answered(&mut self, took: Duration, ways: Option<&RoundTrip>) {
         self.answered += 1;
         if let Some(ways) = ways {
             self.there.add(ways.there_s, ways.error_s);

@@ -17,10 +17,11 @@ pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Re
     let names = || known.iter().map(|(_, name)| plain::line(name)).collect::<Vec<_>>().join(", ");
     match name {
         _ if known.is_empty() => {
-            let faces = running.installation.module(module).map(|found| &found.faces[..]).unwrap_or_default();
-            let faces: Vec<String> = faces.iter().map(|face| running.text(*face)).collect();
-            let faces = if faces.is_empty() { String::new() } else { format!("; its faces may: {}", faces.join(", ")) };
-            Err(format!("{text} publishes no data{faces}").into())
+            let aliases = running.installation.module(module).map(|found| &found.aliases[..]).unwrap_or_default();
+            let aliases: Vec<String> = aliases.iter().map(|alias| running.text(*alias)).collect();
+            let aliases =
+                if aliases.is_empty() { String::new() } else { format!("; its aliases may: {}", aliases.join(", ")) };
+            Err(format!("{text} publishes no data{aliases}").into())
         }
         None => Ok(known),
         Some(name) => match known.iter().find(|(_, known)| known == name) {

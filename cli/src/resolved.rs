@@ -111,7 +111,7 @@ fn module(installation: &Installation, module: &Module) -> Value {
         "line": module.line,
         "priority": module.name.class().0,
         "scheduling": scheduling(installation.scheduling(module.name.class())),
-        "faces": module.faces.iter().map(|face| json!({ "name": text(face), "number": face.raw() })).collect::<Vec<_>>(),
+        "aliases": module.aliases.iter().map(|alias| json!({ "name": text(alias), "number": alias.raw() })).collect::<Vec<_>>(),
         "runs": runs,
         "optional": module.optional,
         "required": module.required,

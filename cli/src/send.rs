@@ -22,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(50);
 Each error is told once, then counted. A command that waits longer than --timeout is not run any more. Commands that \
 come due while earlier ones keep this program from sending are left out, not sent in a heap.")]
 pub(super) struct Arguments {
-    /// Module or face, such as motor.0.
+    /// Module or alias, such as motor.0.
     name: String,
     /// Function.
     function: String,

@@ -1,6 +1,6 @@
 //! `rohrpost status`.
 
-use super::sight::Silence;
+use super::observer::Silence;
 use super::summary::Account;
 use super::table::{table, time};
 use super::target::{Running, Target};
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Line {
+struct StatusRow {
     module: String,
     node: String,
     #[serde(flatten)]
@@ -85,19 +85,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
     };
     let mut tool = running.join(super::units::seconds(arguments.timeout)?)?;
-    let lines: Vec<Line> = names.into_iter().map(|name| ask(&running, &mut tool, &survey, &silent, name)).collect();
+    let lines: Vec<StatusRow> =
+        names.into_iter().map(|name| ask(&running, &mut tool, &survey, &silent, name)).collect();
     tool.close();
     if arguments.json {
         say(serde_json::to_string(&lines)?);
     } else {
         say(print(&lines).trim_end());
     }
-    let well = |line: &Line| line.figures.is_some() && line.account.state != Standing::Error;
+    let well = |line: &StatusRow| line.figures.is_some() && line.account.state != Standing::Error;
     Ok(if lines.iter().all(well) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// What there is to say of a module: as launch and its node's table have it, and what it says itself, unless it is known that it cannot.
-fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silence], name: Name) -> Line {
+fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silence], name: Name) -> StatusRow {
     let (text, node) = (running.text(name), running.node_of(name).to_owned());
     let account = survey.module(name).map(|module| Account::of(module, &running.installation));
     let silence = silent.iter().find(|silence| silence.node == node).map(Silence::text);
@@ -105,22 +106,22 @@ fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silenc
         Some(account) if silence.is_none() && !account.state.answers() => {
             let busy = account.error.clone().filter(|_| account.state == Standing::Busy);
             let failure = Some(busy.unwrap_or_else(|| running.absent(name).to_string()));
-            return Line { module: text, node, account, figures: None, failure };
+            return StatusRow { module: text, node, account, figures: None, failure };
         }
         account => match silence.map_or_else(|| Ok(tool.status(name)), Err) {
             Ok(Ok(status)) => {
                 let account = Account::said(&status, account);
-                return Line { module: text, node, account, figures: Some(status.into()), failure: None };
+                return StatusRow { module: text, node, account, figures: Some(status.into()), failure: None };
             }
             Ok(Err(error)) => (running.told(name, &error).to_string(), account),
             Err(silence) => (silence, account),
         },
     };
     let account = Account::unreachable(&failure, account);
-    Line { module: text, node, account, figures: None, failure: Some(failure) }
+    StatusRow { module: text, node, account, figures: None, failure: Some(failure) }
 }
 
-fn print(lines: &[Line]) -> String {
+fn print(lines: &[StatusRow]) -> String {
     let rows = lines.iter().map(|line| {
         let figure = |of: fn(&Figures) -> String| line.figures.as_ref().map_or("-".into(), of);
         [

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 pub(super) struct ModuleLine {
     pub(super) module: String,
     pub(super) node: String,
-    pub(super) faces: Vec<String>,
+    pub(super) aliases: Vec<String>,
     #[serde(flatten)]
     pub(super) account: Account,
     pub(super) priority: u8,
@@ -90,7 +90,7 @@ pub(super) fn module_lines(installation: &Installation, survey: &Survey, earlier
     let line = |module: &ModuleSurvey| ModuleLine {
         module: installation.classes.format(module.name),
         node: module.node.clone(),
-        faces: module.faces.iter().map(|face| installation.classes.format(*face)).collect(),
+        aliases: module.aliases.iter().map(|alias| installation.classes.format(*alias)).collect(),
         account: Account::of(module, installation),
         priority: module.name.class().0,
         scheduling: scheduling(module.scheduling),
@@ -129,7 +129,7 @@ pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     table_of(&all, rows)
 }
 
-/// The same for a terminal of 80 columns: faces below their module, and rates; below all, what went wrong last.
+/// The same for a terminal of 80 columns: aliases below their module, and rates; below all, what went wrong last.
 pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
     let rate = |line: &ModuleLine| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}"));
     let mut text = table(heads(">in/s"), lines.iter().map(|line| cells(line, "\n", rate(line))));
@@ -152,10 +152,10 @@ const fn heads(received: &str) -> [&str; HEADS] {
 
 /// Of what does not answer, nothing is known.
 fn cells(line: &ModuleLine, gap: &str, received: String) -> [String; HEADS] {
-    let faces: Vec<String> = line.faces.iter().map(|face| format!("{gap}+ {face}")).collect();
+    let aliases: Vec<String> = line.aliases.iter().map(|alias| format!("{gap}+ {alias}")).collect();
     let known = |text: String| if line.account.state == Standing::Unreachable { "-".into() } else { text };
     [
-        line.module.clone() + &faces.concat(),
+        line.module.clone() + &aliases.concat(),
         line.account.state.to_string(),
         line.priority.to_string(),
         line.scheduling.clone(),

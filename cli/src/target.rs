@@ -1,6 +1,6 @@
 //! Which running node a tool means, and what the other nodes of its system are.
 
-use super::sight::Sight;
+use super::observer::Observer;
 use crate::terminal::Failure;
 use clap::Args;
 use rohrpost::launch::choose_node;
@@ -21,7 +21,7 @@ pub(super) struct Target {
     /// Configuration of the nodes; without it, the one that runs here.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Look from this node, and show it alone; else from the first of the configuration that runs here.
+    /// SnapshotRequest from this node, and show it alone; else from the first of the configuration that runs here.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
 }
@@ -34,7 +34,7 @@ pub(super) struct Running {
     pub(super) node: Arc<Node>,
     /// The node that was asked for, which may be another one, on another computer.
     only: Option<String>,
-    pub(super) sight: Sight,
+    pub(super) observer: Observer,
 }
 
 impl Target {
@@ -57,7 +57,7 @@ impl Target {
             match Node::open(&node_directory(&installation.name, &config.name)) {
                 Ok(node) => {
                     let (node_name, only) = (config.name.clone(), named.map(|node| node.name.clone()));
-                    return Ok(Running { installation, node_name, node, only, sight: Sight::default() });
+                    return Ok(Running { installation, node_name, node, only, observer: Observer::default() });
                 }
                 Err(error @ NodeError::Missing(_)) => failed = failed.or(Some(error)),
                 Err(error) => return Err(error.into()),
@@ -112,7 +112,7 @@ impl Running {
         let (config, node_name) = noted_config(self.node.path())?;
         let node = Node::open(self.node.path())?;
         let (installation, only) = (Installation::load(&config)?, self.only.clone());
-        Ok(Self { installation, node_name, node, only, sight: Sight::default() })
+        Ok(Self { installation, node_name, node, only, observer: Observer::default() })
     }
 
     /// Takes part as a tool.

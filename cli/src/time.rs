@@ -25,7 +25,7 @@ pub(super) struct Arguments {
 
 /// What a node says of its time.
 #[derive(Clone, Debug, Default, Serialize)]
-struct Told {
+struct NodeTime {
     node: String,
     clock: Option<ClockState>,
     /// Of a node that has its time from the TCP router.
@@ -45,7 +45,7 @@ struct Told {
 struct Nodes {
     /// Whether all answer, know the time, and follow one master.
     agree: bool,
-    nodes: Vec<Told>,
+    nodes: Vec<NodeTime>,
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
@@ -64,8 +64,8 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
     Ok(if agree || rounds.watch { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn ask(round: &mut Round, clock: &SystemClock, node: String) -> Told {
-    let mut told = Told { node, ..Told::default() };
+fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
+    let mut told = NodeTime { node, ..NodeTime::default() };
     let installation = &round.running.installation;
     let is_beyond = installation.node(&told.node).is_some_and(|node| node.reach == Reach::Tcp);
     let client = installation.tcp_client_of(&told.node).filter(|_| is_beyond);
@@ -86,7 +86,7 @@ fn ask(round: &mut Round, clock: &SystemClock, node: String) -> Told {
     told
 }
 
-impl Told {
+impl NodeTime {
     /// Takes what a client of the TCP router says; when it said so, system time.
     fn by_tcp(&mut self, link: BeyondLink) -> Option<u64> {
         (self.beyond, self.round_trip_ns) = (link.time, link.round_trip_ns);
@@ -127,14 +127,14 @@ impl Told {
 }
 
 impl Nodes {
-    fn new(nodes: Vec<Told>) -> Self {
-        let follows = |told: &Told| {
+    fn new(nodes: Vec<NodeTime>) -> Self {
+        let follows = |told: &NodeTime| {
             let clock = told.clock.as_ref().filter(|clock| clock.error_ns.is_some())?;
             Some((clock.master.clone(), clock.term, clock.epoch)).filter(|(master, ..)| !master.is_empty())
         };
         // Those that have it from the TCP router know no master, but its epoch.
         let first = nodes.iter().find(|told| told.clock.is_some()).and_then(follows);
-        let agrees = |told: &Told| match (&told.clock, &told.beyond) {
+        let agrees = |told: &NodeTime| match (&told.clock, &told.beyond) {
             (Some(_), _) => first.is_some() && follows(told) == first,
             (None, Some(time)) => {
                 let epoch = first.as_ref().map_or(time.epoch, |(.., epoch)| *epoch);
@@ -148,7 +148,7 @@ impl Nodes {
 
     fn text(&self) -> String {
         let heads = ["node", "role", "master", ">term", ">epoch", ">bound", ">off", ">rate", ">way", "stamps", ">ago"];
-        let rows = self.nodes.iter().filter(|told| told.failure.is_none()).map(Told::row);
+        let rows = self.nodes.iter().filter(|told| told.failure.is_none()).map(NodeTime::row);
         let mut text = table(heads, rows);
         for told in &self.nodes {
             if let Some(failure) = &told.failure {

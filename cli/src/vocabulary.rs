@@ -51,7 +51,7 @@ pub(super) fn answered(function: &str) -> String {
     format!("{function} answered")
 }
 
-/// The interface of a built-in module or of its face; it need not run.
+/// The interface of a built-in module or of its alias; it need not run.
 pub(super) fn built_in(installation: &Installation, module: Name) -> Option<Description> {
     match &installation.module(module)?.program {
         Program::Builtin(name) => {

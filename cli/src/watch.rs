@@ -77,11 +77,11 @@ impl Pace {
 
 /// What was seen in the last seconds, oldest first; the oldest is what the others are compared with.
 pub(super) struct Window<T> {
-    seen: VecDeque<Seen<T>>,
+    seen: VecDeque<Observation<T>>,
     long: Duration,
 }
 
-struct Seen<T> {
+struct Observation<T> {
     /// Monotonic clock.
     at_ns: u64,
     what: T,
@@ -97,8 +97,8 @@ impl<T> Window<T> {
         if self.seen.back().is_some_and(|last| at_ns < last.at_ns) {
             self.seen.clear();
         }
-        self.seen.push_back(Seen { at_ns, what });
-        let is_old = |seen: &Seen<T>| u128::from(at_ns.saturating_sub(seen.at_ns)) >= self.long.as_nanos();
+        self.seen.push_back(Observation { at_ns, what });
+        let is_old = |seen: &Observation<T>| u128::from(at_ns.saturating_sub(seen.at_ns)) >= self.long.as_nanos();
         while self.seen.get(1).is_some_and(is_old) {
             self.seen.pop_front();
         }
@@ -197,7 +197,7 @@ impl Track {
 }
 
 fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond>) -> Figures {
-    let (Some(Seen { at_ns: began_ns, what: earlier }), Some(Seen { at_ns, what: Some(now) })) =
+    let (Some(Observation { at_ns: began_ns, what: earlier }), Some(Observation { at_ns, what: Some(now) })) =
         (window.seen.front(), window.seen.back())
     else {
         return Figures::default();

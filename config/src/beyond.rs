@@ -30,7 +30,7 @@ impl Installation {
         Some(Name::new(ALL_SYSTEMS, class.0, TCP_SERVER, local::COMMANDS))
     }
 
-    /// The names that a node hosts, each range with all mailboxes in it: its modules, their faces, and its tools. Sorted; none overlaps
+    /// The names that a node hosts, each range with all mailboxes in it: its modules, their aliases, and its tools. Sorted; none overlaps
     /// another.
     pub fn names_on(&self, node: &str) -> Vec<(Name, Name)> {
         let tool = |instance: u8| Name::new(self.system.id, self.classes.tool().0, instance, 0);

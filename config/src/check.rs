@@ -22,7 +22,7 @@ const FLOW_BYTES_MAX: u64 = 1 << 30;
 pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option<&TdmaLines>, reader: &Reader<'_>) {
     claims(installation, lines, reader);
     for (module, lines) in installation.modules.iter().zip(lines) {
-        access::judge(installation, module, lines, reader);
+        access::validate(installation, module, lines, reader);
         for (to, line) in module.calls.iter().zip(&lines.calls) {
             importance(installation, module, *to, *line, reader);
         }
@@ -33,14 +33,14 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option
     carried_twice(installation, reader);
     // What follows from other mistakes is not worth judging.
     if let Some(slots) = slots.filter(|_| reader.is_content()) {
-        tdma::judge(installation, slots, reader);
+        tdma::validate(installation, slots, reader);
     }
 }
 
 /// Who waits for a less important module waits for all that goes before that one, too.
 fn importance(installation: &Installation, module: &Module, to: Name, line: usize, reader: &Reader<'_>) {
     let classes = &installation.classes;
-    // What the kernel and the mailboxes know is the class of the process, not of a face.
+    // What the kernel and the mailboxes know is the class of the process, not of an alias.
     let Some(host) = installation.module(to) else { return };
     let (own, other) = (module.name.class(), host.name.class());
     let although = module.although.iter().any(|(name, _)| *name == to);

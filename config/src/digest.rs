@@ -59,7 +59,7 @@ impl Installation {
         for module in &self.modules {
             let mut names: Vec<String> = module.names().skip(1).map(|name| name.to_string()).collect();
             names.sort();
-            lines.push(format!("module {} on {} faces {}", module.name, module.node, names.join(" ")));
+            lines.push(format!("module {} on {} aliases {}", module.name, module.node, names.join(" ")));
         }
         // The order of the nodes is their index on the wire.
         if let Some(network) = &self.network {

@@ -5,7 +5,7 @@ use crate::reader::{Section, nearest};
 use rohrpost_mailbox::Name;
 use std::collections::BTreeMap;
 
-/// The names of all modules and faces of a file.
+/// The names of all modules and aliases of a file.
 pub(crate) struct Directory<'d> {
     pub(crate) classes: &'d ClassTable,
     /// By the text in the file. A name that is wrong in itself stays known: its own message is enough.
@@ -40,8 +40,8 @@ impl<'d> Directory<'d> {
         for module in modules {
             let name = module.required("name", "name = \"laser.0\"");
             let name = name.and_then(|item| Some((item.text("laser.0")?, item.line)));
-            let faces = module.get("faces").map(|item| item.texts("odometry.0")).unwrap_or_default();
-            for (text, line) in name.into_iter().chain(faces) {
+            let aliases = module.get("aliases").map(|item| item.texts("odometry.0")).unwrap_or_default();
+            for (text, line) in name.into_iter().chain(aliases) {
                 match lines.get(text) {
                     Some(first) => module.reader.report(
                         line,
@@ -83,7 +83,7 @@ impl<'d> Directory<'d> {
         self.owners.insert(text.into(), name.unwrap_or_default());
     }
 
-    /// The module or face that a text names.
+    /// The module or alias that a text names.
     pub(crate) fn find(&self, text: &str) -> Result<Name, Unknown> {
         self.owners.get(text).copied().ok_or_else(|| {
             // By class alone: `laser.0` and `mapper.0` are alike only in what every name has.

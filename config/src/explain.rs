@@ -3,7 +3,7 @@
 mod slots;
 mod timeline;
 
-use crate::Full;
+use crate::OverflowPolicy;
 use crate::installation::Installation;
 use crate::mailbox::{MailboxSpec, TRANSIT};
 use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, TCP_CLIENT, TCP_ROUTER};
@@ -214,8 +214,8 @@ impl Page<'_> {
         let class = module.name.class();
         self.line("");
         self.line(format!("{}  priority {}, {}", self.name(module.name), class.0, self.installation.scheduling(class)));
-        if !module.faces.is_empty() {
-            self.entry("is also", &self.names(module.faces.iter().copied()));
+        if !module.aliases.is_empty() {
+            self.entry("is also", &self.names(module.aliases.iter().copied()));
         }
         self.entry("runs", &runs(module));
         self.entry("starts", &starts(module));
@@ -362,9 +362,9 @@ fn restart(restart: &Restart) -> String {
 
 fn mailbox(spec: &MailboxSpec) -> String {
     let full = match spec.full {
-        Full::Displace => "full: the least important gives way",
-        Full::Latest => "latest: the newer replaces the older",
-        Full::Reject => "full: new ones are refused",
+        OverflowPolicy::Displace => "full: the least important gives way",
+        OverflowPolicy::Latest => "latest: the newer replaces the older",
+        OverflowPolicy::Reject => "full: new ones are refused",
     };
     let (size, memory) = (size_text(spec.size.into()), about(spec.memory()));
     let mut words = format!("{:>4} x {size:<7} = {memory:<9} {full}", spec.slots);

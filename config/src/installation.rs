@@ -62,7 +62,7 @@ pub struct Installation {
 }
 
 impl Installation {
-    /// The module that has a name, as its own or as a face's. The name may be that of any of the module's mailboxes.
+    /// The module that has a name, as its own or as an alias's. The name may be that of any of the module's mailboxes.
     pub fn module(&self, name: Name) -> Option<&Module> {
         self.modules.iter().find(|module| module.names().any(|own| own == name.module()))
     }
@@ -82,7 +82,7 @@ impl Installation {
         self.nodes.iter().find(|node| node.name == name)
     }
 
-    /// The node that a module, a face or a tool belongs to; none for names that the file does not know.
+    /// The node that a module, an alias or a tool belongs to; none for names that the file does not know.
     pub fn node_of(&self, name: Name) -> Option<&str> {
         let is_tool = name.class() == self.classes.tool() && name.system() == self.system.id;
         let tools = || self.nodes.iter().find(|node| is_tool && node.tools.contains(&name.instance()));
@@ -94,7 +94,7 @@ impl Installation {
         Name::new(self.system.id, self.classes.tool().0, node.launch_instance(), 0)
     }
 
-    /// From which level on a module sends lines at its start; said of a face, it is said of its module.
+    /// From which level on a module sends lines at its start; said of an alias, it is said of its module.
     pub fn output_level(&self, module: Name) -> Level {
         let names = |own: &Name| self.module(module).is_some_and(|module| module.names().any(|name| name == *own));
         let own = self.output.levels.iter().find(|(name, _)| *name == module.module() || names(name));

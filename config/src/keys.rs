@@ -50,7 +50,7 @@ impl fmt::Debug for Key {
 /// The keys that are valid: one, or two while they are changed.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Keys {
-    /// Which new lives of routers seal with first.
+    /// Which new incarnations of routers seal with first.
     pub newest: Key,
     /// Still valid.
     pub older: Option<Key>,

@@ -41,7 +41,7 @@ impl Installation {
         self.lan_index(node).map(|index| Name::new(self.system.id, class.0, index, rohrpost_mailbox::local::COMMANDS))
     }
 
-    /// All names that lie on other nodes of the LAN than this one: their modules, faces and tools, each with all its mailboxes. Sorted by name; no
+    /// All names that lie on other nodes of the LAN than this one: their modules, aliases and tools, each with all its mailboxes. Sorted by name; no
     /// two overlap.
     pub fn routes_from(&self, node: &str) -> Vec<Route> {
         let mut routes = Vec::new();

@@ -82,7 +82,7 @@ pub use plan::bounds;
 pub use principal::Principal;
 pub use program::{MissingProgram, find_program};
 pub use reader::{is_word as is_class_name, nearest};
-pub use rohrpost_mailbox::Full;
+pub use rohrpost_mailbox::OverflowPolicy;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
 pub use tcp::{TCP_SERVER, Tcp};

@@ -75,12 +75,12 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let keys = network.and_then(|network| network::keys_folder(&file, network.security, &folder));
     let cycle = tdma.as_ref().map(|tdma| tdma.cycle);
     let time = TimeSource::read(file.section("time", "[time]"), &file, &nodes, cycle);
-    network::judge(&file, on_lan, &classes);
+    network::validate(&file, on_lan, &classes);
     let tcp = file.section("tcp", "[tcp]").map(|section| Tcp::read(section, &nodes, tdma.as_ref()));
     if tcp.is_some() {
-        tcp::judge(&file, &classes, scheduling);
+        tcp::validate(&file, &classes, scheduling);
     }
-    tcp::judge_nodes(&file, tcp.as_ref(), &nodes);
+    tcp::validate_nodes(&file, tcp.as_ref(), &nodes);
 
     let sections = self::sections(&file, "module");
     if sections.is_empty() {

@@ -1,7 +1,7 @@
 //! How large the mailboxes of a module are and what they do when full.
 
 use crate::reader::Section;
-use rohrpost_mailbox::{BODY_BYTES_MAX, Full, Shape};
+use rohrpost_mailbox::{BODY_BYTES_MAX, OverflowPolicy, Shape};
 use std::time::Duration;
 
 /// Most slots of one mailbox.
@@ -17,7 +17,7 @@ pub struct MailboxSpec {
     /// Largest body in bytes, 1..=65519.
     pub size: u32,
     /// What happens when it is full.
-    pub full: Full,
+    pub full: OverflowPolicy,
     /// Older packages are dropped when the module receives.
     pub max_age: Option<Duration>,
     /// Unfinished claims that one participant may hold; in the file 1..=[`CLAIMS_MAX`].
@@ -31,7 +31,7 @@ pub struct MailboxSpec {
 pub const TRANSIT: MailboxSpec = MailboxSpec {
     slots: 64,
     size: BODY_BYTES_MAX as u32,
-    full: Full::Displace,
+    full: OverflowPolicy::Displace,
     max_age: Some(Duration::from_secs(2)),
     claims: u8::MAX,
 };
@@ -57,7 +57,7 @@ pub struct Mailboxes {
 
 impl Default for Mailboxes {
     fn default() -> Self {
-        let spec = |slots, size| MailboxSpec { slots, size, full: Full::Displace, max_age: None, claims: 1 };
+        let spec = |slots, size| MailboxSpec { slots, size, full: OverflowPolicy::Displace, max_age: None, claims: 1 };
         Self { commands: spec(32, 1024), replies: spec(32, 4096), data: spec(64, 4096) }
     }
 }
@@ -111,13 +111,13 @@ impl MailboxSpec {
             self.size = item.size(1..=BODY_BYTES_MAX as u64, "1 KiB").map_or(self.size, |size| size as u32);
         }
         let full = section.get("full").and_then(|item| {
-            if !latest && item.is(Full::Latest.name()) {
+            if !latest && item.is(OverflowPolicy::Latest.name()) {
                 item.report(
                     "`full` is \"latest\"; write \"displace\" or \"reject\": each command has an id of its own, so none replaces another",
                 );
                 return None;
             }
-            let all = Full::ALL.into_iter().filter(|full| latest || *full != Full::Latest);
+            let all = OverflowPolicy::ALL.into_iter().filter(|full| latest || *full != OverflowPolicy::Latest);
             item.choice(&all.map(|full| (full.name(), full)).collect::<Vec<_>>())
         });
         self.full = full.unwrap_or(self.full);

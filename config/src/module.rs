@@ -83,7 +83,7 @@ pub struct Module {
     /// Its name.
     pub name: Name,
     /// Further names that its process hosts.
-    pub faces: Vec<Name>,
+    pub aliases: Vec<Name>,
     /// Node that it runs on.
     pub node: String,
     /// What runs.
@@ -92,7 +92,7 @@ pub struct Module {
     pub optional: bool,
     /// Whether its node does not start without it. Without one that is not, the others run.
     pub required: bool,
-    /// Modules and faces it sends commands to; subscribing is a command too.
+    /// Modules and aliases it sends commands to; subscribing is a command too.
     pub calls: Vec<Name>,
     /// Those of [`calls`](Self::calls) that are of a less important class, and why they may be, in the file's words.
     pub although: Vec<(Name, String)>,
@@ -119,9 +119,9 @@ pub struct Module {
 }
 
 impl Module {
-    /// Its name and the names of its faces.
+    /// Its name and the names of its aliases.
     pub fn names(&self) -> impl Iterator<Item = Name> {
-        std::iter::once(self.name).chain(self.faces.iter().copied())
+        std::iter::once(self.name).chain(self.aliases.iter().copied())
     }
 
     /// Whether it is one `[[module]]` of the file. Routers are not: they are there by themselves when there are several nodes; nor is what
@@ -134,7 +134,7 @@ impl Module {
     pub(crate) fn by_itself(name: Name, node: &Node, builtin: &str, restart: Restart) -> (Self, Lines) {
         let module = Self {
             name,
-            faces: Vec::new(),
+            aliases: Vec::new(),
             node: node.name.clone(),
             program: Program::Builtin(builtin.into()),
             optional: false,
@@ -161,11 +161,11 @@ impl Module {
         !self.is_in_file() && self.program != Program::Builtin(TCP_ROUTER.into())
     }
 
-    /// Bytes of its mailboxes; each face has a command mailbox like the module's.
+    /// Bytes of its mailboxes; each alias has a command mailbox like the module's.
     pub fn memory(&self) -> u64 {
         let [commands, replies, data] = self.mailboxes.each().map(|(_, spec)| spec.memory());
         let transit = if self.has_transit() { TRANSIT.memory() } else { 0 };
-        commands * (1 + self.faces.len() as u64) + replies + data + transit
+        commands * (1 + self.aliases.len() as u64) + replies + data + transit
     }
 }
 
@@ -189,7 +189,7 @@ impl Context<'_> {
         let what = name_text.map_or("[[module]]".into(), |name| format!("module `{name}`"));
         let section = section.called(&what);
         let name = name_text.and_then(|text| self.directory.find(text).ok());
-        let faces = section.get("faces").map(|item| self.faces(&item)).unwrap_or_default();
+        let aliases = section.get("aliases").map(|item| self.aliases(&item)).unwrap_or_default();
         let node = self.node(&section);
         let program = program(&section);
         let optional = section.get("optional").and_then(|item| item.flag()).unwrap_or(false);
@@ -208,7 +208,7 @@ impl Context<'_> {
         section.finish();
         let module = Module {
             name: name?,
-            faces,
+            aliases,
             node: node?,
             program: program?,
             optional,
@@ -230,8 +230,8 @@ impl Context<'_> {
     }
 
     /// The directory has read and judged the texts already.
-    fn faces(&self, item: &Item<'_>) -> Vec<Name> {
-        let texts = item.value.get_ref().as_array().into_iter().flatten().filter_map(|face| face.get_ref().as_str());
+    fn aliases(&self, item: &Item<'_>) -> Vec<Name> {
+        let texts = item.value.get_ref().as_array().into_iter().flatten().filter_map(|alias| alias.get_ref().as_str());
         texts.filter_map(|text| self.directory.find(text).ok()).collect()
     }
 

@@ -99,7 +99,7 @@ pub(crate) fn keys_folder(file: &Section<'_>, security: Security, folder: &Path)
 }
 
 /// Judges what several nodes of a LAN need beside `[network]`: addresses that can reach each other, and the class of routers.
-pub(crate) fn judge(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
+pub(crate) fn validate(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
     if nodes.len() < 2 {
         return;
     }

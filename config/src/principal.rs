@@ -59,7 +59,7 @@ mod tests {
         for (name, principal, why) in [
             (motor, Principal::Module(motor), "a module"),
             (motor.with_local(9), Principal::Module(motor), "under each of its mailboxes"),
-            (Name::new(1, 150, 0, 1), Principal::Module(motor), "and of its faces"),
+            (Name::new(1, 150, 0, 1), Principal::Module(motor), "and of its aliases"),
             (Name::new(1, 16, 0, 1), Principal::Launch(0), "launch"),
             (Name::new(1, 16, 4, 1), Principal::Launch(1), "of the other node"),
             (Name::new(1, 16, 1, 1), Principal::Tools(0), "a tool"),
@@ -73,6 +73,6 @@ mod tests {
         }
         let both = [Principal::Launch(0), Principal::Tools(0)];
         assert_eq!(installation.callers(motor), [&[Principal::Module(pilot)], &both[..]].concat());
-        assert_eq!(installation.callers(Name::new(1, 150, 0, 0)), both, "its face is called by nobody");
+        assert_eq!(installation.callers(Name::new(1, 150, 0, 0)), both, "its alias is called by nobody");
     }
 }

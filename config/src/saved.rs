@@ -168,7 +168,7 @@ fn owner(item: &Item<'_>, installation: &Installation) -> Option<Name> {
     let right = match module {
         Some((name, module)) if module.name == name => None,
         Some((_, module)) => Some(format!(
-            "it is a face; write [\"{}\"], the module's own name",
+            "it is an alias; write [\"{}\"], the module's own name",
             installation.classes.format(module.name)
         )),
         None => Some(match nearest(text, own.iter().map(String::as_str)) {

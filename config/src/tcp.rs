@@ -168,7 +168,7 @@ fn beside_slots(tdma: &Tdma) -> String {
 }
 
 /// Judges what `[tcp]` needs beside it: its class, which must not be real time, so that it never stands in the way of what is.
-pub(crate) fn judge(file: &Section<'_>, classes: &ClassTable, scheduling: SchedulingRule) {
+pub(crate) fn validate(file: &Section<'_>, classes: &ClassTable, scheduling: SchedulingRule) {
     let line = file.get("classes").map_or(file.line, |classes| classes.line);
     match classes.id(TCP) {
         None => file.reader.report(
@@ -189,9 +189,9 @@ pub(crate) fn judge(file: &Section<'_>, classes: &ClassTable, scheduling: Schedu
 }
 
 /// Judges what nodes need that are not on the LAN: a TCP router, and one that knows the time that they are to have.
-pub(crate) fn judge_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
+pub(crate) fn validate_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
     let is_beyond = |node: &&Node| node.reach == Reach::Tcp;
-    judge_names(file, tcp, nodes);
+    validate_names(file, tcp, nodes);
     let Some(node) = nodes.iter().find(is_beyond) else { return };
     let Some(tcp) = tcp else {
         let what = format!(
@@ -224,7 +224,7 @@ pub(crate) fn judge_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node])
 }
 
 /// A certificate names its node as a part of a domain name.
-fn judge_names(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
+fn validate_names(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
     if tcp.is_none_or(|tcp| tcp.certificates.is_none()) {
         return;
     }

@@ -1,8 +1,8 @@
 //! The table of time slots, sections `[tdma]` and `[[slot]]`.
 
-mod judge;
+mod validate;
 
-pub(crate) use judge::judge;
+pub(crate) use validate::validate;
 
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};

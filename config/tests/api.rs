@@ -1,7 +1,8 @@
 //! What other crates rely on when they use an installation.
 
 use rohrpost_config::{
-    Full, Installation, Level, LineFormat, Node, Program, Reach, RestartPolicy, Scheduling, Start, TimeSource, explain,
+    Installation, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RestartPolicy, Scheduling, Start,
+    TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -44,7 +45,7 @@ fn every_key_arrives() {
     assert_eq!((motor.ready_within, motor.stop_within), (Duration::from_secs(3), Duration::from_millis(500)));
     assert_eq!(motor.spin, Duration::from_micros(20));
     let commands = motor.mailboxes.commands;
-    assert_eq!((commands.slots, commands.size, commands.full, commands.claims), (16, 200, Full::Reject, 2));
+    assert_eq!((commands.slots, commands.size, commands.full, commands.claims), (16, 200, OverflowPolicy::Reject, 2));
     assert_eq!(commands.max_age, Some(Duration::from_millis(300)));
 
     assert_eq!(full.flows[0].deadline, Duration::from_millis(50));
@@ -71,8 +72,8 @@ fn modules_are_found_by_every_name_they_answer_to() {
     }
     assert_eq!(full.modules_on("desk").count(), 3, "with its router");
     let level = |text: &str| full.output_level(full.classes.parse_name(text).unwrap());
-    assert_eq!(level("7.laser.0.2"), Level::Trace, "by a mailbox of a face");
-    assert_eq!(level("motor.0"), Level::Trace, "it is one process with its face");
+    assert_eq!(level("7.laser.0.2"), Level::Trace, "by a mailbox of an alias");
+    assert_eq!(level("motor.0"), Level::Trace, "it is one process with its alias");
     assert_eq!((level("mapper.0"), level("output.0")), (Level::Debug, Level::Warn));
     let node = |text: &str| full.node_of(full.classes.parse_name(text).unwrap());
     assert_eq!([node("motor.0"), node("laser.0"), node("mapper.0")], [Some("base"), Some("base"), Some("desk")]);
@@ -128,7 +129,7 @@ fn digest_counts_what_must_be_equal_and_nothing_else() {
         ("id = 150", "id = 151", false, false, "another priority, and with it other names"),
         ("10.0.0.2", "10.0.0.3", true, false, "another address"),
         ("tools = [16, 31]", "tools = [16, 32]", true, false, "other tool instances"),
-        ("faces = [\"laser.0\"]", "faces = [\"laser.0\", \"laser.1\"]", true, false, "another face"),
+        ("aliases = [\"laser.0\"]", "aliases = [\"laser.0\", \"laser.1\"]", true, false, "another alias"),
     ] {
         assert!(FULL.contains(old), "{old}");
         let changed = digest(&FULL.replacen(old, new, 1));

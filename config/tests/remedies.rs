@@ -209,7 +209,7 @@ fn remedy(message: &str) -> Option<Vec<(At, String)>> {
 #[test]
 fn all_that_is_said_of_a_table_can_be_done_at_once() {
     let mut state = 1_u64;
-    let mut mended = 0;
+    let mut fixed = 0;
     for _ in 0..1000 {
         let table = random_table(|below| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -222,7 +222,7 @@ fn all_that_is_said_of_a_table_can_be_done_at_once() {
         // Lines may be added: the last ones first, so that the others keep their numbers.
         let right = changed.iter().rev().chain(&new).fold(table.clone(), |text, (at, words)| write(&text, *at, words));
         assert_eq!(messages(&right), "", "of\n{table}\nit said\n{said}");
-        mended += usize::from(!said.is_empty());
+        fixed += usize::from(!said.is_empty());
     }
-    assert!(mended > 500, "only {mended} tables");
+    assert!(fixed > 500, "only {fixed} tables");
 }

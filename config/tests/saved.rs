@@ -75,7 +75,7 @@ fn mistakes_in_the_file_are_told_by_line() {
         ("cruise-m-s = 0.4", "tuned.toml:1: `cruise-m-s` names no module; the modules are output.0, motor.0"),
         ("[pilot.0]", "tuned.toml:1: `pilot` names no module; did you mean [\"pilot.0\"]?"),
         ("\n[\"pilto.0\"]", "tuned.toml:2: `pilto.0` names no module; did you mean [\"pilot.0\"]?"),
-        ("[\"laser.0\"]", "tuned.toml:1: `laser.0` names no module; it is a face; write [\"motor.0\"]"),
+        ("[\"laser.0\"]", "tuned.toml:1: `laser.0` names no module; it is an alias; write [\"motor.0\"]"),
         ("\"pilot.0\" = 3", "tuned.toml:1: `pilot.0` is 3; write a table"),
         ("[\"pilot.0\"]\na = [1]", "tuned.toml:2: [\"pilot.0\"]: `a`: a parameter is a number, a text, true or false"),
         ("[\"pilot.0\"]\na = 1979-05-27", "tuned.toml:2: [\"pilot.0\"]: `a`: a parameter is a number"),

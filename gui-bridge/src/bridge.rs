@@ -16,7 +16,7 @@ use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
 use rohrpost::survey::{Standing, Survey};
 use rohrpost::{Context, Module, ModuleError, Name, Received};
 use rohrpost_config::{MailboxSpec, ROUTER};
-use rohrpost_mailbox::{Full, Latency, ModuleState, Node, Shape};
+use rohrpost_mailbox::{Latency, ModuleState, Node, OverflowPolicy, Shape};
 use serde::Deserialize;
 use std::marker::PhantomData;
 use std::path::PathBuf;
@@ -237,7 +237,7 @@ fn newest(data: &MailboxSpec) -> Shape {
     Shape {
         slots: NEWEST_SLOTS,
         body_bytes_max: u16::try_from(data.size).unwrap_or(u16::MAX),
-        full: Full::Latest,
+        full: OverflowPolicy::Latest,
         max_age: data.max_age,
         ..Shape::default()
     }

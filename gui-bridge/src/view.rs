@@ -66,7 +66,7 @@ impl Wish {
 
 /// One value, and whose it is.
 pub struct Datum<'a> {
-    /// The module, or face, that sent it.
+    /// The module, or alias, that sent it.
     pub from: Name,
     /// Its name as text, such as `laser.0`: the last part of entities.
     pub module: &'a str,

@@ -14,7 +14,7 @@ pub(crate) const HINT_WORDS: usize = SLOTS_MAX / 64;
 /// Something in cache lines of its own: 128 bytes, since processors fetch lines in pairs.
 #[derive(Default)]
 #[repr(C, align(128))]
-pub(crate) struct Line<T>(pub(crate) T);
+pub(crate) struct CacheLine<T>(pub(crate) T);
 
 /// What senders and receiver touch with every package, each part in lines of its own: what counts is how often a line goes from
 /// one processor to the other.
@@ -23,14 +23,14 @@ pub(crate) struct Line<T>(pub(crate) T);
 pub(crate) struct Hot {
     /// Senders': the next ticket, that is, the order of publishing. Also the count of packages ever accepted here (one too many
     /// for each sender that was killed between its ticket and its word).
-    pub(crate) ticket: Line<AtomicU64>,
+    pub(crate) ticket: CacheLine<AtomicU64>,
     /// Slots that may have become ready. Hints: each is set after its word changed, and may be late or stale.
-    pub(crate) ready: Line<[AtomicU64; HINT_WORDS]>,
+    pub(crate) ready: CacheLine<[AtomicU64; HINT_WORDS]>,
     /// Written by the receiver and seldom, read by senders with every package.
-    pub(crate) receiver: Line<ReceiverSays>,
+    pub(crate) receiver: CacheLine<ReceiverSays>,
     /// Not 0: a sender has published something above the level. Written by senders seldom, read by the receiver with every
     /// package.
-    pub(crate) alert: Line<AtomicU32>,
+    pub(crate) alert: CacheLine<AtomicU32>,
 }
 
 /// What the receiver tells senders.

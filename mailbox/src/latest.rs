@@ -8,7 +8,7 @@ use crate::layout::Shape;
 use crate::name::Name;
 use crate::package::Type;
 use crate::sender::Label;
-use crate::slots::{Full, Posted, Slots};
+use crate::slots::{OverflowPolicy, Posted, Slots};
 
 /// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word says.
 pub(crate) struct Posts {
@@ -26,7 +26,7 @@ fn state(label: &Label) -> State {
 impl Posts {
     /// All the memory that it will ever need.
     pub(crate) fn new(shape: &Shape) -> Self {
-        let most = if shape.full == Full::Latest { usize::from(shape.slots) } else { 0 };
+        let most = if shape.full == OverflowPolicy::Latest { usize::from(shape.slots) } else { 0 };
         Self { posts: Vec::with_capacity(most), most }
     }
 

@@ -16,7 +16,7 @@ use crate::hot::{Hot, ReceiverSays};
 use crate::memory::Shared;
 use crate::name::Name;
 use crate::package::{BODY_BYTES_MAX, HEAD_BYTES};
-use crate::slots::{Full, SLOTS_MAX};
+use crate::slots::{OverflowPolicy, SLOTS_MAX};
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 use std::time::Duration;
@@ -39,7 +39,7 @@ pub struct Shape {
     /// Largest body, bytes.
     pub body_bytes_max: u16,
     /// What happens when all slots are in use.
-    pub full: Full,
+    pub full: OverflowPolicy,
     /// Packages that waited longer are dropped when their turn comes.
     pub max_age: Option<Duration>,
     /// Slots that one participant may hold unpublished at a time.
@@ -48,7 +48,7 @@ pub struct Shape {
 
 impl Default for Shape {
     fn default() -> Self {
-        Self { slots: 32, body_bytes_max: 1024, full: Full::Displace, max_age: None, claims: 1 }
+        Self { slots: 32, body_bytes_max: 1024, full: OverflowPolicy::Displace, max_age: None, claims: 1 }
     }
 }
 
@@ -177,7 +177,7 @@ impl Identity {
         let shape = Shape {
             slots: self.slots.load(Relaxed).try_into().ok()?,
             body_bytes_max: self.body_bytes_max.load(Relaxed).try_into().ok()?,
-            full: *Full::ALL.get(self.full.load(Relaxed) as usize)?,
+            full: *OverflowPolicy::ALL.get(self.full.load(Relaxed) as usize)?,
             max_age: (max_age_ns != 0).then(|| Duration::from_nanos(max_age_ns)),
             claims: self.claims.load(Relaxed).try_into().ok()?,
         };

@@ -29,7 +29,7 @@
 //! What costs time is a cache line that goes from one processor to another. So each of these is in lines of its own, and in the
 //! steady state of a package three of them move: hint, word, body.
 //!
-//! # The life of a slot, and who may do what
+//! # The incarnation of a slot, and who may do what
 //!
 //! | its word says | body | who may change the word, and to what |
 //! | --- | --- | --- |
@@ -39,7 +39,7 @@
 //! | Taken | the receiver reads | the receiver *releases* it: Free. The next owner *adopts* it: Ready once more, marked; the second time it is *poison*: Free |
 //!
 //! Nobody waits for anybody: each operation is a number of steps bounded by the slot count, and whoever finds a word changed goes
-//! on with the next. A process may be killed between any two steps; `slots` begins with a table of what that leaves and who mends
+//! on with the next. A process may be killed between any two steps; `slots` begins with a table of what that leaves and who fixes
 //! it, and the tests in `mailbox/proof` visit each step by its name.
 //!
 //! # Reading order
@@ -123,7 +123,7 @@ pub use receiver::{Package, Receiver};
 pub use registry::CreateError;
 pub use routes::ROUTES_MAX;
 pub use sender::{Label, Loan, SendError, Sender};
-pub use slots::{Full, SLOTS_MAX};
+pub use slots::{OverflowPolicy, SLOTS_MAX};
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
 pub use waiting::{Waiting, wait_above, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};

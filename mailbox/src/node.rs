@@ -219,7 +219,7 @@ impl Node {
     fn check_in(&self) -> Result<(), NodeError> {
         let page = self.page();
         if page.magic.load(Ordering::Acquire) != MAGIC {
-            // New, or its maker died on the way. Seconds make a first incarnation that no earlier life of the
+            // New, or its maker died on the way. Seconds make a first incarnation that no earlier incarnation of the
             // node has used, if the clock ran on meanwhile.
             let seconds = crate::clock::realtime_ns() / 1_000_000_000;
             page.incarnations.store(seconds as u32, Ordering::Relaxed);

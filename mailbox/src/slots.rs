@@ -2,9 +2,9 @@
 //!
 //! Nothing here maps memory, sleeps, or touches a body (see `segment`, `doorbell`, `sender`, `receiver`), so that loom
 //! can check it as it stands. Each operation takes a number of steps bounded by the slot count and never waits for
-//! another process; a process that dies between any two steps leaves a state that the others mend:
+//! another process; a process that dies between any two steps leaves a state that the others fix:
 //!
-//! | died | left behind | who mends it, and how |
+//! | died | left behind | who fixes it, and how |
 //! | --- | --- | --- |
 //! | sender, claimed, not published | Filling | receiver's `reclaim`: Free again; the package was never accepted |
 //! | sender, with its ticket | Filling, and a ticket that nobody has | the same; the count of accepted packages is one too high |
@@ -38,7 +38,7 @@ const DISPLACE_LOOKS_MAX: usize = 4;
 
 /// What happens to a package that finds no free slot. The numbers stand in the segment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Full {
+pub enum OverflowPolicy {
     /// It takes the place of the newest of the least important packages, if it is more important; else it is refused.
     #[default]
     Displace = 0,
@@ -54,7 +54,7 @@ pub enum Full {
     Reject = 1,
 }
 
-impl Full {
+impl OverflowPolicy {
     /// All policies, in the order of their codes in a segment.
     pub const ALL: [Self; 3] = [Self::Displace, Self::Reject, Self::Latest];
 
@@ -72,7 +72,7 @@ impl Full {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum NoSlot {
     /// All are in use by packages as important or more.
-    Full,
+    OverflowPolicy,
     /// The mailbox has been given up.
     Retired,
 }
@@ -194,7 +194,7 @@ impl<'a> Slots<'a> {
         by: Claimant,
         cursor: &mut usize,
         priority: Priority,
-        full: Full,
+        full: OverflowPolicy,
         old: Option<Posted>,
     ) -> Result<Claim, NoSlot> {
         if self.is_retired() {
@@ -211,12 +211,12 @@ impl<'a> Slots<'a> {
             }
         }
         match full {
-            Full::Displace => self.displace(by, priority).ok_or(NoSlot::Full),
-            Full::Latest => {
+            OverflowPolicy::Displace => self.displace(by, priority).ok_or(NoSlot::OverflowPolicy),
+            OverflowPolicy::Latest => {
                 let reused = old.and_then(|old| self.reuse(by, old));
-                reused.or_else(|| self.displace(by, priority)).ok_or(NoSlot::Full)
+                reused.or_else(|| self.displace(by, priority)).ok_or(NoSlot::OverflowPolicy)
             }
-            Full::Reject => Err(NoSlot::Full),
+            OverflowPolicy::Reject => Err(NoSlot::OverflowPolicy),
         }
     }
 

@@ -102,7 +102,7 @@ impl TimeRecord {
     }
 }
 
-/// What was seen last of the computer's clocks by whoever writes a node's time: its next life sees what they did while nobody watched.
+/// What was seen last of the computer's clocks by whoever writes a node's time: its next incarnation sees what they did while nobody watched.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Watched {
     /// The clock of the page, [`monotonic_ns`].
@@ -169,7 +169,7 @@ pub(crate) struct TimePage {
     index: AtomicU64,
     writer_pid: AtomicU32,
     padding: AtomicU32,
-    /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which its next life takes for a clock that
+    /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which its next incarnation takes for a clock that
     /// is not to be believed.
     watched: [AtomicU64; 6],
     records: [SharedRecord; 2],
@@ -317,7 +317,7 @@ impl SystemClock {
 /// Writes a node's system time. There is one: the launch of the node, or the router that hears the master.
 pub struct TimeKeeper {
     mapping: Mapping,
-    /// What this life has noted last.
+    /// What this incarnation has noted last.
     watched: Option<Watched>,
 }
 
@@ -394,7 +394,7 @@ impl TimeKeeper {
         (local_ns > 0).then_some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns })
     }
 
-    /// Notes what was seen, for the next life of whoever writes here. Records that are written from then on are of this moment: if the computer sleeps before
+    /// Notes what was seen, for the next incarnation of whoever writes here. Records that are written from then on are of this moment: if the computer sleeps before
     /// one is written, its readers see that.
     pub fn note_watched(&mut self, watched: &Watched) {
         if self.watched.replace(*watched) == Some(*watched) {

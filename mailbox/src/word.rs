@@ -11,7 +11,7 @@
 //!  └────┴─────────────┴───┴───────────────────────────────────────────────┘
 //! ```
 //!
-//! The life of a slot, and who may make each change:
+//! The incarnation of a slot, and who may make each change:
 //!
 //! ```text
 //!            claim (sender)               publish (its filler)            take (receiver)

@@ -7,8 +7,8 @@ mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, label};
 use rohrpost_mailbox::{
-    Class, Full, Interest, ModuleState, Name, Participant, ROUTES_MAX, Shape, TimeKeeper, TimeSource, Watches, Work,
-    local,
+    Class, Interest, ModuleState, Name, OverflowPolicy, Participant, ROUTES_MAX, Shape, TimeKeeper, TimeSource,
+    Watches, Work, local,
 };
 use std::os::unix::fs::{FileExt, FileTypeExt};
 use std::time::Duration;
@@ -51,7 +51,7 @@ fn a_mailbox_is_as_documented() {
     for (slots, word_bytes) in [(64, 64), (65, 8)] {
         let ground = Ground::new();
         let max_age = Some(Duration::from_secs(9));
-        let shape = Shape { slots, body_bytes_max: 100, full: Full::Reject, max_age, claims: 3 };
+        let shape = Shape { slots, body_bytes_max: 100, full: OverflowPolicy::Reject, max_age, claims: 3 };
         let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
         let mut sender = ground.sender();
         sender.send(&label(LOW, 0), &[b"first"]).unwrap();
@@ -123,7 +123,7 @@ fn quiet(level: u8) -> Said {
 #[test]
 fn senders_and_receiver_talk_where_it_is_documented() {
     let ground = Ground::new();
-    let shape = Shape { slots: 1, full: Full::Latest, ..Shape::default() };
+    let shape = Shape { slots: 1, full: OverflowPolicy::Latest, ..Shape::default() };
     let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
     let file = std::fs::File::open(ground.path().join(format!("{:08x}.mbx", MAILBOX.raw()))).unwrap();
     let mut sender = ground.sender();
@@ -200,7 +200,7 @@ fn waiting_times_by_class_are_as_documented() {
 #[test]
 fn a_word_tells_whom_its_package_replaces() {
     let ground = Ground::new();
-    let shape = Shape { slots: 1, body_bytes_max: 8, full: Full::Latest, ..Shape::default() };
+    let shape = Shape { slots: 1, body_bytes_max: 8, full: OverflowPolicy::Latest, ..Shape::default() };
     let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
     let mut sender = ground.sender();
     (0..3).for_each(|_| sender.send(&label(LOW, 0), &[]).unwrap());

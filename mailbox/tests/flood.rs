@@ -9,7 +9,9 @@ use common::board::{Board, Mark, PRIORITIES};
 use common::crew::{Actor, alone, master};
 use common::random::Random;
 use common::{Ground, MAILBOX, PATIENCE, accounted, label, lost, received, shape, tell, until};
-use rohrpost_mailbox::{Class, ClassTraffic, Full, Loss, Options, Package, Priority, SendError, Sender, Shape};
+use rohrpost_mailbox::{
+    Class, ClassTraffic, Loss, Options, OverflowPolicy, Package, Priority, SendError, Sender, Shape,
+};
 use std::time::{Duration, Instant};
 
 /// Runs of the board, seats, and indices of [`PRIORITIES`].
@@ -23,7 +25,7 @@ const HOLDERS: usize = 6;
 fn role() {
     let Some((role, ground)) = common::role() else { return };
     let (what, full) = role.split_once(", ").unwrap();
-    let full = Full::ALL.into_iter().find(|one| one.name() == full).unwrap();
+    let full = OverflowPolicy::ALL.into_iter().find(|one| one.name() == full).unwrap();
     master(|| match what {
         "flood" => flood(&ground, full),
         "holders" => holders(&ground, full),
@@ -34,17 +36,17 @@ fn role() {
 
 #[test]
 fn what_is_urgent_passes_a_flood_as_the_policy_says() {
-    Full::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), &format!("flood, {}", full.name())));
+    OverflowPolicy::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), &format!("flood, {}", full.name())));
 }
 
 #[test]
 fn who_is_stopped_with_a_loan_closes_no_mailbox() {
-    Full::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), &format!("holders, {}", full.name())));
+    OverflowPolicy::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), &format!("holders, {}", full.name())));
 }
 
 /// Sends one package of this class; with `latest`, of the state that its number has in turn.
-fn send(board: Board, sender: &mut Sender, full: Full, class: usize, number: u32) -> bool {
-    let state = if full == Full::Latest && class == LOW { number % 4 } else { class as u32 };
+fn send(board: Board, sender: &mut Sender, full: OverflowPolicy, class: usize, number: u32) -> bool {
+    let state = if full == OverflowPolicy::Latest && class == LOW { number % 4 } else { class as u32 };
     let mark = Mark { run: class as u32, number, mailbox: 0, key: state as u8, class: class as u8 };
     let mut body = [0; 60];
     mark.write(&mut body);
@@ -52,7 +54,7 @@ fn send(board: Board, sender: &mut Sender, full: Full, class: usize, number: u32
     let id = if class == LOW { state } else { number };
     match sender.send(&label(PRIORITIES[class], id as u16), &[&body]) {
         Ok(()) => board.accepted(&mark),
-        Err(SendError::Full(MAILBOX)) => {
+        Err(SendError::OverflowPolicy(MAILBOX)) => {
             board.refused(&mark);
             return false;
         }
@@ -61,7 +63,7 @@ fn send(board: Board, sender: &mut Sender, full: Full, class: usize, number: u32
     true
 }
 
-fn low_sender(board: Board, ground: &Ground, full: Full) {
+fn low_sender(board: Board, ground: &Ground, full: OverflowPolicy) {
     let (mut sender, mut number, mut random) = (ground.sender(), 1, Random::new(1));
     board.seat(LOW).set_ready();
     while !board.is_ended() {
@@ -76,7 +78,7 @@ fn low_sender(board: Board, ground: &Ground, full: Full) {
 
 /// One each millisecond, when the one before was received: what waits is never more than one. Every second one finds the mailbox
 /// full.
-fn urgent_sender(board: Board, ground: &Ground, full: Full) {
+fn urgent_sender(board: Board, ground: &Ground, full: OverflowPolicy) {
     let (mut sender, mut number) = (ground.sender(), 1);
     for round in 0..ROUNDS {
         std::thread::sleep(Duration::from_millis(1));
@@ -87,7 +89,7 @@ fn urgent_sender(board: Board, ground: &Ground, full: Full) {
     until("it ends", || board.is_ended());
 }
 
-fn flood(ground: &Ground, full: Full) {
+fn flood(ground: &Ground, full: OverflowPolicy) {
     let board = Board::new(PRIORITIES.len());
     // As many as there are states, so that the newest of all fill it.
     let shape = Shape { full, ..shape(4) };
@@ -120,7 +122,7 @@ fn flood(ground: &Ground, full: Full) {
     check_flood(ground, full, board);
 }
 
-fn check_flood(ground: &Ground, full: Full, board: Board) {
+fn check_flood(ground: &Ground, full: OverflowPolicy, board: Board) {
     let (info, tally) = (ground.look(), board.tally(0));
     let class = |class: usize| -> ClassTraffic {
         let Priority(number) = PRIORITIES[class];
@@ -135,13 +137,13 @@ fn check_flood(ground: &Ground, full: Full, board: Board) {
     assert_eq!(tally.accepted[URGENT] + tally.refused[URGENT], ROUNDS);
     let [displaced, replaced] = gone;
     match full {
-        Full::Displace => {
+        OverflowPolicy::Displace => {
             assert!(tally.refused[URGENT] == 0 && replaced == 0 && displaced >= ROUNDS / 2 && tally.refused[LOW] > 0)
         }
         // The flood is of a few states, of which only the newest counts; what is urgent displaces one of them.
-        Full::Latest => assert!(tally.refused[URGENT] == 0 && replaced > ROUNDS && displaced >= ROUNDS / 2),
+        OverflowPolicy::Latest => assert!(tally.refused[URGENT] == 0 && replaced > ROUNDS && displaced >= ROUNDS / 2),
         // Here the flood keeps out what is urgent. Its sender is told.
-        Full::Reject => {
+        OverflowPolicy::Reject => {
             assert!(tally.refused[URGENT] >= ROUNDS / 2 && replaced + displaced == 0 && tally.refused[LOW] > 0)
         }
     }
@@ -164,11 +166,11 @@ fn hold(board: Board, ground: &Ground, seat: usize) {
     until("it ends", || board.is_ended());
 }
 
-fn holders(ground: &Ground, full: Full) {
+fn holders(ground: &Ground, full: OverflowPolicy) {
     let board = Board::new(HOLDERS + 1);
     let shape = Shape { full, ..shape(HOLDERS as u16 + 2) };
     drop(ground.join().receiver(MAILBOX, shape).unwrap());
-    let filled = if full == Full::Reject { 0 } else { u64::from(shape.slots) };
+    let filled = if full == OverflowPolicy::Reject { 0 } else { u64::from(shape.slots) };
     // Then each takes the place of an accepted package, and the others' two slots hold the rest.
     (0..filled).for_each(|id| ground.sender().send(&label(PRIORITIES[0], id as u16), &[]).unwrap());
     let all: Vec<Actor> = (0..HOLDERS).map(|seat| Actor::new(|| hold(board, ground, seat))).collect();
@@ -184,7 +186,7 @@ fn holders(ground: &Ground, full: Full) {
         for id in 0..2 {
             sender.send(&label(PRIORITIES[0], 2 * round + id), &[b"goes on"]).unwrap();
         }
-        assert!(matches!(sender.send(&label(PRIORITIES[0], 9_999), &[]), Err(SendError::Full(_))));
+        assert!(matches!(sender.send(&label(PRIORITIES[0], 9_999), &[]), Err(SendError::OverflowPolicy(_))));
         for id in 0..2 {
             let package = receiver.receive_timeout(PATIENCE).unwrap();
             assert_eq!((package.head().id, package.body()), (2 * round + id, &b"goes on"[..]));

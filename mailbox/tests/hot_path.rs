@@ -10,7 +10,7 @@ use common::crew::{Actor, alone, master};
 use common::hands::{OPERATIONS, do_all};
 use common::{Ground, HIGH, LOW, MAILBOX, label, shape, tell};
 use counting::{CountingHeap, heap_uses};
-use rohrpost_mailbox::{Full, Interest, Shape, Waiting, Watches};
+use rohrpost_mailbox::{Interest, OverflowPolicy, Shape, Waiting, Watches};
 use std::time::Duration;
 
 #[global_allocator]
@@ -36,11 +36,11 @@ fn no_hot_path_touches_the_heap_also_when_somebody_sleeps() {
 
 #[test]
 fn many_types_and_other_descriptors_do_not_touch_the_heap() {
-    a_round_again_and_again(Full::Displace);
-    a_round_again_and_again(Full::Latest);
+    a_round_again_and_again(OverflowPolicy::Displace);
+    a_round_again_and_again(OverflowPolicy::Latest);
 }
 
-fn a_round_again_and_again(full: Full) {
+fn a_round_again_and_again(full: OverflowPolicy) {
     let ground = Ground::new();
     let node = ground.node();
     let mut receiver = ground.join().receiver(MAILBOX, Shape { full, ..shape(8) }).unwrap();

@@ -6,7 +6,7 @@ mod common;
 
 use common::{Ground, MAILBOX, label, lost, received, shape};
 use proptest::prelude::*;
-use rohrpost_mailbox::{Full, Loss, Options, Priority, Receiver, SendError, Sender};
+use rohrpost_mailbox::{Loss, Options, OverflowPolicy, Priority, Receiver, SendError, Sender};
 
 const SENDERS: usize = 3;
 
@@ -48,7 +48,7 @@ struct Waiting {
 /// A mailbox as it is described: a list.
 struct Model {
     slots: usize,
-    full: Full,
+    full: OverflowPolicy,
     /// In the order of sending.
     waiting: Vec<Waiting>,
     sent: u64,
@@ -65,7 +65,7 @@ impl Model {
             return true;
         }
         let least = self.waiting.iter().map(|package| package.priority).min().filter(|least| *least < priority);
-        let least = least.filter(|_| self.full != Full::Reject);
+        let least = least.filter(|_| self.full != OverflowPolicy::Reject);
         match least {
             Some(least) => {
                 let newest = self.waiting.iter().rposition(|package| package.priority == least).unwrap();
@@ -78,7 +78,7 @@ impl Model {
     }
 
     fn send(&mut self, package: Waiting) -> bool {
-        let same = self.waiting.iter().position(|old| self.full == Full::Latest && old.of == package.of);
+        let same = self.waiting.iter().position(|old| self.full == OverflowPolicy::Latest && old.of == package.of);
         let sent = same.is_some() || self.claim(package.priority);
         match same {
             Some(at) => {
@@ -109,12 +109,12 @@ fn receive(receiver: &mut Receiver) -> Option<u16> {
 fn send(sender: &mut Sender, priority: u8, id: u16, number: u16) -> bool {
     match sender.send(&label(Priority(priority), id), &[&number.to_le_bytes()]) {
         Ok(()) => true,
-        Err(SendError::Full(MAILBOX)) => false,
+        Err(SendError::OverflowPolicy(MAILBOX)) => false,
         Err(error) => panic!("{error}"),
     }
 }
 
-fn agree(slots: u16, full: Full, steps: &[Step]) {
+fn agree(slots: u16, full: OverflowPolicy, steps: &[Step]) {
     let ground = Ground::new();
     let shape = rohrpost_mailbox::Shape { full, ..shape(slots) };
     let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
@@ -161,7 +161,7 @@ proptest! {
     #[test]
     fn a_mailbox_is_a_list_by_priority_and_age(
         slots in prop_oneof![1u16..6, 63u16..67],
-        full in proptest::sample::select(Full::ALL.to_vec()),
+        full in proptest::sample::select(OverflowPolicy::ALL.to_vec()),
         steps in proptest::collection::vec(step(), 0..300),
     ) {
         agree(slots, full, &steps);
@@ -171,12 +171,12 @@ proptest! {
 #[test]
 fn a_full_mailbox_does_what_it_says() {
     for (full, priorities, out) in [
-        (Full::Displace, &[1, 1, 2, 3][..], &[3, 2][..]),
-        (Full::Displace, &[2, 2, 2], &[2, 2]),
-        (Full::Displace, &[3, 2, 1], &[3, 2]),
-        (Full::Reject, &[1, 1, 9], &[1, 1]),
-        (Full::Latest, &[1, 1, 2, 3], &[3, 2]),
-        (Full::Latest, &[2, 2, 2], &[2, 2]),
+        (OverflowPolicy::Displace, &[1, 1, 2, 3][..], &[3, 2][..]),
+        (OverflowPolicy::Displace, &[2, 2, 2], &[2, 2]),
+        (OverflowPolicy::Displace, &[3, 2, 1], &[3, 2]),
+        (OverflowPolicy::Reject, &[1, 1, 9], &[1, 1]),
+        (OverflowPolicy::Latest, &[1, 1, 2, 3], &[3, 2]),
+        (OverflowPolicy::Latest, &[2, 2, 2], &[2, 2]),
     ] {
         let ground = Ground::new();
         let mut receiver = ground.join().receiver(MAILBOX, rohrpost_mailbox::Shape { full, ..shape(2) }).unwrap();

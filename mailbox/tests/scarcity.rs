@@ -48,8 +48,13 @@ fn made(me: &Arc<Participant>, name: Name) -> Receiver {
 }
 
 const SMALL: Shape = Shape { slots: 1, body_bytes_max: 40, ..DEFAULT };
-const DEFAULT: Shape =
-    Shape { slots: 32, body_bytes_max: 1024, full: rohrpost_mailbox::Full::Displace, max_age: None, claims: 1 };
+const DEFAULT: Shape = Shape {
+    slots: 32,
+    body_bytes_max: 1024,
+    full: rohrpost_mailbox::OverflowPolicy::Displace,
+    max_age: None,
+    claims: 1,
+};
 
 /// Mailboxes of one process of several.
 fn names(process: u8) -> impl Iterator<Item = Name> {

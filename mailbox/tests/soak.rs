@@ -12,10 +12,10 @@ mod common;
 
 use common::board::{Board, MAILBOXES, PRIORITIES, Tally};
 use common::crew::{Actor, alone, master};
-use common::load::{Listener, Talker, Way, Weather};
+use common::load::{Listener, Talker, WaitMode, Weather};
 use common::random::Random;
 use common::{Ground, lost, received, shape, tell, until};
-use rohrpost_mailbox::{Class, Full, Loss, MailboxInfo, Participant, Priority, Sender, Shape};
+use rohrpost_mailbox::{Class, Loss, MailboxInfo, OverflowPolicy, Participant, Priority, Sender, Shape};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -33,7 +33,7 @@ fn duration() -> Duration {
 }
 
 /// Around the sizes at which something changes: one slot, fewer than senders, words of hints, distance of slot words.
-fn shapes(full: Full) -> Vec<Shape> {
+fn shapes(full: OverflowPolicy) -> Vec<Shape> {
     let of = |slots, body_bytes_max, max_age| Shape { full, body_bytes_max, max_age, claims: 2, ..shape(slots) };
     vec![
         of(1, 256, None),
@@ -50,12 +50,12 @@ fn shapes(full: Full) -> Vec<Shape> {
 fn role() {
     let Some((_, ground)) = common::role() else { return };
     master(|| {
-        let cases: Vec<Shape> = Full::ALL.into_iter().flat_map(shapes).collect();
+        let cases: Vec<Shape> = OverflowPolicy::ALL.into_iter().flat_map(shapes).collect();
         let each = duration() / cases.len() as u32;
         let mut random = Random::from_environment();
         let mut stale = 0;
         for shape in cases {
-            let way = Way::ALL[random.below(Way::ALL.len() as u64) as usize];
+            let way = WaitMode::ALL[random.below(WaitMode::ALL.len() as u64) as usize];
             stale += soak(&ground, shape, way, each);
             assert!(ground.node().remove_orphan(MAILBOXES[0]).unwrap());
         }
@@ -70,7 +70,7 @@ fn what_is_sent_is_received_in_order_or_counted_to_the_last_package() {
 }
 
 /// Lets all loose on one mailbox; returns how many packages were stale.
-fn soak(ground: &Ground, shape: Shape, way: Way, time: Duration) -> u64 {
+fn soak(ground: &Ground, shape: Shape, way: WaitMode, time: Duration) -> u64 {
     let board = Board::new(SENDERS);
     // Those who are forked hold no lock of ours: the mailbox is ours again only after that.
     drop(Listener::new(board, &ground.join(), &[shape], way));
@@ -114,12 +114,12 @@ fn soak(ground: &Ground, shape: Shape, way: Way, time: Duration) -> u64 {
     lost(&info, Loss::Stale)
 }
 
-fn talk(board: Board, seat: usize, full: Full, sender: Sender) {
+fn talk(board: Board, seat: usize, full: OverflowPolicy, sender: Sender) {
     Talker::new(board, seat, seat as u32, full, vec![sender], Weather::Calm).talk();
 }
 
 /// Two by two they are one participant, which may hold two claims.
-fn start_threads(board: Board, ground: &Ground, full: Full) -> Vec<JoinHandle<()>> {
+fn start_threads(board: Board, ground: &Ground, full: OverflowPolicy) -> Vec<JoinHandle<()>> {
     let pairs: Vec<Arc<Participant>> = (PROCESSES..SENDERS).step_by(2).map(|_| ground.join()).collect();
     let all = (PROCESSES..SENDERS).zip(pairs.iter().flat_map(|one| [one, one]));
     all.map(|(seat, participant)| {
@@ -141,8 +141,12 @@ fn check(info: &MailboxInfo, tally: &Tally) {
     }
     let cannot_be = [Loss::Poison, Loss::Closed, Loss::Unfinished].map(|cause| lost(info, cause));
     assert_eq!(cannot_be, [0; 3]);
-    assert_eq!(info.shape.full == Full::Latest, lost(info, Loss::Replaced) > 0, "only newer states replace: {info:#?}");
-    assert!(info.shape.full != Full::Reject || lost(info, Loss::Displaced) == 0);
+    assert_eq!(
+        info.shape.full == OverflowPolicy::Latest,
+        lost(info, Loss::Replaced) > 0,
+        "only newer states replace: {info:#?}"
+    );
+    assert!(info.shape.full != OverflowPolicy::Reject || lost(info, Loss::Displaced) == 0);
 }
 
 /// What the senders' own tables say is the same. A loan that was asked for and not lent had no type yet; they do not count it.

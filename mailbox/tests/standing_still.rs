@@ -5,12 +5,12 @@
 mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, PATIENCE, accounted, label, lost, shape, tell, until};
-use rohrpost_mailbox::{Full, Loss, SendError, Shape};
+use rohrpost_mailbox::{Loss, OverflowPolicy, SendError, Shape};
 
 #[test]
 fn role() {
     let Some((role, ground)) = common::role() else { return };
-    let full = Full::ALL.into_iter().find(|full| full.name() == role).unwrap();
+    let full = OverflowPolicy::ALL.into_iter().find(|full| full.name() == role).unwrap();
     let mut receiver = ground.join().receiver(MAILBOX, Shape { full, ..shape(4) }).unwrap();
     tell("there");
     while let Some(package) = receiver.receive_timeout(PATIENCE) {
@@ -28,7 +28,7 @@ fn stands(pid: u32) -> bool {
 
 #[test]
 fn a_receiver_that_stops_reading_costs_what_is_counted_and_gets_the_rest_when_it_goes_on() {
-    for full in Full::ALL {
+    for full in OverflowPolicy::ALL {
         let ground = Ground::new();
         let receiver = ground.start(full.name());
         assert_eq!(receiver.hear(), "there");
@@ -42,14 +42,14 @@ fn a_receiver_that_stops_reading_costs_what_is_counted_and_gets_the_rest_when_it
             sent.filter(|sent| match sent {
                 Ok(()) => true,
                 Err(error) => {
-                    assert!(matches!(error, SendError::Full(MAILBOX)), "{error}");
+                    assert!(matches!(error, SendError::OverflowPolicy(MAILBOX)), "{error}");
                     false
                 }
             })
             .count()
         };
         assert_eq!(send(LOW, 1..11), 4, "as many as there are slots, and nobody waits");
-        let (urgent, displaced) = if full == Full::Reject { (0, 0) } else { (4, 4) };
+        let (urgent, displaced) = if full == OverflowPolicy::Reject { (0, 0) } else { (4, 4) };
         assert_eq!(send(HIGH, 11..17), urgent, "{full:?}: none gives way to its like");
         let info = ground.look();
         assert_eq!((info.depth, info.owner), (4, Some(receiver.id())));
@@ -57,7 +57,7 @@ fn a_receiver_that_stops_reading_costs_what_is_counted_and_gets_the_rest_when_it
         assert_eq!(lost(&info, Loss::Refused), 16 - 4 - urgent as u64, "{full:?}: senders were told");
         assert_eq!(info.sent, accounted(&info));
         receiver.signal(libc::SIGCONT);
-        let first = if full == Full::Reject { 1 } else { 11 };
+        let first = if full == OverflowPolicy::Reject { 1 } else { 11 };
         for id in first..first + 4 {
             assert_eq!(receiver.hear(), id.to_string(), "{full:?}");
         }

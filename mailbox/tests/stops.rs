@@ -9,13 +9,13 @@ mod common;
 
 use common::board::{Board, MAILBOXES, missing, shared};
 use common::crew::{Actor, alone, master};
-use common::load::{Listener, Talker, Way, Weather};
+use common::load::{Listener, Talker, WaitMode, Weather};
 use common::random::Random;
 use common::{Ground, HIGH, LOW, MAILBOX, label, received, shape, tell, until};
 use nix::sys::ptrace;
 use nix::sys::signal::{Signal, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
-use rohrpost_mailbox::{Full, Loss, Node, Participant, Priority, Receiver, SendError, Sender, Shape};
+use rohrpost_mailbox::{Loss, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape};
 use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
 use std::time::Duration;
 
@@ -31,7 +31,7 @@ fn kills() -> u64 {
 #[test]
 fn role() {
     let Some((role, ground)) = common::role() else { return };
-    master(|| match (role.as_str(), Full::ALL.into_iter().find(|full| full.name() == role)) {
+    master(|| match (role.as_str(), OverflowPolicy::ALL.into_iter().find(|full| full.name() == role)) {
         (_, Some(full)) => stop_and_go(&ground, full),
         ("instructions", None) => OPERATIONS.iter().for_each(|operation| operation.prove(&ground)),
         (other, None) => panic!("no role {other}"),
@@ -41,7 +41,7 @@ fn role() {
 
 #[test]
 fn who_is_stopped_at_random_holds_nobody_up() {
-    Full::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), full.name()));
+    OverflowPolicy::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), full.name()));
 }
 
 // Other processors may have atomics of two instructions, of which the second fails when the process was stopped after the first.
@@ -52,14 +52,14 @@ fn who_is_stopped_after_any_instruction_holds_nobody_up() {
 }
 
 /// Senders and then the receiver are stopped at random moments: all others go on, and nothing is lost when they do too.
-fn stop_and_go(ground: &Ground, full: Full) {
+fn stop_and_go(ground: &Ground, full: OverflowPolicy) {
     let board = Board::new(SENDERS + 1);
     let mut random = Random::from_environment();
     let shape = Shape { full, ..shape(SENDERS as u16 + 2) };
-    drop(Listener::new(board, &ground.join(), &[shape], Way::Polling));
+    drop(Listener::new(board, &ground.join(), &[shape], WaitMode::Polling));
     let actors: Vec<Actor> = (0..=SENDERS)
         .map(|seat| {
-            let way = Way::ALL[random.below(Way::ALL.len() as u64) as usize];
+            let way = WaitMode::ALL[random.below(WaitMode::ALL.len() as u64) as usize];
             let path = ground.path();
             Actor::new(|| {
                 let me = Participant::join(&Node::open(path).unwrap(), rohrpost_mailbox::Name::NONE).unwrap();
@@ -101,7 +101,7 @@ fn stop_and_go(ground: &Ground, full: Full) {
         }
         actor.finish();
     }
-    let mut listener = Listener::new(board, &ground.join(), &[shape], Way::Polling);
+    let mut listener = Listener::new(board, &ground.join(), &[shape], WaitMode::Polling);
     listener.drain();
     let (info, tally) = (ground.look(), board.tally(0));
     let accepted: u64 = tally.accepted.iter().sum();
@@ -113,7 +113,7 @@ fn stop_and_go(ground: &Ground, full: Full) {
 /// What a process does while it is led through it, instruction by instruction.
 struct Operation {
     name: &'static str,
-    full: Full,
+    full: OverflowPolicy,
     /// Others' packages that wait, all of priority [`LOW`]; there are four slots.
     filled: u16,
     does: Does,
@@ -133,23 +133,28 @@ const SLOTS: u16 = 4;
 const DONE: u32 = 1;
 const REFUSED: u32 = 2;
 const OPERATIONS: &[Operation] = &[
-    Operation { name: "send", full: Full::Reject, filled: 2, does: Does::Send(LOW) },
-    Operation { name: "send a loan", full: Full::Latest, filled: 2, does: Does::Loan(HIGH) },
-    Operation { name: "send and displace", full: Full::Displace, filled: 4, does: Does::Send(HIGH) },
-    Operation { name: "send and be refused", full: Full::Displace, filled: 4, does: Does::Send(LOW) },
-    Operation { name: "send and replace", full: Full::Latest, filled: 2, does: Does::Renew(Priority(1)) },
-    Operation { name: "send into one's own slot", full: Full::Latest, filled: 3, does: Does::Renew(Priority(1)) },
-    Operation { name: "receive", full: Full::Displace, filled: 4, does: Does::Receive },
+    Operation { name: "send", full: OverflowPolicy::Reject, filled: 2, does: Does::Send(LOW) },
+    Operation { name: "send a loan", full: OverflowPolicy::Latest, filled: 2, does: Does::Loan(HIGH) },
+    Operation { name: "send and displace", full: OverflowPolicy::Displace, filled: 4, does: Does::Send(HIGH) },
+    Operation { name: "send and be refused", full: OverflowPolicy::Displace, filled: 4, does: Does::Send(LOW) },
+    Operation { name: "send and replace", full: OverflowPolicy::Latest, filled: 2, does: Does::Renew(Priority(1)) },
+    Operation {
+        name: "send into one's own slot",
+        full: OverflowPolicy::Latest,
+        filled: 3,
+        does: Does::Renew(Priority(1)),
+    },
+    Operation { name: "receive", full: OverflowPolicy::Displace, filled: 4, does: Does::Receive },
 ];
 
 /// In the process that is led: stops itself, does it, and says so.
 fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
     ptrace::traceme().unwrap();
     let stop = || raise(Signal::SIGSTOP).unwrap();
-    // Full: it may look at each slot just while that one is in use, since the others act between any two of its instructions.
+    // OverflowPolicy: it may look at each slot just while that one is in use, since the others act between any two of its instructions.
     let told = |sent| match sent {
         Ok(()) => DONE,
-        Err(SendError::Full(_)) => REFUSED,
+        Err(SendError::OverflowPolicy(_)) => REFUSED,
         Err(error) => panic!("{error}"),
     };
     let send = |sender: &mut Sender, priority| told(sender.send(&label(priority, 1), &[b"step", b" by step"]));
@@ -217,7 +222,7 @@ impl Others {
             assert!(self.receive(), "{what}: packages wait, and none is received");
             self.send().unwrap_or_else(|error| panic!("{what}: {error}, though a slot was freed just now"));
         } else if let Err(error) = self.send() {
-            assert!(matches!(error, SendError::Full(_)), "{what}: {error}");
+            assert!(matches!(error, SendError::OverflowPolicy(_)), "{what}: {error}");
         }
     }
 }

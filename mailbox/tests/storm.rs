@@ -13,10 +13,10 @@ mod common;
 
 use common::board::{Board, MAILBOXES, Mark, PRIORITIES, missing};
 use common::crew::{Actor, alone, master};
-use common::load::{Listener, Talker, Way, Weather};
+use common::load::{Listener, Talker, WaitMode, Weather};
 use common::random::Random;
 use common::{Ground, PATIENCE, label, received, shape, tell};
-use rohrpost_mailbox::{Full, Loss, MailboxInfo, Node, Participant, SendError, Shape};
+use rohrpost_mailbox::{Loss, MailboxInfo, Node, OverflowPolicy, Participant, SendError, Shape};
 use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -29,7 +29,7 @@ const CALM_EVERY: u64 = 40;
 const AUDIT_EVERY: u64 = 400;
 
 /// Of each mailbox two shapes, which replace each other.
-fn shapes(full: Full, which: usize) -> [Shape; MAILBOXES.len()] {
+fn shapes(full: OverflowPolicy, which: usize) -> [Shape; MAILBOXES.len()] {
     let of = |slots, body_bytes_max| Shape { full, body_bytes_max, ..shape(slots) };
     [[of(16, 256), of(3, 256)], [of(65, 100), of(5, 700)]][which]
 }
@@ -41,7 +41,7 @@ fn kills() -> u64 {
 #[test]
 fn role() {
     let Some((role, ground)) = common::role() else { return };
-    let full = Full::ALL.into_iter().find(|full| role.ends_with(full.name())).unwrap();
+    let full = OverflowPolicy::ALL.into_iter().find(|full| role.ends_with(full.name())).unwrap();
     master(|| Storm::new(ground, full).rage(kills()));
     tell("done");
 }
@@ -73,7 +73,7 @@ struct Shaped {
 struct Storm {
     ground: Ground,
     node: Arc<Node>,
-    full: Full,
+    full: OverflowPolicy,
     board: Board,
     random: Random,
     actors: Vec<Actor>,
@@ -86,9 +86,9 @@ struct Storm {
 }
 
 impl Storm {
-    fn new(ground: Ground, full: Full) -> Self {
+    fn new(ground: Ground, full: OverflowPolicy) -> Self {
         let node = ground.node();
-        // A life for each kill, and for those who live at the end of each part.
+        // An incarnation for each kill, and for those who live at the end of each part.
         let board = Board::new((kills() * 2) as usize + 100 * SENDERS);
         let random = Random::from_environment();
         let shaped = Shaped { wanted: 0, known: None, replacements: 0 };
@@ -106,7 +106,7 @@ impl Storm {
             deadline: Instant::now() + PATIENCE,
         };
         // The mailboxes exist before anybody sends.
-        drop(Listener::new(board, &storm.ground.join(), &shapes(full, 0), Way::Polling));
+        drop(Listener::new(board, &storm.ground.join(), &shapes(full, 0), WaitMode::Polling));
         storm.start_all();
         storm
     }
@@ -159,7 +159,7 @@ impl Storm {
             self.shaped.known = None;
             self.shaped.replacements += MAILBOXES.len() as u64;
         }
-        let way = Way::ALL[self.random.below(Way::ALL.len() as u64) as usize];
+        let way = WaitMode::ALL[self.random.below(WaitMode::ALL.len() as u64) as usize];
         let (path, board, shapes) = (self.ground.path(), self.board, shapes(self.full, self.shaped.wanted));
         Actor::new(|| {
             let seat = board.seat(RECEIVER);
@@ -236,7 +236,7 @@ impl Storm {
         if self.shaped.known.is_none() {
             self.shaped.replacements += MAILBOXES.len() as u64;
         }
-        let mut listener = Listener::new(self.board, &me, &shapes, Way::Polling);
+        let mut listener = Listener::new(self.board, &me, &shapes, WaitMode::Polling);
         listener.drain();
         self.check_accounts();
         self.runs += 1;
@@ -257,7 +257,7 @@ impl Storm {
             let sent = sender.send(&label(PRIORITIES[0], number as u16), &[&body]);
             match sent {
                 Ok(()) => self.board.accepted(&mark),
-                Err(SendError::Full(_)) => self.board.refused(&mark),
+                Err(SendError::OverflowPolicy(_)) => self.board.refused(&mark),
                 Err(error) => panic!("{error}"),
             }
             assert_eq!(number > u32::from(shape.slots), sent.is_err(), "{self}: slot {number}");
@@ -288,9 +288,9 @@ impl Storm {
     fn assert_was_busy(&self, kills: u64) {
         let infos = self.look();
         let cause = match self.full {
-            Full::Displace => Loss::Displaced,
-            Full::Latest => Loss::Replaced,
-            Full::Reject => Loss::Refused,
+            OverflowPolicy::Displace => Loss::Displaced,
+            OverflowPolicy::Latest => Loss::Replaced,
+            OverflowPolicy::Reject => Loss::Refused,
         };
         let lost = |cause| infos.iter().map(|info| common::lost(info, cause)).sum::<u64>();
         let (received, gone) = (infos.iter().map(received).sum::<u64>(), lost(cause));

@@ -208,7 +208,11 @@ fn a_flow_that_lost_its_row_and_comes_back_is_another() {
     assert_eq!(sum(), 4 + 127 + 5, "nothing is forgotten");
     assert_eq!(first().packages, 5);
     assert!(!first().is_same(&seen));
-    assert_eq!(first().rate_since(Some(&seen)), first().rate_since(None), "counts of another life are not subtracted");
+    assert_eq!(
+        first().rate_since(Some(&seen)),
+        first().rate_since(None),
+        "counts of another incarnation are not subtracted"
+    );
 }
 
 #[test]

@@ -51,7 +51,7 @@ pub struct Status {
     pub state: State,
     /// Why, when it is in error; else empty.
     pub error: String,
-    /// Tells this life of the module from earlier ones.
+    /// Tells this incarnation of the module from earlier ones.
     pub incarnation: u32,
     /// Time since it started, ms.
     pub uptime_ms: u64,
@@ -71,7 +71,7 @@ pub struct Status {
     pub refused: Refused,
 }
 
-/// Packages that a module did not take in this life of it, by cause.
+/// Packages that a module did not take in this incarnation of it, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Refused {
     /// Commands from classes that `[access]` does not let command it.
@@ -86,8 +86,8 @@ pub struct Refused {
     pub other_publisher: u64,
     /// Data of another number than the one that is subscribed to.
     pub other_number: u64,
-    /// Data that an earlier life of the module asked for.
-    pub earlier_life: u64,
+    /// Data that an earlier incarnation of the module asked for.
+    pub earlier_incarnation: u64,
 }
 
 /// What a module is doing.
@@ -165,7 +165,7 @@ impl TimeReport {
     }
 }
 
-/// What came of a module's exchange with another one, in this life of the module.
+/// What came of a module's exchange with another one, in this incarnation of the module.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Exchange {
     /// The other one, such as `laser.0`.
@@ -222,7 +222,7 @@ pub struct DescriptionPart {
 pub struct ParameterPage {
     /// Parameters of the module.
     pub total: u16,
-    /// Times that parameters were set in this life of the module: pages with different ones do not belong together.
+    /// Times that parameters were set in this incarnation of the module: pages with different ones do not belong together.
     pub changes: u32,
     /// Those from the index that was asked for.
     pub parameters: Vec<Parameter>,
@@ -258,7 +258,7 @@ pub struct DataHead {
     pub sequence: u32,
     /// Periods so far in which nothing could be delivered, and packages that found the mailbox full.
     pub missed: u32,
-    /// Of the subscriber, as the envelope of its request had it: a later life of the subscriber takes no data that an earlier one asked
+    /// Of the subscriber, as the envelope of its request had it: a later incarnation of the subscriber takes no data that an earlier one asked
     /// for. 0 for data that nobody asked for, such as lines of output.
     pub incarnation: u32,
 }

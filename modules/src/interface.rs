@@ -97,7 +97,7 @@ impl ProxyCore {
     }
 }
 
-/// The interfaces of a module: one, or a tuple of them, one a face.
+/// The interfaces of a module: one, or a tuple of them, one an alias.
 pub trait Interfaces<M> {
     /// A line for each.
     fn table() -> Vec<Served<M>>;
@@ -105,7 +105,7 @@ pub trait Interfaces<M> {
 
 /// One interface of a module.
 pub struct Served<M> {
-    /// Class of the face that has it.
+    /// Class of the alias that has it.
     pub class: &'static str,
     /// Functions and data.
     pub description: Description,

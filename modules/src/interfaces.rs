@@ -135,7 +135,7 @@ pub trait Player {
 /// A page of the collector's lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Page {
-    /// Tells this life of the collector, whose lines are counted from its start, from earlier ones.
+    /// Tells this incarnation of the collector, whose lines are counted from its start, from earlier ones.
     pub life: u32,
     /// Number of the first line here.
     pub first: u64,

@@ -134,7 +134,7 @@ pub enum Scope {
 
 /// What is to be looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Look {
+pub enum SnapshotRequest {
     /// The node.
     Survey(Scope),
     /// A mailbox (its raw name), down to its slots.
@@ -197,7 +197,7 @@ pub trait Launcher {
     /// Looks at its node, keeps what it saw for a while, and answers with the first page of it. `form` is that of the looks that
     /// the reader knows; no page is longer than `bytes_max`.
     #[command(20, idempotent)]
-    fn look(&mut self, what: Look, form: u32, bytes_max: u16) -> Result<LookPage, LookError>;
+    fn look(&mut self, what: SnapshotRequest, form: u32, bytes_max: u16) -> Result<LookPage, LookError>;
 
     /// A further page of this look, from this byte on.
     #[command(21, idempotent)]

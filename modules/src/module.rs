@@ -13,7 +13,7 @@ use std::fmt;
 pub trait Module: Sized {
     /// What the configuration says under `settings`; use `#[serde(deny_unknown_fields, rename_all = "kebab-case")]`.
     type Settings: DeserializeOwned;
-    /// The interface it serves: `MotorInterface`; for a module with faces a tuple, one each; `()` for none.
+    /// The interface it serves: `MotorInterface`; for a module with aliases a tuple, one each; `()` for none.
     type Interfaces: Interfaces<Self>;
 
     /// Makes the module, switched off. Subscribe here, and keep the proxies that you need.

@@ -17,7 +17,7 @@ const PERIOD_MIN_US: u32 = 100;
 /// The newest value of one kind of data.
 #[derive(Default)]
 pub(crate) struct Newest {
-    pub(crate) face: usize,
+    pub(crate) endpoint: usize,
     pub(crate) number: u16,
     /// Its name, for messages.
     pub(crate) name: &'static str,
@@ -45,7 +45,7 @@ pub(crate) struct Asked {
 
 /// One subscription.
 pub(crate) struct Subscription {
-    pub(crate) face: usize,
+    pub(crate) endpoint: usize,
     pub(crate) wish: Subscribe,
     /// The request that began or last renewed it; the data carry its priority and incarnation.
     pub(crate) asked: Asked,
@@ -65,7 +65,7 @@ pub(crate) enum Delivery {
     /// Accepted.
     Sent,
     /// The subscriber's mailbox was full.
-    Full,
+    OverflowPolicy,
     /// The subscriber's mailbox takes no value of this size, and this was said.
     TooLarge,
     /// The subscriber is gone.
@@ -88,20 +88,21 @@ impl Subscriptions {
     }
 
     /// Begins or renews; false when there is no place. Times are monotonic.
-    pub(crate) fn subscribe(&mut self, face: usize, asked: Asked, mut wish: Subscribe, now_ns: u64) -> bool {
+    pub(crate) fn subscribe(&mut self, endpoint: usize, asked: Asked, mut wish: Subscribe, now_ns: u64) -> bool {
         wish.period_us = if wish.period_us == 0 { 0 } else { wish.period_us.max(PERIOD_MIN_US) };
         let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms.min(LEASE_MAX_MS)) * 1_000_000);
         let due_ns = if wish.period_us == 0 { 0 } else { now_ns };
-        // A new life of the subscriber: nobody takes what its earlier life asked for.
+        // A new incarnation of the subscriber: nobody takes what its earlier incarnation asked for.
         self.retain(|s| s.asked.by != asked.by || s.asked.incarnation == asked.incarnation);
         if let Some(known) = self.list.iter_mut().find(|s| s.asked.to == asked.to && s.wish.id == wish.id) {
             known.ends_ns = ends_ns;
-            let changed = (known.wish.number, known.wish.period_us, known.face) != (wish.number, wish.period_us, face);
+            let changed =
+                (known.wish.number, known.wish.period_us, known.endpoint) != (wish.number, wish.period_us, endpoint);
             if changed {
                 // What was fresh was another's.
                 (known.due_ns, known.fresh, known.told) = (due_ns, false, false);
             }
-            (known.face, known.wish, known.asked) = (face, wish, asked);
+            (known.endpoint, known.wish, known.asked) = (endpoint, wish, asked);
             return true;
         }
         // One whose lease is over holds no place, whether or not it was dropped by now.
@@ -110,7 +111,7 @@ impl Subscriptions {
             return false;
         }
         self.list.push(Subscription {
-            face,
+            endpoint,
             wish,
             asked,
             sequence: 0,
@@ -147,7 +148,7 @@ impl Subscriptions {
     pub(crate) fn published(&mut self, newest: &Newest, mut deliver: impl FnMut(&Subscription) -> Delivery) {
         let mut gone = false;
         for subscription in &mut self.list {
-            if (subscription.face, subscription.wish.number) != (newest.face, newest.number) {
+            if (subscription.endpoint, subscription.wish.number) != (newest.endpoint, newest.number) {
                 continue;
             }
             if subscription.wish.period_us == 0 {
@@ -195,7 +196,7 @@ impl Subscription {
     fn settle(&mut self, delivery: Delivery) -> bool {
         match delivery {
             Delivery::Sent => self.sequence = self.sequence.wrapping_add(1),
-            Delivery::Full | Delivery::TooLarge => {
+            Delivery::OverflowPolicy | Delivery::TooLarge => {
                 self.told |= matches!(delivery, Delivery::TooLarge);
                 // The number is used up, so that the subscriber sees the gap.
                 self.sequence = self.sequence.wrapping_add(1);
@@ -334,7 +335,7 @@ mod tests {
     fn a_subscriber_that_was_started_again_has_none_of_its_earlier_subscriptions() {
         let mut all = subscribed(0);
         assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
-        publish(&mut all, || Delivery::Full);
+        publish(&mut all, || Delivery::OverflowPolicy);
         let later = Asked { incarnation: 6, ..asked(2) };
         assert!(all.subscribe(0, later, Subscribe { number: 2, ..wish(0) }, 2));
         let left: Vec<_> = all.list.iter().map(|s| (s.wish.number, s.asked.incarnation, s.sequence)).collect();
@@ -387,7 +388,7 @@ mod tests {
     #[test]
     fn full_is_a_gap_and_a_miss_and_gone_is_gone() {
         let mut all = subscribed(0);
-        publish(&mut all, || Delivery::Full);
+        publish(&mut all, || Delivery::OverflowPolicy);
         assert_eq!((all.list[0].sequence, all.missed()), (1, 1));
         publish(&mut all, || Delivery::Gone);
         assert_eq!((all.len(), all.missed()), (0, 1), "what was missed stays counted");

@@ -17,7 +17,7 @@ mod usage;
 
 pub use crate::launcher::Scope;
 pub use distant::{Distant, LookFailure, look_at_all};
-pub use form::Seen;
+pub use form::Snapshot;
 pub(crate) use standing::in_words;
 pub use standing::{Standing, Working};
 pub use usage::Usage;
@@ -57,7 +57,7 @@ pub struct ModuleSurvey {
     /// Its name, local id 0.
     pub name: Name,
     /// Further names of its process.
-    pub faces: Vec<Name>,
+    pub aliases: Vec<Name>,
     /// Its process, as the node's table has it; none when it does not run.
     pub process: Option<ParticipantInfo>,
     /// What that takes of its computer; none until [`Survey::ask_kernel`], and if it has ended since.
@@ -98,17 +98,17 @@ impl Survey {
         let participants = node.participants();
         let flows = node.traffic();
         let at_ns = monotonic_ns();
-        let survey = |name, faces| {
+        let survey = |name, aliases| {
             let mut module = ModuleSurvey {
                 node: node_name.into(),
                 at_ns: Some(at_ns),
-                ..survey(name, faces, &participants, &mailboxes, &flows)
+                ..survey(name, aliases, &participants, &mailboxes, &flows)
             };
             module.working = Working::of(&module, node, installation, at_ns);
             module
         };
         let mut modules: Vec<ModuleSurvey> =
-            installation.modules_on(node_name).map(|module| survey(module.name, module.faces.clone())).collect();
+            installation.modules_on(node_name).map(|module| survey(module.name, module.aliases.clone())).collect();
         for participant in participants.iter().filter(|p| p.module != Name::NONE) {
             if modules.iter().all(|module| module.name != participant.module) {
                 modules.push(survey(participant.module, Vec::new()));
@@ -146,7 +146,7 @@ impl Survey {
         let flows = &self.flows;
         let is_sent_to = |mailbox: Name| flows.iter().any(|flow| is_own(flow.from) && flow.to == mailbox);
         self.mailboxes.retain(|mailbox| is_own(mailbox.name) || is_sent_to(mailbox.name));
-        self.modules.retain(|module| module.name == name || module.faces.contains(&name));
+        self.modules.retain(|module| module.name == name || module.aliases.contains(&name));
     }
 
     /// Several nodes as one, in this order; of each node of `silent`, which do not answer, the modules that the configuration
@@ -170,7 +170,7 @@ impl Survey {
         }
         for node in silent {
             let modules = installation.modules_on(node);
-            let unseen = modules.map(|module| survey(module.name, module.faces.clone(), &[], &[], &[]));
+            let unseen = modules.map(|module| survey(module.name, module.aliases.clone(), &[], &[], &[]));
             all.modules.extend(unseen.map(|module| ModuleSurvey { node: (*node).into(), ..module }));
         }
         all.mailboxes.sort_by_key(|mailbox| mailbox.name);
@@ -188,10 +188,10 @@ impl Survey {
         }
     }
 
-    /// The module of this name, or with this face.
+    /// The module of this name, or with this alias.
     pub fn module(&self, name: Name) -> Option<&ModuleSurvey> {
         let name = name.module();
-        self.modules.iter().find(|module| module.name == name || module.faces.contains(&name))
+        self.modules.iter().find(|module| module.name == name || module.aliases.contains(&name))
     }
 
     /// Packages a second that a module received since `earlier`.
@@ -215,12 +215,12 @@ fn add_children(modules: &mut [ModuleSurvey], installation: &Installation, child
 
 fn survey(
     name: Name,
-    faces: Vec<Name>,
+    aliases: Vec<Name>,
     participants: &[ParticipantInfo],
     mailboxes: &[MailboxInfo],
     flows: &[FlowInfo],
 ) -> ModuleSurvey {
-    let own = |mailbox: &&MailboxInfo| mailbox.name.module() == name || faces.contains(&mailbox.name.module());
+    let own = |mailbox: &&MailboxInfo| mailbox.name.module() == name || aliases.contains(&mailbox.name.module());
     let own: Vec<&MailboxInfo> = mailboxes.iter().filter(own).collect();
     let classes = || own.iter().flat_map(|mailbox| &mailbox.classes);
     let process = participants.iter().find(|participant| participant.module == name).cloned();
@@ -233,7 +233,7 @@ fn survey(
         node: String::new(),
         at_ns: None,
         name,
-        faces,
+        aliases,
         process,
         usage: None,
         scheduling: None,
@@ -300,14 +300,14 @@ pub fn is_hop(installation: &Installation, node: &str, flow: &FlowInfo) -> bool 
 
 /// A mailbox down to its slots.
 #[derive(Clone, Debug)]
-pub struct MailboxLook {
+pub struct MailboxSnapshot {
     /// What it says of itself.
     pub detail: MailboxDetail,
     /// Processes in it that stand: by SIGSTOP, Ctrl-Z or a debugger.
     pub stopped: Vec<u32>,
 }
 
-impl MailboxLook {
+impl MailboxSnapshot {
     /// Looks at a mailbox of a node on this computer.
     ///
     /// # Errors

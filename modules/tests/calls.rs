@@ -5,7 +5,7 @@
 use rohrpost_config::Principal;
 use rohrpost_mailbox::{Head, Label, Name, Node, Options, Participant, Receiver, SendError, Sender, Shape, Type};
 use rohrpost_modules::call::{
-    CallEnvelope, CallError, Fault, Link, Once, Pending, REPLIES_KEPT, ReplyEnvelope, Request, Verdict,
+    CallEnvelope, CallError, Deduplicator, Fault, Link, Pending, REPLIES_KEPT, ReplyEnvelope, Request, Verdict,
 };
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -254,7 +254,7 @@ fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
     let mut ground = ground();
     let name = Name::new(1, 90, 2, 0);
     let [first, second] = [(); 2].map(|()| Participant::join(&ground.node, Name::NONE).unwrap());
-    let mut once = Once::new(0, &[]);
+    let mut once = Deduplicator::new(0, &[]);
     for participant in [&second, &first, &second] {
         let replies = participant.receiver(name.with_local(1), Shape::default()).unwrap();
         let mut link = Link::new(participant, name, replies);
@@ -272,7 +272,7 @@ fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
             redelivered: false,
             idempotent: false,
         };
-        assert_eq!(once.judge(&request, 1), Verdict::Run, "{request:?}");
+        assert_eq!(once.validate(&request, 1), Verdict::Run, "{request:?}");
         once.done(&request, 1, false, &[]);
         link.close();
     }

@@ -95,14 +95,14 @@ mod variants {
         ForgetsFloor,
         /// Inbound: a package that came in parts is judged by what is known of its flow when the last part has come.
         ForgetsBegun,
-        /// Inbound: a new life of a peer is believed at its first datagram.
-        BelievesLives,
+        /// Inbound: a new incarnation of a peer is believed at its first datagram.
+        BelievesIncarnations,
         /// Inbound: so is a sequence that is far ahead.
         BelievesJumps,
         /// Inbound: one refusal parts from a peer that has just said that it hears us.
         BelievesRefusals,
-        /// Inbound: datagrams of lives that are over are taken.
-        TakesOldLives,
+        /// Inbound: datagrams of incarnations that are over are taken.
+        TakesOldIncarnations,
         /// Inbound: other configurations are not refused.
         TakesOtherDigests,
         /// Inbound: what waited in the socket for too long is delivered.
@@ -260,7 +260,7 @@ mod variants {
             Self::CountsNoGaps,
             Self::TakesLate,
             Self::ForgetsFloor,
-            Self::TakesOldLives,
+            Self::TakesOldIncarnations,
             Self::TakesOtherDigests,
             Self::TakesStale,
             Self::MixesPackages,
@@ -277,7 +277,7 @@ mod variants {
         pub const CROWDED: [Self; 1] = [Self::ForgetsBegun];
 
         /// Those that show where somebody sends what a router could have sent.
-        pub const FORGED: [Self; 3] = [Self::BelievesLives, Self::BelievesJumps, Self::BelievesRefusals];
+        pub const FORGED: [Self; 3] = [Self::BelievesIncarnations, Self::BelievesJumps, Self::BelievesRefusals];
 
         /// All mistakes of sessions.
         pub const SESSION: [Self; 31] = [

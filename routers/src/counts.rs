@@ -218,7 +218,7 @@ pub struct PeerReceived {
     pub returned: Count,
     /// Datagrams that came before, or so late that it cannot be told; dropped.
     pub copies: Count,
-    /// Datagrams of an earlier life of the peer, or of one that is doubted; dropped.
+    /// Datagrams of an earlier incarnation of the peer, or of one that is doubted; dropped.
     pub old: Count,
     /// Datagrams that came after later ones; taken.
     pub overtaken: Count,

@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn flows_of_one_pair_are_told_apart_by_size_and_then_by_kind() {
         let ms = Duration::from_millis;
-        let (laser, wheels, pilot, face) = (module(200, 0), module(201, 0), module(50, 1), module(51, 1));
+        let (laser, wheels, pilot, alias) = (module(200, 0), module(201, 0), module(50, 1), module(51, 1));
         let mut flows = [
             flow(laser, pilot, 800),
             flow(laser, pilot, 64),
@@ -230,7 +230,7 @@ mod tests {
             flow(pilot, wheels, 8),
         ];
         flows[1].period = ms(900);
-        flows[0].to.push(face);
+        flows[0].to.push(alias);
         flows[3].to.push(wheels);
         let flows = Flows::new(&flows);
         let (data, reply) = (Type::data(1), Type::reply(16));
@@ -240,7 +240,7 @@ mod tests {
             (laser, pilot, data, 64, Some(2), "the more frequent"),
             (laser, pilot.with_local(1), reply, 10, Some(1), "the rarer"),
             (laser, pilot, data, 900, Some(0), "larger than declared"),
-            (laser, face, data, 10, Some(0), "declared for all names of the process"),
+            (laser, alias, data, 10, Some(0), "declared for all names of the process"),
             (pilot, laser, data, 1, Some(3), "the other way is another"),
             (pilot, wheels, data, 1, Some(4), "declared for this name"),
             (laser, module(52, 1), data, 1, None, "not declared"),

@@ -38,7 +38,7 @@ pub enum State {
 pub struct Link {
     /// When something of it came last, ns of the monotonic clock; 0: never.
     pub heard_ns: Count,
-    /// Its life; 0: none.
+    /// Its incarnation; 0: none.
     pub incarnation: Count,
     /// Sequence that is expected next.
     pub next: Count,

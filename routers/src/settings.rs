@@ -2,7 +2,7 @@
 //!
 //! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
 
-use crate::admission::{Admission, Way, capped};
+use crate::admission::{Admission, ArrivalPath, capped};
 use crate::counts::Cause;
 use crate::flows::Flow;
 use crate::frame::{self, FRAGMENT_HEAD_BYTES, NodeIndex, PARTS_MAX};
@@ -40,7 +40,7 @@ pub struct Settings {
     pub nodes: Vec<NodeSettings>,
     /// What must be equal on both ends of a wire.
     pub digest: u64,
-    /// Tells this life of the router from its others; not 0, and never the same again.
+    /// Tells this incarnation of the router from its others; not 0, and never the same again.
     pub incarnation: u64,
     /// How it sends.
     pub network: Network,
@@ -82,7 +82,7 @@ pub enum SettingsError {
 }
 
 impl Settings {
-    /// The router of a node. `incarnation`: never the same for two lives of it; not 0.
+    /// The router of a node. `incarnation`: never the same for two incarnations of it; not 0.
     ///
     /// # Errors
     /// [`SettingsError`]
@@ -158,7 +158,7 @@ impl Settings {
     /// node speaks for its own names alone; without seals anyone may say that.
     pub fn refuses(&self, node: NodeIndex, head: &Head, body: &[u8]) -> Option<Cause> {
         let is_its_name = !self.is_sealed() || self.node_of(head.from) == Some(node);
-        self.admission.judge(Way::Lan { node, is_its_name }, head, body).err().map(Cause::from)
+        self.admission.validate(ArrivalPath::Lan { node, is_its_name }, head, body).err().map(Cause::from)
     }
 
     /// The nodes besides this one.

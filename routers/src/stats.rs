@@ -47,10 +47,10 @@ pub struct Stats {
     knows: Option<Arc<Self>>,
 }
 
-/// After so long the wire holds no copy any more of what a router's life before took.
+/// After so long the wire holds no copy any more of what a router's incarnation before took.
 ///
-/// Whether there was such a life nobody can tell: a launch that ends takes the node's directory along, transit mailbox and all, and the
-/// next may begin at once, with no restart counted. So the first life of a router is held to be young as well; what that costs is the
+/// Whether there was such an incarnation nobody can tell: a launch that ends takes the node's directory along, transit mailbox and all, and the
+/// next may begin at once, with no restart counted. So the first incarnation of a router is held to be young as well; what that costs is the
 /// wait for a caller's next try.
 pub(crate) const YOUNG_NS: u64 = 500_000_000;
 
@@ -103,20 +103,20 @@ impl Stats {
         self.knows.as_deref().unwrap_or(self).peer(peer).link.state(self.started_ns, now_ns)
     }
 
-    /// Whether a life of a peer is another than the one that is heard at the port of what is real time, where that is found out.
-    pub(crate) fn is_other_life(&self, peer: NodeIndex, incarnation: u64) -> bool {
+    /// Whether an incarnation of a peer is another than the one that is heard at the port of what is real time, where that is found out.
+    pub(crate) fn is_other_incarnation(&self, peer: NodeIndex, incarnation: u64) -> bool {
         self.knows.as_ref().is_some_and(|all| {
             let known = all.peer(peer).link.incarnation.get();
             known != 0 && known != incarnation
         })
     }
 
-    /// Whether it is that life.
-    pub(crate) fn is_known_life(&self, peer: NodeIndex, incarnation: u64) -> bool {
+    /// Whether it is that incarnation.
+    pub(crate) fn is_known_incarnation(&self, peer: NodeIndex, incarnation: u64) -> bool {
         self.knows.as_ref().is_some_and(|all| all.peer(peer).link.incarnation.get() == incarnation)
     }
 
-    /// Whether the router has just begun: what comes may be a copy of what its life before took, so nothing is said of its fate.
+    /// Whether the router has just begun: what comes may be a copy of what its incarnation before took, so nothing is said of its fate.
     pub fn is_young(&self, now_ns: u64) -> bool {
         now_ns.saturating_sub(self.started_ns) < YOUNG_NS
     }

@@ -8,7 +8,7 @@ pub mod counting;
 use counting::{CountingHeap, heap_uses};
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
 use rohrpost_routers::security::{
-    Acquaintances, Greeter, HELLO_DATAGRAM_BYTES, InstallationKey, KeyId, KeyRing, Opened, Opening, Port, Rejection,
+    HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection,
     Sealing, TAG_BYTES, Tally, Who,
 };
 use std::num::NonZeroU8;
@@ -22,8 +22,8 @@ const PACKAGES: u64 = 10_000;
 
 struct Router {
     own: NodeIndex,
-    all: Arc<Acquaintances>,
-    greeter: Greeter,
+    all: Arc<PeerSessions>,
+    handshake: Handshake,
     sealing: Sealing,
     opening: Opening,
 }
@@ -31,10 +31,10 @@ struct Router {
 impl Router {
     fn new(own: NodeIndex) -> Self {
         let who = Who { system: 1, own, nodes: 2, digest: 7, incarnation: 100 + u64::from(own) };
-        let all = Acquaintances::new(who, KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &[3; 32]), None));
+        let all = PeerSessions::new(who, KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &[3; 32]), None));
         Self {
             own,
-            greeter: Greeter::new(&all, [own; 32]),
+            handshake: Handshake::new(&all, [own; 32]),
             sealing: Sealing::new(&all, Port::Packages),
             opening: Opening::new(&all, Port::Packages),
             all,
@@ -45,8 +45,8 @@ impl Router {
     fn greet(&mut self, now_ns: u64, hello: &mut [u8; HELLO_DATAGRAM_BYTES]) -> bool {
         let mut reply = [0; HELLO_DATAGRAM_BYTES];
         let Opened::Hello(head, greeting) = self.opening.open(hello).unwrap() else { panic!("no hello") };
-        let replied = self.greeter.greet(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
-        self.greeter.begin();
+        let replied = self.handshake.greet(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
+        self.handshake.begin();
         *hello = reply;
         replied
     }
@@ -84,7 +84,7 @@ fn sealing_and_opening_take_nothing_from_the_heap() {
             tally.note(number, Some(0), Rejection::Forged);
             sequence += 1;
             if number == 0 {
-                // A life had begun, so keys were derived.
+                // An incarnation had begun, so keys were derived.
                 (before, took) = (heap_uses(), Duration::ZERO);
             }
         }

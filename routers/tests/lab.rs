@@ -78,7 +78,7 @@ fn who_is_beyond_reaches_one_node_and_the_others_reach_that_one_at_the_same_addr
         let _ = far.send_to(b"hello", other.local_addr().unwrap());
         assert_eq!(other.recv_from(&mut [0; 16]).unwrap_err().kind(), ErrorKind::WouldBlock, "nothing is handed on");
         lab.cut("far").unwrap();
-        lab.mend("far").unwrap();
+        lab.fix("far").unwrap();
         arrives(&far, &home);
     }
 }
@@ -124,10 +124,10 @@ fn a_cut_link_carries_nothing_and_a_mended_one_all() {
     let sockets = [0, 1, 2].map(|index| socket(&lab, &format!("n{index}"), &format!("10.77.0.{}", index + 1)));
     arrives(&sockets[0], &sockets[1]);
     lab.cut("n1").unwrap();
-    // What was sent meanwhile does not come later either: the mended link brings `hello` first.
+    // What was sent meanwhile does not come later either: the fixed link brings `hello` first.
     let _ = sockets[0].send_to(b"lost", sockets[1].local_addr().unwrap());
     arrives(&sockets[0], &sockets[2]);
-    lab.mend("n1").unwrap();
+    lab.fix("n1").unwrap();
     arrives(&sockets[2], &sockets[1]);
     arrives(&sockets[1], &sockets[0]);
 }

@@ -13,7 +13,7 @@ use rohrpost_network::Security;
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::link::State;
 use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
@@ -68,7 +68,7 @@ fn answer(pair: &Pair, replies: &mut Receiver, to: Name, body: &[u8]) -> String 
 
 #[test]
 fn an_undeliverable_command_comes_back_and_says_why() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let mut pair = Pair::new();
         let mut replies = replies(&pair);
         assert_eq!(answer(&pair, &mut replies, module(1), b"call and arguments"), "callno-mailbox");
@@ -101,7 +101,7 @@ fn an_undeliverable_command_comes_back_and_says_why() {
 
 #[test]
 fn packages_in_the_routers_mailbox_outlive_it() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let mut pair = Pair::new();
         let mut receiver = pair.sides[1].receiver(module(1), Shape { slots: 64, ..Shape::default() });
         let mut sender = pair.sides[0].sender(module(1));
@@ -161,7 +161,11 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
     // By the kernel, which tells with the next datagram of the peer.
     until("all are counted", || dropped() == before.1 + 3);
     assert_eq!(foreign(), before.0, "none came to the router");
-    assert_eq!(here.shell().stats().peer(1).link.incarnation.get(), 2, "the peer's own life still is the known one");
+    assert_eq!(
+        here.shell().stats().peer(1).link.incarnation.get(),
+        2,
+        "the peer's own incarnation still is the known one"
+    );
     // From the node's address, but of another system.
     let own = UdpSocket::bind((here.settings.nodes[1].address, 0)).unwrap();
     let head = FrameHead { system: 2, ..head };
@@ -172,12 +176,12 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
 #[test]
 fn each_sealed_life_has_an_incarnation_of_its_own_whatever_its_settings_say() {
     let mut pair = Pair::new();
-    let lives: Vec<_> = (0..3).map(|_| sealed_life(&mut pair)).collect();
+    let lives: Vec<_> = (0..3).map(|_| sealed_incarnation(&mut pair)).collect();
     assert!(lives[0] != lives[1] && lives[1] != lives[2] && lives[0] != lives[2], "{lives:?}");
 }
 
 /// Starts the first router anew with the same settings; the incarnation that it has.
-fn sealed_life(pair: &mut Pair) -> u64 {
+fn sealed_incarnation(pair: &mut Pair) -> u64 {
     let side = &mut pair.sides[0];
     side.settings.incarnation = 7;
     side.settings.network.security = Security::Keys;

@@ -8,7 +8,7 @@ mod common;
 
 use common::{PATIENCE, Pair, Side, label, module, turns};
 use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::security::Port;
 use rohrpost_routers::stats::Stats;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -43,7 +43,7 @@ fn send(sender: &mut Sender, priority: u8, id: u16, body: &[u8]) {
     loop {
         match sender.send(&label(module(0), priority, id), &[body]) {
             Ok(()) => return,
-            Err(SendError::Full(_)) => std::thread::yield_now(),
+            Err(SendError::OverflowPolicy(_)) => std::thread::yield_now(),
             Err(error) => panic!("{error}"),
         }
     }
@@ -66,7 +66,7 @@ fn round(sender: &mut Sender, receiver: &mut Receiver, large: &[u8]) {
 /// All ways of sending in one test, one after the other: all threads of the process are counted.
 #[test]
 fn no_package_takes_from_the_heap() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         as_packages_come(&paced(Side::start));
         let sealed = paced(Side::seal);
         as_packages_come(&sealed);
@@ -95,7 +95,7 @@ fn mailboxes(pair: &Pair) -> (Sender, Receiver) {
 fn as_packages_come(pair: &Pair) {
     let (mut sender, mut receiver) = mailboxes(pair);
     let large = vec![7; 40_000];
-    // Ways are opened, and room for parts is taken, once.
+    // SenderCache are opened, and room for parts is taken, once.
     (0..50).for_each(|_| round(&mut sender, &mut receiver, &large));
     let before = USES.load(Ordering::SeqCst);
     assert!(before > 0, "counts");

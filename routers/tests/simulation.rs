@@ -6,7 +6,7 @@ mod rare;
 mod simulated;
 
 use rohrpost_config::Principal;
-use rohrpost_modules::call::{Fault, Once, Request, Verdict};
+use rohrpost_modules::call::{Deduplicator, Fault, Request, Verdict};
 use rohrpost_routers::broken::Broken;
 use rohrpost_routers::sim::calls::{Attempt, Guard, Ruling};
 use rohrpost_routers::sim::plan::Plan;
@@ -119,7 +119,7 @@ const UNSEEN: [Mistake; 3] = [
     Mistake::Packages(Broken::CountsPartsTwice),
     Mistake::Packages(Broken::NeverInAdvance),
 ];
-/// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them. What has another digest is of a life that
+/// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them. What has another digest is of an incarnation that
 /// is doubted anyway.
 const SELDOM: [Mistake; 5] = [
     Mistake::Packages(Broken::TakesOtherDigests),
@@ -130,7 +130,7 @@ const SELDOM: [Mistake; 5] = [
 ];
 
 /// The real guard of commands.
-struct RealGuard(Once);
+struct RealGuard(Deduplicator);
 
 fn request(attempt: &Attempt) -> Request {
     Request {
@@ -147,8 +147,8 @@ fn request(attempt: &Attempt) -> Request {
 }
 
 impl Guard for RealGuard {
-    fn judge(&mut self, attempt: &Attempt, now_ns: u64) -> Ruling {
-        match self.0.judge(&request(attempt), now_ns) {
+    fn validate(&mut self, attempt: &Attempt, now_ns: u64) -> Ruling {
+        match self.0.validate(&request(attempt), now_ns) {
             Verdict::Run => Ruling::Run,
             Verdict::Again(_, body) => Ruling::Again(body.iter().fold(0, |run, byte| run << 8 | u32::from(*byte))),
             Verdict::Refuse(Fault::Interrupted) => Ruling::Interrupted,
@@ -163,7 +163,7 @@ impl Guard for RealGuard {
 }
 
 fn guard(started_ns: u64) -> Box<dyn Guard> {
-    Box::new(RealGuard(Once::new(started_ns, &[])))
+    Box::new(RealGuard(Deduplicator::new(started_ns, &[])))
 }
 
 /// What a broken promise looks like, and how to see it again.
@@ -190,14 +190,14 @@ fn keep_promises(test: &str, seeds: u64, plan: fn(u64) -> Plan) -> BTreeMap<&'st
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     let mut broken = Vec::new();
     let first = number("ROHRPOST_SIM_FIRST").unwrap_or(0);
-    let judged = |seed| {
+    let repeated_on_stall = |seed| {
         let outcome = run(plan(seed), guard, false);
         let told = outcome.problems.first().map(|problem| told(test, seed, problem));
         // At once: thousands of networks take their time.
         told.iter().for_each(|told| eprintln!("{told}"));
         (told, outcome)
     };
-    for (told, outcome) in for_all(seeds, |seed| judged(first + seed)) {
+    for (told, outcome) in for_all(seeds, |seed| repeated_on_stall(first + seed)) {
         broken.extend(told);
         outcome.seen.iter().for_each(|(what, count)| *seen.entry(what).or_default() += count);
     }
@@ -490,7 +490,7 @@ fn every_mistake_in_time_slots_is_noticed() {
     all_are_noticed(&mistakes.collect::<Vec<_>>(), Plan::slotted);
 }
 
-/// Each promise of time slots is seen to be broken: what is judged first in some network is this.
+/// Each promise of time slots is seen to be broken: what is repeated_on_stall first in some network is this.
 #[test]
 fn every_promise_of_time_slots_can_be_broken() {
     let stubborn = Mistake::Time(time::Broken::Stubborn);
@@ -519,8 +519,9 @@ fn every_promise_of_sealed_time_slots_can_be_broken() {
 fn each_is_called_what_it_is(broken: &[(Mistake, Promise)], plan: fn(u64) -> Plan) {
     let found = for_all(broken.len() as u64, |index| {
         let (mistake, promise) = broken[index as usize];
-        let judged = |seed| run_broken(plan(seed), guard, mistake).problems.first().map(|first| first.promise);
-        (mistake, promise, (0..PROMISE_SEEDS).find(|seed| judged(*seed) == Some(promise)))
+        let repeated_on_stall =
+            |seed| run_broken(plan(seed), guard, mistake).problems.first().map(|first| first.promise);
+        (mistake, promise, (0..PROMISE_SEEDS).find(|seed| repeated_on_stall(*seed) == Some(promise)))
     });
     eprintln!("{found:?}");
     let missed: Vec<_> = found.iter().filter(|(_, _, found)| found.is_none()).collect();

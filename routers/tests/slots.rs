@@ -26,7 +26,7 @@ const BROKEN_SEEDS: u64 = 60;
 struct NoCalls;
 
 impl Guard for NoCalls {
-    fn judge(&mut self, _: &Attempt, _: u64) -> Ruling {
+    fn validate(&mut self, _: &Attempt, _: u64) -> Ruling {
         Ruling::Ignore
     }
 

@@ -6,10 +6,10 @@
 mod common;
 
 use common::process::{Router, be_a_router};
-use common::talk::{Ears, talk};
-use common::{Capture, Crossed, MASTERS, Segment, assert_kept, judge, name, table};
+use common::talk::{Listeners, talk};
+use common::{Capture, Crossed, MASTERS, Segment, assert_kept, name, table, validate};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::link::State;
 use rohrpost_routers::time::Role;
 use std::sync::{Arc, Weak};
@@ -84,7 +84,7 @@ fn in_a_process_of_its_own() {
 
 #[test]
 fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut segment) = Segment::at_rest(None) else { return };
         let Segment { stations, lab, .. } = &mut segment;
         stations[usize::from(OTHERS[0])].skew.rate_ppb = FAST_PPB;
@@ -99,17 +99,17 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         segment.wait_until("the first is master", |_| capture.so_far(speaks));
         segment.lab.divide(&[&name(LONELY)]).unwrap();
         let _routers = OTHERS.map(|own| Router::start(&segment, own, PROCESS));
-        let mut ears = Ears::new(&segment);
+        let mut listeners = Listeners::new(&segment);
         let lonely = |segment: &Segment| segment.stations[usize::from(LONELY)].clock();
         assert_eq!(lonely(&segment).role, Role::Master, "nobody disturbs it");
         // Where they may send to each other, their routers have begun.
         segment.wait_until("the others send", |_| {
             capture.so_far(|crossed| OTHERS.iter().all(|own| crossed.iter().any(|frame| frame.from == *own)))
         });
-        talk(&segment, &mut ears, &OTHERS, 100);
+        talk(&segment, &mut listeners, &OTHERS, 100);
         segment.wait_until("the parts have two times, and have sent by them", |_| {
             capture.so_far(|crossed| {
-                are_apart(crossed) && judge(crossed, &time_of_others(crossed)).outside.len() > FOREIGN
+                are_apart(crossed) && validate(crossed, &time_of_others(crossed)).outside.len() > FOREIGN
             })
         });
 
@@ -121,7 +121,7 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
             lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
         });
         segment.wait_until("it yields to who is followed", |segment| lonely(segment).master == Some(OTHERS[0]));
-        talk(&segment, &mut ears, &ALL, 100);
+        talk(&segment, &mut listeners, &ALL, 100);
         drop(held);
         reader.join().unwrap();
 
@@ -135,7 +135,7 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
             let (before, rest) = crossed.split_at(crossed.partition_point(|frame| frame.at_ns < united_ns));
             [before, &rest[rest.partition_point(|frame| frame.at_ns < healed_ns)..]]
         };
-        let foreign = judge(before, &time).outside.len();
+        let foreign = validate(before, &time).outside.len();
         assert!(foreign > FOREIGN / 2, "the parts had two times: {foreign} frames of {}", before.len());
         if let Some((reigns_ns, _)) = ahead_ns(after, LONELY, 0).next() {
             // By the true clock, some of these may be replacements: of a master that stood still.

@@ -6,11 +6,11 @@
 mod common;
 
 use common::relay::Relay;
-use common::talk::{Ears, PAUSE, mouths, talk};
+use common::talk::{Listeners, PAUSE, talk, talkers};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_routers::frame::Kind;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::shell::Failure;
 use rohrpost_routers::tdma::Silent;
 use std::io::Write;
@@ -35,19 +35,20 @@ fn knows_its_rate(station: &Station) -> bool {
 
 #[test]
 fn a_slave_whose_clock_drifts_and_changes_its_rate_keeps_its_slots() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut segment) = Segment::at_rest(None) else { return };
         let Segment { stations, lab, .. } = &mut segment;
         stations[2].skew.rate_ppb = DRIFT_PPB;
         stations[2].skew.wander_ppb = SWING_PPB;
         stations.iter_mut().for_each(|station| station.start(lab));
         segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-        let (mut ears, time, began) = (Ears::new(&segment), segment.stations[0].clock().record, Instant::now());
+        let (mut listeners, time, began) =
+            (Listeners::new(&segment), segment.stations[0].clock().record, Instant::now());
         let capture = Capture::start(&segment.lab);
         let knows_its_rate = || (segment.stations[2].clock().rate_ppb.abs() - DRIFT_PPB).abs() < 2 * SWING_PPB as i64;
         // A new master is measured anew.
         while began.elapsed() < DRIFTS || (!knows_its_rate() && began.elapsed() < PATIENCE) {
-            talk(&segment, &mut ears, &ALL, 100);
+            talk(&segment, &mut listeners, &ALL, 100);
         }
         assert!(knows_its_rate(), "{} ppb", segment.stations[2].clock().rate_ppb);
         assert_kept("two clocks that drift", &capture.end(), &time);
@@ -56,7 +57,7 @@ fn a_slave_whose_clock_drifts_and_changes_its_rate_keeps_its_slots() {
 
 #[test]
 fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_and_says_why() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut segment) = Segment::at_rest(None) else { return };
         let Segment { stations, lab, .. } = &mut segment;
         stations[2].late = Some("delay=2ms,jitter=500us,seed=7".parse().unwrap());
@@ -66,8 +67,8 @@ fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_an
             let (clock, slots) = (segment.stations[2].clock(), segment.stations[2].slots());
             clock.exchanges > 5 && matches!(slots.silent, Some(Silent::BoundTooLarge { .. }))
         });
-        let mut ears = Ears::new(&segment);
-        talk(&segment, &mut ears, &[0, 1], 100);
+        let mut listeners = Listeners::new(&segment);
+        talk(&segment, &mut listeners, &[0, 1], 100);
         let crossed = capture.end();
         let speaks = |kind| matches!(kind, Kind::Alive | Kind::Packages);
         assert!(crossed.iter().any(|frame| frame.from == 2), "it asks for the time");
@@ -79,7 +80,7 @@ fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_an
         stations[2].late = None;
         stations[2].start(lab);
         segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-        talk(&segment, &mut ears, &ALL, 50);
+        talk(&segment, &mut listeners, &ALL, 50);
     });
 }
 
@@ -88,34 +89,34 @@ const TRIES: usize = 8;
 
 #[test]
 fn behind_a_bridge_that_becomes_slow_a_node_keeps_its_slots_and_loses_nothing() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(segment) = Segment::start() else { return };
-        let mut ears = Ears::new(&segment);
+        let mut listeners = Listeners::new(&segment);
         let is_kept = (0..TRIES).any(|_| {
             segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
             segment.wait_until("node 2 knows its rate", |segment| knows_its_rate(&segment.stations[2]));
-            goes_on_behind_a_slow_bridge(&segment, &mut ears)
+            goes_on_behind_a_slow_bridge(&segment, &mut listeners)
         });
         assert!(is_kept, "there was another master in each of {TRIES} tries");
-        talk(&segment, &mut ears, &ALL, 50);
+        talk(&segment, &mut listeners, &ALL, 50);
     });
 }
 
 /// False when another master began meanwhile: its time cannot be measured from behind such a bridge.
-fn goes_on_behind_a_slow_bridge(segment: &Segment, ears: &mut Ears) -> bool {
+fn goes_on_behind_a_slow_bridge(segment: &Segment, listeners: &mut Listeners) -> bool {
     const ROUNDS: u16 = 300;
     let terms = || segment.stations.iter().map(|station| station.clock().term).collect::<Vec<_>>();
     let (before, time) = (terms(), segment.stations[0].clock().record);
-    let mut mouths = mouths(segment, &ALL);
-    ears.acquaint(&mut mouths);
+    let mut talkers = talkers(segment, &ALL);
+    listeners.acquaint(&mut talkers);
     let capture = Capture::start(&segment.lab);
     let relay = Relay::start(segment, 2, HELD_BACK, |_| false);
-    ears.say_all(&mut mouths, ROUNDS);
+    listeners.say_all(&mut talkers, ROUNDS);
     let silent = segment.stations[2].slots().silent;
     let is_same = || terms() == before;
     if is_same() {
         // What the relay holds when it ends is lost.
-        ears.hear_all(&ALL, &(0..ROUNDS).collect::<Vec<_>>());
+        listeners.hear_all(&ALL, &(0..ROUNDS).collect::<Vec<_>>());
     }
     assert!(relay.end() > 300, "data and time take that way");
     if !is_same() {
@@ -128,7 +129,7 @@ fn goes_on_behind_a_slow_bridge(segment: &Segment, ears: &mut Ears) -> bool {
 
 #[test]
 fn a_master_whose_packages_come_is_replaced_by_nobody_who_misses_its_syncs() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(segment) = Segment::start() else { return };
         assert!(
             (0..TRIES).any(|_| stays_master_without_syncs(&segment)),
@@ -149,13 +150,13 @@ fn stays_master_without_syncs(segment: &Segment) -> bool {
     });
     let (stood_in, term) = (|| backup.slots().counts.syncs.replacements_sent, backup.clock().term);
     let (is_over, began) = (AtomicBool::new(false), stood_in());
-    let mut mouths = mouths(segment, &[master, backup.own]);
+    let mut talkers = talkers(segment, &[master, backup.own]);
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let _ = schedule(Scheduling::Fifo(1));
             let since = Instant::now();
             for id in (0..).take_while(|_| !is_over.load(Ordering::Relaxed) && since.elapsed() < PATIENCE) {
-                mouths.iter_mut().for_each(|mouth| mouth.say(id));
+                talkers.iter_mut().for_each(|talker| talker.say(id));
                 std::thread::sleep(PAUSE);
             }
         });
@@ -179,7 +180,7 @@ fn shape(segment: &Segment, node: u8, words: &str) -> bool {
 
 #[test]
 fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(segment) = Segment::start() else { return };
         segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
         // A thousandth of what `link` says.
@@ -188,8 +189,8 @@ fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
             let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: a device that is too slow (`tc` with tbf)");
             return;
         }
-        let (mut ears, slow) = (Ears::new(&segment), &segment.stations[2]);
-        let full = || slow.shell().failures().of(Failure::Full);
+        let (mut listeners, slow) = (Listeners::new(&segment), &segment.stations[2]);
+        let full = || slow.shell().failures().of(Failure::OverflowPolicy);
         let (mut flood, mut id, began) = (slow.sender(1), 0, Instant::now());
         while full() < 100 {
             assert!(began.elapsed() < PATIENCE, "all is taken: {:?}", slow.slots());
@@ -200,9 +201,9 @@ fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
             id = id.wrapping_add(1);
         }
         let used = slow.slots().counts.used;
-        talk(&segment, &mut ears, &[0, 1], 50);
+        talk(&segment, &mut listeners, &[0, 1], 50);
         segment.wait_until("it goes on with its slots", |segment| segment.stations[2].slots().counts.used > used);
         assert!(shape(&segment, 2, "qdisc del dev lan root"));
-        talk(&segment, &mut ears, &[0, 2], 50);
+        talk(&segment, &mut listeners, &[0, 2], 50);
     });
 }

@@ -7,11 +7,11 @@ mod common;
 
 use common::hog::{Hog, be_a_hog};
 use common::process::{Router, be_a_router};
-use common::talk::{Ears, Mouth, PAUSE, mouths};
+use common::talk::{Listeners, PAUSE, Talker, talkers};
 use common::{Capture, MASTERS, Segment, assert_kept};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::monotonic_ns;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::link::State;
 use std::io::Write;
 use std::sync::Arc;
@@ -39,19 +39,19 @@ fn kills() -> u16 {
 /// The masters' routers are processes.
 struct Scene {
     routers: [Option<Router>; 2],
-    ears: Ears,
+    listeners: Listeners,
     segment: Segment,
 }
 
 impl Scene {
     fn new() -> Option<Self> {
         let mut segment = Segment::at_rest(None)?;
-        // By its time frames are judged, so its clock is the true one.
+        // By its time frames are repeated_on_stall, so its clock is the true one.
         segment.stations[usize::from(WITNESS)].skew = Default::default();
         let Segment { stations, lab, .. } = &mut segment;
         stations[usize::from(WITNESS)].start(lab);
         let routers = MASTERS.map(|own| Some(Router::start(&segment, own, PROCESS)));
-        let scene = Self { routers, ears: Ears::new(&segment), segment };
+        let scene = Self { routers, listeners: Listeners::new(&segment), segment };
         scene.wait_until_all_send();
         Some(scene)
     }
@@ -88,10 +88,10 @@ impl Scene {
     }
 
     /// So many rounds of packages.
-    fn talk(&mut self, mouths: &mut [Mouth], numbers: std::ops::Range<u16>) {
+    fn talk(&mut self, talkers: &mut [Talker], numbers: std::ops::Range<u16>) {
         for id in numbers {
-            mouths.iter_mut().for_each(|mouth| mouth.say(id));
-            self.ears.listen();
+            talkers.iter_mut().for_each(|talker| talker.say(id));
+            self.listeners.listen();
             std::thread::sleep(PAUSE);
         }
     }
@@ -102,13 +102,13 @@ impl Scene {
         let others = [MASTERS[0] + MASTERS[1] - master, WITNESS];
         let time = self.segment.stations[usize::from(WITNESS)].clock().record;
         let capture = Capture::start(&self.segment.lab);
-        let mut mouths_of_others = mouths(&self.segment, &others);
+        let mut mouths_of_others = talkers(&self.segment, &others);
         self.talk(&mut mouths_of_others, 0..20);
         happens(self, master);
         self.talk(&mut mouths_of_others, 20..120);
         ends(self, master);
         self.talk(&mut mouths_of_others, 120..160);
-        self.ears.hear_all(&others, &(0..160).collect::<Vec<_>>());
+        self.listeners.hear_all(&others, &(0..160).collect::<Vec<_>>());
         let crossed = capture.end();
         assert_kept(what, &crossed, &time);
     }
@@ -117,10 +117,10 @@ impl Scene {
     fn all_talk(&mut self) {
         self.wait_until_all_send();
         let all = [MASTERS[0], MASTERS[1], WITNESS];
-        let mut mouths = mouths(&self.segment, &all);
-        self.ears.acquaint(&mut mouths);
-        self.talk(&mut mouths, 0..20);
-        self.ears.hear_all(&all, &(0..20).collect::<Vec<_>>());
+        let mut talkers = talkers(&self.segment, &all);
+        self.listeners.acquaint(&mut talkers);
+        self.talk(&mut talkers, 0..20);
+        self.listeners.hear_all(&all, &(0..20).collect::<Vec<_>>());
     }
 }
 
@@ -132,7 +132,7 @@ fn in_a_process_of_its_own() {
 
 #[test]
 fn the_master_is_killed_again_and_again_and_the_others_lose_nothing() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut scene) = Scene::new() else { return };
         let mut reigns = [0; 2];
         for time in 0..kills() {
@@ -151,7 +151,7 @@ fn the_master_is_killed_again_and_again_and_the_others_lose_nothing() {
 
 #[test]
 fn a_master_that_stood_still_wakes_as_a_slave_and_sends_in_its_own_slots() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut scene) = Scene::new() else { return };
         for time in 0..TIMES {
             let freeze = |scene: &mut Scene, master: u8| scene.router(master).signal(Signal::SIGSTOP);
@@ -168,7 +168,7 @@ fn a_master_that_stood_still_wakes_as_a_slave_and_sends_in_its_own_slots() {
 
 #[test]
 fn a_master_that_stumbles_disturbs_nobody() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut scene) = Scene::new() else { return };
         for time in 0..TIMES {
             let ends = Arc::new(AtomicBool::new(false));
@@ -185,7 +185,7 @@ fn a_master_that_stumbles_disturbs_nobody() {
 
 #[test]
 fn under_a_hog_that_goes_first_slots_are_left_out_and_counted() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut scene) = Scene::new() else { return };
         let counts = |scene: &Scene| scene.segment.stations[usize::from(WITNESS)].slots().counts;
         let [mut before, mut after] = [counts(&scene); 2];

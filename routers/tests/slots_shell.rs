@@ -5,10 +5,10 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
-use common::talk::{Ears, PAUSE, mouths};
-use common::{Capture, MASTERS, NODES, PATIENCE, Segment, assert_kept, judge};
+use common::talk::{Listeners, PAUSE, talkers};
+use common::{Capture, MASTERS, NODES, PATIENCE, Segment, assert_kept, validate};
 use rohrpost_routers::frame::Kind;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::time::Role;
 use std::time::Instant;
 
@@ -16,20 +16,20 @@ use std::time::Instant;
 const ROUNDS: u16 = 150;
 #[test]
 fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut segment) = Segment::start() else { return };
         segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
         let all: Vec<u8> = (0..NODES).collect();
-        let (mut ears, mut mouths_of_all) = (Ears::new(&segment), mouths(&segment, &all));
-        ears.acquaint(&mut mouths_of_all);
+        let (mut listeners, mut mouths_of_all) = (Listeners::new(&segment), talkers(&segment, &all));
+        listeners.acquaint(&mut mouths_of_all);
         let time = segment.stations[0].clock().record;
         let capture = Capture::start(&segment.lab);
         for id in 0..ROUNDS {
-            mouths_of_all.iter_mut().for_each(|mouth| mouth.say(id));
-            ears.listen();
+            mouths_of_all.iter_mut().for_each(|talker| talker.say(id));
+            listeners.listen();
             std::thread::sleep(PAUSE);
         }
-        ears.hear_all(&all, &(0..ROUNDS).collect::<Vec<_>>());
+        listeners.hear_all(&all, &(0..ROUNDS).collect::<Vec<_>>());
         let crossed = capture.end();
         for kind in [Kind::Packages, Kind::Sync, Kind::Request, Kind::Reply] {
             assert!(crossed.iter().any(|frame| frame.kind == kind), "{kind:?} crossed the bridge");
@@ -44,7 +44,7 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
         let master = master().unwrap();
         let next = MASTERS[0] + MASTERS[1] - master;
         let others = [next, 2];
-        let mut mouths_of_others = mouths(&segment, &others);
+        let mut mouths_of_others = talkers(&segment, &others);
         let left_out = |segment: &Segment| {
             let counts = segment.stations[usize::from(next)].slots().counts;
             (counts.syncs.replacements_sent, counts.late + counts.skipped + counts.synchronisations_late)
@@ -54,11 +54,11 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
             if id == ROUNDS / 2 {
                 segment.stations[usize::from(master)].shell = None;
             }
-            mouths_of_others.iter_mut().for_each(|mouth| mouth.say(id));
-            ears.listen();
+            mouths_of_others.iter_mut().for_each(|talker| talker.say(id));
+            listeners.listen();
             std::thread::sleep(PAUSE);
         }
-        ears.hear_all(&others, &(0..2 * ROUNDS).collect::<Vec<_>>());
+        listeners.hear_all(&others, &(0..2 * ROUNDS).collect::<Vec<_>>());
         segment.wait_until("the next is the master", |segment| {
             segment.stations[usize::from(next)].clock().role == Role::Master
         });
@@ -80,16 +80,16 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
         let Segment { stations, lab, .. } = &mut segment;
         stations[usize::from(master)].start(lab);
         segment.wait_until("all send again", |segment| segment.stations.iter().all(common::Station::is_ready));
-        ears.acquaint(&mut mouths_of_all);
+        listeners.acquaint(&mut mouths_of_all);
         let numbers: Vec<_> = (0..20).collect();
-        numbers.iter().for_each(|id| mouths_of_all.iter_mut().for_each(|mouth| mouth.say(*id)));
-        ears.hear_all(&all, &numbers);
+        numbers.iter().for_each(|id| mouths_of_all.iter_mut().for_each(|talker| talker.say(*id)));
+        listeners.hear_all(&all, &numbers);
     });
 }
 
 #[test]
 fn a_refusal_waits_for_a_slot() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(mut segment) = Segment::start() else { return };
         segment.wait_until("all send", |segment| segment.stations.iter().all(common::Station::is_ready));
         let time = segment.stations[0].clock().record;
@@ -111,7 +111,7 @@ fn a_refusal_waits_for_a_slot() {
         let mut crossed = capture.end();
         crossed.retain(|frame| frame.kind == Kind::Refusal);
         assert!(crossed.len() >= refusals);
-        let judged = judge(&crossed, &time);
-        assert!(judged.outside.is_empty(), "{judged:?}");
+        let repeated_on_stall = validate(&crossed, &time);
+        assert!(repeated_on_stall.outside.is_empty(), "{repeated_on_stall:?}");
     });
 }

@@ -15,12 +15,12 @@
 mod common;
 
 use common::{
-    Capture, Crossed, MASTERS, NODES, PATIENCE, Segment, Station, assert_inside, judge, label, module, table,
+    Capture, Crossed, MASTERS, NODES, PATIENCE, Segment, Station, assert_inside, label, module, table, validate,
 };
 use rohrpost_config::{Installation, bounds};
 use rohrpost_mailbox::{Receiver, Sender, TimeRecord, monotonic_ns};
 use rohrpost_network::{LATE, Tdma, Tunnel};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::tdma::Table;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -159,8 +159,8 @@ fn late_percent(segment: &Segment, what: &str, mut is_done: impl FnMut() -> bool
     });
     come.all(&published);
     let crossed = capture.end();
-    let judged = judge(&crossed, &time);
-    assert_inside(what, &judged);
+    let repeated_on_stall = validate(&crossed, &time);
+    assert_inside(what, &repeated_on_stall);
     let bridge = Bridge::new(&crossed, &time);
     let percents = published.iter().zip(bounds_ns).enumerate().map(|(flow, (published, bound_ns))| {
         let seen = bridge.latencies(flow, published);
@@ -286,7 +286,7 @@ fn typed(mut near: TcpStream, far: TcpStream, mut is_done: impl FnMut() -> bool 
 
 #[test]
 fn somebody_types_and_copies_a_file_and_declared_flows_keep_their_bounds() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let Some(segment) = Segment::with(Some(TUNNEL)) else { return };
         if segment.stations[0].shell().tunnel().is_none() {
             let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: TUN devices cannot be made here");

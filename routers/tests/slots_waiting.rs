@@ -9,7 +9,7 @@ use common::{PATIENCE, Pair, Side, label, module, router, turns};
 use rohrpost_config::TRANSIT;
 use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
 use rohrpost_network::Tdma;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::net::IpAddr;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -75,7 +75,7 @@ fn adopt(side: &Side) -> Receiver {
 
 #[test]
 fn what_waits_for_a_slot_outlives_a_router_that_is_killed() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let mut pair = Pair::with(Some(seldom()));
         pair.sides[0].shell = None;
         let there = Shape { slots: 256, ..Shape::default() };

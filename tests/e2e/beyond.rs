@@ -4,7 +4,7 @@
 use crate::harness::{halt, probe, signal, wait};
 use crate::systems::{OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ fn check_lists(systems: &Systems) {
 
 #[test]
 fn calls_and_data_cross_from_system_to_system() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(systems) = Systems::launched(OPEN) else { return };
         check_crossing(&systems);
         for nobodys in ["2.probe.7.0", "9.probe.0.0"] {
@@ -65,7 +65,7 @@ fn accounts(client: &serde_json::Value) -> Vec<(u64, u64)> {
 
 #[test]
 fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(systems) = Systems::launched(OPEN) else { return };
         let north = systems.robot("north");
         let clients = || SYSTEMS.map(|node| (systems.robot(node).pid("tcp.0"), systems.robot(node).pid("probe.0")));

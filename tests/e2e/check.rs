@@ -18,7 +18,7 @@ tool = { id = 16 }
 [[module]]
 name = "motor.0"
 builtin = "sim"
-faces = ["laser.0", "odometry.0", "mapper.1"]
+aliases = ["laser.0", "odometry.0", "mapper.1"]
 settings = { map = "building.map", beems = 181 }
 [[module]]
 name = "laser.1"
@@ -56,7 +56,7 @@ show = [
 "#;
 
 const SAID: [&str; 11] = [
-    "13: module `motor.0`: face `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, laser",
+    "13: module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, laser",
     "17: module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
      `laser-noise-m`, `odometry-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
     "21: module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz",

@@ -5,7 +5,7 @@ use crate::process::Running;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost::launcher::{Phase, launcher_of};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ fn number(text: &str, words: &str) -> u64 {
 
 #[test]
 fn the_simulated_robot_maps_and_says_what_came_of_it() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
         wait("it has mapped", || {
@@ -45,7 +45,7 @@ fn the_simulated_robot_maps_and_says_what_came_of_it() {
 /// The same robot over three nodes, on a network that loses, delays and reorders.
 #[test]
 fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_for() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
         let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "--impair", bad]);
@@ -67,7 +67,7 @@ fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_f
 /// The same robot, each node in its own time slots.
 #[test]
 fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let said = place.say(&["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet"]);
         if lacks_namespaces(&said.err) {

@@ -23,7 +23,7 @@ fn this_computer_is_examined() {
     let findings = examine(&place, &["--config", config.to_str().unwrap()]);
     for finding in &findings {
         assert!(!finding["is"].as_str().unwrap().is_empty() && !finding["why"].as_str().unwrap().is_empty());
-        assert_eq!(finding["state"] == "ok", finding["mend"].is_null(), "what is not well can be mended: {finding}");
+        assert_eq!(finding["state"] == "ok", finding["fix"].is_null(), "what is not well can be fixed: {finding}");
     }
     assert_eq!(find(&findings, "kernel")["state"], "ok");
     let real_time = find(&findings, "real time")["is"].as_str().unwrap();
@@ -64,8 +64,8 @@ fn the_network_of_a_configuration_is_examined() {
     let config = place.config_of("elsewhere", &nodes("192.0.2.1"), &[&module]);
     let findings = examine(&place, &["--config", config.to_str().unwrap(), "--node", "base"]);
     assert_eq!(find(&findings, "node address")["state"], "bad");
-    let mend = find(&findings, "node address")["mend"].as_str().unwrap();
-    assert!(mend.contains("base") && mend.contains("elsewhere.toml"), "{mend}");
+    let fix = find(&findings, "node address")["fix"].as_str().unwrap();
+    assert!(fix.contains("base") && fix.contains("elsewhere.toml"), "{fix}");
     assert_eq!(find(&findings, "port of time")["is"], "UDP 21118, not tried");
     place.assert_empty();
 }
@@ -165,7 +165,7 @@ fn what_a_crash_left_is_found() {
     drop(robot);
     let findings = examine(&place, &[]);
     assert_eq!(
-        (&find(&findings, "node")["state"], &find(&findings, "node")["mend"]),
+        (&find(&findings, "node")["state"], &find(&findings, "node")["fix"]),
         (&"warn".into(), &"rohrpost clean".into())
     );
     let cleaned = place.say(&["clean", "--json"]).json();

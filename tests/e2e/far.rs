@@ -6,7 +6,7 @@ use crate::process::{Running, Said};
 use crate::systems::CLASSES;
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::path::PathBuf;
 
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";
@@ -139,7 +139,7 @@ impl Field {
 
 #[test]
 fn a_laptop_of_a_robot_with_one_computer_calls_hears_and_is_called() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(field) = Field::launched(
             &["base", "far"],
             "[nodes.base]\ntools = [0, 15]\n",
@@ -155,7 +155,7 @@ fn a_laptop_of_a_robot_with_one_computer_calls_hears_and_is_called() {
 
 #[test]
 fn sealed_it_reaches_all_nodes_of_a_lan_and_an_outage_costs_a_gap() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(field) = Field::launched(&["base", "arm", "far"], TWO, SEALED) else { return };
         field.check_talk();
         field.check_tools();

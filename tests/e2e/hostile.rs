@@ -208,7 +208,7 @@ fn check_counted(field: &Field, tried: &[BTreeMap<String, u64>]) {
     for module in ["pilot.0", "laser.0", "mapper.0"] {
         let refused = tool.status(field.robot().name(module)).unwrap().refused;
         let counts = [
-            ("unasked", refused.unasked + refused.other_publisher + refused.other_number + refused.earlier_life),
+            ("unasked", refused.unasked + refused.other_publisher + refused.other_number + refused.earlier_incarnation),
             ("no-place", refused.no_place),
             ("malformed", refused.malformed),
         ];

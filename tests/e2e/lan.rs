@@ -10,7 +10,7 @@ use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Head, monotonic_ns};
 use rohrpost_routers::frame::{FrameHead, Kind};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
@@ -119,7 +119,7 @@ impl Lan {
 
 #[test]
 fn calls_and_data_cross_from_node_to_node_as_if_there_were_one() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let lan = Lan::launched();
         assert_eq!(lan.say(&["call", "probe.1", "count", "1"]).ok(), "1\n");
         assert_eq!(lan.say(&["call", "probe.1", "count", "2"]).ok(), "2\n", "by another tool");
@@ -274,7 +274,7 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
 
 #[test]
 fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let mut lan = Lan::launched();
         let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
         let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();

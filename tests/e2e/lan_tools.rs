@@ -5,7 +5,7 @@ use crate::lan::addresses;
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::FlowInfo;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use serde_json::Value;
 use std::time::{Duration, Instant};
 
@@ -79,7 +79,7 @@ fn module<'a>(json: &'a Value, name: &str) -> &'a Value {
 
 #[test]
 fn all_nodes_are_listed_from_each_of_them() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let two = Two::launched();
         let text = two.say(&["list"]).ok();
         assert!(text.starts_with("nodes base, arm of test, seen from base\n"), "{text}");
@@ -122,7 +122,7 @@ fn all_nodes_are_listed_from_each_of_them() {
 
 #[test]
 fn figures_of_another_node_are_as_those_of_ones_own() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let two = Two::launched();
         for node in ["base", "arm"] {
             let hz = two.say_at(node, &["hz", "probe.1", "beat", "--seconds", "1.5", "--count", "1", "--json"]).ok();
@@ -169,7 +169,7 @@ fn figures_of_another_node_are_as_those_of_ones_own() {
 
 #[test]
 fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let two = Two::launched();
         for (node, count) in [("base", 1), ("arm", 5)] {
             let called = two.say_at(node, &["call", "probe.1", "count", "7"]).ok();
@@ -218,7 +218,7 @@ fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
 
 #[test]
 fn time_tells_of_all_nodes_and_how_far_off_each_may_be() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let two = Two::launched();
         let told = wait("all nodes follow one master", || {
             let said = two.say(&["time", "--json"]);
@@ -264,7 +264,7 @@ fn time_tells_of_all_nodes_and_how_far_off_each_may_be() {
 
 #[test]
 fn a_silent_node_is_told_and_nobody_waits_for_it() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let two = Two::launched();
         let launch = two.arm.0.pid();
         let router = two.arm.1.pid("router.1");

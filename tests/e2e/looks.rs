@@ -3,31 +3,31 @@
 use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
-use rohrpost::launcher::{LauncherInterface, Look, LookError, LookPage};
+use rohrpost::launcher::{LauncherInterface, LookError, LookPage, SnapshotRequest};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::survey::{LookFailure, MailboxLook, Scope, Seen, Survey, look_at_all};
+use rohrpost::survey::{LookFailure, MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
 use rohrpost_mailbox::{FlowInfo, Name};
 use std::time::{Duration, Instant};
 
 const LOOK: u16 = 20;
 const LOOK_ON: u16 = 21;
 
-fn look(tool: &mut ToolLink, what: Look) -> Result<Seen, LookFailure> {
+fn look(tool: &mut ToolLink, what: SnapshotRequest) -> Result<Snapshot, LookFailure> {
     let launcher = tool.launcher();
     look_at_all(&mut tool.link, &[launcher], what, PATIENCE).pop().unwrap()
 }
 
 fn survey(tool: &mut ToolLink, scope: Scope) -> Survey {
-    match look(tool, Look::Survey(scope)).unwrap() {
-        Seen::Survey(survey) => *survey,
-        Seen::Mailbox(_) => panic!("a survey was asked for"),
+    match look(tool, SnapshotRequest::Survey(scope)).unwrap() {
+        Snapshot::Survey(survey) => *survey,
+        Snapshot::Mailbox(_) => panic!("a survey was asked for"),
     }
 }
 
-fn mailbox(tool: &mut ToolLink, name: Name) -> Option<Box<MailboxLook>> {
-    match look(tool, Look::Mailbox(name.raw())).unwrap() {
-        Seen::Mailbox(look) => look,
-        Seen::Survey(_) => panic!("a mailbox was asked for"),
+fn mailbox(tool: &mut ToolLink, name: Name) -> Option<Box<MailboxSnapshot>> {
+    match look(tool, SnapshotRequest::Mailbox(name.raw())).unwrap() {
+        Snapshot::Mailbox(look) => look,
+        Snapshot::Survey(_) => panic!("a mailbox was asked for"),
     }
 }
 
@@ -55,7 +55,7 @@ fn a_look_from_afar_shows_what_a_look_from_near_does() {
     let names = |survey: &Survey| survey.modules.iter().map(|module| module.name).collect::<Vec<_>>();
     assert_eq!(names(&before), names(&near));
     for (name, ((a, b), c)) in names(&near).iter().zip(before.modules.iter().zip(&near.modules).zip(&after.modules)) {
-        assert_eq!((&a.process, &a.faces, &a.node), (&b.process, &b.faces, &b.node), "{name}");
+        assert_eq!((&a.process, &a.aliases, &a.node), (&b.process, &b.aliases, &b.node), "{name}");
         for (what, count) in [
             ("received", [a.received, b.received, c.received]),
             ("sent", [a.sent, b.sent, c.sent]),
@@ -111,7 +111,7 @@ fn a_mailbox_is_shown_down_to_its_slots() {
     halt(pid);
     robot.begin(&mut tool, "probe.0", 16, &(7u32,));
     let seen = mailbox(&mut tool, name).unwrap();
-    let near = MailboxLook::new(&robot.node, name).unwrap();
+    let near = MailboxSnapshot::new(&robot.node, name).unwrap();
     assert_eq!(seen.detail.slots, near.detail.slots);
     assert_eq!((seen.detail.receiver, seen.detail.is_retired), (near.detail.receiver, near.detail.is_retired));
     assert_eq!((seen.detail.info.depth, seen.detail.info.shape), (1, near.detail.info.shape));
@@ -135,7 +135,7 @@ fn another_version_is_refused_and_an_old_look_is_gone() {
         let hash = LauncherInterface::hash();
         tool.call(launcher, function, hash, write, |bytes| from_bytes::<Result<LookPage, LookError>>(bytes)).unwrap()
     };
-    let what = Look::Survey(Scope::Modules);
+    let what = SnapshotRequest::Survey(Scope::Modules);
     let Err(LookError::Form(form)) = ask(LOOK, &|body| append(body, &(what, 1u32, 100u16)).unwrap()) else {
         panic!("the form of another version was taken");
     };
@@ -163,7 +163,7 @@ fn a_launch_that_stands_is_silent_in_time() {
     let launcher = tool.launcher();
     halt(launch.pid());
     let (began, timeout) = (Instant::now(), Duration::from_millis(700));
-    let seen = look_at_all(&mut tool.link, &[launcher], Look::Survey(Scope::All), timeout).pop().unwrap();
+    let seen = look_at_all(&mut tool.link, &[launcher], SnapshotRequest::Survey(Scope::All), timeout).pop().unwrap();
     assert!(matches!(seen, Err(LookFailure::Silent(_))), "{seen:?}");
     assert!(began.elapsed() >= timeout);
     signal(launch.pid(), Signal::SIGCONT);

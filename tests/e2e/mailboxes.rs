@@ -37,7 +37,7 @@ fn packages_accepted_while_a_module_was_dead_or_stopped_arrive_in_order() {
         }
         if number == Signal::SIGSTOP {
             assert_eq!(robot.waiting("probe.0"), 20);
-            // Killed while it is stopped: what waited for it is kept for its next life.
+            // Killed while it is stopped: what waited for it is kept for its next incarnation.
             signal(pid, Signal::SIGKILL);
         }
         wait("all have been counted", || (place.counted().len() >= 20).then_some(()));

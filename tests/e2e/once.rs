@@ -8,7 +8,7 @@ use rohrpost::common;
 use rohrpost::launcher::{ControlError, LauncherInterface};
 use rohrpost::serde::{Serialize, de::DeserializeOwned};
 use rohrpost::{CallError, Class, Fault};
-use rohrpost_mailbox::{Full, Label, Name, Options, Participant, Receiver, Sender, Shape, Type, local};
+use rohrpost_mailbox::{Label, Name, Options, OverflowPolicy, Participant, Receiver, Sender, Shape, Type, local};
 use rohrpost_modules::call::{CallEnvelope, Link, ReplyEnvelope};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -53,7 +53,7 @@ impl Raw {
     }
 
     /// The next answer to this call. A server that is killed between answering and letting go of a command leaves it to its
-    /// next life, which answers it too.
+    /// next incarnation, which answers it too.
     fn answer_to(&mut self, sequence: u32) -> Result<u64, Fault> {
         loop {
             let (envelope, result) = self.answer();
@@ -131,7 +131,7 @@ fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
         let (envelope, result) = raw.answer();
         assert_eq!((envelope, result), (ReplyEnvelope { incarnation, sequence }, Ok(u64::from(number))));
     }
-    // Late packages of the earlier life: one that ran, and one that never came before. If that life is none, but a program whose node's
+    // Late packages of the earlier incarnation: one that ran, and one that never came before. If that incarnation is none, but a program whose node's
     // clock was set back, it learns why it is not served.
     for (sequence, age_us, number) in [(2, 500, 5), (3, 0, 6)] {
         raw.send(COUNT, Raw::envelope(7, sequence, age_us), number);
@@ -153,7 +153,7 @@ fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
     });
     raw.send(COUNT, Raw::envelope(8, 3, 0), 7);
     assert_eq!(raw.answer().0, ReplyEnvelope { incarnation: 8, sequence: 3 });
-    // The same with real tools: each is a new life under the same name, with numbers from 1 on.
+    // The same with real tools: each is a new incarnation under the same name, with numbers from 1 on.
     for number in 8..=10u32 {
         place.say(&["call", "probe.0", "count", &number.to_string()]).ok();
     }
@@ -178,7 +178,7 @@ fn a_restarted_server_runs_no_repeat_of_what_its_earlier_life_may_have_run() {
         [(COUNT, 1, Err(Fault::Interrupted)), (COUNT, 2, Err(Fault::Interrupted)), (COUNT_AGAIN, 3, Ok(1))]
     {
         raw.send(function, Raw::envelope(7, sequence, age_us(began)), sequence);
-        assert_eq!(raw.answer_to(sequence), answer, "tried before the new life: {sequence}");
+        assert_eq!(raw.answer_to(sequence), answer, "tried before the new incarnation: {sequence}");
     }
     // What it hears for the first time is no repeat, whatever came before.
     raw.send(COUNT, Raw::envelope(7, 4, 0), 4);
@@ -229,7 +229,7 @@ fn replies_that_find_no_room_are_asked_for_again_and_nothing_runs_twice() {
     let participant = Participant::join(&robot.node, Name::NONE).unwrap();
     let me = Name::new(1, 16, 201, 0);
     // Room for one answer, and eight calls at a time.
-    let shape = Shape { slots: 1, full: Full::Reject, ..Shape::default() };
+    let shape = Shape { slots: 1, full: OverflowPolicy::Reject, ..Shape::default() };
     let replies = participant.receiver(me.with_local(local::REPLIES), shape).unwrap();
     let mut link = Link::new(&participant, me, replies);
     let mut answers = BTreeSet::new();

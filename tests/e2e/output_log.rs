@@ -4,7 +4,7 @@ use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
 use crate::output::{call, is_own};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 
 const PATIENT: [&str; 3] = ["log", "--timeout", "60"];
 
@@ -56,7 +56,7 @@ fn levels_are_set_while_modules_run() {
     assert_eq!(rows[1], ["probe.0", "trace", "info", "0", "0"], "{table}");
     assert_eq!(rows[2], ["probe.1", "error", "warn", "0", "0"], "{table}");
 
-    // It is the configuration's again in its next life.
+    // It is the configuration's again in its next incarnation.
     let pid = robot.pid("probe.0");
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.0", pid);
@@ -123,7 +123,7 @@ fn filters_choose_by_module_class_level_text_and_time() {
 
 #[test]
 fn a_follower_survives_the_collector_and_says_so() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let output = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\nrestart = { backoff = \"50 ms\" }\n";
         let (mut launch, robot) = place.launched(&[output, &probe("probe.0", "", "")]);

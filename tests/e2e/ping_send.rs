@@ -3,12 +3,12 @@
 use crate::harness::{PATIENCE, Place, halt, probe, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use serde_json::Value;
 
 #[test]
 fn ping_counts_answers_and_ends_at_its_deadline() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let (_launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
         let text = place.say(&["ping", "probe.0", "-c", "5", "--interval", "0"]).ok();
@@ -45,7 +45,7 @@ fn ping_counts_answers_and_ends_at_its_deadline() {
 
 #[test]
 fn send_repeats_a_command_and_counts_what_came_of_it() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let (_launch, _robot) = place.launched(&[&probe("probe.0", "", "")]);
         let counts = place.say(&["send", "probe.0", "count", "7", "--rate", "10", "--count", "12", "--json"]).json();

@@ -6,7 +6,7 @@
 use nix::sys::signal::{SigHandler, Signal, raise, signal};
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError, Rate, Received, Subscription};
-use rohrpost_mailbox::{Full, Shape};
+use rohrpost_mailbox::{OverflowPolicy, Shape};
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ pub(crate) enum ProbeError {
 /// Does what tests ask of it.
 #[rohrpost::interface(class = "probe")]
 pub(crate) trait Probing {
-    /// Writes the number into the record and tells how many it has written in this life.
+    /// Writes the number into the record and tells how many it has written in this incarnation.
     #[command(16)]
     fn count(&mut self, number: u32) -> u64;
 
@@ -215,14 +215,14 @@ fn hear(from: &str, context: &mut Context) -> Result<[Subscription<u64>; 2], Mod
     let beat = ProbingInterface::BEAT;
     let refused = context.subscribe_in(NEWEST, beat, from, Rate::Each).err().unwrap().to_string();
     assert!(refused.contains("no mailbox 3 for data; make it with `open_mailbox`"), "{refused}");
-    context.open_mailbox(NEWEST, Shape { slots: 8, full: Full::Latest, ..Shape::default() })?;
+    context.open_mailbox(NEWEST, Shape { slots: 8, full: OverflowPolicy::Latest, ..Shape::default() })?;
     let newest = context.subscribe_in(NEWEST, beat, from, Rate::Each)?;
     Ok([context.subscribe(beat, from, Rate::Each)?, newest])
 }
 
 /// Follows another probe's blobs, of which only the newest counts.
 fn watch(from: &str, context: &mut Context) -> Result<Subscription<Vec<u8>>, ModuleError> {
-    let shape = Shape { slots: 8, body_bytes_max: 16 * 1024, full: Full::Latest, ..Shape::default() };
+    let shape = Shape { slots: 8, body_bytes_max: 16 * 1024, full: OverflowPolicy::Latest, ..Shape::default() };
     context.open_mailbox(NEWEST, shape)?;
     Ok(context.subscribe_in(NEWEST, ProbingInterface::BLOB, from, Rate::Each)?)
 }

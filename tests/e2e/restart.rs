@@ -45,7 +45,7 @@ fn a_killed_module_works_again_and_its_restarts_are_counted() {
         let process = robot.wait_restarted("probe.0", pid);
         assert_eq!(process.restarts, count);
         pid = process.pid;
-        assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n", "a new life counts anew");
+        assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n", "a new incarnation counts anew");
     }
     let list = place.say(&["list", "--json"]).json();
     assert_eq!(list["modules"][1]["restarts"], 2);

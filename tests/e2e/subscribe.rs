@@ -127,7 +127,7 @@ fn data_that_nobody_asked_for_are_dropped_and_counted_by_cause() {
         other_publisher: 2,
         unasked: 2,
         other_number: 1,
-        earlier_life: 2,
+        earlier_incarnation: 2,
         malformed: 2,
         ..Refused::default()
     };
@@ -156,10 +156,10 @@ fn a_subscriber_that_restarts_with_its_subscriptions_in_another_order_takes_no_o
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.1", pid);
     wait("it hears again", || (mixed("beat").len() > before + 20).then_some(()));
-    // What its earlier life asked for came to it, and the beats are the publisher's own.
+    // What its earlier incarnation asked for came to it, and the beats are the publisher's own.
     let refused = tool.status(robot.name("probe.1")).unwrap().refused;
     let said = place.record().join("\n");
-    assert!(refused.earlier_life + refused.other_number > 0, "{refused:?}: nothing of before came");
+    assert!(refused.earlier_incarnation + refused.other_number > 0, "{refused:?}: nothing of before came");
     assert!(mixed("beat").windows(2).all(|two| two[0] < two[1]) && mixed("beat").last() < Some(&BLOB), "{said}");
     assert!(mixed("blob").iter().all(|blob| *blob == BLOB), "{said}");
     tool.close();

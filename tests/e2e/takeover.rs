@@ -8,7 +8,7 @@ use rohrpost::interface::DataPort;
 use rohrpost::interfaces::RouterInterface;
 use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::schema::Data;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::path::Path;
 use std::time::Duration;
 
@@ -41,7 +41,7 @@ fn assert_kept(said: &str, kills: usize) {
     assert!(lost <= kills as u64 / 20, "{lost} lost by {kills} kills:\n{said}");
 }
 
-/// What was sealed to the life that died is lost with it, and nothing can be sealed to the next before that has joined: of each flow a
+/// What was sealed to the incarnation that died is lost with it, and nothing can be sealed to the next before that has joined: of each flow a
 /// part of so many at most.
 fn assert_lost_of(said: &str, part: u64) {
     for row in flows(said) {
@@ -138,7 +138,7 @@ fn killed_again(place: &Place) -> Option<Said> {
 
 #[test]
 fn killed_again_and_again_the_master_costs_no_package_of_a_declared_flow() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let Some(said) = killed_again(&place) else { return };
         assert_eq!(said.code, Some(0), "{said:?}");
@@ -176,7 +176,7 @@ fn ended_well(place: &Place, arguments: &[&str]) -> Option<Said> {
 
 #[test]
 fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let arguments = ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "--kill-master"];
         let Some(Said { out: said, .. }) = ended_well(&place, &arguments) else { return };
@@ -199,10 +199,10 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
     });
 }
 
-/// Sealed, its next life knows nobody, and hears the time before anybody has shown that it lives.
+/// Sealed, its next incarnation knows nobody, and hears the time before anybody has shown that it lives.
 #[test]
 fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
         let arguments = ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "--kill-master"];
         let Some(Said { out, err, .. }) = ended_well(&place, &arguments) else { return };

@@ -53,7 +53,7 @@ fn echo_goes_on_when_its_module_is_restarted_and_ends_by_ctrl_c() {
     let pid = robot.pid("probe.0");
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.0", pid);
-    wait("beats of the new life", || {
+    wait("beats of the new incarnation", || {
         echo.assert_runs();
         // Its numbers begin anew.
         let numbers: Vec<_> = beats(&echo).iter().map(|line| line["sequence"].as_u64()).collect();

@@ -5,7 +5,7 @@ use crate::harness::{PATIENCE, Place, Robot, probe, skipped, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -161,7 +161,7 @@ impl Wifi {
 
 #[test]
 fn by_a_bad_wifi_what_comes_is_fresh_and_an_outage_costs_a_gap_and_nothing_else() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(wifi) = Wifi::launched() else { return };
         wait("blobs are replaced", || (wifi.replaced() > 0).then_some(()));
         wifi.check_fresh();
@@ -175,7 +175,7 @@ fn by_a_bad_wifi_what_comes_is_fresh_and_an_outage_costs_a_gap_and_nothing_else(
         let (before, outages) = (modules(), wait("net tells", || wifi.net("far")["beyond"]["outages"].as_u64()));
         wifi.lab.cut("far").unwrap();
         wait("far is away", || (wifi.net("far")["beyond"]["state"] == "away").then_some(()));
-        wifi.lab.mend("far").unwrap();
+        wifi.lab.fix("far").unwrap();
         wait("far takes part again, and says that it was away", || {
             let beyond = wifi.net("far")["beyond"].clone();
             (beyond["state"] == "up" && beyond["outages"].as_u64() > Some(outages)).then_some(())

@@ -1,7 +1,7 @@
 //! Drawings of whole demos, in files.
 
 use super::programs::{bridge, entities_of, ok, rerun, rows, rrd, search_path, timed_rows, times_ns};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
@@ -96,7 +96,7 @@ impl Drawing {
 
 #[test]
 fn the_simulated_robot_is_drawn() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let drawing = Drawing::of(&["--seconds", "6"]);
         // Ten a second of scans and of poses, for six seconds less the start; a busy computer draws fewer.
         drawing.has("/world/scan/laser.0", 15..=70);
@@ -113,7 +113,7 @@ fn the_simulated_robot_is_drawn() {
 /// Each node draws what its router tells of its slots, and of the flows that leave it.
 #[test]
 fn time_slots_and_flows_are_drawn() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let drawing = Drawing::where_possible(&["--nodes", "3", "--tdma", "--seconds", "10"]);
         let Some(drawing) = drawing else { return };
         for entity in ["slots", "guards", "nodes", "marks", "times"] {
@@ -135,7 +135,7 @@ fn time_slots_and_flows_are_drawn() {
 /// and nothing else.
 #[test]
 fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let drawing = Drawing::where_possible(&["--nodes", "3", "--gui", "tcp", "--secure", "--seconds", "16"]);
         let Some(drawing) = drawing else { return };
         let said = &drawing.said;
@@ -178,7 +178,7 @@ fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
 
 #[test]
 fn a_log_is_drawn() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let drawing = Drawing::of(&["--log", LOG, "--speed", "2"]);
         assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
         assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);

@@ -4,8 +4,8 @@ use super::programs::{printed, rows, times_ns};
 use super::robot::{Robot, wait};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost_mailbox::{ClassTraffic, Full, Loss, local};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_mailbox::{ClassTraffic, Loss, OverflowPolicy, local};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 
 const SCAN: &str = "/world/scan/source.0";
 /// The bridge's mailbox for what tells how things are.
@@ -22,7 +22,7 @@ fn is_stopped(pid: u32) -> bool {
 
 #[test]
 fn a_bridge_that_stood_still_goes_on_with_the_newest() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let mut robot = Robot::start("file = \"robot.rrd\"", "");
         let file = robot.folder().join("robot.rrd");
         wait("scans are drawn", || (!times_ns(&file, SCAN).is_empty()).then_some(()));
@@ -59,7 +59,7 @@ fn a_bridge_that_stood_still_goes_on_with_the_newest() {
 
         let [newest, each] = [NEWEST, local::DATA].map(|local| robot.bridge_mailbox(local));
         let replaced = |classes: &[ClassTraffic]| classes.iter().map(|class| class.lost(Loss::Replaced)).sum::<u64>();
-        assert_eq!((newest.shape.full, each.shape.full), (Full::Latest, Full::Displace));
+        assert_eq!((newest.shape.full, each.shape.full), (OverflowPolicy::Latest, OverflowPolicy::Displace));
         assert!(replaced(&newest.classes) > u64::from(WAITING), "{:?}", newest.classes);
         assert_eq!(replaced(&each.classes), 0, "patches do not replace each other");
         robot.assert_well();

@@ -15,7 +15,7 @@
 use super::load::{Load, on_one_processor};
 use super::robot::{Mark, Robot};
 use super::viewer::{Viewer, free_port};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};
 
 /// The robot's latencies with a viewer that misbehaves, by those in peace; in as many rounds as somebody asked for.
@@ -212,7 +212,7 @@ fn measure(test: &mut Test, when: &str, marks: &[(Mark, &str); 2], freeze: bool)
 
 #[test]
 fn a_viewer_that_misbehaves_does_not_slow_the_robot() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let mut test = Test::new(|_| String::new());
         test.robot.mark(&Mark::Begun(1));
         test.windows();
@@ -255,7 +255,7 @@ fn a_viewer_that_misbehaves_does_not_slow_the_robot() {
 /// The measurement can fail: a robot that waits for its viewer is found out.
 #[test]
 fn a_robot_that_waits_for_its_viewer_is_found_out() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let mut test = Test::new(|port| format!("ask-viewer = {port}"));
         test.restart();
         let before = quiet(&[test.windows(), test.windows()].concat());

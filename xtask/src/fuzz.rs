@@ -2,7 +2,7 @@
 //! lets libFuzzer run them.
 //!
 //! What it finds of new ways is kept below `target/fuzz/found`, for longer runs to go on from; an input that breaks a
-//! promise is a file in `target/fuzz`, and goes into `tests/fuzz/corpus` once the mistake is mended.
+//! promise is a file in `target/fuzz`, and goes into `tests/fuzz/corpus` once the mistake is fixed.
 
 use crate::cargo::{self, cargo, host};
 use crate::failure::Failure;

@@ -10,7 +10,7 @@ use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, 
 use crate::one_way::{Ground, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
-use rohrpost_mailbox::{Full, monotonic_ns};
+use rohrpost_mailbox::{OverflowPolicy, monotonic_ns};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -44,7 +44,7 @@ impl Case for Cost {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let bursts = settings.count(32_000) / self.burst + GROUP;
         let ours = Contender::sampled("rohrpost", || {
-            let ground = Ground::new(DEPTH, BYTES, Full::Displace)?;
+            let ground = Ground::new(DEPTH, BYTES, OverflowPolicy::Displace)?;
             cost(self.burst, bursts, || ground.sink(100, Retry::Never), || ground.source(true))
         });
         let wakeable = Contender::sampled("Vyukov, wakeable", || vyukov::<true>(self.burst, bursts));
@@ -66,7 +66,7 @@ struct Turn {
     gate: Gate,
     samples: Samples,
     /// On lines of its own: whoever sends looks at it again and again.
-    received: crate::floors::ring::Line<AtomicU64>,
+    received: crate::floors::ring::CacheLine<AtomicU64>,
 }
 
 // SAFETY: atomics only.

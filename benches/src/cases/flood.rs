@@ -16,7 +16,7 @@ use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, 
 use crate::one_way::{Ground, QueueSink, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
-use rohrpost_mailbox::{Full, monotonic_ns, sys};
+use rohrpost_mailbox::{OverflowPolicy, monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -76,12 +76,15 @@ impl Case for Flood {
             }
         };
         let contenders = [
-            Contender::sampled("rohrpost", ours(Full::Displace, 1, None)),
+            Contender::sampled("rohrpost", ours(OverflowPolicy::Displace, 1, None)),
             two_rings,
             Contender::sampled("posix-mq", queue(1)),
-            Contender::sampled("rohrpost, latest", ours(Full::Latest, 2 * DEPTH as u16, None)),
+            Contender::sampled("rohrpost, latest", ours(OverflowPolicy::Latest, 2 * DEPTH as u16, None)),
             // What rejects has no room for the urgent unless somebody leaves it.
-            Contender::sampled("rohrpost, reject, 8 left free", ours(Full::Reject, 1, Some(DEPTH as u64 - 8))),
+            Contender::sampled(
+                "rohrpost, reject, 8 left free",
+                ours(OverflowPolicy::Reject, 1, Some(DEPTH as u64 - 8)),
+            ),
             Contender::sampled("posix-mq, one priority", queue(0)),
         ];
         let versus = [

@@ -6,7 +6,7 @@ use crate::one_way::Ground;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
-use rohrpost_mailbox::Full;
+use rohrpost_mailbox::OverflowPolicy;
 use std::os::unix::fs::MetadataExt;
 
 const PAGE: usize = 4096;
@@ -36,7 +36,7 @@ impl Memory {
 
     /// What the file of a mailbox of this shape takes.
     fn taken_bytes(&self) -> Result<u64, Failure> {
-        let ground = Ground::new(self.slots, self.bytes, Full::Displace)?;
+        let ground = Ground::new(self.slots, self.bytes, OverflowPolicy::Displace)?;
         let _source = ground.source(false)?;
         let files = std::fs::read_dir(ground.path()).map_err(|error| Failure::of("node's directory", error))?;
         let sizes = files.filter_map(|file| {

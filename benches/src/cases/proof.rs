@@ -15,7 +15,7 @@ use nix::sys::ptrace;
 use nix::sys::signal::{Signal, kill, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork};
-use rohrpost_mailbox::Full;
+use rohrpost_mailbox::OverflowPolicy;
 use std::hint::black_box;
 use std::sync::mpsc;
 use std::time::Duration;
@@ -80,7 +80,7 @@ fn counted<'a>(name: &'static str, count: impl Fn() -> Result<f64, Failure> + 'a
 
 /// Sends batch after batch into a mailbox of this process, with `mark` before and after each, and receives it again.
 fn mailbox_under(batches: usize, mut mark: impl FnMut()) -> Result<usize, Failure> {
-    let ground = Ground::new(2 * BATCH, BYTES, Full::Displace)?;
+    let ground = Ground::new(2 * BATCH, BYTES, OverflowPolicy::Displace)?;
     let mut source = ground.source(false)?;
     let mut sink = ground.sink(100, Retry::Never)?;
     let mut message = [0; BYTES];

@@ -11,7 +11,7 @@ use crate::one_way::{Ground, QueueSink, Retry, Stream, rate};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
-use rohrpost_mailbox::Full;
+use rohrpost_mailbox::OverflowPolicy;
 use std::time::Duration;
 
 /// Long enough for some hundred thousand packages, short enough that the kernel's fair server stays out.
@@ -108,6 +108,6 @@ fn rated<'a>(name: &'static str, turn: impl Fn() -> Result<f64, Failure> + 'a) -
 }
 
 fn ours(stream: &Stream, spins: bool, retry: Retry) -> Result<f64, Failure> {
-    let ground = Ground::new(DEPTH, stream.bytes, Full::Reject)?;
+    let ground = Ground::new(DEPTH, stream.bytes, OverflowPolicy::Reject)?;
     rate(stream, |sender| ground.sink(PRIORITIES[sender % PRIORITIES.len()], retry), || ground.source(spins))
 }

@@ -15,15 +15,15 @@ pub const BYTES_MAX: usize = 4096;
 
 /// A word with its cache line, and the next one, which processors fetch along.
 #[repr(C, align(128))]
-pub struct Line<T>(pub T);
+pub struct CacheLine<T>(pub T);
 
 /// A ring's memory.
 #[repr(C)]
 pub struct Memory {
-    produced: Line<AtomicU64>,
-    consumed: Line<AtomicU64>,
+    produced: CacheLine<AtomicU64>,
+    consumed: CacheLine<AtomicU64>,
     room: Bell,
-    slots: Line<UnsafeCell<[u8; DEPTH * BYTES_MAX]>>,
+    slots: CacheLine<UnsafeCell<[u8; DEPTH * BYTES_MAX]>>,
 }
 
 // SAFETY: a slot's bytes are written by the sender before it says `produced` and read by the receiver before it says `consumed`.
@@ -43,7 +43,7 @@ unsafe impl Zeroable for Shared {}
 
 /// A word that one process sleeps on: 1 while it does or is about to.
 #[repr(C)]
-pub struct Bell(Line<AtomicU32>);
+pub struct Bell(CacheLine<AtomicU32>);
 
 impl Bell {
     /// Sleeps unless something is found once it is said that we do.

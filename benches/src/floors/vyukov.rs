@@ -4,7 +4,7 @@
 //! with `FENCED` that is done too, though here the receiver never sleeps. It knows no priorities, and a sender that dies with a
 //! number closes it for ever.
 
-use super::ring::{BYTES_MAX, DEPTH, Line};
+use super::ring::{BYTES_MAX, CacheLine, DEPTH};
 use crate::Failure;
 use crate::harness::Zeroable;
 use crate::one_way::{Sink, Source};
@@ -17,10 +17,10 @@ const TURN_BYTES: usize = size_of::<AtomicU64>();
 /// The queue's memory.
 #[repr(C)]
 pub struct Memory {
-    next: Line<AtomicU64>,
-    sleeping: Line<AtomicU32>,
+    next: CacheLine<AtomicU64>,
+    sleeping: CacheLine<AtomicU32>,
     /// Each slot's number, and the message behind it; how far apart they are depends on the message.
-    slots: Line<UnsafeCell<[u8; DEPTH * (BYTES_MAX + 128)]>>,
+    slots: CacheLine<UnsafeCell<[u8; DEPTH * (BYTES_MAX + 128)]>>,
 }
 
 // SAFETY: a slot's bytes belong to the sender whose number it shows, or to the receiver when that is one more.

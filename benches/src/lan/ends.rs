@@ -5,7 +5,7 @@ use super::nodes::{self, Nodes};
 use crate::Failure;
 use crate::harness::{End, Link, Meetings};
 use rohrpost_mailbox::{
-    Full, Label, Name, Node, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
+    Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -105,7 +105,7 @@ impl Source {
     pub fn offer(&mut self, message: &[u8]) -> Result<bool, Failure> {
         match self.sender.send(&self.label, &[message]) {
             Ok(()) => Ok(true),
-            Err(SendError::Full(_)) => Ok(false),
+            Err(SendError::OverflowPolicy(_)) => Ok(false),
             Err(error) => Err(Failure::of("send", error)),
         }
     }
@@ -130,7 +130,8 @@ impl Sink {
     /// When it cannot be made.
     pub fn open(directory: &Path, own: Name, bytes: usize) -> Result<Self, Failure> {
         let participant = join(directory, own)?;
-        let shape = Shape { slots: SLOTS, body_bytes_max: body(bytes)?, full: Full::Reject, ..Shape::default() };
+        let shape =
+            Shape { slots: SLOTS, body_bytes_max: body(bytes)?, full: OverflowPolicy::Reject, ..Shape::default() };
         let receiver = participant.receiver(own, shape).map_err(|error| Failure::of("mailbox", error))?;
         Ok(Self { receiver })
     }

@@ -4,7 +4,7 @@ use super::{Sink, Source};
 use crate::Failure;
 use crate::harness::Scratch;
 use rohrpost_mailbox::{
-    Full, Label, Name, Node, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
+    Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Type, Waiting,
 };
 use std::path::PathBuf;
 use std::time::Duration;
@@ -24,7 +24,7 @@ impl Ground {
     ///
     /// # Errors
     /// When there is no room.
-    pub fn new(slots: usize, bytes: usize, full: Full) -> Result<Self, Failure> {
+    pub fn new(slots: usize, bytes: usize, full: OverflowPolicy) -> Result<Self, Failure> {
         let shape = Shape { slots: slots as u16, body_bytes_max: bytes as u16, full, ..Shape::default() };
         Ok(Self { scratch: Scratch::new()?, shape })
     }
@@ -108,7 +108,7 @@ impl Sink for OurSink {
         loop {
             match self.sender.send(&self.label, &[message]) {
                 Ok(()) => return Ok(()),
-                Err(SendError::Full(_)) if self.retry != Retry::Never => self.pause(),
+                Err(SendError::OverflowPolicy(_)) if self.retry != Retry::Never => self.pause(),
                 Err(error) => return Err(Failure::of("send", error)),
             }
         }

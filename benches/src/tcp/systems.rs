@@ -171,7 +171,7 @@ impl Systems {
     /// As a user would ask.
     fn is_up(&self, end: End) -> Result<bool, Failure> {
         #[derive(Deserialize)]
-        struct Told {
+        struct StatusJson {
             beyond: Option<Beyond>,
         }
         #[derive(Deserialize)]
@@ -185,7 +185,7 @@ impl Systems {
             .output();
         let output = asked.map_err(|error| Failure::of("rohrpost net", error))?;
         // Before the client has said anything there is nothing to read.
-        let told: Vec<Told> = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).unwrap_or_default();
         Ok(told.into_iter().filter_map(|told| told.beyond).any(|beyond| beyond.state == "up"))
     }
 }

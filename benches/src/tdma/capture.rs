@@ -66,7 +66,7 @@ pub struct Arrived {
 }
 
 #[repr(C)]
-struct Seen {
+struct CaptureMemory {
     gate: Gate,
     frames: AtomicU64,
     arrivals: AtomicU64,
@@ -77,11 +77,11 @@ struct Seen {
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Seen {}
+unsafe impl Zeroable for CaptureMemory {}
 
 /// Watches, in a process of its own, until it is dropped.
 pub struct Capture {
-    seen: Shared<Seen>,
+    seen: Shared<CaptureMemory>,
     /// One process.
     watcher: Vec<Child>,
 }
@@ -92,7 +92,7 @@ impl Capture {
     /// # Errors
     /// When the system lets nobody watch.
     pub fn start(stage: &Stage) -> Result<Self, Failure> {
-        let seen = Shared::<Seen>::new()?;
+        let seen = Shared::<CaptureMemory>::new()?;
         let mut watcher = vec![Child::start(|| {
             stage.enter_bridge()?;
             let socket = filter::open([PORT, PORT + 1], PATIENCE)?;
@@ -154,7 +154,7 @@ fn arrived(words: &[AtomicU64; 3]) -> Arrived {
     Arrived { at_ns, published_ns, class, from }
 }
 
-impl Seen {
+impl CaptureMemory {
     fn frame(&self, frame: &Crossed) {
         let what = u64::from_le_bytes([frame.from, frame.what as u8, 0, 0, 0, 0, 0, 0]);
         append(&self.frames, &self.frame, [frame.at_ns, what]);
@@ -175,7 +175,7 @@ fn append<const WORDS: usize>(count: &AtomicU64, all: &[[AtomicU64; WORDS]], wor
     count.store(at + 1, Ordering::Release);
 }
 
-fn watch(socket: &OwnedFd, seen: &Seen) -> Result<(), Failure> {
+fn watch(socket: &OwnedFd, seen: &CaptureMemory) -> Result<(), Failure> {
     // Both clocks are slewed alike, so it stays as it is unless somebody sets one.
     let ahead_ns = realtime_ahead_ns();
     let (mut bytes, mut space) = ([0; 2048], nix::cmsg_space!(TimeSpec));
@@ -198,7 +198,7 @@ fn watch(socket: &OwnedFd, seen: &Seen) -> Result<(), Failure> {
 }
 
 /// Remembers a datagram, and the stamped packages in it.
-fn note(seen: &Seen, at_ns: u64, datagram: &[u8]) {
+fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
     let Ok((head, frame)) = Frame::parse(datagram) else { return };
     let from = head.from;
     let what = match frame {
@@ -225,7 +225,7 @@ fn note(seen: &Seen, at_ns: u64, datagram: &[u8]) {
     seen.frame(&Crossed { at_ns, from, what });
 }
 
-fn arrive(seen: &Seen, at_ns: u64, from: u8, sender: Name, end: &[u8]) {
+fn arrive(seen: &CaptureMemory, at_ns: u64, from: u8, sender: Name, end: &[u8]) {
     if let Some((_, published)) = end.split_last_chunk() {
         let (published_ns, class) = (u64::from_le_bytes(*published), sender.class().0);
         seen.arrival(&Arrived { at_ns, published_ns, class, from });

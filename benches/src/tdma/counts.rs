@@ -27,7 +27,7 @@ pub struct Counts {
 }
 
 #[derive(Deserialize)]
-struct Told {
+struct StatusJson {
     slots: Option<Counts>,
     failure: Option<String>,
 }
@@ -96,7 +96,7 @@ fn answer(asked: Child) -> Result<Counts, Failure> {
     let output = asked.wait_with_output().map_err(|error| Failure::of("rohrpost net", error))?;
     let said = || format!("rohrpost net: {}", String::from_utf8_lossy(&output.stderr));
     // It fails if a peer is silent, which is no concern of ours.
-    let told: Vec<Told> = serde_json::from_slice(&output.stdout).map_err(|error| Failure::of(&said(), error))?;
+    let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).map_err(|error| Failure::of(&said(), error))?;
     let told = told.into_iter().next().ok_or_else(|| Failure::Failed(said()))?;
     told.slots.ok_or_else(|| Failure::Failed(told.failure.unwrap_or_else(said)))
 }

@@ -30,14 +30,14 @@ pub(super) struct Arguments {
 /// # Errors
 /// Everything that is wrong, by line.
 pub(super) fn load(file: &Path) -> Result<Installation, Errors> {
-    judge(Installation::load(file)?)
+    validate(Installation::load(file)?)
 }
 
 /// Asks the built-in modules of an installation whether they could work with it.
 ///
 /// # Errors
 /// Everything that they would refuse, by line.
-pub(super) fn judge(installation: Installation) -> Result<Installation, Errors> {
+pub(super) fn validate(installation: Installation) -> Result<Installation, Errors> {
     let problems = rohrpost_modules::builtin::check(&installation);
     if !problems.is_empty() {
         return Err(Errors::new(&installation.path, problems));

@@ -72,7 +72,7 @@ fn folder(file: &Path) -> Result<PathBuf, Failure> {
 
 fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Arguments) -> Result<String, Failure> {
     // Checked as it was written, so that a mistake is told with its own file and line.
-    let installation = check::judge(Installation::parse(text, shown)?)?;
+    let installation = check::validate(Installation::parse(text, shown)?)?;
     let mut document: DocumentMut = text.parse()?;
     if let (Some(folder), Some(item)) = (folder, document.get_mut("parameters")) {
         start_from(folder, item);
@@ -167,13 +167,13 @@ mod tests {
     use clap::Parser;
 
     #[derive(Parser)]
-    struct Line {
+    struct TestArguments {
         #[command(flatten)]
         arguments: Arguments,
     }
 
     fn copied(text: &str, words: &[&str]) -> Installation {
-        let line = Line::parse_from([&["demo"], words].concat());
+        let line = TestArguments::parse_from([&["demo"], words].concat());
         let text = rewritten(text, Path::new("robot.toml"), Some(Path::new("/etc/robot")), &line.arguments).unwrap();
         Installation::parse(&text, Path::new("/tmp/copy.toml")).unwrap()
     }

@@ -5,7 +5,7 @@ use super::arguments::{Arguments, Joined};
 use super::asked::{FIRST_FUNCTION, map_line, running};
 use super::drawing::{drawing, drawn};
 use super::losses::Losses;
-use super::takeover::{Seen, Victim, Watch};
+use super::takeover::{TakeoverRecord, Victim, Watch};
 use super::{beyond, copy};
 use crate::launch::{Nodes, lab};
 use crate::speech::Speech;
@@ -63,7 +63,7 @@ fn watch(
     installation: &Arc<Installation>,
     long: Option<Duration>,
     victims: Vec<Victim>,
-) -> Option<Result<Seen, Failure>> {
+) -> Option<Result<TakeoverRecord, Failure>> {
     while !nodes.all_run() {
         if !nodes.watch(Duration::MAX) {
             return None;
@@ -92,7 +92,7 @@ fn watch(
 }
 
 /// All there is to say at the end, and whether all is well.
-fn summary(installation: &Arc<Installation>, seen: &Seen) -> Result<(String, bool), Failure> {
+fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord) -> Result<(String, bool), Failure> {
     let open = |node: &rohrpost_config::Node| Node::open(&node_directory(&installation.name, &node.name));
     let nodes = installation.nodes.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let (first, name) = (&nodes[0], &installation.nodes[0].name);

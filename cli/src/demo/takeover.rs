@@ -2,9 +2,9 @@
 //!
 //! A thread looks at the bridge and at the nodes' tables. It asks nobody, so that nothing crosses the network for it.
 
-use super::ears::Ears;
-use super::lives::{Death, Lives};
-use super::reigns::{Reign, Reigns};
+use super::incarnations::{Death, Incarnations};
+use super::masters::{MasterTerm, Masters};
+use super::sealed_capture::SealedCapture;
 use crate::table::time;
 use crate::terminal::Failure;
 use rohrpost_config::Installation;
@@ -26,7 +26,7 @@ const READ_LOOKS: u32 = 10;
 pub(super) struct Watch {
     /// Who is to be killed; without this end, the thread ends.
     kill: Sender<Victim>,
-    thread: JoinHandle<Seen>,
+    thread: JoinHandle<TakeoverRecord>,
     installation: Arc<Installation>,
 }
 
@@ -40,13 +40,13 @@ pub(super) enum Victim {
 }
 
 /// What it has seen.
-pub(super) struct Seen {
+pub(super) struct TakeoverRecord {
     installation: Arc<Installation>,
     began_ns: u64,
-    lives: Lives,
+    incarnations: Incarnations,
     /// Of the TCP router.
-    beyond: Lives,
-    reigns: Reigns,
+    beyond: Incarnations,
+    masters: Masters,
     /// Processes that were killed on purpose.
     on_purpose: Vec<u32>,
     /// Kills that were wanted when nobody was master.
@@ -57,14 +57,14 @@ impl Watch {
     /// Of nodes that all run.
     pub(super) fn begin(installation: &Arc<Installation>, capture: Capture) -> Result<Self, Failure> {
         let (kill, words) = channel();
-        let seen = Seen {
+        let seen = TakeoverRecord {
             installation: installation.clone(),
             began_ns: monotonic_ns(),
-            lives: Lives::of(installation, |node| installation.router_of(node))?,
-            beyond: Lives::of(installation, |node| {
+            incarnations: Incarnations::of(installation, |node| installation.router_of(node))?,
+            beyond: Incarnations::of(installation, |node| {
                 installation.tcp_router().filter(|router| installation.node_of(*router) == Some(node))
             })?,
-            reigns: Reigns::heard_with(Ears::of(installation)?),
+            masters: Masters::heard_with(SealedCapture::of(installation)?),
             on_purpose: Vec::new(),
             in_vain: 0,
         };
@@ -79,23 +79,23 @@ impl Watch {
     }
 
     /// Ends it.
-    pub(super) fn end(self) -> Result<Seen, Failure> {
+    pub(super) fn end(self) -> Result<TakeoverRecord, Failure> {
         drop(self.kill);
         let name = &self.installation.name;
         self.thread.join().map_err(|_| format!("the thread that watches {name} has panicked").into())
     }
 }
 
-impl Seen {
+impl TakeoverRecord {
     fn watch(mut self, mut capture: Capture, words: &Receiver<Victim>) -> Self {
         let mut looks = 0;
         loop {
             let word = words.recv_timeout(LOOK);
-            self.lives.look();
+            self.incarnations.look();
             self.beyond.look();
             looks += 1;
             if looks % READ_LOOKS == 0 || word != Err(RecvTimeoutError::Timeout) {
-                capture.drain(|crossing| self.reigns.note(&crossing));
+                capture.drain(|crossing| self.masters.note(&crossing));
             }
             match word {
                 Ok(victim) => self.kill(victim),
@@ -108,8 +108,8 @@ impl Seen {
     fn kill(&mut self, victim: Victim) {
         let killed = match victim {
             Victim::Master => {
-                let master = self.reigns.master_at(monotonic_ns()).map(|reign| usize::from(reign.node));
-                master.and_then(|node| self.lives.kill(node))
+                let master = self.masters.master_at(monotonic_ns()).map(|term| usize::from(term.node));
+                master.and_then(|node| self.incarnations.kill(node))
             }
             Victim::TcpRouter => (0..self.installation.nodes.len()).find_map(|node| self.beyond.kill(node)),
         };
@@ -119,10 +119,10 @@ impl Seen {
         }
     }
 
-    /// Nodes whose routers had more than one life.
+    /// Nodes whose routers had more than one incarnation.
     pub(super) fn died(&self) -> Vec<&str> {
         let name = |death: &Death| self.installation.nodes[death.node].name.as_str();
-        let mut names: Vec<&str> = self.lives.deaths.iter().map(name).collect();
+        let mut names: Vec<&str> = self.incarnations.deaths.iter().map(name).collect();
         names.sort_unstable();
         names.dedup();
         names
@@ -130,17 +130,18 @@ impl Seen {
 
     /// Whether each that died came back, and was killed if it was to be.
     pub(super) fn is_well(&self) -> bool {
-        self.in_vain == 0 && self.lives.deaths.iter().chain(&self.beyond.deaths).all(|death| death.again.is_some())
+        self.in_vain == 0
+            && self.incarnations.deaths.iter().chain(&self.beyond.deaths).all(|death| death.again.is_some())
     }
 
-    /// Whether the TCP router had more than one life.
+    /// Whether the TCP router had more than one incarnation.
     pub(super) fn tcp_router_died(&self) -> bool {
         !self.beyond.deaths.is_empty()
     }
 
     /// All of it in words; empty when no router died.
     pub(super) fn text(&self) -> String {
-        let mut text: String = self.lives.deaths.iter().map(|death| self.event(death)).collect();
+        let mut text: String = self.incarnations.deaths.iter().map(|death| self.event(death)).collect();
         for death in &self.beyond.deaths {
             text += &format!("The TCP router {}.\n", self.life(death));
         }
@@ -148,15 +149,15 @@ impl Seen {
             text += "no router was killed, as there was none: no master, if [time] of the configuration is without `source = \"master\"`, or no \
                      TCP router\n";
         }
-        if !self.lives.deaths.is_empty() {
-            let master = self.reigns.master_at(u64::MAX).map(|reign| self.name(reign));
+        if !self.incarnations.deaths.is_empty() {
+            let master = self.masters.master_at(u64::MAX).map(|term| self.name(term));
             text += &format!("Master at the end: {}.\n", master.unwrap_or("none was heard"));
         }
         text
     }
 
-    fn name(&self, reign: &Reign) -> &str {
-        self.installation.nodes.get(usize::from(reign.node)).map_or("?", |node| &node.name)
+    fn name(&self, term: &MasterTerm) -> &str {
+        self.installation.nodes.get(usize::from(term.node)).map_or("?", |node| &node.name)
     }
 
     fn event(&self, death: &Death) -> String {
@@ -178,24 +179,24 @@ impl Seen {
 
     /// What became of its time, if it was the master.
     fn takeover(&self, death: &Death) -> Option<String> {
-        let is_its = |last: &&Reign| death.at_ns < last.last_ns + FOUND_NS || self.on_purpose.contains(&death.pid);
-        let last = self.reigns.last_of(death.node, death.at_ns).filter(is_its)?;
-        let after = |reign: &Reign| {
-            let cycles = reign.first_cycle.saturating_sub(last.last_cycle);
-            let took = time(Duration::from_nanos(reign.first_ns.saturating_sub(last.last_ns)));
+        let is_its = |last: &&MasterTerm| death.at_ns < last.last_ns + FOUND_NS || self.on_purpose.contains(&death.pid);
+        let last = self.masters.last_of(death.node, death.at_ns).filter(is_its)?;
+        let after = |term: &MasterTerm| {
+            let cycles = term.first_cycle.saturating_sub(last.last_cycle);
+            let took = time(Duration::from_nanos(term.first_ns.saturating_sub(last.last_ns)));
             format!("{cycles} {} ({took}) after its last", if cycles == 1 { "cycle" } else { "cycles" })
         };
-        let mut next = self.reigns.since(last.last_ns).peekable();
+        let mut next = self.masters.since(last.last_ns).peekable();
         let mut text = String::from("  It was the master.");
-        while let Some(reign) = next.next_if(|reign| reign.replacement) {
-            let (who, many) = (self.name(reign), reign.cycles());
+        while let Some(term) = next.next_if(|term| term.replacement) {
+            let (who, many) = (self.name(term), term.cycles());
             let syncs = if many == 1 { "synchronisation" } else { "synchronisations" };
-            text += &format!(" {who} stood in with {many} {syncs}, the first {}.", after(reign));
+            text += &format!(" {who} stood in with {many} {syncs}, the first {}.", after(term));
         }
         text += &match next.peek() {
             None => " No other took over.\n".into(),
-            Some(reign) if reign.node == last.node => format!(" It told the time again {}.\n", after(reign)),
-            Some(reign) => format!(" {} was master from the sync on that came {}.\n", self.name(reign), after(reign)),
+            Some(term) if term.node == last.node => format!(" It told the time again {}.\n", after(term)),
+            Some(term) => format!(" {} was master from the sync on that came {}.\n", self.name(term), after(term)),
         };
         Some(text)
     }

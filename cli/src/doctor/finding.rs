@@ -29,23 +29,23 @@ pub(super) struct Finding {
     pub(super) is: String,
     /// Why it matters.
     pub(super) why: &'static str,
-    /// What mends it: a command, if one does.
-    pub(super) mend: Option<String>,
+    /// What fixes it: a command, if one does.
+    pub(super) fix: Option<String>,
 }
 
 impl Finding {
     pub(super) fn ok(what: &'static str, is: impl Into<String>, why: &'static str) -> Self {
-        Self { what, state: State::Ok, is: is.into(), why, mend: None }
+        Self { what, state: State::Ok, is: is.into(), why, fix: None }
     }
 
-    /// Something that is not as it should be, and what mends it.
+    /// Something that is not as it should be, and what fixes it.
     pub(super) fn not(
         state: State,
         what: &'static str,
         is: impl Into<String>,
         why: &'static str,
-        mend: impl Into<String>,
+        fix: impl Into<String>,
     ) -> Self {
-        Self { what, state, is: is.into(), why, mend: Some(mend.into()) }
+        Self { what, state, is: is.into(), why, fix: Some(fix.into()) }
     }
 }

@@ -75,10 +75,10 @@ fn throttling(machine: &Machine) -> Option<Finding> {
     let (path, what) = ("/proc/sys/kernel/sched_rt_runtime_us", "real-time share");
     let runtime: i64 = machine.read(path)?.parse().ok()?;
     let period = machine.number("/proc/sys/kernel/sched_rt_period_us").unwrap_or(1_000_000).max(1);
-    let mend = "sudo sysctl -w kernel.sched_rt_runtime_us=950000";
+    let fix = "sudo sysctl -w kernel.sched_rt_runtime_us=950000";
     Some(match runtime {
-        0 => Finding::not(State::Bad, what, "0 µs: SCHED_FIFO threads never run", why, mend),
-        ..0 => Finding::not(State::Warn, what, "no limit: a runaway takes the computer with it", why, mend),
+        0 => Finding::not(State::Bad, what, "0 µs: SCHED_FIFO threads never run", why, fix),
+        ..0 => Finding::not(State::Warn, what, "no limit: a runaway takes the computer with it", why, fix),
         _ => Finding::ok(what, format!("{runtime} of {period} µs"), why),
     })
 }
@@ -102,11 +102,11 @@ fn clock_source(machine: &Machine) -> Option<Finding> {
     }
     let available = machine.read(&format!("{folder}/available_clocksource")).unwrap_or_default();
     let better = available.split_whitespace().find(|source| !slow.contains(source));
-    let mend = match better {
+    let fix = match better {
         Some(better) => format!("echo {better} | sudo tee {folder}/current_clocksource"),
         None => "look why the kernel gave up the better one: `dmesg | grep -i clocksource`".into(),
     };
-    Some(Finding::not(State::Warn, what, format!("{source} (slow)"), why, mend))
+    Some(Finding::not(State::Warn, what, format!("{source} (slow)"), why, fix))
 }
 
 fn governor(machine: &Machine) -> Finding {
@@ -120,8 +120,8 @@ fn governor(machine: &Machine) -> Finding {
         [] => Finding::ok(what, "none: firmware or the host sets the clock rate", why),
         [only] if only == "performance" => Finding::ok(what, "performance", why),
         several => {
-            let mend = "sudo cpupower frequency-set -g performance";
-            Finding::not(State::Warn, what, several.join(", "), why, mend)
+            let fix = "sudo cpupower frequency-set -g performance";
+            Finding::not(State::Warn, what, several.join(", "), why, fix)
         }
     }
 }
@@ -140,8 +140,8 @@ fn idle(machine: &Machine) -> Finding {
             Finding::ok(what, format!("deepest is {name}, {latency} µs"), why)
         }
         Some((latency, name)) => {
-            let mend = format!("sudo cpupower idle-set -D {IDLE_LATENCY_US}");
-            Finding::not(State::Warn, what, format!("deepest is {name}, {latency} µs"), why, mend)
+            let fix = format!("sudo cpupower idle-set -D {IDLE_LATENCY_US}");
+            Finding::not(State::Warn, what, format!("deepest is {name}, {latency} µs"), why, fix)
         }
     }
 }
@@ -156,8 +156,8 @@ fn cores(machine: &Machine) -> Finding {
         (count, list) => format!("{count} (numbers {})", list.unwrap_or_default()),
     };
     if count == 1 {
-        let mend = "give it more cores, or lift the restriction (`taskset -pc $$`, cpuset of the container)";
-        return Finding::not(State::Warn, what, is, why, mend);
+        let fix = "give it more cores, or lift the restriction (`taskset -pc $$`, cpuset of the container)";
+        return Finding::not(State::Warn, what, is, why, fix);
     }
     Finding::ok(what, is, why)
 }

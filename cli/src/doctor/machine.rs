@@ -93,11 +93,11 @@ pub(super) struct Bridge {
 /// A node's directory.
 pub(super) struct NodeFound {
     pub(super) path: PathBuf,
-    pub(super) seen: Seen,
+    pub(super) seen: NodeDirectory,
 }
 
 /// What is in a node's directory.
-pub(super) enum Seen {
+pub(super) enum NodeDirectory {
     /// A launch of this process id watches over it.
     Launched(u32),
     /// Processes run in it without a launch.
@@ -222,14 +222,14 @@ fn is_bridge(program: &Path) -> bool {
     program.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.trim_end_matches(" (deleted)") == BRIDGE)
 }
 
-fn seen(path: &Path) -> Seen {
+fn seen(path: &Path) -> NodeDirectory {
     match Node::open(path) {
         Ok(node) => match node.launcher() {
-            Some(pid) => Seen::Launched(pid),
-            None if node.participants().is_empty() => Seen::Dead,
-            None => Seen::InUse,
+            Some(pid) => NodeDirectory::Launched(pid),
+            None if node.participants().is_empty() => NodeDirectory::Dead,
+            None => NodeDirectory::InUse,
         },
-        Err(NodeError::Version(_, version)) => Seen::OtherVersion(version),
-        Err(error) => Seen::Unreadable(error.to_string()),
+        Err(NodeError::Version(_, version)) => NodeDirectory::OtherVersion(version),
+        Err(error) => NodeDirectory::Unreadable(error.to_string()),
     }
 }

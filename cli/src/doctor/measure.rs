@@ -16,20 +16,20 @@ const WHY: &str = "so late is a module that waits for its time, when this comput
 /// Measures under the scheduling that the most urgent module would get.
 pub(super) fn wake_up(priority: u8) -> Finding {
     match std::thread::spawn(move || measure(priority)).join() {
-        Ok((latenesses, fifo)) => judge(&latenesses, fifo.then_some(priority)),
+        Ok((latenesses, fifo)) => validate(&latenesses, fifo.then_some(priority)),
         Err(_) => Finding::not(State::Warn, WHAT, "the measuring thread has panicked", WHY, "try again"),
     }
 }
 
 /// Judges latenesses, in order, that were measured in real time of a priority, or under the normal scheduler.
-pub(super) fn judge(latenesses: &[Duration], fifo: Option<u8>) -> Finding {
+pub(super) fn validate(latenesses: &[Duration], fifo: Option<u8>) -> Finding {
     let at = |part: f64| time(latenesses[((latenesses.len() - 1) as f64 * part) as usize]);
     let how = fifo.map_or_else(|| "the normal scheduler".into(), |priority| format!("SCHED_FIFO {priority}"));
     let wakes = latenesses.len();
     let is = format!("half by {}, 99 % by {}, all by {} late, of {wakes} under {how}", at(0.5), at(0.99), at(1.0));
     if latenesses.last().is_some_and(|most| *most > LATE) {
-        let mend = "see what warns above; then look for what else runs (`top -H`)";
-        return Finding::not(State::Warn, WHAT, is, WHY, mend);
+        let fix = "see what warns above; then look for what else runs (`top -H`)";
+        return Finding::not(State::Warn, WHAT, is, WHY, fix);
     }
     Finding::ok(WHAT, is, WHY)
 }

@@ -1,4 +1,4 @@
-//! `rohrpost doctor`: whether this computer lets a robot run in time, and what would mend it.
+//! `rohrpost doctor`: whether this computer lets a robot run in time, and what would fix it.
 
 mod finding;
 mod kernel;
@@ -76,11 +76,11 @@ const INDENT: usize = 24;
 
 fn page(findings: &[Finding]) -> String {
     let mut text = String::new();
-    for Finding { what, state, is, why, mend } in findings {
+    for Finding { what, state, is, why, fix } in findings {
         text += &format!("{:4}  {what:<width$}{is}\n", state.name(), width = INDENT - 6);
         text += &format!("{:INDENT$}{why}\n", "");
-        if let Some(mend) = mend {
-            text += &format!("{:INDENT$}mend: {mend}\n", "");
+        if let Some(fix) = fix {
+            text += &format!("{:INDENT$}fix: {fix}\n", "");
         }
     }
     let count = |state| findings.iter().filter(|finding| finding.state == state).count();
@@ -89,8 +89,8 @@ fn page(findings: &[Finding]) -> String {
 
 fn json(findings: &[Finding]) -> serde_json::Value {
     let worst = findings.iter().map(|finding| finding.state).max().unwrap_or(State::Ok);
-    let findings = findings.iter().map(|Finding { what, state, is, why, mend }| {
-        serde_json::json!({ "what": what, "state": state.name(), "is": is, "why": why, "mend": mend })
+    let findings = findings.iter().map(|Finding { what, state, is, why, fix }| {
+        serde_json::json!({ "what": what, "state": state.name(), "is": is, "why": why, "fix": fix })
     });
     serde_json::json!({ "state": worst.name(), "findings": findings.collect::<Vec<_>>() })
 }

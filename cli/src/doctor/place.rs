@@ -1,7 +1,7 @@
 //! Where a node would lie, what surrounds it, and what is there already.
 
 use super::finding::{Finding, State};
-use super::machine::{Bridge, Machine, Needs, Seen};
+use super::machine::{Bridge, Machine, Needs, NodeDirectory};
 use rohrpost_config::size_text;
 use std::path::Path;
 
@@ -76,24 +76,24 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
     let (what, why) = ("shared memory", "a mailbox takes its memory when it is made; then it must be there");
     let mount = mount(machine);
     let Some(room) = machine.asked.room else {
-        let mend = match &mount {
+        let fix = match &mount {
             Some(mount) if mount.is_memory() => format!("df {}", mount.quoted()),
             _ => "mount -t tmpfs tmpfs /dev/shm".to_owned(),
         };
-        return Some(Finding::not(State::Warn, what, "its size is not told", why, mend));
+        return Some(Finding::not(State::Warn, what, "its size is not told", why, fix));
     };
     let needed = match &needs.from {
         Some(file) => format!("; {} needs {} for its mailboxes", file.display(), size(needs.memory)),
         None => String::new(),
     };
     let is = format!("{} free of {}{needed}", size(room.free), size(room.bytes));
-    let mend = || {
+    let fix = || {
         let wanted = (needs.memory + 2 * SPARE + room.bytes - room.free).next_power_of_two() >> 20;
         format!("rohrpost clean; {}", more_room(mount.as_ref(), wanted))
     };
     Some(match room.free {
-        free if free < needs.memory.max(LEAST) => Finding::not(State::Bad, what, is, why, mend()),
-        free if free < needs.memory + SPARE => Finding::not(State::Warn, what, is, why, mend()),
+        free if free < needs.memory.max(LEAST) => Finding::not(State::Bad, what, is, why, fix()),
+        free if free < needs.memory + SPARE => Finding::not(State::Warn, what, is, why, fix()),
         _ => Finding::ok(what, is, why),
     })
 }
@@ -134,17 +134,17 @@ fn share_of_time(machine: &Machine) -> Option<Finding> {
         let (quota, period) = text.split_once(' ')?;
         Some(quota.parse::<f64>().ok()? / period.parse::<f64>().ok()?)
     })?;
-    let mend = format!("echo max | sudo tee {path}, or start the container without `--cpus`");
-    Some(Finding::not(State::Warn, "CPU quota", format!("{value} cores ({path})"), why, mend))
+    let fix = format!("echo max | sudo tee {path}, or start the container without `--cpus`");
+    Some(Finding::not(State::Warn, "CPU quota", format!("{value} cores ({path})"), why, fix))
 }
 
 /// Version 1 of control groups gives real-time threads nothing unless told.
 fn share_of_real_time(machine: &Machine) -> Option<Finding> {
     let least = tightest(machine, "cpu", "cpu.rt_runtime_us", |text| text.parse::<f64>().ok());
     let (_, path) = least.filter(|(value, _)| *value <= 0.0)?;
-    let mend = format!("echo 950000 | sudo tee {path}, in the groups around it first");
+    let fix = format!("echo 950000 | sudo tee {path}, in the groups around it first");
     let why = "SCHED_FIFO is refused in such a group";
-    Some(Finding::not(State::Warn, "real-time quota", format!("0 µs ({path})"), why, mend))
+    Some(Finding::not(State::Warn, "real-time quota", format!("0 µs ({path})"), why, fix))
 }
 
 fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding> {
@@ -154,8 +154,8 @@ fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding>
     if limit >= needs.memory + SPARE {
         return Some(Finding::ok(what, is, why));
     }
-    let mend = "start the container with more `--memory`, or MemoryMax= in the unit";
-    Some(Finding::not(State::Bad, what, is, why, mend))
+    let fix = "start the container with more `--memory`, or MemoryMax= in the unit";
+    Some(Finding::not(State::Bad, what, is, why, fix))
 }
 
 fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
@@ -168,8 +168,8 @@ fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
         return Some(Finding::ok(what, is, why));
     }
     let more = used + 10 * wanted;
-    let mend = format!("echo {more} | sudo tee {path}, or `--pids-limit` of the container, TasksMax= of the unit");
-    Some(Finding::not(State::Bad, what, is, why, mend))
+    let fix = format!("echo {more} | sudo tee {path}, or `--pids-limit` of the container, TasksMax= of the unit");
+    Some(Finding::not(State::Bad, what, is, why, fix))
 }
 
 /// A limit in bytes or processes. What is as good as none (version 1 writes it as the largest number of pages) is none.
@@ -211,12 +211,12 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
     let finding = |node: &super::machine::NodeFound| {
         let (what, path) = ("node", node.path.display());
         match &node.seen {
-            Seen::Launched(pid) => Finding::ok(what, format!("{path}: launched by process {pid}"), why),
-            Seen::InUse => Finding::ok(what, format!("{path}: in use, without a launch"), why),
-            Seen::Dead => {
+            NodeDirectory::Launched(pid) => Finding::ok(what, format!("{path}: launched by process {pid}"), why),
+            NodeDirectory::InUse => Finding::ok(what, format!("{path}: in use, without a launch"), why),
+            NodeDirectory::Dead => {
                 Finding::not(State::Warn, what, format!("{path}: nothing lives there"), why, "rohrpost clean")
             }
-            Seen::OtherVersion(version) => Finding::not(
+            NodeDirectory::OtherVersion(version) => Finding::not(
                 State::Warn,
                 what,
                 format!(
@@ -226,7 +226,7 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
                 why,
                 format!("stop what runs there (with the program that launched it), then rm -r {path}"),
             ),
-            Seen::Unreadable(error) => {
+            NodeDirectory::Unreadable(error) => {
                 Finding::not(State::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
             }
         }
@@ -236,9 +236,9 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
 
 fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     // Who wants to see nothing misses nothing.
-    let missing = |what, why, mend: &str| match &needs.from {
+    let missing = |what, why, fix: &str| match &needs.from {
         Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} shows nothing", file.display()), why),
-        _ => Finding::not(State::Warn, what, "not found", why, mend),
+        _ => Finding::not(State::Warn, what, "not found", why, fix),
     };
     let (what, why) = ("GUI bridge", "draws what modules publish; the module `gui.0` of the demo is it");
     let bridge = match &machine.asked.bridge {

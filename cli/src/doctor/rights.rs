@@ -35,11 +35,11 @@ fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
     match &machine.asked.fifo {
         Ok(()) => Some(Finding::ok(what, format!("granted ({right}); {wanted}"), why)),
         Err(error) => {
-            let mend = format!(
+            let fix = format!(
                 "echo \"$USER - rtprio {FIFO_MAX}\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in anew; \
                  in a container: `--ulimit rtprio={FIFO_MAX} --cap-add=SYS_NICE`"
             );
-            Some(Finding::not(State::Warn, what, format!("refused ({right}): {error}; {wanted}"), why, mend))
+            Some(Finding::not(State::Warn, what, format!("refused ({right}): {error}; {wanted}"), why, fix))
         }
     }
 }
@@ -62,9 +62,9 @@ fn memory_lock(machine: &Machine) -> Option<Finding> {
     Some(match machine.limit("Max locked memory")? {
         Limit::None => Finding::ok(what, "no limit", why),
         Limit::Of(bytes) => {
-            let mend = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
+            let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
                         anew; in a container: `--ulimit memlock=-1`";
-            Finding::not(State::Warn, what, format!("at most {}", super::place::size(bytes)), why, mend)
+            Finding::not(State::Warn, what, format!("at most {}", super::place::size(bytes)), why, fix)
         }
     })
 }
@@ -88,9 +88,9 @@ fn files(machine: &Machine) -> Option<Finding> {
     let (what, why) = ("open files", "a process opens each mailbox that it has or sends to");
     Some(match machine.limit("Max open files")? {
         Limit::Of(limit) if limit < FILES_LEAST => {
-            let mend =
+            let fix =
                 format!("ulimit -n {FILES_LEAST}, or a line `$USER - nofile {FILES_LEAST}` in /etc/security/limits.d");
-            Finding::not(State::Warn, what, format!("at most {limit}"), why, mend)
+            Finding::not(State::Warn, what, format!("at most {limit}"), why, fix)
         }
         Limit::Of(limit) => Finding::ok(what, format!("at most {limit}"), why),
         Limit::None => Finding::ok(what, "no limit", why),

@@ -1,7 +1,7 @@
 //! What `doctor` says of computers that were written down, and of networks.
 
 use super::lan::{Lan, Peer, Port, PortState, Reach, Stamps};
-use super::machine::{Asked, Bridge, NodeFound, Seen};
+use super::machine::{Asked, Bridge, NodeDirectory, NodeFound};
 use super::protection::{Lan as OfLan, Tcp as OfTcp};
 use super::*;
 use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
@@ -94,7 +94,7 @@ fn good() -> (Asked, Needs) {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-1000".into(),
         room: Some(Room { bytes: 8 << 30, free: 7 << 30 }),
-        nodes: vec![NodeFound { path: "/dev/shm/rohrpost-1000/arm.main".into(), seen: Seen::Launched(812) }],
+        nodes: vec![NodeFound { path: "/dev/shm/rohrpost-1000/arm.main".into(), seen: NodeDirectory::Launched(812) }],
         bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: Some(820) }),
         viewer: Some("/usr/local/bin/rerun".into()),
         lan: Some(lan_that_works()),
@@ -110,8 +110,8 @@ fn bad() -> (Asked, Needs) {
         base: "/home/robot/nodes".into(),
         room: Some(Room { bytes: 64 << 20, free: 1 << 20 }),
         nodes: vec![
-            NodeFound { path: "/home/robot/nodes/demo.main".into(), seen: Seen::Dead },
-            NodeFound { path: "/home/robot/nodes/old.main".into(), seen: Seen::OtherVersion(99) },
+            NodeFound { path: "/home/robot/nodes/demo.main".into(), seen: NodeDirectory::Dead },
+            NodeFound { path: "/home/robot/nodes/old.main".into(), seen: NodeDirectory::OtherVersion(99) },
         ],
         bridge: None,
         viewer: None,
@@ -205,9 +205,9 @@ fn full_shared_memory_is_bad() {
 
 #[test]
 fn waking_up_late_is_told() {
-    let judge = |most| measure::judge(&[Duration::from_micros(60), Duration::from_micros(most)], Some(34));
-    assert_eq!((judge(90).state, judge(6000).state), (State::Ok, State::Warn));
-    assert_ne!(judge(90).is, judge(6000).is);
+    let validate = |most| measure::validate(&[Duration::from_micros(60), Duration::from_micros(most)], Some(34));
+    assert_eq!((validate(90).state, validate(6000).state), (State::Ok, State::Warn));
+    assert_ne!(validate(90).is, validate(6000).is);
 }
 
 /// A line that says the same of each computer tells nothing, or lies.

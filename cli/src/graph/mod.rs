@@ -4,7 +4,7 @@ mod dot;
 mod parts;
 mod svg;
 
-use super::sight::Silence;
+use super::observer::Silence;
 use super::table::table;
 use super::target::{Running, Target};
 use super::units::{Stop, bytes, seconds};
@@ -30,7 +30,7 @@ of their launches: modules are sent nothing.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
-    /// Look for so long.
+    /// SnapshotRequest for so long.
     #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
     seconds: f64,
     /// Print it for Graphviz.
@@ -137,7 +137,7 @@ impl Graph {
             .map(|module| Module {
                 module: classes.format(module.name),
                 node: module.node.clone(),
-                faces: module.faces.iter().map(|face| classes.format(*face)).collect(),
+                aliases: module.aliases.iter().map(|alias| classes.format(*alias)).collect(),
                 state: module.standing().word().into(),
                 priority: module.name.class().0,
                 is_left_out: module.is_left_out(&running.installation),
@@ -149,8 +149,8 @@ impl Graph {
                 let found = running.module(name).ok();
                 let priority = found.map_or(0, |module| module.class().0);
                 let node = found.map_or(&*running.node_name, |module| running.node_of(module)).into();
-                let (faces, state, is_left_out) = (Vec::new(), "tool".into(), false);
-                modules.push(Module { module: name.clone(), node, faces, state, priority, is_left_out });
+                let (aliases, state, is_left_out) = (Vec::new(), "tool".into(), false);
+                modules.push(Module { module: name.clone(), node, aliases, state, priority, is_left_out });
             }
         }
         let installation = running.installation.name.clone();
@@ -182,7 +182,7 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// The module behind a name, which may be one of its faces.
+    /// The module behind a name, which may be one of its aliases.
     fn process(&self, name: Name) -> String {
         let name = self.survey.module(name).map_or(name.module(), |module| module.name);
         self.running.text(name)

@@ -1,6 +1,6 @@
 //! The parts of a graph: modules, and edges with what they carry.
 
-use crate::sight::Silence;
+use crate::observer::Silence;
 use rohrpost::output::plain;
 use rohrpost::survey::Standing;
 use serde::Serialize;
@@ -25,7 +25,7 @@ pub(super) struct Graph {
 pub(super) struct Module {
     pub(super) module: String,
     pub(super) node: String,
-    pub(super) faces: Vec<String>,
+    pub(super) aliases: Vec<String>,
     pub(super) state: String,
     pub(super) priority: u8,
     /// It need not run.
@@ -72,10 +72,10 @@ impl Graph {
         format!("{word} {} of {}", self.nodes.join(", "), self.installation)
     }
 
-    /// What stands below a module's name: its node if there are several, its faces.
+    /// What stands below a module's name: its node if there are several, its aliases.
     pub(super) fn below<'a>(&'a self, module: &'a Module) -> impl Iterator<Item = String> + use<'a> {
         let node = (self.nodes.len() > 1).then(|| format!("on {}", module.node));
-        node.into_iter().chain(module.faces.iter().map(|face| format!("+ {face}")))
+        node.into_iter().chain(module.aliases.iter().map(|alias| format!("+ {alias}")))
     }
 
     /// The edges that a drawing shows.

@@ -272,7 +272,7 @@ mod tests {
         let module = |n: usize| Module {
             module: format!("m.{n}"),
             node: "main".into(),
-            faces: Vec::new(),
+            aliases: Vec::new(),
             state: "on".into(),
             priority: 9,
             is_left_out: false,

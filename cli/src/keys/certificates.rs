@@ -114,7 +114,7 @@ struct Signing {
     made: Vec<Written>,
 }
 
-/// The authority that is there, mended if only its certificate is lost; a new one where nothing is signed yet.
+/// The authority that is there, fixed if only its certificate is lost; a new one where nothing is signed yet.
 fn signing(folder: &Path, installation: &Installation) -> Result<Signing, CertificateError> {
     let [certificate, secret] = files(folder, AUTHORITY);
     let file = || installation.shown.clone();

@@ -89,9 +89,9 @@ fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
     assert_eq!(shown(place.path()), first, "what is there stays");
     std::fs::remove_file(place.path().join("shown/brain.system-1.pem")).unwrap();
     step(Step::New, &file).unwrap();
-    let mended = shown(place.path());
-    assert!(mended.len() == first.len() && mended["brain.system-1.pem"] != first["brain.system-1.pem"]);
-    assert_eq!((&mended["ca.pem"], &mended["desk.system-1.pem"]), (&first["ca.pem"], &first["desk.system-1.pem"]));
+    let fixed = shown(place.path());
+    assert!(fixed.len() == first.len() && fixed["brain.system-1.pem"] != first["brain.system-1.pem"]);
+    assert_eq!((&fixed["ca.pem"], &fixed["desk.system-1.pem"]), (&first["ca.pem"], &first["desk.system-1.pem"]));
     step(rotate, &file).unwrap();
     let rotated = shown(place.path());
     assert!(rotated["ca.pem"] == first["ca.pem"] && rotated["desk.system-1.pem"] != first["desk.system-1.pem"]);
@@ -175,9 +175,9 @@ fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
     put("base.system-1.key", &first["desk.system-1.key"]);
     assert!(says().contains("base.system-1.pem: certificate and key do not fit; `rohrpost keys new`"), "{}", says());
     step(Step::New, &file).unwrap();
-    let mended = shown(place.path());
-    assert!(!says().contains("keys new") && mended["base.system-1.pem"] != first["base.system-1.pem"]);
-    for (name, text) in mended.iter().filter(|(name, _)| !name.starts_with("base.")) {
+    let fixed = shown(place.path());
+    assert!(!says().contains("keys new") && fixed["base.system-1.pem"] != first["base.system-1.pem"]);
+    for (name, text) in fixed.iter().filter(|(name, _)| !name.starts_with("base.")) {
         assert_eq!(text, &first[name], "{name} stays");
     }
     // Expired.

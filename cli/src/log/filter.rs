@@ -47,7 +47,7 @@ impl Filter {
     }
 }
 
-/// The module that a user names by its own name or a face's: lines carry its own.
+/// The module that a user names by its own name or an alias's: lines carry its own.
 pub(super) fn module(text: &str, running: &Running) -> Result<Name, Failure> {
     let name = running.module(text)?;
     let module = running

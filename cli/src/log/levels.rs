@@ -38,7 +38,7 @@ impl Setting {
     }
 }
 
-/// A module with its faces: they are one process, and have one level.
+/// A module with its aliases: they are one process, and have one level.
 fn names(module: Name, running: &Running) -> String {
     let names = running.installation.module(module).map(|module| module.names().collect()).unwrap_or(vec![module]);
     names.into_iter().map(|name| running.text(name)).collect::<Vec<_>>().join(" + ")

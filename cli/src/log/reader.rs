@@ -18,7 +18,7 @@ pub(super) struct Reader<'a> {
     collector: Name,
     /// Whether launch ran when this began; if so, the node ends with it.
     launched: bool,
-    /// The collector's life that `next` counts in.
+    /// The collector's incarnation that `next` counts in.
     life: Option<u32>,
     next: u64,
     /// Whether it is being waited for.
@@ -62,7 +62,7 @@ impl<'a> Reader<'a> {
         let waited = std::mem::take(&mut self.waiting);
         let known = self.life.replace(page.life);
         if known.is_some_and(|life| life != page.life) {
-            // What this page has counts in the new life; it may begin in its middle.
+            // What this page has counts in the new incarnation; it may begin in its middle.
             self.next = 0;
             let file = &self.running.installation.output.file;
             let file = file.as_ref().map(|file| format!("; {} has them", file.display())).unwrap_or_default();

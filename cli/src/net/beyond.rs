@@ -1,6 +1,6 @@
 //! What `rohrpost net` shows of the TCP router: the clients of all nodes as they see themselves, and the server's own view.
 
-use super::told::Told;
+use super::node_report::NodeReport;
 use crate::table::{table, time};
 use crate::target::Running;
 use crate::units::{bytes, fine};
@@ -10,7 +10,7 @@ use rohrpost::output::plain;
 use std::time::Duration;
 
 /// Tables of clients, of the server's connections and of what was lost or replaced, and why who takes no part does not; empty without a TCP router.
-pub(super) fn text(running: &Running, all: &[Told]) -> [String; 4] {
+pub(super) fn text(running: &Running, all: &[NodeReport]) -> [String; 4] {
     let links: Vec<&BeyondLink> = all.iter().filter_map(|told| told.beyond.as_ref()).collect();
     let servers: Vec<&BeyondClients> = all.iter().filter_map(|told| told.clients.as_ref()).collect();
     [self::links(&links), whys(&links), clients(&servers), losses(running, &links, &servers)]

@@ -1,16 +1,16 @@
 //! `rohrpost net`: how the routers of all nodes are: who hears whom, what waits, what was lost and why, and whose time is how good.
 
 mod beyond;
+mod node_report;
 mod show;
-mod told;
 
 use super::round::{Round, Rounds};
 use super::vocabulary::Vocabulary;
 use crate::terminal::{Failure, say};
+use node_report::{NodeReport, rates};
 use rohrpost::interfaces::{RouterInterface, TcpInterface};
 use std::process::ExitCode;
 use std::time::Duration;
-use told::{Told, rates};
 
 /// Between the two looks that a rate is made of: routers tell how they are twice a second.
 const LOOK_AGAIN: Duration = Duration::from_millis(600);
@@ -45,7 +45,7 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
         for (told, before) in now.iter_mut().zip(&before) {
             told.rates = rates(before, told);
         }
-        well = now.iter().all(Told::is_well);
+        well = now.iter().all(NodeReport::is_well);
         let text =
             if rounds.json { serde_json::to_string(&now)? } else { show::text(&round.running, &now, &mut vocabulary) };
         if !say(text.trim_end()) || !rounds.watch {
@@ -60,15 +60,15 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
 }
 
 /// Asks the routers of all nodes that are meant.
-fn look(round: &mut Round) -> Vec<Told> {
+fn look(round: &mut Round) -> Vec<NodeReport> {
     round.nodes().into_iter().map(|node| ask(round, node)).collect()
 }
 
-fn ask(round: &mut Round, node: String) -> Told {
+fn ask(round: &mut Round, node: String) -> NodeReport {
     let mut told = if round.running.installation.router_of(&node).is_some() {
         ask_router(round, node)
     } else {
-        Told { node, ..Told::default() }
+        NodeReport { node, ..NodeReport::default() }
     };
     let installation = &round.running.installation;
     let client = installation.tcp_client_of(&told.node);
@@ -84,7 +84,7 @@ fn ask(round: &mut Round, node: String) -> Told {
     told
 }
 
-fn ask_router(round: &mut Round, node: String) -> Told {
+fn ask_router(round: &mut Round, node: String) -> NodeReport {
     let links = round.newest(&node, RouterInterface::LINKS);
     // A router that has no clock publishes none, and none slots that has none.
     let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
@@ -98,5 +98,5 @@ fn ask_router(round: &mut Round, node: String) -> Told {
     };
     let (clock, slots) = (clock.map(|(_, clock)| clock), slots.map(|(_, slots)| slots));
     let flows = flows.map(|(_, flows)| flows);
-    Told { node, time_ns, links, clock, slots, flows, failure, ..Told::default() }
+    NodeReport { node, time_ns, links, clock, slots, flows, failure, ..NodeReport::default() }
 }

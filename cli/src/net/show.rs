@@ -1,7 +1,7 @@
 //! `rohrpost net`, for people.
 
 use super::beyond;
-use super::told::Told;
+use super::node_report::NodeReport;
 use crate::flows;
 use crate::slots::kept;
 use crate::table::{table, time};
@@ -14,7 +14,7 @@ use rohrpost::output::plain;
 use std::time::Duration;
 
 /// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
-pub(super) fn text(running: &Running, all: &[Told], vocabulary: &mut Vocabulary) -> String {
+pub(super) fn text(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) -> String {
     let mut parts = vec![links(all)];
     parts.extend(
         all.iter()
@@ -48,7 +48,7 @@ pub(super) fn text(running: &Running, all: &[Told], vocabulary: &mut Vocabulary)
     parts.join("\n")
 }
 
-fn links(all: &[Told]) -> String {
+fn links(all: &[NodeReport]) -> String {
     let mut rows = Vec::new();
     for told in all {
         for peer in told.links.iter().flat_map(|links| &links.peers) {
@@ -94,7 +94,7 @@ fn state(state: LinkState) -> &'static str {
 }
 
 /// Datagrams that were not taken since they came from nobody, or from a peer that is another than it should be, and what to do.
-fn strangers(all: &[Told]) -> String {
+fn strangers(all: &[NodeReport]) -> String {
     let mut text = String::new();
     for links in all.iter().filter_map(|told| told.links.as_ref()) {
         for peer in links.peers.iter().filter(|peer| peer.refused > 0) {
@@ -120,7 +120,7 @@ fn strangers(all: &[Told]) -> String {
 }
 
 /// Datagrams that were not sealed as they must be, by where they seem to come from.
-fn rejections(all: &[Told]) -> String {
+fn rejections(all: &[NodeReport]) -> String {
     let links = all.iter().filter_map(|told| told.links.as_ref());
     let told = links.flat_map(|links| links.rejections.iter().map(|rejected| (&links.node, rejected)));
     let rows: Vec<_> = told
@@ -137,7 +137,7 @@ fn datagrams(count: u64) -> String {
 }
 
 /// What was refused by computers themselves. That nobody listened is no news: that one is silent.
-fn failures(all: &[Told]) -> String {
+fn failures(all: &[NodeReport]) -> String {
     let links = all.iter().filter_map(|told| told.links.as_ref());
     let all = links.flat_map(|links| links.failures.iter().map(|failure| (&links.node, failure)));
     let told = all.filter(|(_, failure)| failure.cause != "nobody-there");
@@ -145,7 +145,7 @@ fn failures(all: &[Told]) -> String {
         .collect()
 }
 
-fn waiting(all: &[Told]) -> String {
+fn waiting(all: &[NodeReport]) -> String {
     let links = all.iter().filter_map(|told| told.links.as_ref());
     let queues = links.filter(|links| !links.waiting.is_empty()).map(|links| {
         let levels: Vec<String> =
@@ -157,7 +157,7 @@ fn waiting(all: &[Told]) -> String {
 }
 
 /// Classes of which something was lost; the others are in the JSON.
-fn losses(running: &Running, all: &[Told]) -> String {
+fn losses(running: &Running, all: &[NodeReport]) -> String {
     let mut rows = Vec::new();
     for links in all.iter().filter_map(|told| told.links.as_ref()) {
         for class in links.classes.iter().filter(|class| !class.lost.is_empty()) {
@@ -181,7 +181,7 @@ fn losses(running: &Running, all: &[Told]) -> String {
 }
 
 /// Declared flows; nothing without any.
-fn measured(running: &Running, all: &[Told], vocabulary: &mut Vocabulary) -> String {
+fn measured(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) -> String {
     let links: Vec<&Links> = all.iter().filter_map(|told| told.links.as_ref()).collect();
     let states = all.iter().filter_map(|told| told.flows.as_ref());
     let table =
@@ -189,7 +189,7 @@ fn measured(running: &Running, all: &[Told], vocabulary: &mut Vocabulary) -> Str
     if table.is_empty() { table } else { format!("{table}({})\n", flows::LEGEND) }
 }
 
-fn clocks(all: &[Told]) -> String {
+fn clocks(all: &[NodeReport]) -> String {
     let clocks: Vec<&ClockState> = all.iter().filter_map(|told| told.clock.as_ref()).collect();
     if clocks.is_empty() {
         return String::new();

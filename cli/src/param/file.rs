@@ -21,7 +21,7 @@ impl Contents {
         let saved = Saved::load(path, installation).map_err(|errors| {
             let problem = errors.problems().first().map_or("", |problem| problem.message.as_str());
             format!(
-                "{} is no file of parameters, and is left alone: {problem}; name another, or mend it",
+                "{} is no file of parameters, and is left alone: {problem}; name another, or fix it",
                 path.display()
             )
         })?;

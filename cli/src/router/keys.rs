@@ -15,7 +15,7 @@ pub(crate) fn of(installation: &Installation) -> Result<Option<KeyRing>, KeysErr
     Ok(Some(KeyRing::new(key(&newest), older.as_ref().map(key))))
 }
 
-/// Tells this life of a router from all others. Sealed, two lives with one would use a key twice in one way: so nobody can guess it.
+/// Tells this incarnation of a router from all others. Sealed, two incarnations with one would use a key twice in one way: so nobody can guess it.
 ///
 /// # Errors
 /// [`NoRandom`]

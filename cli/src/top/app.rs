@@ -85,7 +85,7 @@ impl App {
     /// The modules that are shown, in their order.
     pub(super) fn rows<'m>(&self, model: &'m Model) -> Vec<&'m Row> {
         let holds = |row: &&Row| {
-            let names = std::iter::once(&row.line.module).chain(&row.line.faces);
+            let names = std::iter::once(&row.line.module).chain(&row.line.aliases);
             self.filter.is_empty() || names.into_iter().any(|name| name.contains(&self.filter))
         };
         let mut rows: Vec<&Row> = model.modules.iter().filter(holds).collect();

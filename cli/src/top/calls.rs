@@ -1,14 +1,14 @@
 //! What `top` asks for: to switch modules on and off, what was said, why a module is in error. Nothing here waits:
 //! calls are begun, and looked after each time round, so that a module that hangs freezes no screen.
 
-use super::super::sight::{Silence, silence};
+use super::super::observer::{Silence, silence};
 use super::super::target::Running;
 use rohrpost::CallError;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
-use rohrpost::launcher::{ControlError, Look, launcher_of};
+use rohrpost::launcher::{ControlError, SnapshotRequest, launcher_of};
 use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::survey::{Distant, Scope, Seen, Survey};
+use rohrpost::survey::{Distant, Scope, Snapshot, Survey};
 use rohrpost::{Name, ToolLink};
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ pub(super) enum Answer {
     Why(Name, String),
     Restarted(Name, Result<(), String>),
     /// What another node shows, or why it does not.
-    Seen(String, Result<Survey, Silence>),
+    Snapshot(String, Result<Survey, Silence>),
 }
 
 /// Top's place among those that call.
@@ -89,7 +89,7 @@ impl Calls {
             let Some(launcher) = launcher.filter(|_| self.looks.iter().all(|(known, _)| known != node)) else {
                 continue;
             };
-            let distant = Distant::new(launcher, Look::Survey(Scope::All), PATIENCE, nodes.len());
+            let distant = Distant::new(launcher, SnapshotRequest::Survey(Scope::All), PATIENCE, nodes.len());
             self.looks.push(((*node).into(), distant));
         }
     }
@@ -133,12 +133,12 @@ impl Calls {
         for (node, mut look) in std::mem::take(&mut self.looks) {
             match look.poll(&mut self.tool.link) {
                 None => self.looks.push((node, look)),
-                Some(Ok(Seen::Survey(survey))) => answers.push(Answer::Seen(node, Ok(*survey))),
+                Some(Ok(Snapshot::Survey(survey))) => answers.push(Answer::Snapshot(node, Ok(*survey))),
                 // It was not asked for one.
-                Some(Ok(Seen::Mailbox(_))) => {}
+                Some(Ok(Snapshot::Mailbox(_))) => {}
                 Some(Err(failure)) => {
                     let silence = silence(&running.installation, &node, &failure);
-                    answers.push(Answer::Seen(node, Err(silence)));
+                    answers.push(Answer::Snapshot(node, Err(silence)));
                 }
             }
         }

@@ -31,7 +31,7 @@ pub(super) fn page(
     let own = |mailbox: &&MailboxInfo| {
         module.is_some_and(|module| {
             let of = mailbox.name.module();
-            of == module.name || module.faces.contains(&of)
+            of == module.name || module.aliases.contains(&of)
         })
     };
     let mailboxes: Vec<MailboxInfo> = sample.survey.mailboxes.iter().filter(own).cloned().collect();
@@ -49,9 +49,10 @@ pub(super) fn page(
     }
     lines.extend(peers("sends to", &row.sends_to));
     lines.extend(peers("receives from", &row.receives_from));
-    let names = module.into_iter().flat_map(|module| std::iter::once(&module.name).chain(&module.faces));
-    for face in names {
-        lines.extend(describe(*face).into_iter().flat_map(|description| interface(installation, *face, &description)));
+    let names = module.into_iter().flat_map(|module| std::iter::once(&module.name).chain(&module.aliases));
+    for alias in names {
+        lines
+            .extend(describe(*alias).into_iter().flat_map(|description| interface(installation, *alias, &description)));
     }
     lines
 }
@@ -70,8 +71,8 @@ fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
     let text = installation.classes.text(row.name.class()).filter(|text| !text.is_empty());
     let text = text.map_or(String::new(), |text| format!(": {text}"));
     say("class", format!("{}, priority {}{text}", row.class, row.line.priority));
-    if !row.line.faces.is_empty() {
-        say("also", row.line.faces.join(", "));
+    if !row.line.aliases.is_empty() {
+        say("also", row.line.aliases.join(", "));
     }
     if let Some(module) = installation.module(row.name) {
         let program = match &module.program {
@@ -162,8 +163,8 @@ fn histogram(class: &str, latency: &Latency) -> Vec<String> {
 }
 
 /// Functions and data, as the module itself describes them.
-fn interface(installation: &Installation, face: Name, description: &Description) -> Vec<String> {
-    let mut lines = vec!["".into(), format!("{} offers: {}", installation.classes.format(face), description.text)];
+fn interface(installation: &Installation, alias: Name, description: &Description) -> Vec<String> {
+    let mut lines = vec!["".into(), format!("{} offers: {}", installation.classes.format(alias), description.text)];
     for function in &description.functions {
         lines.push(format!("  {} -> {}", usage(function), describe_result(&function.result)));
         lines.push(format!("      {}", function.text));

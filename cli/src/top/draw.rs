@@ -193,14 +193,14 @@ pub(super) fn columns(model: &Model, width: u16) -> Vec<(Column, u16)> {
 }
 
 fn full_name(row: &Row) -> String {
-    let faces: Vec<String> = row.line.faces.iter().map(|face| format!(" + {face}")).collect();
-    row.line.module.clone() + &faces.concat()
+    let aliases: Vec<String> = row.line.aliases.iter().map(|alias| format!(" + {alias}")).collect();
+    row.line.module.clone() + &aliases.concat()
 }
 
 /// All its names if they have room, else its own and how many more there are.
 fn name(row: &Row, width: u16) -> String {
     let full = full_name(row);
-    match row.line.faces.len() {
+    match row.line.aliases.len() {
         more if more > 0 && full.chars().count() > width.into() => format!("{} +{more}", row.line.module),
         _ => full,
     }

@@ -1,6 +1,6 @@
 //! The loop at the terminal: looks, draws, takes keys, and looks after what was asked.
 
-use super::super::sight::Silence;
+use super::super::observer::Silence;
 use super::super::target::Running;
 use super::app::{Action, App, Screen};
 use super::calls::{Answer, Calls};
@@ -9,7 +9,7 @@ use super::draw::{OutputText, View, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
-use super::sample::{self, Said, Seen};
+use super::sample::{self, NodeSurveys, Said};
 use super::terminal::{Opened, keyboard};
 use crate::terminal::Failure;
 use ratatui::DefaultTerminal;
@@ -47,12 +47,12 @@ fn others(running: &Running) -> impl Iterator<Item = &str> {
     running.shown().into_iter().filter(|node| *node != running.node_name)
 }
 
-fn not_seen_yet(running: &Running) -> Seen {
+fn not_seen_yet(running: &Running) -> NodeSurveys {
     others(running).map(|node| Err(Silence::new(node, "it was not heard yet"))).collect()
 }
 
 /// What all nodes that are meant show, in the order of the configuration.
-fn in_order(running: &Running, own: Seen, others: &Seen) -> Seen {
+fn in_order(running: &Running, own: NodeSurveys, others: &NodeSurveys) -> NodeSurveys {
     let (mut own, mut others) = (own.into_iter(), others.iter().cloned());
     let next = |node: &str| if node == running.node_name { own.next() } else { others.next() };
     running.shown().into_iter().filter_map(next).collect()
@@ -68,7 +68,7 @@ struct Live {
     now: Sample,
     model: Model,
     /// What other nodes showed last, in the order of the configuration.
-    others: Seen,
+    others: NodeSurveys,
     /// Since when those are silent that are.
     silent_since: HashMap<String, Instant>,
     /// What modules of other nodes offer, as they said when they were asked once.
@@ -245,7 +245,7 @@ impl Live {
                 self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
                 self.peek();
             }
-            Answer::Seen(node, seen) => {
+            Answer::Snapshot(node, seen) => {
                 match &seen {
                     Ok(_) => {
                         self.silent_since.remove(&node);
@@ -318,11 +318,11 @@ impl Live {
         let details = match self.app.screen {
             Screen::Details(name) => {
                 let Self { running, described, now, model, .. } = self;
-                let describe = |face| match running.is_own(face) {
-                    true => running.describe(face).ok(),
+                let describe = |alias| match running.is_own(alias) {
+                    true => running.describe(alias).ok(),
                     // Asked once, and not if it would only be waited for.
                     false if now.is_silent(name) => None,
-                    false => described.entry(face).or_insert_with(|| running.describe(face).ok()).clone(),
+                    false => described.entry(alias).or_insert_with(|| running.describe(alias).ok()).clone(),
                 };
                 details::page(&running.installation, now, model, name, describe)
             }

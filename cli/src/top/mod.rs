@@ -42,7 +42,7 @@ Counters are read from shared memory, of other nodes by way of their launches: l
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
-    /// Look so often, seconds; rates are those of this time.
+    /// SnapshotRequest so often, seconds; rates are those of this time.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     interval: f64,
     /// Print the table once, after one interval.

@@ -1,7 +1,7 @@
 //! What `top` shows: two looks at a node, made into one table. Pure; also what `--json` prints.
 
 use super::super::list::{MailboxLine, mailbox_lines};
-use super::super::sight::Silence;
+use super::super::observer::Silence;
 use super::super::summary::{Losses, ModuleLine};
 use rohrpost::Name;
 use rohrpost::survey::{ModuleSurvey, Standing, Survey};
@@ -138,7 +138,7 @@ impl Model {
                 sends_to: peers(installation, now, earlier, |flow| (flow.module == module.name).then_some(flow.to)),
                 receives_from: peers(installation, now, earlier, |flow| {
                     let to = flow.to.module();
-                    (to == module.name || module.faces.contains(&to)).then_some(sender(flow))
+                    (to == module.name || module.aliases.contains(&to)).then_some(sender(flow))
                 }),
             }
         });

@@ -19,7 +19,7 @@ const SHOWN: usize = 500;
 pub(super) struct Output {
     collector: Option<Name>,
     lines: VecDeque<OutputLine>,
-    /// The collector's life that `next` counts in; none until it has said how far it is.
+    /// The collector's incarnation that `next` counts in; none until it has said how far it is.
     life: Option<u32>,
     /// Number of the next line.
     next: u64,

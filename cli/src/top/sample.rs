@@ -1,6 +1,6 @@
 //! One look at a node, and at those others that showed themselves: it waits for nobody.
 
-use super::super::sight::Silence;
+use super::super::observer::Silence;
 use super::super::summary::module_lines;
 use super::super::target::Running;
 use super::model::{Sample, TimeNow};
@@ -14,17 +14,17 @@ use std::collections::HashMap;
 pub(super) type Said = HashMap<Name, String>;
 
 /// What each of some nodes shows, or why it does not.
-pub(super) type Seen = Vec<Result<Survey, Silence>>;
+pub(super) type NodeSurveys = Vec<Result<Survey, Silence>>;
 
 /// Looks at the own node, if it is meant.
-pub(super) fn own(running: &Running) -> Result<Seen, Failure> {
+pub(super) fn own(running: &Running) -> Result<NodeSurveys, Failure> {
     let is_own = |node: &&str| *node == running.node_name;
     let own: Vec<&str> = running.shown().into_iter().filter(is_own).collect();
     running.look_at(&own, Scope::All)
 }
 
 /// Puts together what nodes show; `earlier` makes rates.
-pub(super) fn put_together(running: &Running, seen: Seen, earlier: Option<&Sample>, said: &Said) -> Sample {
+pub(super) fn put_together(running: &Running, seen: NodeSurveys, earlier: Option<&Sample>, said: &Said) -> Sample {
     let (mut surveys, mut silent) = (Vec::new(), Vec::new());
     for seen in seen {
         match seen {

@@ -6,9 +6,9 @@ use crate::module::{Lines, Module};
 use crate::reader::Reader;
 use rohrpost_mailbox::Name;
 
-/// Nobody is listed as a caller of whom it may not command, and no face lets in whom its module keeps out: a router goes by the class of the
+/// Nobody is listed as a caller of whom it may not command, and no alias lets in whom its module keeps out: a router goes by the class of the
 /// name that is commanded.
-pub(crate) fn judge(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
+pub(crate) fn validate(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
     for (to, line) in module.calls.iter().zip(&lines.calls) {
         let refuses = |access: &&Access| access.refuses(module.name.class(), to.class());
         if let Some(access) = installation.access.iter().find(refuses) {
@@ -17,19 +17,19 @@ pub(crate) fn judge(installation: &Installation, module: &Module, lines: &Lines,
     }
     let rule = |class| installation.access.iter().find(|access| access.class == class);
     let Some(access) = rule(module.name.class()) else { return };
-    for face in module.faces.iter().filter(|face| rule(face.class()).is_none()) {
-        reader.report(module.line, told_of_face(installation, module, *face, access));
+    for alias in module.aliases.iter().filter(|alias| rule(alias.class()).is_none()) {
+        reader.report(module.line, alias_text(installation, module, *alias, access));
     }
 }
 
-fn told_of_face(installation: &Installation, module: &Module, face: Name, access: &Access) -> String {
+fn alias_text(installation: &Installation, module: &Module, alias: Name, access: &Access) -> String {
     let classes = &installation.classes;
-    let class = classes.name(face.class()).unwrap_or_default();
+    let class = classes.name(alias.class()).unwrap_or_default();
     format!(
-        "module `{}` may be commanded by the classes of [access] in line {} alone, and its face `{}` by all; add a line for class `{class}` there",
+        "module `{}` may be commanded by the classes of [access] in line {} alone, and its alias `{}` by all; add a line for class `{class}` there",
         classes.format(module.name),
         access.line,
-        classes.format(face),
+        classes.format(alias),
     )
 }
 

@@ -73,7 +73,7 @@ fn source(part: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Without unit tests, and without the first comment, which an included file may not have. Line numbers stay.
+/// Without unit tests, and without the first comment, which an included file may not have. CacheLine numbers stay.
 fn plain(source: &str) -> String {
     let end = source.find("#[cfg(test)]\nmod tests {").unwrap_or(source.len());
     source[..end].lines().map(|line| line.replacen("//!", "// ", usize::from(line.starts_with("//!"))) + "\n").collect()

@@ -6,7 +6,7 @@
 
 use super::random::sum;
 use nix::sys::mman::{MapFlags, ProtFlags, mmap_anonymous};
-use rohrpost_mailbox::{Full, Loss, MailboxInfo, Name, Options, Package, Priority};
+use rohrpost_mailbox::{Loss, MailboxInfo, Name, Options, OverflowPolicy, Package, Priority};
 use std::ffi::c_void;
 use std::num::NonZeroUsize;
 use std::ptr::NonNull;
@@ -67,7 +67,7 @@ impl Seat {
     }
 }
 
-/// One life of a sender.
+/// One incarnation of a sender.
 #[repr(C)]
 struct Run {
     /// By mailbox and priority.
@@ -257,6 +257,6 @@ pub(crate) fn missing(info: &MailboxInfo) -> u64 {
 }
 
 /// What stays in order: with `latest`, where a newer package takes the place of an older one of its state, only those.
-pub(crate) fn key(full: Full, class: u8, state: u8) -> u8 {
-    if full == Full::Latest { state } else { class }
+pub(crate) fn key(full: OverflowPolicy, class: u8, state: u8) -> u8 {
+    if full == OverflowPolicy::Latest { state } else { class }
 }

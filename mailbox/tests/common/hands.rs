@@ -6,7 +6,8 @@ use super::crew::{Actor, is_asleep};
 use super::{Ground, HIGH, LOW, MAILBOX, OTHER, PATIENCE, label, shape, until};
 use nix::unistd::Pid;
 use rohrpost_mailbox::{
-    Full, Interest, Name, Priority, Receiver, SendError, Sender, Shape, Waiting, Watches, local, monotonic_ns, wait_any,
+    Interest, Name, OverflowPolicy, Priority, Receiver, SendError, Sender, Shape, Waiting, Watches, local,
+    monotonic_ns, wait_any,
 };
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
@@ -54,7 +55,7 @@ pub(crate) const OPERATIONS: &[Operation] = &[
         "send and be refused",
         OFTEN,
         |hands| hands.fill(HIGH),
-        |hands| assert!(matches!(hands.sender.send(&label(LOW, 1), &[]), Err(SendError::Full(_)))),
+        |hands| assert!(matches!(hands.sender.send(&label(LOW, 1), &[]), Err(SendError::OverflowPolicy(_)))),
     ),
     operation("send what is too large", OFTEN, nothing, |hands| {
         assert!(matches!(hands.sender.send(&label(LOW, 1), &[&[0; 1000]]), Err(SendError::TooLarge { .. })));
@@ -220,7 +221,7 @@ impl Hands {
     fn new(ground: &Ground, board: Board, asked: &'static AtomicU32, pids: [Pid; 2]) -> Self {
         let me = ground.join();
         let receiver = me.receiver(MAILBOX, shape(8)).unwrap();
-        let newest = me.receiver(OTHER, Shape { full: Full::Latest, ..shape(2) }).unwrap();
+        let newest = me.receiver(OTHER, Shape { full: OverflowPolicy::Latest, ..shape(2) }).unwrap();
         let mut watches = Watches::new(&me).unwrap();
         let (far, near) = UnixStream::pair().unwrap();
         watches.add(&near, Interest::Read).unwrap();

@@ -3,7 +3,8 @@
 use super::board::{BODY_BYTES_MIN, Board, KEYS, MAILBOXES, Mark, PRIORITIES, Seat, key};
 use super::random::Random;
 use rohrpost_mailbox::{
-    Full, Interest, Label, Options, Participant, Receiver, SendError, Sender, Shape, Type, Waiting, Watches, wait_any,
+    Interest, Label, Options, OverflowPolicy, Participant, Receiver, SendError, Sender, Shape, Type, Waiting, Watches,
+    wait_any,
 };
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
@@ -14,7 +15,7 @@ pub(crate) struct Talker {
     board: Board,
     seat: &'static Seat,
     run: u32,
-    full: Full,
+    full: OverflowPolicy,
     random: Random,
     senders: Vec<Sender>,
     numbers: [[u32; KEYS]; MAILBOXES.len()],
@@ -32,7 +33,14 @@ pub(crate) enum Weather {
 }
 
 impl Talker {
-    pub(crate) fn new(board: Board, seat: usize, run: u32, full: Full, senders: Vec<Sender>, weather: Weather) -> Self {
+    pub(crate) fn new(
+        board: Board,
+        seat: usize,
+        run: u32,
+        full: OverflowPolicy,
+        senders: Vec<Sender>,
+        weather: Weather,
+    ) -> Self {
         let (random, seat) = (Random::new(u64::from(run)), board.seat(seat));
         Self { board, seat, run, full, random, senders, numbers: Default::default(), buffer: Vec::new(), weather }
     }
@@ -53,7 +61,7 @@ impl Talker {
     pub(crate) fn once(&mut self) {
         let mailbox = self.random.below(self.senders.len() as u64) as usize;
         let [class, state] = [PRIORITIES.len(), KEYS].map(|end| self.random.below(end as u64) as u8);
-        let state = if self.weather == Weather::Stormy && self.full == Full::Latest { class } else { state };
+        let state = if self.weather == Weather::Stormy && self.full == OverflowPolicy::Latest { class } else { state };
         let of = key(self.full, class, state);
         let number = self.numbers[mailbox][usize::from(of)] + 1;
         let mark = Mark { run: self.run, number, mailbox: mailbox as u8, key: of, class };
@@ -98,7 +106,7 @@ impl Talker {
                 self.board.accepted(mark);
             }
             Ok(false) => {}
-            Err(SendError::Full(_)) => {
+            Err(SendError::OverflowPolicy(_)) => {
                 self.board.refused(mark);
                 std::thread::yield_now();
             }
@@ -118,7 +126,7 @@ fn pause(time: Duration) {
 
 /// How a receiver waits.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Way {
+pub(crate) enum WaitMode {
     /// Asleep, until it is woken.
     Asleep,
     /// Awake for a moment, then asleep.
@@ -131,7 +139,7 @@ pub(crate) enum Way {
     Watching,
 }
 
-impl Way {
+impl WaitMode {
     pub(crate) const ALL: [Self; 5] = [Self::Asleep, Self::Spinning, Self::Timed, Self::Polling, Self::Watching];
 }
 
@@ -141,15 +149,15 @@ pub(crate) struct Listener {
     receivers: Vec<Receiver>,
     /// Packages so far.
     pub(crate) taken: u64,
-    way: Way,
+    way: WaitMode,
     random: Random,
     watches: Option<(Watches, UnixStream)>,
 }
 
 impl Listener {
-    pub(crate) fn new(board: Board, me: &Arc<Participant>, shapes: &[Shape], way: Way) -> Self {
+    pub(crate) fn new(board: Board, me: &Arc<Participant>, shapes: &[Shape], way: WaitMode) -> Self {
         let receivers = MAILBOXES.iter().zip(shapes).map(|(name, shape)| me.receiver(*name, *shape).unwrap()).collect();
-        let watches = (way == Way::Watching).then(|| {
+        let watches = (way == WaitMode::Watching).then(|| {
             let mut watches = Watches::new(me).unwrap();
             let (far, near) = UnixStream::pair().unwrap();
             watches.add(&near, Interest::Read).unwrap();
@@ -181,11 +189,11 @@ impl Listener {
         let mut all: Vec<&mut Receiver> = self.receivers.iter_mut().collect();
         let mut some_us = |end| Duration::from_micros(self.random.below(end));
         match (self.way, &mut self.watches) {
-            (Way::Polling, _) => std::thread::yield_now(),
-            (Way::Timed, _) => drop(wait_any(&mut all, some_us(3000), ended)),
-            (Way::Spinning, _) => drop(wait_any(&mut all, Waiting { spin: some_us(60), deadline: None }, ended)),
-            (Way::Watching, Some((watches, _))) => drop(watches.wait_any(&mut all, None, ended)),
-            (Way::Watching | Way::Asleep, _) => drop(wait_any(&mut all, None, ended)),
+            (WaitMode::Polling, _) => std::thread::yield_now(),
+            (WaitMode::Timed, _) => drop(wait_any(&mut all, some_us(3000), ended)),
+            (WaitMode::Spinning, _) => drop(wait_any(&mut all, Waiting { spin: some_us(60), deadline: None }, ended)),
+            (WaitMode::Watching, Some((watches, _))) => drop(watches.wait_any(&mut all, None, ended)),
+            (WaitMode::Watching | WaitMode::Asleep, _) => drop(wait_any(&mut all, None, ended)),
         }
     }
 

@@ -9,7 +9,9 @@ pub(crate) mod hands;
 pub(crate) mod load;
 pub(crate) mod random;
 
-use rohrpost_mailbox::{Full, Label, Loss, MailboxInfo, Name, Node, Participant, Priority, Sender, Shape, Type};
+use rohrpost_mailbox::{
+    Label, Loss, MailboxInfo, Name, Node, OverflowPolicy, Participant, Priority, Sender, Shape, Type,
+};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -26,7 +28,7 @@ pub(crate) const HIGH: Priority = Priority(20);
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 pub(crate) fn shape(slots: u16) -> Shape {
-    Shape { slots, body_bytes_max: 256, full: Full::Displace, max_age: None, claims: 1 }
+    Shape { slots, body_bytes_max: 256, full: OverflowPolicy::Displace, max_age: None, claims: 1 }
 }
 
 /// A node in a directory of its own.

@@ -114,7 +114,7 @@ fn name(number: libc::c_long, arguments: [u64; 6]) -> String {
 
 fn check(all: &[Traced]) {
     assert!(CALLS.iter().all(|(name, _)| OPERATIONS.iter().any(|operation| operation.name == *name)));
-    // On a machine whose clock source cannot be read without the kernel, every look at the clock is a call: not ours to mend.
+    // On a machine whose clock source cannot be read without the kernel, every look at the clock is a call: not ours to fix.
     let slow_clock = all.iter().any(|(at, calls)| *at == 0 && calls.iter().any(|call| call == CLOCK));
     if slow_clock {
         tell(

@@ -58,7 +58,7 @@ pub fn of_class(class: &str) -> Option<&'static str> {
     all.into_iter().find(|builtin| *builtin == class || description(builtin, class).is_some())
 }
 
-/// What a built-in module offers under the name of a class, its own or a face's; none if it knows no such class.
+/// What a built-in module offers under the name of a class, its own or an alias's; none if it knows no such class.
 pub fn description(builtin: &str, class: &str) -> Option<Description> {
     // The programs of these are not here: this crate knows no network.
     let beyond_here = match builtin {

@@ -1,4 +1,4 @@
-//! What one built-in module would refuse of its settings, its faces and what it calls.
+//! What one built-in module would refuse of its settings, its aliases and what it calls.
 
 use crate::interface::Interfaces;
 use crate::module::Module;
@@ -60,7 +60,7 @@ pub(super) fn saved<M: Module<Settings: Settings>>(
 /// What a built-in module would refuse.
 pub(super) fn module<M: Module<Settings: Settings>>(installation: &Installation, module: &Configured) -> Vec<Problem> {
     let what = format!("module `{}`", installation.classes.format(module.name));
-    let mut problems = faces::<M>(installation, module, &what);
+    let mut problems = aliases::<M>(installation, module, &what);
     let settings: M::Settings = match installation.settings_without_saved(module) {
         Ok(settings) => settings,
         Err(error) => {
@@ -83,18 +83,18 @@ pub(super) fn module<M: Module<Settings: Settings>>(installation: &Installation,
 }
 
 /// Names that the module answers to have interfaces.
-fn faces<M: Module>(installation: &Installation, module: &Configured, what: &str) -> Vec<Problem> {
+fn aliases<M: Module>(installation: &Installation, module: &Configured, what: &str) -> Vec<Problem> {
     let known: Vec<&str> = M::Interfaces::table().iter().map(|served| served.class).collect();
     let mut problems = Vec::new();
-    for face in &module.faces {
-        let class = installation.classes.name(face.class()).unwrap_or_default();
+    for alias in &module.aliases {
+        let class = installation.classes.name(alias.class()).unwrap_or_default();
         if !known.contains(&class) {
             let right = match &known[..] {
-                [] => "it has none; drop it from `faces`".into(),
+                [] => "it has none; drop it from `aliases`".into(),
                 known => format!("it has {}", known.join(", ")),
             };
-            let face = installation.classes.format(*face);
-            let message = format!("{what}: face `{face}`: the builtin has no interface of class `{class}`; {right}");
+            let alias = installation.classes.format(*alias);
+            let message = format!("{what}: alias `{alias}`: the builtin has no interface of class `{class}`; {right}");
             problems.push(Problem { line: Some(module.line), message });
         }
     }

@@ -13,9 +13,9 @@ use std::time::Duration;
 pub struct CallEnvelope {
     /// Hash of the interface that the caller was compiled with.
     pub interface: u32,
-    /// Tells this life of the caller from earlier ones: later than that of whoever had its reply mailbox before.
+    /// Tells this incarnation of the caller from earlier ones: later than that of whoever had its reply mailbox before.
     pub incarnation: u32,
-    /// Counts this life's calls. A repeat carries the number of the first try.
+    /// Counts this incarnation's calls. A repeat carries the number of the first try.
     pub sequence: u32,
     /// How long after the first try the command may still be run, µs.
     pub valid_for_us: u32,

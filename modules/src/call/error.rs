@@ -116,7 +116,7 @@ pub enum Fault {
     #[error(
         "a later incarnation of this caller has called it already: two programs have this name, or the computer's clock was set back \
          before the node was launched; this passes {} s after the later one's last call was over",
-        super::once::TRANSIT_MAX.as_secs()
+        super::deduplicator::TRANSIT_MAX.as_secs()
     )]
     EarlierIncarnation,
 }

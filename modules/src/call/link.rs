@@ -83,7 +83,7 @@ impl Link {
             participant: participant.clone(),
             me,
             // Not the participant's: of two that join, the first may have the name after the other, and whoever served that
-            // other would take these calls for those of an earlier life. The mailbox is ours, so all earlier owners have theirs.
+            // other would take these calls for those of an earlier incarnation. The mailbox is ours, so all earlier owners have theirs.
             incarnation: participant.node().next_incarnation(),
             replies,
             senders: Vec::new(),
@@ -101,7 +101,7 @@ impl Link {
         self.me
     }
 
-    /// Tells this life of the module from others that had or will have its name.
+    /// Tells this incarnation of the module from others that had or will have its name.
     pub fn incarnation(&self) -> u32 {
         self.incarnation
     }
@@ -163,7 +163,7 @@ impl Link {
         Ok(self.senders.len() - 1)
     }
 
-    /// Sends a command and returns at once; [`Link::wait`] fetches the answer. `arguments` are postcard.
+    /// Sends a command and returns at deduplicator; [`Link::wait`] fetches the answer. `arguments` are postcard.
     ///
     /// # Errors
     /// [`CallError::NotSent`], [`CallError::BadArguments`], or [`CallError::TooMany`] when too many calls are under way.
@@ -227,7 +227,7 @@ impl Link {
             Err(error) => {
                 self.spare.push(call.body);
                 // One whose server is not there is none of the calls that should have had an answer.
-                if matches!(error, SendError::Full(_)) {
+                if matches!(error, SendError::OverflowPolicy(_)) {
                     self.tallies.ended(sequence, to, Ending::Refused);
                 }
                 Err(error.into())
@@ -328,7 +328,7 @@ impl Link {
         }
     }
 
-    /// Moves the answers that have come to their calls. Late ones are counted, all others to nobody (to an earlier life) are dropped.
+    /// Moves the answers that have come to their calls. Late ones are counted, all others to nobody (to an earlier incarnation) are dropped.
     pub fn collect(&mut self) {
         for _ in 0..BURST {
             let Some(package) = self.replies.try_receive() else { return };

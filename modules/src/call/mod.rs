@@ -3,16 +3,16 @@
 //! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side, `tally` counts what came of its calls.
 
 mod absent;
+mod deduplicator;
 mod envelope;
 mod error;
 mod link;
-mod once;
 mod tally;
 
+pub use deduplicator::{CALLERS_MAX, Deduplicator, REPLIES_KEPT, Request, TRANSIT_MAX, VALIDITY_MAX, Verdict, WINDOW};
 pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope, append};
 pub use error::{CallError, Fault};
 pub(crate) use link::is_to;
 pub use link::{CALLS_MAX, Caller, Link, Pending};
-pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, TRANSIT_MAX, VALIDITY_MAX, Verdict, WINDOW};
 pub use tally::Tally;

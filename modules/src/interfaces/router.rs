@@ -62,7 +62,7 @@ pub struct PeerLink {
     pub damaged: u64,
     /// Datagrams from it that came after later ones.
     pub overtaken: u64,
-    /// Datagrams with its address that were not taken: of another version or configuration, or of another life of its router.
+    /// Datagrams with its address that were not taken: of another version or configuration, or of another incarnation of its router.
     pub refused: u64,
     /// Times that its router was started anew.
     pub restarts: u64,
@@ -148,7 +148,7 @@ pub struct Links {
 pub struct Rejected {
     /// The node whose address they came from, which anybody can write on a datagram; empty: no node has it.
     pub node: String,
-    /// In a word: `unsealed`, `other-key`, `not-ours`, `other-life`, `replay`, `forged`, `version`.
+    /// In a word: `unsealed`, `other-key`, `not-ours`, `other-incarnation`, `replay`, `forged`, `version`.
     pub cause: String,
     /// Of packages and of time.
     pub datagrams: u64,

@@ -46,7 +46,7 @@ enum Mailboxes {
 pub(super) struct Child {
     name: Name,
     text: String,
-    /// Its name and its faces.
+    /// Its name and its aliases.
     names: Vec<Name>,
     program: Program,
     policy: Policy,
@@ -78,7 +78,7 @@ pub(super) struct Child {
     health: Health,
     printed: Printed,
     /// Launch ends: nothing is started any more.
-    last_life: bool,
+    last_incarnation: bool,
 }
 
 impl Child {
@@ -108,7 +108,7 @@ impl Child {
             last_end: String::new(),
             health: Health::new(module.busy_after, Instant::now()),
             printed: Printed::new(relay.voice(installation, module.name)),
-            last_life: false,
+            last_incarnation: false,
         }
     }
 
@@ -205,7 +205,7 @@ impl Child {
             // Killed, since it did not get ready.
             Phase::Waiting if self.process.is_some() => Some(LOOK_KEPT),
             Phase::Ready | Phase::Running => Some(self.health.look_at().saturating_duration_since(now)),
-            Phase::Waiting if !self.last_life => Some(self.since.saturating_duration_since(now)),
+            Phase::Waiting if !self.last_incarnation => Some(self.since.saturating_duration_since(now)),
             _ => None,
         }
     }
@@ -309,7 +309,7 @@ impl Child {
     }
 
     fn may_spawn(&self, now: Instant) -> bool {
-        self.process.is_none() && now >= self.since && !self.last_life && !self.has_left_mailboxes()
+        self.process.is_none() && now >= self.since && !self.last_incarnation && !self.has_left_mailboxes()
     }
 
     /// Notes whether somebody has switched it on or off.
@@ -346,8 +346,8 @@ impl Child {
     }
 
     /// Launch ends: whatever happens, it is not started any more.
-    pub(super) fn begin_last_life(&mut self) {
-        self.last_life = true;
+    pub(super) fn begin_last_incarnation(&mut self) {
+        self.last_incarnation = true;
     }
 }
 

@@ -31,7 +31,7 @@ pub(super) struct Ending {
 
 impl Ending {
     pub(super) fn begin(children: &mut [Child], words: u32, now: Instant) -> Self {
-        children.iter_mut().for_each(Child::begin_last_life);
+        children.iter_mut().for_each(Child::begin_last_incarnation);
         Self { began: now, told: children.len(), told_at: now, disorder: false, words }
     }
 

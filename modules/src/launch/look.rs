@@ -3,8 +3,8 @@
 //! A look is taken once and kept as bytes; its pages are parts of these, so they belong together however long their reader takes.
 //! The oldest look gives way to a new one, and its reader is told to begin anew.
 
-use crate::launcher::{LOOK_BYTES_MAX, Look, LookError, LookPage};
-use crate::survey::{MailboxLook, Seen, Survey};
+use crate::launcher::{LOOK_BYTES_MAX, LookError, LookPage, SnapshotRequest};
+use crate::survey::{MailboxSnapshot, Snapshot, Survey};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{InspectError, Name, Node};
 use std::collections::VecDeque;
@@ -27,10 +27,10 @@ impl Looks {
         &mut self,
         form: u32,
         bytes_max: u16,
-        see: impl FnOnce() -> Result<Seen, LookError>,
+        see: impl FnOnce() -> Result<Snapshot, LookError>,
     ) -> Result<LookPage, LookError> {
-        if form != Seen::format() {
-            return Err(LookError::Form(Seen::format()));
+        if form != Snapshot::format() {
+            return Err(LookError::Form(Snapshot::format()));
         }
         let bytes = see()?.to_bytes();
         if bytes.len() > LOOK_BYTES_MAX {
@@ -53,17 +53,22 @@ impl Looks {
     }
 }
 
-pub(super) fn see(what: Look, node: &Node, installation: &Installation, node_name: &str) -> Result<Seen, LookError> {
+pub(super) fn see(
+    what: SnapshotRequest,
+    node: &Node,
+    installation: &Installation,
+    node_name: &str,
+) -> Result<Snapshot, LookError> {
     match what {
-        Look::Survey(scope) => {
+        SnapshotRequest::Survey(scope) => {
             let survey = Survey::within(scope, node, installation, node_name);
             let mut survey = survey.map_err(|error| LookError::Failed(error.to_string()))?;
             survey.ask_kernel();
-            Ok(Seen::Survey(Box::new(survey)))
+            Ok(Snapshot::Survey(Box::new(survey)))
         }
-        Look::Mailbox(raw) => match MailboxLook::new(node, Name::from_raw(raw)) {
-            Ok(look) => Ok(Seen::Mailbox(Some(Box::new(look)))),
-            Err(InspectError::Missing(_)) => Ok(Seen::Mailbox(None)),
+        SnapshotRequest::Mailbox(raw) => match MailboxSnapshot::new(node, Name::from_raw(raw)) {
+            Ok(look) => Ok(Snapshot::Mailbox(Some(Box::new(look)))),
+            Err(InspectError::Missing(_)) => Ok(Snapshot::Mailbox(None)),
             Err(error @ InspectError::Bad(..)) => Err(LookError::Failed(error.to_string())),
         },
     }
@@ -76,7 +81,7 @@ mod tests {
     #[test]
     fn the_oldest_look_goes_and_all_others_stay_whole() {
         let mut looks = Looks::default();
-        let take = |looks: &mut Looks| looks.take(Seen::format(), 1, || Ok(Seen::Mailbox(None))).unwrap();
+        let take = |looks: &mut Looks| looks.take(Snapshot::format(), 1, || Ok(Snapshot::Mailbox(None))).unwrap();
         let first = take(&mut looks);
         let others: Vec<LookPage> = (1..LOOKS_KEPT).map(|_| take(&mut looks)).collect();
         assert_eq!(looks.page(first.look, 0, 1), Ok(first.clone()), "as many as there is room for");

@@ -114,7 +114,7 @@ mod tests {
         }
     }
 
-    /// A router is never given up; the pauses bound how often it is tried, and how much is said of it, however long each life is.
+    /// A router is never given up; the pauses bound how often it is tried, and how much is said of it, however long each incarnation is.
     #[test]
     fn a_crash_loop_that_never_ends_is_slow() {
         let (ms, second) = (Duration::from_millis, Duration::from_secs(1));

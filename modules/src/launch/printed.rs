@@ -10,7 +10,7 @@
 //! that say where a panic came from, which launch tells once and not again as long as they stay the same.
 
 use crate::common::OutputLevel;
-use crate::output::{SENT, TRACE_LINES_MAX, TRACED, Voice, Whisper};
+use crate::output::{OutputProxy, SENT, TRACE_LINES_MAX, TRACED, WeakOutputProxy};
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeReader, PipeWriter};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -28,7 +28,7 @@ const HOLD: Duration = Duration::from_millis(200);
 pub(super) struct Printed {
     lines: Arc<Mutex<Lines>>,
     readers: Vec<JoinHandle<()>>,
-    voice: Option<Voice>,
+    voice: Option<OutputProxy>,
     /// Where the panic came from that was told last.
     told: Vec<String>,
 }
@@ -73,7 +73,7 @@ struct Held {
 
 impl Printed {
     /// Of a module; `voice` speaks for it, if anybody listens.
-    pub(super) fn new(voice: Option<Voice>) -> Self {
+    pub(super) fn new(voice: Option<OutputProxy>) -> Self {
         Self { lines: Arc::default(), readers: Vec::new(), voice, told: Vec::new() }
     }
 
@@ -91,7 +91,7 @@ impl Printed {
     fn read(&mut self, name: &str, level: OutputLevel) -> io::Result<PipeWriter> {
         let (pipe, writer) = io::pipe()?;
         let lines = self.lines.clone();
-        let whisper = self.voice.as_ref().map(Voice::whisper);
+        let whisper = self.voice.as_ref().map(OutputProxy::whisper);
         let read = move || keep(pipe, level, &lines, whisper.as_ref());
         self.readers.push(std::thread::Builder::new().name(name.into()).spawn(read)?);
         Ok(writer)
@@ -174,7 +174,7 @@ fn lock(lines: &Mutex<Lines>) -> MutexGuard<'_, Lines> {
 }
 
 /// Keeps the last lines that come through a pipe, until it closes.
-fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<Lines>, whisper: Option<&Whisper>) {
+fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<Lines>, whisper: Option<&WeakOutputProxy>) {
     let mut pipe = BufReader::new(pipe);
     let mut line = Vec::new();
     while let Ok(1..) = io::Read::take(&mut pipe, LINE_BYTES_MAX).read_until(b'\n', &mut line) {
@@ -191,7 +191,7 @@ fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<Lines>, whisper: Opt
             Some(text) => (text.to_owned(), true),
             None => (text, false),
         };
-        let voice = whisper.and_then(Whisper::voice).filter(|_| !sent && !text.is_empty());
+        let voice = whisper.and_then(WeakOutputProxy::voice).filter(|_| !sent && !text.is_empty());
         let pressed = voice.as_ref().and_then(|voice| {
             let mut lines = lock(lines);
             lines.held.push_back(Held { level, time_ns: voice.now_ns(), since: Instant::now(), text: text.clone() });

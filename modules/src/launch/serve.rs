@@ -6,9 +6,9 @@ use crate::call::{Fault, Link};
 use crate::common;
 use crate::interface::{Interface, Serve};
 use crate::launcher::{Children, ControlError, Launcher, LauncherInterface};
-use crate::launcher::{Look, LookError, LookPage};
+use crate::launcher::{LookError, LookPage, SnapshotRequest};
 use crate::runtime::refusals::{Cause, Refusals};
-use crate::runtime::server::{Call, Desk, Servant, admit};
+use crate::runtime::server::{Call, CommandHandler, CommandServer, admit};
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{CreateError, Head, Label, Name, Node, Receiver, SendError, Shape};
 use rohrpost_schema::Description;
@@ -21,7 +21,7 @@ const PAGE_BYTES: usize = 3000;
 
 /// Launch's command mailbox, and what it tells of itself.
 pub(super) struct Counter {
-    desk: Desk,
+    command_server: CommandServer,
     description: Description,
     /// Postcard of it.
     bytes: Vec<u8>,
@@ -35,7 +35,7 @@ impl Counter {
         // Writing to a growing vector does not fail.
         let bytes = description.to_bytes();
         Ok(Self {
-            desk: Desk::new(commands, &installation.callers(link.me())),
+            command_server: CommandServer::new(commands, &installation.callers(link.me())),
             description,
             bytes,
             refusals: Refusals::default(),
@@ -44,7 +44,7 @@ impl Counter {
 
     /// To wait on.
     pub(super) fn commands(&mut self) -> &mut Receiver {
-        &mut self.desk.commands
+        &mut self.command_server.commands
     }
 
     /// Answers those who have asked.
@@ -52,14 +52,14 @@ impl Counter {
         let Self { description, bytes, refusals, .. } = self;
         let mut clerk = Clerk { orders, link, description, bytes, refusals };
         for _ in 0..BURST {
-            if !self.desk.handle(&mut clerk) {
+            if !self.command_server.handle(&mut clerk) {
                 return;
             }
         }
     }
 
     pub(super) fn close(self) {
-        self.desk.commands.close();
+        self.command_server.commands.close();
     }
 }
 
@@ -82,7 +82,7 @@ struct Clerk<'a> {
     refusals: &'a mut Refusals,
 }
 
-impl Servant for Clerk<'_> {
+impl CommandHandler for Clerk<'_> {
     fn is_idempotent(&self, number: u16) -> bool {
         number < common::FIRST_OWN || self.description.functions.iter().any(|f| f.number == number && f.idempotent)
     }
@@ -110,7 +110,7 @@ impl Servant for Clerk<'_> {
 }
 
 impl Orders<'_> {
-    /// The module of this name, or with this face.
+    /// The module of this name, or with this alias.
     fn find(&mut self, module: &str) -> Result<&mut Child, ControlError> {
         if self.ending {
             return Err(ControlError::Ending(module.into()));
@@ -167,7 +167,7 @@ impl Launcher for Orders<'_> {
         Ok(child.lives() + 1)
     }
 
-    fn look(&mut self, what: Look, form: u32, bytes_max: u16) -> Result<LookPage, LookError> {
+    fn look(&mut self, what: SnapshotRequest, form: u32, bytes_max: u16) -> Result<LookPage, LookError> {
         self.looks.take(form, bytes_max, || see(what, self.node, self.installation, self.node_name))
     }
 

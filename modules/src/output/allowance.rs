@@ -51,7 +51,7 @@ pub(super) struct Excess {
 
 /// What there is to tell.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Told {
+pub(super) struct Suppressed {
     pub(super) lines: u32,
     /// From the first to the last of them.
     pub(super) within: Duration,
@@ -75,7 +75,7 @@ impl Excess {
     }
 
     /// What is to be told by now; each is told once, by whichever thread asks first.
-    pub(super) fn tell(&self, now_ns: u64) -> Option<Told> {
+    pub(super) fn tell(&self, now_ns: u64) -> Option<Suppressed> {
         if self.due_ns()? > now_ns {
             return None;
         }
@@ -83,7 +83,7 @@ impl Excess {
     }
 
     /// The same, whether it is time or not: the module ends.
-    pub(super) fn tell_all(&self) -> Option<Told> {
+    pub(super) fn tell_all(&self) -> Option<Suppressed> {
         // ORDERING: see `add`.
         let first_ns = self.first_ns.swap(0, Ordering::SeqCst);
         if first_ns == 0 {
@@ -92,7 +92,7 @@ impl Excess {
         // One that is counted between these two lines is told of now, and found to be none when its own time comes.
         let lines = self.count.swap(0, Ordering::SeqCst);
         let within = self.last_ns.load(Ordering::Relaxed).saturating_sub(first_ns);
-        (lines > 0).then_some(Told { lines, within: Duration::from_nanos(within) })
+        (lines > 0).then_some(Suppressed { lines, within: Duration::from_nanos(within) })
     }
 }
 
@@ -179,7 +179,7 @@ mod tests {
         assert!(!excess.add(start + 100 * MS));
         assert_eq!(excess.due_ns(), Some(start + 600 * MS));
         assert_eq!(excess.tell(start + 599 * MS), None);
-        let told = Told { lines: 2, within: Duration::from_millis(100) };
+        let told = Suppressed { lines: 2, within: Duration::from_millis(100) };
         assert_eq!(excess.tell(start + 600 * MS), Some(told));
         assert_eq!(excess.tell(start + 600 * MS), None);
 

@@ -23,7 +23,7 @@ mod way;
 #[cfg(feature = "builtin")]
 pub use format::{Format, iso};
 pub(crate) use print::print;
-pub(crate) use relay::{Relay, Voice, Whisper};
+pub(crate) use relay::{OutputProxy, Relay, WeakOutputProxy};
 pub(crate) use trace::LINES_MAX as TRACE_LINES_MAX;
 pub(crate) use way::install_quiet;
 pub(crate) use way::is_installed;

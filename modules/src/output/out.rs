@@ -14,7 +14,7 @@ const RETRY_MAX: Duration = Duration::from_secs(3);
 /// The one way out of a process, however many modules it speaks for.
 #[derive(Default)]
 pub(super) struct Out {
-    way: Mutex<Way>,
+    way: Mutex<Outlet>,
     /// Whether `way` holds a line back.
     pub(super) held: AtomicBool,
     /// Until then nothing is sent.
@@ -25,7 +25,7 @@ impl Out {
     /// One by which nothing is sent for so long.
     pub(super) fn quiet(quiet: Duration) -> Self {
         let quiet_until = (!quiet.is_zero()).then(|| Instant::now() + quiet);
-        Self { way: Mutex::new(Way { retry_at: quiet_until, ..Way::default() }), quiet_until, ..Self::default() }
+        Self { way: Mutex::new(Outlet { retry_at: quiet_until, ..Outlet::default() }), quiet_until, ..Self::default() }
     }
 
     /// Whether nothing is sent yet.
@@ -34,7 +34,7 @@ impl Out {
     }
 
     /// None: another thread has it.
-    pub(super) fn way(&self) -> Option<MutexGuard<'_, Way>> {
+    pub(super) fn way(&self) -> Option<MutexGuard<'_, Outlet>> {
         match self.way.try_lock() {
             Ok(way) => Some(way),
             Err(TryLockError::Poisoned(way)) => Some(way.into_inner()),
@@ -44,7 +44,7 @@ impl Out {
 }
 
 #[derive(Default)]
-pub(super) struct Way {
+pub(super) struct Outlet {
     pub(super) sender: Option<Sender>,
     pub(super) retry_at: Option<Instant>,
     /// How often in a row it was not there.
@@ -55,7 +55,7 @@ pub(super) struct Way {
     pub(super) sequence: u32,
 }
 
-impl Way {
+impl Outlet {
     /// Whether the collector is there; it is looked for when it is time.
     pub(super) fn open(&mut self, participant: &Arc<Participant>, to: Name) -> bool {
         if self.retry_at.is_some_and(|at| Instant::now() < at) {
@@ -82,7 +82,7 @@ mod tests {
 
     #[test]
     fn a_collector_that_stays_away_is_looked_for_less_and_less() {
-        let mut way = Way::default();
+        let mut way = Outlet::default();
         let waits: Vec<u128> = (0..6).map(|_| way.away().as_millis()).collect();
         assert_eq!(waits, [200, 400, 800, 1600, 3000, 3000]);
         way.failures = u32::MAX;

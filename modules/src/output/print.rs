@@ -68,9 +68,9 @@ fn marked(level: OutputLevel, text: &str) -> String {
 
 /// Prints a line to standard error, as far as that takes it at once; the rest is dropped.
 pub(crate) fn print(line: &dyn Display) {
-    static ERROR: OnceLock<Way> = OnceLock::new();
+    static ERROR: OnceLock<WriteMode> = OnceLock::new();
     let (text, stderr) = (format!("{line}\n"), stderr());
-    let way = ERROR.get_or_init(|| Way::to(&stderr));
+    let way = ERROR.get_or_init(|| WriteMode::to(&stderr));
     let mut rest = text.as_bytes();
     while !rest.is_empty() {
         let (part, behind) = rest.split_at(whole(rest));
@@ -88,7 +88,7 @@ fn whole(text: &[u8]) -> usize {
 }
 
 /// How to write without waiting.
-enum Way {
+enum WriteMode {
     /// A pipe or a terminal, opened anew: writes to this description never wait. The one that standard error has is shared with
     /// other processes, and with all that print with the standard library; those may expect that theirs do.
     Again(File),
@@ -98,7 +98,7 @@ enum Way {
     InTurn(Mutex<()>),
 }
 
-impl Way {
+impl WriteMode {
     fn to(stderr: &impl AsFd) -> Self {
         let kind = stderr.as_fd().try_clone_to_owned().and_then(|fd| File::from(fd).metadata());
         let Ok(kind) = kind.map(|metadata| metadata.file_type()) else { return Self::InTurn(Mutex::default()) };
@@ -152,8 +152,8 @@ mod tests {
     #[test]
     fn a_full_pipe_keeps_nobody() {
         let (mut pipe, writer) = std::io::pipe().unwrap();
-        let way = Way::to(&writer);
-        assert!(matches!(way, Way::Again(_)));
+        let way = WriteMode::to(&writer);
+        assert!(matches!(way, WriteMode::Again(_)));
         let line = format!("{}\n", "x".repeat(99));
         let flood = || (0..10_000).filter(|_| way.take(line.as_bytes(), &stderr())).count();
         let taken: usize = std::thread::scope(|scope| {
@@ -170,8 +170,8 @@ mod tests {
     #[test]
     fn a_socket_that_cannot_be_opened_anew_is_written_when_it_has_room() {
         let (_reads, writes) = std::os::unix::net::UnixStream::pair().unwrap();
-        assert!(matches!(Way::to(&writes), Way::InTurn(_)));
+        assert!(matches!(WriteMode::to(&writes), WriteMode::InTurn(_)));
         let file = tempfile::tempfile().unwrap();
-        assert!(matches!(Way::to(&file), Way::File));
+        assert!(matches!(WriteMode::to(&file), WriteMode::File));
     }
 }

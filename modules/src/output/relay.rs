@@ -19,10 +19,10 @@ pub(crate) struct Relay {
 }
 
 /// Speaks for one module, within the same allowance as the module has itself.
-pub(crate) struct Voice(Arc<Output>);
+pub(crate) struct OutputProxy(Arc<Output>);
 
 /// The same for a thread that nobody waits for: silent when all else has ended.
-pub(crate) struct Whisper(Weak<Output>);
+pub(crate) struct WeakOutputProxy(Weak<Output>);
 
 impl Relay {
     pub(crate) fn new(participant: &Arc<Participant>, from: Name) -> Self {
@@ -30,13 +30,13 @@ impl Relay {
     }
 
     /// None: the configuration knows no collector.
-    pub(crate) fn voice(&self, installation: &Installation, module: Name) -> Option<Voice> {
+    pub(crate) fn voice(&self, installation: &Installation, module: Name) -> Option<OutputProxy> {
         let output = Output::new(&self.participant, installation, module, self.from, self.out.clone(), Print::Nothing)?;
-        Some(Voice(Arc::new(output)))
+        Some(OutputProxy(Arc::new(output)))
     }
 }
 
-impl Voice {
+impl OutputProxy {
     /// Says a line as of this system time, unless the module says too much already, or its configuration wants to hear only
     /// of more important things.
     pub(crate) fn say(&self, level: OutputLevel, time_ns: u64, text: String) {
@@ -60,13 +60,13 @@ impl Voice {
         self.0.retry_at()
     }
 
-    pub(crate) fn whisper(&self) -> Whisper {
-        Whisper(Arc::downgrade(&self.0))
+    pub(crate) fn whisper(&self) -> WeakOutputProxy {
+        WeakOutputProxy(Arc::downgrade(&self.0))
     }
 }
 
-impl Whisper {
-    pub(crate) fn voice(&self) -> Option<Voice> {
-        self.0.upgrade().map(Voice)
+impl WeakOutputProxy {
+    pub(crate) fn voice(&self) -> Option<OutputProxy> {
+        self.0.upgrade().map(OutputProxy)
     }
 }

@@ -1,7 +1,7 @@
 //! The way of a line out of this process: allowances, queues, and whoever finds the way free sends.
 
-use super::allowance::{Bucket, Excess, Told};
-use super::out::{Out, Way};
+use super::allowance::{Bucket, Excess, Suppressed};
+use super::out::{Out, Outlet};
 use super::print::Print;
 use super::{CLASS, LINES, OutputLine, layer};
 use crate::common::{DataHead, OutputLevel};
@@ -307,13 +307,13 @@ impl Output {
     }
 
     /// Tells of what was suppressed, unless there is no room: then its time comes later.
-    fn tell(&self, told: impl Fn(&Excess, u64) -> Option<Told>) {
+    fn tell(&self, told: impl Fn(&Excess, u64) -> Option<Suppressed>) {
         for lane in Lane::ALL {
             let own = &self.lanes[lane as usize];
             if own.excess.due_ns().is_none() || own.queue.is_full() {
                 continue;
             }
-            if let Some(Told { lines, within }) = told(&own.excess, monotonic_ns()) {
+            if let Some(Suppressed { lines, within }) = told(&own.excess, monotonic_ns()) {
                 let ((what, level), rate) = (lane.words(), self.rate);
                 let text = format!("… {lines} {what} were suppressed in {within:.1?}: more than {rate} a second");
                 self.push(lane, level, self.now_ns(), lines, text);
@@ -394,7 +394,7 @@ impl Output {
     }
 
     /// False when nothing more goes through now.
-    fn send(&self, way: &mut Way, mut line: OutputLine) -> bool {
+    fn send(&self, way: &mut Outlet, mut line: OutputLine) -> bool {
         // The line that was held back may be that of another for whom this process speaks.
         let own = line.module() == self.me;
         line.lost = if own { self.lost_now.swap(0, Ordering::Relaxed) } else { 0 };

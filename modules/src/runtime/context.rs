@@ -1,6 +1,6 @@
 //! What a module can ask of its runtime.
 
-use super::face::Face;
+use super::endpoint::Endpoint;
 use super::follow::{Followings, Rate, Subscription};
 use super::refusals::Refusals;
 use crate::call::append;
@@ -10,8 +10,8 @@ use crate::interface::{DataPort, Proxy};
 use crate::publish::{Delivery, Newest, Subscriptions};
 use rohrpost_config::{ClassTable, Installation, NameTextError, Principal};
 use rohrpost_mailbox::{
-    CreateError, Full, Head, Interest, Label, Name, Options, Publications, Receiver, SendError, Shape, SystemClock,
-    SystemTime, Type, Watch, Watches, local,
+    CreateError, Head, Interest, Label, Name, Options, OverflowPolicy, Publications, Receiver, SendError, Shape,
+    SystemClock, SystemTime, Type, Watch, Watches, local,
 };
 use rohrpost_schema::Data;
 use std::cell::RefCell;
@@ -48,9 +48,11 @@ pub enum ContextError {
     /// More subscriptions than have ids.
     #[error("this module has 65536 subscriptions, and no id for another")]
     TooMany,
-    /// Data that no face of this module publishes.
-    #[error("this module has no face of class `{0}`; add one to `faces` in the configuration, or to its `Interfaces`")]
-    NoFace(&'static str),
+    /// Data that no endpoint of this module publishes.
+    #[error(
+        "this module has no endpoint of class `{0}`; add one to `endpoints` in the configuration, or to its `Interfaces`"
+    )]
+    NoName(&'static str),
     /// Data of an interface that the program does not serve under the name that has its class.
     #[error(
         "data `{data}` of an interface of class `{class}` cannot be published as `{module}`: its program does not serve that \
@@ -61,7 +63,7 @@ pub enum ContextError {
         data: &'static str,
         /// Class of its interface.
         class: &'static str,
-        /// The module or face.
+        /// The module or endpoint.
         module: String,
     },
     /// The value cannot be written as postcard.
@@ -74,8 +76,8 @@ pub struct Context {
     pub(crate) me: Name,
     pub(crate) installation: Arc<Installation>,
     pub(crate) link: Caller,
-    pub(crate) faces: Vec<Name>,
-    /// Of each face, the hash of the interface that the module serves there, if it serves one.
+    pub(crate) endpoints: Vec<Name>,
+    /// Of each endpoint, the hash of the interface that the module serves there, if it serves one.
     served: Vec<Option<u32>>,
     /// Numbers and names of the functions of all of them.
     pub(crate) functions: Vec<(u16, String)>,
@@ -104,19 +106,19 @@ impl Context {
         me: Name,
         installation: Arc<Installation>,
         link: Link,
-        faces: Vec<Name>,
+        endpoints: Vec<Name>,
         clock: SystemClock,
         data: &Shape,
     ) -> Self {
         let publications = Publications::new(link.participant());
         let followings = Followings::of(link.incarnation());
-        let named: Vec<Principal> = faces.iter().flat_map(|face| installation.callers(*face)).collect();
+        let named: Vec<Principal> = endpoints.iter().flat_map(|endpoint| installation.callers(*endpoint)).collect();
         let subscriptions = Subscriptions::new(&named);
         Self {
             me,
             installation,
             link: Rc::new(RefCell::new(link)),
-            faces,
+            endpoints,
             served: Vec::new(),
             functions: Vec::new(),
             newest: Vec::new(),
@@ -126,7 +128,7 @@ impl Context {
             refusals: Refusals::default(),
             clock,
             own: Vec::new(),
-            taking: vec![(local::DATA, data.full == Full::Latest)],
+            taking: vec![(local::DATA, data.full == OverflowPolicy::Latest)],
             open: Vec::new(),
             watches: None,
             period: None,
@@ -136,9 +138,9 @@ impl Context {
     }
 
     /// Under its names the module serves these interfaces.
-    pub(super) fn serves<M>(&mut self, faces: &[Face<M>]) {
-        self.served = faces.iter().map(|face| face.offer.serve.map(|_| face.offer.hash)).collect();
-        self.functions = faces.iter().flat_map(|face| face.offer.functions.iter().cloned()).collect();
+    pub(super) fn serves<M>(&mut self, endpoints: &[Endpoint<M>]) {
+        self.served = endpoints.iter().map(|endpoint| endpoint.offer.serve.map(|_| endpoint.offer.hash)).collect();
+        self.functions = endpoints.iter().flat_map(|endpoint| endpoint.offer.functions.iter().cloned()).collect();
     }
 
     /// The module's own name.
@@ -253,12 +255,12 @@ impl Context {
     /// When it cannot be made.
     pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
         self.make_mailbox(local, shape)?;
-        self.taking.push((local, shape.full == Full::Latest));
+        self.taking.push((local, shape.full == OverflowPolicy::Latest));
         Ok(())
     }
 
     /// Makes a mailbox of the module's own, local id 3 or more, that takes data from all: what comes to it comes to
-    /// [`crate::Module::received`], whoever sent it, if it begins as data do. Whose word counts is for the module to judge.
+    /// [`crate::Module::received`], whoever sent it, if it begins as data do. Whose word counts is for the module to validate.
     ///
     /// # Errors
     /// When it cannot be made.
@@ -328,22 +330,22 @@ impl Context {
     /// A subscriber whose mailbox is full misses it, and sees that it did.
     ///
     /// # Errors
-    /// [`ContextError::NoFace`], [`ContextError::Undeclared`] or [`ContextError::Encode`].
+    /// [`ContextError::NoName`], [`ContextError::Undeclared`] or [`ContextError::Encode`].
     pub fn publish<T: Data>(&mut self, port: DataPort<T>, stamp_ns: u64, value: &T) -> Result<(), ContextError> {
         let class = self.installation.classes.id(port.class);
-        let face = self.faces.iter().position(|face| Some(face.class()) == class);
-        let face = face.ok_or(ContextError::NoFace(port.class))?;
+        let endpoint = self.endpoints.iter().position(|endpoint| Some(endpoint.class()) == class);
+        let endpoint = endpoint.ok_or(ContextError::NoName(port.class))?;
         self.scratch.clear();
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
-        let at = self.newest_at(face, &port)?;
+        let at = self.newest_at(endpoint, &port)?;
         let newest = &mut self.newest[at];
         (newest.name, newest.stamp_ns) = (port.name, stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);
-        let (newest, link, faces) = (&self.newest[at], &self.link, &self.faces);
+        let (newest, link, endpoints) = (&self.newest[at], &self.link, &self.endpoints);
         let age = Duration::from_nanos(self.clock.now().ns.saturating_sub(stamp_ns));
-        self.publications.published(faces[face], Type::data(port.number), newest.value.len(), age);
+        self.publications.published(endpoints[endpoint], Type::data(port.number), newest.value.len(), age);
         let classes = &self.installation.classes;
-        self.subscriptions.published(newest, |to| deliver(link, classes, faces, newest, to));
+        self.subscriptions.published(newest, |to| deliver(link, classes, endpoints, newest, to));
         Ok(())
     }
 
@@ -355,26 +357,26 @@ impl Context {
         self.publish(port, self.now().ns, value)
     }
 
-    fn newest_at<T>(&mut self, face: usize, port: &DataPort<T>) -> Result<usize, ContextError> {
+    fn newest_at<T>(&mut self, endpoint: usize, port: &DataPort<T>) -> Result<usize, ContextError> {
         let number = port.number;
-        if let Some(at) = self.newest.iter().position(|newest| (newest.face, newest.number) == (face, number)) {
+        if let Some(at) = self.newest.iter().position(|newest| (newest.endpoint, newest.number) == (endpoint, number)) {
             return Ok(at);
         }
         // Asked once, since what is refused is never the newest.
-        if self.served.get(face).copied().flatten() != Some((port.hash)()) {
-            let module = self.installation.classes.format(self.faces[face]);
+        if self.served.get(endpoint).copied().flatten() != Some((port.hash)()) {
+            let module = self.installation.classes.format(self.endpoints[endpoint]);
             return Err(ContextError::Undeclared { data: port.name, class: port.class, module });
         }
-        self.newest.push(Newest { face, number, ..Newest::default() });
+        self.newest.push(Newest { endpoint, number, ..Newest::default() });
         Ok(self.newest.len() - 1)
     }
 
     /// Delivers periodic data that is due.
     pub(crate) fn deliver_due(&mut self, now_ns: u64) {
-        let (all, link, faces, classes) = (&self.newest, &self.link, &self.faces, &self.installation.classes);
+        let (all, link, endpoints, classes) = (&self.newest, &self.link, &self.endpoints, &self.installation.classes);
         self.subscriptions.tick(now_ns, |to| {
-            match all.iter().find(|newest| (newest.face, newest.number) == (to.face, to.wish.number)) {
-                Some(newest) => deliver(link, classes, faces, newest, to),
+            match all.iter().find(|newest| (newest.endpoint, newest.number) == (to.endpoint, to.wish.number)) {
+                Some(newest) => deliver(link, classes, endpoints, newest, to),
                 // Fresh, so there is one.
                 None => Delivery::Sent,
             }
@@ -386,7 +388,7 @@ impl Context {
 fn deliver(
     link: &Caller,
     classes: &ClassTable,
-    faces: &[Name],
+    endpoints: &[Name],
     newest: &Newest,
     to: &crate::publish::Subscription,
 ) -> Delivery {
@@ -394,7 +396,7 @@ fn deliver(
     let (stamp_ns, incarnation) = (newest.stamp_ns, asked.incarnation);
     let head = DataHead { stamp_ns, sequence: to.sequence, missed: to.missed, incarnation };
     let label = Label {
-        from: faces[newest.face].with_local(local::COMMANDS),
+        from: endpoints[newest.endpoint].with_local(local::COMMANDS),
         kind: Type::data(newest.number),
         id: to.wish.id,
         priority: asked.priority,
@@ -413,6 +415,6 @@ fn deliver(
             }
             Delivery::TooLarge
         }
-        Err(_) => Delivery::Full,
+        Err(_) => Delivery::OverflowPolicy,
     }
 }

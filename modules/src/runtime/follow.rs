@@ -91,9 +91,9 @@ struct Followed {
 
 /// All that a module follows.
 pub(crate) struct Followings {
-    /// A subscription's id is its place here; none is used twice in a life.
+    /// A subscription's id is its place here; none is used twice in an incarnation.
     list: Vec<Followed>,
-    /// Of this life of the module, as its requests carry it.
+    /// Of this incarnation of the module, as its requests carry it.
     incarnation: u32,
 }
 
@@ -181,8 +181,8 @@ impl Followings {
     /// Whether data that came to `mailbox` are what was subscribed to; if so, notes their number. `latest`: a gap there is what newer ones
     /// replaced, there or on the way, and no loss.
     ///
-    /// A subscription is told by its id and by the incarnation of this life, which nothing before it has had: so whoever still sends what an
-    /// earlier life asked for, in whatever order that subscribed, is not taken for another. The publisher and the number are compared
+    /// A subscription is told by its id and by the incarnation of this incarnation, which nothing before it has had: so whoever still sends what an
+    /// earlier incarnation asked for, in whatever order that subscribed, is not taken for another. The publisher and the number are compared
     /// besides, since both numbers are no secret; a router lets nobody send in the name of another node's module.
     pub(crate) fn admit(
         &mut self,
@@ -200,7 +200,7 @@ impl Followings {
             return Err(Cause::OtherNumber);
         }
         if data.incarnation != self.incarnation {
-            return Err(Cause::EarlierLife);
+            return Err(Cause::PreviousIncarnation);
         }
         followed.note(latest, data.sequence);
         Ok(())
@@ -296,8 +296,8 @@ mod tests {
             (0, 2, Name::new(1, 150, 1, 0), 1, LIFE, Err(Cause::OtherPublisher), "another scanner"),
             (0, 2, LASER, 2, LIFE, Err(Cause::OtherNumber), "as if subscribed in another order"),
             (3, 2, LASER, 1, LIFE, Err(Cause::OtherNumber), "and the other way round"),
-            (0, 2, LASER, 1, LIFE - 1, Err(Cause::EarlierLife), "what the life before asked for"),
-            (0, 2, LASER, 1, 0, Err(Cause::EarlierLife), "what nobody asked for"),
+            (0, 2, LASER, 1, LIFE - 1, Err(Cause::PreviousIncarnation), "what the incarnation before asked for"),
+            (0, 2, LASER, 1, 0, Err(Cause::PreviousIncarnation), "what nobody asked for"),
         ] {
             let head = Head { from, id, ..Head::default() };
             let data = DataHead { stamp_ns: 0, sequence: followed, missed: 0, incarnation };

@@ -1,12 +1,12 @@
 //! A module as those who send it commands see it, under one of its names.
 
 use super::context::Context;
+use super::endpoint::Offer;
 use super::exchange;
-use super::face::Offer;
-use super::life::Life;
+use super::incarnation::Incarnation;
 use super::parameters;
 use super::refusals::Cause;
-use super::server::{Call, Servant, admit, read_arguments, write_result};
+use super::server::{Call, CommandHandler, admit, read_arguments, write_result};
 use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
 use crate::module::Module;
@@ -17,14 +17,14 @@ use rohrpost_mailbox::{Head, Label, Name, Options, SendError, Work, local, monot
 
 /// What is needed to run one command.
 pub(super) struct Hosted<'a, M> {
-    /// Which face.
+    /// Which endpoint.
     pub(super) index: usize,
     pub(super) offer: &'a Offer<M>,
-    pub(super) life: &'a mut Life<M>,
+    pub(super) life: &'a mut Incarnation<M>,
     pub(super) context: &'a mut Context,
 }
 
-impl<M: Module> Servant for Hosted<'_, M> {
+impl<M: Module> CommandHandler for Hosted<'_, M> {
     fn is_idempotent(&self, number: u16) -> bool {
         number < common::FIRST_OWN || self.offer.idempotent.contains(&number)
     }
@@ -128,7 +128,7 @@ impl<M: Module> Hosted<'_, M> {
     fn get_data(&self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         let (number,): (u16,) = read_arguments(call.arguments)?;
         self.offer.require_data(number)?;
-        let is_it = |newest: &&crate::publish::Newest| (newest.face, newest.number) == (self.index, number);
+        let is_it = |newest: &&crate::publish::Newest| (newest.endpoint, newest.number) == (self.index, number);
         let newest = self.context.newest.iter().find(is_it).ok_or(Fault::NothingYet)?;
         // A tuple of the time and the value: in postcard just the one after the other.
         write_result(reply, &newest.stamp_ns)?;

@@ -9,13 +9,13 @@
 //! ```
 
 mod context;
+mod endpoint;
 mod error;
 mod exchange;
-mod face;
 mod follow;
 mod host;
 mod hosted;
-mod life;
+mod incarnation;
 mod parameters;
 mod received;
 pub(crate) mod refusals;

@@ -22,14 +22,14 @@ pub(crate) enum Cause {
     OtherPublisher,
     /// The subscription is to data of another number.
     OtherNumber,
-    /// An earlier life of the module asked for it.
-    EarlierLife,
+    /// An earlier incarnation of the module asked for it.
+    PreviousIncarnation,
     /// It is of an earlier incarnation of its sender than one that is remembered. Told, and not counted: it passes by itself.
     EarlierIncarnation,
 }
 
 impl Cause {
-    /// What is told of it. Nothing where it happens to all: after a restart, what the life before asked for still comes for a while.
+    /// What is told of it. Nothing where it happens to all: after a restart, what the incarnation before asked for still comes for a while.
     fn words(self) -> Option<&'static str> {
         match self {
             Self::NotAllowed => Some("[access] does not let that class command this one"),
@@ -42,12 +42,12 @@ impl Cause {
                 "a later incarnation of it has called before. If this goes on, either two programs have that name: end one of them. Or its \
                  computer's clock was set back before its node was launched: set the clock right, and launch that node again",
             ),
-            Self::EarlierLife => None,
+            Self::PreviousIncarnation => None,
         }
     }
 }
 
-/// All refusals of one life.
+/// All refusals of one incarnation.
 #[derive(Default)]
 pub(crate) struct Refusals {
     pub(crate) counts: Refused,
@@ -80,7 +80,7 @@ impl Refusals {
             Cause::Unasked => Some(&mut counts.unasked),
             Cause::OtherPublisher => Some(&mut counts.other_publisher),
             Cause::OtherNumber => Some(&mut counts.other_number),
-            Cause::EarlierLife => Some(&mut counts.earlier_life),
+            Cause::PreviousIncarnation => Some(&mut counts.earlier_incarnation),
             Cause::EarlierIncarnation => None,
         }
     }
@@ -99,7 +99,7 @@ mod tests {
             Cause::Unasked,
             Cause::OtherPublisher,
             Cause::OtherNumber,
-            Cause::EarlierLife,
+            Cause::PreviousIncarnation,
         ];
         let mut refusals = Refusals::default();
         for (times, cause) in (1..).zip(causes) {
@@ -112,7 +112,7 @@ mod tests {
             unasked: 4,
             other_publisher: 5,
             other_number: 6,
-            earlier_life: 7,
+            earlier_incarnation: 7,
         };
         assert_eq!(refusals.counts, expected);
     }

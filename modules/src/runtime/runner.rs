@@ -1,10 +1,10 @@
 //! The loop of a module's one thread.
 
 use super::context::Context;
+use super::endpoint::Endpoint;
 use super::error::StartError;
-use super::face::Face;
 use super::hosted::Hosted;
-use super::life::Life;
+use super::incarnation::Incarnation;
 use super::received::Received;
 use super::refusals::Cause;
 use super::start::Start;
@@ -12,7 +12,7 @@ use crate::common::DataHead;
 use crate::interface::Interfaces;
 use crate::module::Module;
 use crate::output;
-use rohrpost_mailbox::{Full, Kind, ModuleState, Receiver, Waiting, Watches, Work, monotonic_ns, wait_any};
+use rohrpost_mailbox::{Kind, ModuleState, OverflowPolicy, Receiver, Waiting, Watches, Work, monotonic_ns, wait_any};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -71,8 +71,8 @@ pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
 
 /// A module that runs.
 pub(crate) struct Running<M> {
-    pub(crate) life: Life<M>,
-    pub(crate) faces: Vec<Face<M>>,
+    pub(crate) life: Incarnation<M>,
+    pub(crate) endpoints: Vec<Endpoint<M>>,
     pub(crate) data: Receiver,
     pub(crate) context: Context,
     pub(crate) stop: Arc<AtomicBool>,
@@ -122,10 +122,10 @@ impl<M: Module> Running<M> {
 
     fn commands(&mut self) -> bool {
         let mut any = false;
-        for (index, face) in self.faces.iter_mut().enumerate() {
-            let Face { desk, offer, .. } = face;
+        for (index, endpoint) in self.endpoints.iter_mut().enumerate() {
+            let Endpoint { command_server, offer, .. } = endpoint;
             let mut hosted = Hosted { index, offer, life: &mut self.life, context: &mut self.context };
-            any |= burst(|| desk.handle(&mut hosted));
+            any |= burst(|| command_server.handle(&mut hosted));
         }
         any
     }
@@ -195,7 +195,7 @@ impl<M: Module> Running<M> {
         let deadline = [tick, renewal, delivery, output].into_iter().flatten().min();
         let mut link = self.context.link.borrow_mut();
         let mut receivers = empty(std::mem::take(&mut self.receivers));
-        receivers.extend(self.faces.iter_mut().map(|face| &mut face.desk.commands));
+        receivers.extend(self.endpoints.iter_mut().map(|endpoint| &mut endpoint.command_server.commands));
         receivers.push(&mut self.data);
         receivers.extend(&mut self.context.own);
         receivers.push(link.replies());
@@ -224,7 +224,7 @@ impl<M: Module> Running<M> {
         }
         // With it go its proxies, which hold the link.
         drop(self.life);
-        let commands = self.faces.into_iter().map(|face| face.desk.commands);
+        let commands = self.endpoints.into_iter().map(|endpoint| endpoint.command_server.commands);
         for mailbox in commands.chain([self.data]).chain(self.context.own) {
             mailbox.close();
         }
@@ -235,8 +235,8 @@ impl<M: Module> Running<M> {
 }
 
 /// Hands out a burst of packages of one mailbox; false when there was none.
-fn take<M: Module>(mailbox: &mut Receiver, life: &mut Life<M>, context: &mut Context) -> bool {
-    let (local, latest) = (mailbox.name().local(), mailbox.shape().full == Full::Latest);
+fn take<M: Module>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &mut Context) -> bool {
+    let (local, latest) = (mailbox.name().local(), mailbox.shape().full == OverflowPolicy::Latest);
     burst(|| {
         let Some(package) = mailbox.try_receive() else { return false };
         let head = package.head();
@@ -275,7 +275,7 @@ fn empty<'a>(mut receivers: Vec<&mut Receiver>) -> Vec<&'a mut Receiver> {
     receivers.into_iter().map(|_| -> &'a mut Receiver { unreachable!("it is empty") }).collect()
 }
 
-/// What a module serves, in the order of its faces.
+/// What a module serves, in the order of its endpoints.
 pub(crate) fn served<M: Module>() -> Vec<crate::interface::Served<M>> {
     M::Interfaces::table()
 }

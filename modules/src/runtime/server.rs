@@ -2,13 +2,13 @@
 
 use super::refusals::Cause;
 use crate::call::append;
-use crate::call::{CallEnvelope, Fault, Once, ReplyEnvelope, Request, Verdict};
+use crate::call::{CallEnvelope, Deduplicator, Fault, ReplyEnvelope, Request, Verdict};
 use crate::common::{self, DescriptionPart};
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{Head, Kind, Label, Name, Options, Package, Receiver, SendError, Type, local, monotonic_ns};
 
 /// Whoever runs the commands of a mailbox: a module under one of its names, or launch.
-pub(crate) trait Servant {
+pub(crate) trait CommandHandler {
     /// Whether a function may be run twice without harm.
     fn is_idempotent(&self, number: u16) -> bool;
     /// Runs a command; what it has to say is appended to the reply.
@@ -22,47 +22,47 @@ pub(crate) trait Servant {
 }
 
 /// A command mailbox, and what was run of what came there.
-pub(crate) struct Desk {
+pub(crate) struct CommandServer {
     pub(crate) commands: Receiver,
-    once: Once,
+    deduplicator: Deduplicator,
     /// The result being written; kept, so that answering allocates nothing.
     reply: Vec<u8>,
 }
 
-impl Desk {
+impl CommandServer {
     /// Whoever had this mailbox before has ended by now, and ran nothing after this. These principals always find a place.
     pub(crate) fn new(commands: Receiver, named: &[Principal]) -> Self {
-        Self { commands, once: Once::new(monotonic_ns(), named), reply: Vec::with_capacity(1024) }
+        Self { commands, deduplicator: Deduplicator::new(monotonic_ns(), named), reply: Vec::with_capacity(1024) }
     }
 
     /// Handles the next command; false when there is none.
-    pub(crate) fn handle(&mut self, servant: &mut impl Servant) -> bool {
+    pub(crate) fn handle(&mut self, handler: &mut impl CommandHandler) -> bool {
         let Some(package) = self.commands.try_receive() else { return false };
         let head = *package.head();
         let (Kind::Command(number), Ok((envelope, arguments))) =
             (head.kind.kind(), CallEnvelope::split(package.body()))
         else {
-            servant.refuse(Cause::Malformed, head.from);
+            handler.refuse(Cause::Malformed, head.from);
             return true;
         };
-        let principal = match servant.admit(&head) {
+        let principal = match handler.admit(&head) {
             Ok(principal) => principal,
             Err(fault) => {
-                servant.refuse(Cause::NotAllowed, head.from);
+                handler.refuse(Cause::NotAllowed, head.from);
                 fill(&mut self.reply, &fault);
-                answer(servant, &head, number, &envelope, true, &self.reply);
+                answer(handler, &head, number, &envelope, true, &self.reply);
                 return true;
             }
         };
         let now_ns = monotonic_ns();
-        let request = request(&package, &envelope, principal, servant.is_idempotent(number), now_ns);
-        let (error, body): (bool, &[u8]) = match self.once.judge(&request, now_ns) {
+        let request = request(&package, &envelope, principal, handler.is_idempotent(number), now_ns);
+        let (error, body): (bool, &[u8]) = match self.deduplicator.validate(&request, now_ns) {
             Verdict::Ignore => return true,
             Verdict::Again(error, body) => (error, body),
             Verdict::Refuse(fault) => {
                 match fault {
-                    Fault::Busy => servant.refuse(Cause::NoPlace, head.from),
-                    Fault::EarlierIncarnation => servant.refuse(Cause::EarlierIncarnation, head.from),
+                    Fault::Busy => handler.refuse(Cause::NoPlace, head.from),
+                    Fault::EarlierIncarnation => handler.refuse(Cause::EarlierIncarnation, head.from),
                     _ => {}
                 }
                 fill(&mut self.reply, &fault);
@@ -72,18 +72,18 @@ impl Desk {
                 self.reply.clear();
                 let CallEnvelope { interface: hash, incarnation, .. } = envelope;
                 let call = Call { number, head, hash, incarnation, arguments };
-                let error = match servant.run(&call, &mut self.reply) {
+                let error = match handler.run(&call, &mut self.reply) {
                     Ok(()) => false,
                     Err(fault) => {
                         fill(&mut self.reply, &fault);
                         true
                     }
                 };
-                self.once.done(&request, now_ns, error, &self.reply);
+                self.deduplicator.done(&request, now_ns, error, &self.reply);
                 (error, &self.reply)
             }
         };
-        answer(servant, &head, number, &envelope, error, body);
+        answer(handler, &head, number, &envelope, error, body);
         true
     }
 }
@@ -126,7 +126,14 @@ fn fill(reply: &mut Vec<u8>, fault: &Fault) {
     let _ = append(reply, fault);
 }
 
-fn answer(servant: &mut impl Servant, head: &Head, number: u16, envelope: &CallEnvelope, error: bool, body: &[u8]) {
+fn answer(
+    handler: &mut impl CommandHandler,
+    head: &Head,
+    number: u16,
+    envelope: &CallEnvelope,
+    error: bool,
+    body: &[u8],
+) {
     if !head.from.is_mailbox() {
         return;
     }
@@ -138,11 +145,11 @@ fn answer(servant: &mut impl Servant, head: &Head, number: u16, envelope: &CallE
         priority: head.priority,
         options: if error { Options::ERROR } else { Options::default() },
     };
-    let sent = match servant.send(head.from, &label(error), &[&envelope, body]) {
+    let sent = match handler.send(head.from, &label(error), &[&envelope, body]) {
         Err(SendError::TooLarge { len, .. }) => {
             let mut fault = Vec::new();
             fill(&mut fault, &Fault::TooLarge(len as u32));
-            servant.send(head.from, &label(true), &[&envelope, &fault])
+            handler.send(head.from, &label(true), &[&envelope, &fault])
         }
         sent => sent,
     };

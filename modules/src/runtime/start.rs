@@ -1,9 +1,9 @@
 //! From a command line or launch's environment to a running module.
 
 use super::context::Context;
+use super::endpoint::Endpoint;
 use super::error::StartError;
-use super::face::Face;
-use super::life::Life;
+use super::incarnation::Incarnation;
 use super::parameters;
 use super::runner::{Running, served};
 use crate::call::Link;
@@ -120,16 +120,16 @@ impl Start {
             })
         };
         let mut served = served::<M>();
-        let mut faces = Vec::new();
+        let mut endpoints = Vec::new();
         for name in module.names() {
             let class = installation.classes.name(name.class()).unwrap_or_default().to_owned();
             let at = served.iter().position(|served| served.class == class);
             if at.is_none() && name != module.name {
-                return Err(StartError::Face(installation.classes.format(name), text, class));
+                return Err(StartError::Endpoint(installation.classes.format(name), text, class));
             }
             let commands = receiver(name.with_local(local::COMMANDS), &module.mailboxes.commands)?;
             let named = installation.callers(name);
-            faces.push(Face::new(name, &class, commands, &named, at.map(|at| served.swap_remove(at))));
+            endpoints.push(Endpoint::new(name, &class, commands, &named, at.map(|at| served.swap_remove(at))));
         }
         if let Some(left) = served.first() {
             let names: Vec<String> =
@@ -140,10 +140,10 @@ impl Start {
         let replies = receiver(self.name.with_local(local::REPLIES), &module.mailboxes.replies)?;
         let link = Link::new(&participant, self.name, replies);
         let clock = SystemClock::open(&node);
-        let names = faces.iter().map(|face: &Face<M>| face.name).collect();
+        let names = endpoints.iter().map(|endpoint: &Endpoint<M>| endpoint.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock, data.shape());
         let settings = installation.settings_as(module)?;
-        context.serves(&faces);
+        context.serves(&endpoints);
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);
         participant.end_work();
@@ -152,8 +152,8 @@ impl Start {
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
         let spin = module.spin;
-        let life = Life::new(made, participant, module.busy_after);
-        Ok(Running { life, faces, data, context, stop, turn_on, by_hand, spin, receivers: Vec::new() })
+        let life = Incarnation::new(made, participant, module.busy_after);
+        Ok(Running { life, endpoints, data, context, stop, turn_on, by_hand, spin, receivers: Vec::new() })
     }
 }
 

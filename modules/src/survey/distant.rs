@@ -2,10 +2,10 @@
 //!
 //! Nothing here waits but [`look_at_all`], and that for a bounded time. A page that gets lost is asked for again.
 
-use super::Seen;
+use super::Snapshot;
 use crate::call::append;
 use crate::call::{CallError, Fault, Link};
-use crate::launcher::{LOOK, LOOK_BYTES_MAX, LOOK_ON, LauncherInterface, Look, LookError, LookPage};
+use crate::launcher::{LOOK, LOOK_BYTES_MAX, LOOK_ON, LauncherInterface, LookError, LookPage, SnapshotRequest};
 use rohrpost_mailbox::{Name, wait_any};
 use std::time::{Duration, Instant};
 
@@ -32,10 +32,10 @@ pub enum LookFailure {
     Silent(Duration),
 }
 
-/// A look at another node, under way. Look after it with [`Distant::poll`]; give it up with [`Distant::forget`].
+/// A look at another node, under way. SnapshotRequest after it with [`Distant::poll`]; give it up with [`Distant::forget`].
 pub struct Distant {
     launcher: Name,
-    what: Look,
+    what: SnapshotRequest,
     /// Pages that are asked for at a time.
     ahead: usize,
     /// Bytes of a page, such that it fits the reply mailbox.
@@ -61,7 +61,7 @@ struct Asked {
 impl Distant {
     /// Begins to look at the node of this launch; all of it is to come within `timeout`. Of several looks at a time, `nodes` is
     /// their number: they share the reply mailbox.
-    pub fn new(launcher: Name, what: Look, timeout: Duration, nodes: usize) -> Self {
+    pub fn new(launcher: Name, what: SnapshotRequest, timeout: Duration, nodes: usize) -> Self {
         let ahead = (AHEAD / nodes.max(1)).max(1);
         let (look, bytes, there, next) = (None, Vec::new(), 0, 0);
         let (page, began) = (PAGE_BYTES_MAX, Instant::now());
@@ -69,7 +69,7 @@ impl Distant {
     }
 
     /// What was seen, or why nothing was; none while it is under way. Asks for what is missing.
-    pub fn poll(&mut self, link: &mut Link) -> Option<Result<Seen, LookFailure>> {
+    pub fn poll(&mut self, link: &mut Link) -> Option<Result<Snapshot, LookFailure>> {
         let fits = link.replies().shape().body_bytes_max.saturating_sub(PAGE_MARGIN);
         self.page = PAGE_BYTES_MAX.min(fits);
         let step = self.collect(link).and_then(|()| self.ask(link));
@@ -88,8 +88,8 @@ impl Distant {
         self.under_way.drain(..).for_each(|asked| link.forget(asked.sequence));
     }
 
-    fn read(&self) -> Result<Seen, LookFailure> {
-        Ok(Seen::from_bytes(&self.bytes).map_err(|error| CallError::BadReply(self.launcher, error.to_string()))?)
+    fn read(&self) -> Result<Snapshot, LookFailure> {
+        Ok(Snapshot::from_bytes(&self.bytes).map_err(|error| CallError::BadReply(self.launcher, error.to_string()))?)
     }
 
     /// Takes the pages that have come.
@@ -164,7 +164,7 @@ impl Distant {
         let function = if look.is_some() { LOOK_ON } else { LOOK };
         let write = |body: &mut Vec<u8>| match look {
             Some(look) => append(body, &(look, from as u32, page)),
-            None => append(body, &(what, Seen::format(), page)),
+            None => append(body, &(what, Snapshot::format(), page)),
         };
         let patience = left.min(PAGE_PATIENCE);
         let sequence = link.begin(self.launcher, function, LauncherInterface::hash(), patience, write)?;
@@ -188,13 +188,13 @@ fn passes(error: &CallError) -> bool {
 pub fn look_at_all(
     link: &mut Link,
     launchers: &[Name],
-    what: Look,
+    what: SnapshotRequest,
     timeout: Duration,
-) -> Vec<Result<Seen, LookFailure>> {
+) -> Vec<Result<Snapshot, LookFailure>> {
     let deadline = Instant::now() + timeout;
     let looks = launchers.iter().map(|launcher| Distant::new(*launcher, what, timeout, launchers.len()));
     let mut looks: Vec<Distant> = looks.collect();
-    let mut seen: Vec<Option<Result<Seen, LookFailure>>> = launchers.iter().map(|_| None).collect();
+    let mut seen: Vec<Option<Result<Snapshot, LookFailure>>> = launchers.iter().map(|_| None).collect();
     loop {
         for (look, seen) in looks.iter_mut().zip(&mut seen).filter(|(_, seen)| seen.is_none()) {
             *seen = look.poll(link);

@@ -8,11 +8,11 @@ mod detail;
 mod tests;
 mod traffic;
 
-use super::{MailboxLook, ModuleSurvey, Survey, Usage, Working};
+use super::{MailboxSnapshot, ModuleSurvey, Survey, Usage, Working};
 use crate::launcher::ChildState;
 use detail::{DetailForm, detail, detail_form};
 use rohrpost_mailbox::sys::Scheduling;
-use rohrpost_mailbox::{Full, Loss, MailboxInfo, ModuleState, Name, ParticipantInfo, Shape};
+use rohrpost_mailbox::{Loss, MailboxInfo, ModuleState, Name, OverflowPolicy, ParticipantInfo, Shape};
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -20,14 +20,14 @@ use traffic::{ClassForm, FlowForm, LatencyForm, class, class_form, flow, flow_fo
 
 /// What one look shows.
 #[derive(Clone, Debug)]
-pub enum Seen {
+pub enum Snapshot {
     /// A node.
     Survey(Box<Survey>),
     /// One of its mailboxes; none when it has none of this name.
-    Mailbox(Option<Box<MailboxLook>>),
+    Mailbox(Option<Box<MailboxSnapshot>>),
 }
 
-impl Seen {
+impl Snapshot {
     /// As it travels.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let form = match self {
@@ -38,7 +38,7 @@ impl Seen {
         postcard::to_stdvec(&form).unwrap_or_default()
     }
 
-    /// Reads what [`Seen::to_bytes`] wrote.
+    /// Reads what [`Snapshot::to_bytes`] wrote.
     ///
     /// # Errors
     /// When the bytes are of another kind.
@@ -76,7 +76,7 @@ struct ModuleForm {
     node: String,
     at_ns: Option<u64>,
     name: u32,
-    faces: Vec<u32>,
+    aliases: Vec<u32>,
     process: Option<ProcessForm>,
     usage: Option<UsageForm>,
     scheduling: Option<SchedulingForm>,
@@ -179,7 +179,7 @@ fn module_form(module: &ModuleSurvey) -> ModuleForm {
         node: module.node.clone(),
         at_ns: module.at_ns,
         name: module.name.raw(),
-        faces: module.faces.iter().map(|face| face.raw()).collect(),
+        aliases: module.aliases.iter().map(|alias| alias.raw()).collect(),
         process: module.process.as_ref().map(process_form),
         usage: module.usage.map(|usage| UsageForm {
             cpu_ms: u64::try_from(usage.cpu.as_millis()).unwrap_or(u64::MAX),
@@ -210,7 +210,7 @@ fn module(form: ModuleForm) -> ModuleSurvey {
         node: form.node,
         at_ns: form.at_ns,
         name: Name::from_raw(form.name),
-        faces: form.faces.into_iter().map(Name::from_raw).collect(),
+        aliases: form.aliases.into_iter().map(Name::from_raw).collect(),
         process: form.process.map(process),
         usage: form
             .usage
@@ -277,9 +277,9 @@ fn mailbox_form(mailbox: &MailboxInfo) -> MailboxForm {
         slots: mailbox.shape.slots,
         body_bytes_max: mailbox.shape.body_bytes_max,
         full: match mailbox.shape.full {
-            Full::Displace => FullForm::Displace,
-            Full::Latest => FullForm::Latest,
-            Full::Reject => FullForm::Reject,
+            OverflowPolicy::Displace => FullForm::Displace,
+            OverflowPolicy::Latest => FullForm::Latest,
+            OverflowPolicy::Reject => FullForm::Reject,
         },
         max_age_ns: mailbox.shape.max_age.map(ns),
         claims: mailbox.shape.claims,
@@ -299,9 +299,9 @@ fn mailbox(form: MailboxForm) -> MailboxInfo {
             slots: form.slots,
             body_bytes_max: form.body_bytes_max,
             full: match form.full {
-                FullForm::Displace => Full::Displace,
-                FullForm::Latest => Full::Latest,
-                FullForm::Reject => Full::Reject,
+                FullForm::Displace => OverflowPolicy::Displace,
+                FullForm::Latest => OverflowPolicy::Latest,
+                FullForm::Reject => OverflowPolicy::Reject,
             },
             max_age: form.max_age_ns.map(Duration::from_nanos),
             claims: form.claims,

@@ -167,9 +167,9 @@ pub(crate) fn in_words(work: Work, functions: &[(u16, String)]) -> String {
 }
 
 impl ModuleSurvey {
-    /// Its name and its faces.
+    /// Its name and its aliases.
     pub fn names(&self) -> impl Iterator<Item = rohrpost_mailbox::Name> {
-        std::iter::once(self.name).chain(self.faces.iter().copied())
+        std::iter::once(self.name).chain(self.aliases.iter().copied())
     }
 
     /// How it stands.

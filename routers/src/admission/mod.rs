@@ -46,7 +46,7 @@ pub struct Admission {
 
 /// The way by which a package came.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Way {
+pub enum ArrivalPath {
     /// From a node of the LAN. `is_its_name`: the sender is one of that node, or nobody vouches for who sent it anyway.
     Lan {
         /// Which node.
@@ -111,17 +111,19 @@ impl Admission {
     ///
     /// # Errors
     /// Why not.
-    pub fn judge(&self, way: Way, head: &Head, body: &[u8]) -> Result<(), Refused> {
+    pub fn validate(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), Refused> {
         let is_reply = matches!(head.kind.kind(), Kind::Reply(_));
         match way {
-            Way::Lan { is_its_name: false, .. } if !broken!(AdmitsForeignNames) => return Err(Refused::ForeignName),
+            ArrivalPath::Lan { is_its_name: false, .. } if !broken!(AdmitsForeignNames) => {
+                return Err(Refused::ForeignName);
+            }
             // In our own names the server itself speaks: it says that a module of ours is not there.
-            Way::Beyond { is_our_name }
+            ArrivalPath::Beyond { is_our_name }
                 if (is_our_name && !is_reply || !head.from.is_mailbox()) && !broken!(AdmitsForeignNames) =>
             {
                 return Err(Refused::ForeignName);
             }
-            Way::Lan { .. } | Way::Beyond { .. } => {}
+            ArrivalPath::Lan { .. } | ArrivalPath::Beyond { .. } => {}
         }
         // A reply in the name of such a mailbox says that it takes nothing.
         if self.is_routers_own(head.to) || self.is_routers_own(head.from) && !is_reply {
@@ -153,10 +155,10 @@ impl Admission {
     }
 
     /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own address.
-    fn judge_routers_own(&self, way: Way, head: &Head, body: &[u8]) -> Result<(), Refused> {
+    fn judge_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), Refused> {
         let node = match way {
-            Way::Lan { node, .. } => Some(node),
-            Way::Beyond { .. } => None,
+            ArrivalPath::Lan { node, .. } => Some(node),
+            ArrivalPath::Beyond { .. } => None,
         };
         let is_tunnel = node.is_some()
             && self.tunnel.is_some()
@@ -171,12 +173,12 @@ impl Admission {
     }
 
     /// Whether a package of another system is for a router. The TCP router alone is for all: they ask it what it hosts.
-    fn is_across_systems(&self, way: Way, head: &Head) -> bool {
+    fn is_across_systems(&self, way: ArrivalPath, head: &Head) -> bool {
         let Head { to, from, .. } = *head;
         let class = Some(to.class());
         let is_for_all = class == self.tcp && to.module() == Name::new(to.system(), to.class().0, TCP_SERVER, 0);
         let is_router = class == self.router || class == self.tcp;
-        matches!(way, Way::Beyond { .. }) && from.system() != to.system() && is_router && !is_for_all
+        matches!(way, ArrivalPath::Beyond { .. }) && from.system() != to.system() && is_router && !is_for_all
     }
 }
 

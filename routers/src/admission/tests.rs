@@ -16,14 +16,14 @@ fn name(system: u8, class: u8, instance: u8, local: u8) -> Name {
     Name::new(system, class, instance, local)
 }
 
-fn lan(node: NodeIndex) -> Way {
-    Way::Lan { node, is_its_name: true }
+fn lan(node: NodeIndex) -> ArrivalPath {
+    ArrivalPath::Lan { node, is_its_name: true }
 }
 
-const BEYOND: Way = Way::Beyond { is_our_name: false };
+const BEYOND: ArrivalPath = ArrivalPath::Beyond { is_our_name: false };
 
-fn judged(way: Way, kind: Type, from: Name, to: Name) -> Result<(), Refused> {
-    admission().judge(way, &Head { to, from, kind, ..Head::default() }, &[])
+fn judged(way: ArrivalPath, kind: Type, from: Name, to: Name) -> Result<(), Refused> {
+    admission().validate(way, &Head { to, from, kind, ..Head::default() }, &[])
 }
 
 #[test]
@@ -31,9 +31,9 @@ fn who_has_not_the_name_that_it_sends_under_is_refused() {
     let (mine, yours) = (name(1, 60, 1, 1), name(1, 90, 0, 2));
     for (way, from, is_admitted, why) in [
         (lan(1), mine, true, "a node speaks for its own names"),
-        (Way::Lan { node: 1, is_its_name: false }, mine, false, "and for no others"),
+        (ArrivalPath::Lan { node: 1, is_its_name: false }, mine, false, "and for no others"),
         (BEYOND, name(2, 60, 1, 1), true, "the TCP router vouches"),
-        (Way::Beyond { is_our_name: true }, mine, false, "nobody beyond hosts our names"),
+        (ArrivalPath::Beyond { is_our_name: true }, mine, false, "nobody beyond hosts our names"),
         (BEYOND, Name::NONE, false, "none"),
         (BEYOND, name(0, 60, 1, 1), false, "no system"),
         (BEYOND, name(255, 60, 1, 1), false, "all systems"),
@@ -121,10 +121,10 @@ fn packets_of_the_tunnel_come_from_the_node_whose_address_they_have() {
         (lan(1), Head { kind: Type::command(1), ..head }, packet.clone(), own, "a command"),
         (BEYOND, head, packet.clone(), own, "by the TCP router"),
     ] {
-        assert_eq!(admission().judge(way, &head, &body), expected, "{why}");
+        assert_eq!(admission().validate(way, &head, &body), expected, "{why}");
     }
     let without = Admission { tunnel: None, ..admission() };
-    assert_eq!(without.judge(lan(1), &head, &packet), own, "without a tunnel there is nobody to take it");
+    assert_eq!(without.validate(lan(1), &head, &packet), own, "without a tunnel there is nobody to take it");
 }
 
 #[test]

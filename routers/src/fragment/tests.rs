@@ -90,7 +90,11 @@ fn check_what_is_missing_is_given_up_after_a_second() {
     assert_eq!(given_up, [(cut.head, Change::GivenUp)]);
     assert_eq!(take(&mut parts, S * 3, &cut.part(2)), (None, vec![]), "a straggler begins nothing");
     parts.clear(|_, _, _| unreachable!());
-    assert_eq!(take(&mut parts, S * 3, &cut.part(2)), (None, vec![(10, Change::Began)]), "another life's is another");
+    assert_eq!(
+        take(&mut parts, S * 3, &cut.part(2)),
+        (None, vec![(10, Change::Began)]),
+        "another incarnation's is another"
+    );
 }
 
 #[test]

@@ -81,9 +81,9 @@ pub struct FrameHead {
     pub to: NodeIndex,
     /// Of the sender's configuration.
     pub digest: u64,
-    /// Tells this life of the sending router from its others; never 0.
+    /// Tells this incarnation of the sending router from its others; never 0.
     pub incarnation: u64,
-    /// Counts the datagrams of this life from this sender to this receiver, from 0. Time frames have a count of their own.
+    /// Counts the datagrams of this incarnation from this sender to this receiver, from 0. Time frames have a count of their own.
     pub sequence: u64,
 }
 
@@ -349,11 +349,11 @@ impl<'a> Fragment<'a> {
 /// "Still there", and what was heard of the receiver: so one-way links are noticed, and losses at the end of a burst.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Alive {
-    /// The life of the receiver that is heard; 0: none.
+    /// The incarnation of the receiver that is heard; 0: none.
     pub heard_incarnation: u64,
     /// The sequence that is expected next of it.
     pub heard_next: u64,
-    /// Datagrams of that life that never came.
+    /// Datagrams of that incarnation that never came.
     pub heard_lost: u64,
 }
 

@@ -1,5 +1,5 @@
 //! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line, changed bits. And what
-//! the same network is to a stream: a [`Line`].
+//! the same network is to a stream: a [`BandwidthQueue`].
 //!
 //! ```text
 //!  push ──▶ lost? ──▶ line of `rate` ──▶ delay ± jitter ──▶ held back? ──▶ changed bit? ──▶ due, in order of time ──▶ poll
@@ -10,10 +10,10 @@
 //! datagram depends on the seed, the stream and how many came before it, not on the time or on other faults: raising the loss leaves the
 //! same datagrams late. The kernel's netem does the same where it exists; this is everywhere, and in the simulator too.
 
-mod line;
+mod bandwidth_queue;
 mod text;
 
-pub use line::Line;
+pub use bandwidth_queue::BandwidthQueue;
 pub use text::SettingsError;
 
 use rand::{RngCore, SeedableRng};

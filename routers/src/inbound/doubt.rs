@@ -27,7 +27,7 @@ struct Said {
 }
 
 impl Doubt {
-    /// Whether another datagram has said the same: it was of this life and came shortly before, or was overtaken. If none has, this one is
+    /// Whether another datagram has said the same: it was of this incarnation and came shortly before, or was overtaken. If none has, this one is
     /// remembered.
     pub(super) fn is_confirmed(&mut self, now_ns: u64, head: &FrameHead) -> bool {
         let says_so =

@@ -1,7 +1,7 @@
 //! What comes from other nodes: who sent it, what is missing, what came twice, and where it goes.
 //!
 //! ```text
-//!  datagram ─▶ ours? ─▶ of our version and digest? ─▶ this life of the peer? ─▶ not seen yet? ─┬─ packages ──────────┬─▶ in order? ─▶ deliver
+//!  datagram ─▶ ours? ─▶ of our version and digest? ─▶ this incarnation of the peer? ─▶ not seen yet? ─┬─ packages ──────────┬─▶ in order? ─▶ deliver
 //!              foreign   refused, and told so          old                       copy           └─ part ─▶ Reassembly ┘   late
 //! ```
 
@@ -22,7 +22,7 @@ use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use order::position;
-use peer::{Peer, Refusing, Way};
+use peer::{Peer, PeerContext, Refusing};
 use rohrpost_mailbox::Head;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -126,7 +126,7 @@ impl Inbound {
         }
     }
 
-    /// The same of one that was sealed, and opened: `text` is what follows its head, `first` the sequence from which on its life is heard.
+    /// The same of one that was sealed, and opened: `text` is what follows its head, `first` the sequence from which on its incarnation is heard.
     pub fn handle_opened(
         &mut self,
         now_ns: u64,
@@ -156,7 +156,7 @@ impl Inbound {
         network.datagram_bytes_max + network.security.tag_bytes()
     }
 
-    /// Whether a life of a peer may begin that has this head: it may if all that must be equal is.
+    /// Whether an incarnation of a peer may begin that has this head: it may if all that must be equal is.
     pub(crate) fn may_greet(
         &mut self,
         now_ns: u64,
@@ -224,9 +224,9 @@ impl Inbound {
         deliver: &mut impl Deliver,
     ) {
         let from = head.from;
-        let way = Way { from, stats: &self.stats, peer: self.stats.peer(from) };
+        let way = PeerContext { from, stats: &self.stats, peer: self.stats.peer(from) };
         let peer = &mut self.peers[usize::from(from)];
-        let is_other = first.is_none() && self.stats.is_other_life(from, head.incarnation);
+        let is_other = first.is_none() && self.stats.is_other_incarnation(from, head.incarnation);
         if is_other || !peer.lives(now_ns, head, first, &way, deliver) {
             return way.peer.received.old.add(1);
         }
@@ -279,7 +279,7 @@ impl Inbound {
             self.tick_ns = now_ns + TICK_EVERY_NS;
         }
         for from in self.settings.peers() {
-            let way = Way { from, stats: &self.stats, peer: self.stats.peer(from) };
+            let way = PeerContext { from, stats: &self.stats, peer: self.stats.peer(from) };
             let peer = &mut self.peers[usize::from(from)];
             peer.reassembly.expire(now_ns, |head, body, change| way.partial(head, body, change, deliver));
             if is_tick {

@@ -13,7 +13,7 @@ use rohrpost_mailbox::Head;
 const GROUPS: usize = 64;
 const PLACES: usize = 4;
 
-/// Where a package stands among all of its peer's life: sequence of its first datagram, then its place in it.
+/// Where a package stands among all of its peer's incarnation: sequence of its first datagram, then its place in it.
 pub(super) fn position(sequence: u64, index: u16) -> u64 {
     sequence << 16 | u64::from(index)
 }
@@ -49,7 +49,7 @@ impl Order {
         Self { groups: Box::new([Group::default(); GROUPS]) }
     }
 
-    /// Forgets all: a new life of the peer.
+    /// Forgets all: a new incarnation of the peer.
     pub(super) fn clear(&mut self) {
         self.groups.fill(Group::default());
     }

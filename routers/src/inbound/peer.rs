@@ -1,4 +1,4 @@
-//! One peer as it is heard: which life, which datagrams, and what becomes of the packages in them.
+//! One peer as it is heard: which incarnation, which datagrams, and what becomes of the packages in them.
 
 use super::doubt::Doubt;
 use super::order::{Order, sequence_of};
@@ -17,19 +17,19 @@ use std::net::IpAddr;
 const OLD_KEPT: usize = 8;
 /// Further lives within this time are counted, not told.
 const RESTARTS_TOLD_NS: u64 = 5_000_000_000;
-/// Datagrams of an old life are on their way for so long at most; after that, its router still runs.
+/// Datagrams of an old incarnation are on their way for so long at most; after that, its router still runs.
 const OLD_GONE_NS: u64 = 2_000_000_000;
 
 /// What is known of a peer.
 #[derive(Debug, Default)]
 pub(super) struct Peer {
-    /// The life that is heard; 0: none yet.
+    /// The incarnation that is heard; 0: none yet.
     incarnation: u64,
     began_ns: u64,
     /// More than one of its datagrams came.
     is_sure: bool,
     doubt: Doubt,
-    /// When it was told last that a life began, ns; 0: never.
+    /// When it was told last that an incarnation began, ns; 0: never.
     restart_told_ns: u64,
     old: [Old; OLD_KEPT],
     old_next: usize,
@@ -37,7 +37,7 @@ pub(super) struct Peer {
     pub(super) order: Order,
     pub(super) reassembly: Reassembly,
     pub(super) refusing: Refusing,
-    told: Told,
+    told: PeerNotices,
 }
 
 /// Refusals to one address.
@@ -52,7 +52,7 @@ pub(super) struct Refusing {
     pub(super) last_ns: u64,
 }
 
-/// A life that is over.
+/// An incarnation that is over.
 #[derive(Clone, Copy, Debug, Default)]
 struct Old {
     /// 0: none.
@@ -63,7 +63,7 @@ struct Old {
 
 /// What was said of a peer and is not over.
 #[derive(Clone, Copy, Debug, Default)]
-struct Told {
+struct PeerNotices {
     heard: bool,
     silent: bool,
     unheard: bool,
@@ -73,17 +73,17 @@ struct Told {
 }
 
 impl Peer {
-    /// Whether a datagram is of the life that is heard. A life that was not known begins; of one that is over nothing is taken, unless
+    /// Whether a datagram is of the incarnation that is heard. An incarnation that was not known begins; of one that is over nothing is taken, unless
     /// it goes on, and the one that was taken for its successor is silent: then it was the other way round. What it sent before it was
     /// over says nothing: that may be a copy, which the wire or a stranger kept. What nobody vouches for is taken when another datagram
     /// says the same: see [`Doubt`].
-    /// `first`: where datagrams are sealed, it has shown to be the present life, and to be heard from this sequence on.
+    /// `first`: where datagrams are sealed, it has shown to be the present incarnation, and to be heard from this sequence on.
     pub(super) fn lives(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
         first: Option<u64>,
-        way: &Way<'_>,
+        way: &PeerContext<'_>,
         deliver: &mut impl Deliver,
     ) -> bool {
         if head.incarnation == self.incarnation {
@@ -92,7 +92,7 @@ impl Peer {
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
-        let may_go_on = first.is_some() || (is_silent && goes_on) || broken!(TakesOldLives);
+        let may_go_on = first.is_some() || (is_silent && goes_on) || broken!(TakesOldIncarnations);
         if was.is_some() && !may_go_on {
             if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
@@ -101,25 +101,25 @@ impl Peer {
             return false;
         }
         let is_first = self.incarnation == 0;
-        let is_vouched_for = first.is_some() || way.stats.is_known_life(way.from, head.incarnation);
-        let is_doubted = !is_vouched_for && was.is_none() && !is_first && !broken!(BelievesLives);
+        let is_vouched_for = first.is_some() || way.stats.is_known_incarnation(way.from, head.incarnation);
+        let is_doubted = !is_vouched_for && was.is_none() && !is_first && !broken!(BelievesIncarnations);
         if is_doubted && !self.doubt.is_confirmed(now_ns, head) {
             return false;
         }
         if !is_first {
             let next = self.window.next();
-            self.end_life(way, deliver);
+            self.end_incarnation(way, deliver);
             let place = was.unwrap_or(self.old_next % OLD_KEPT);
             self.old_next += usize::from(was.is_none());
             self.old[place] = Old { incarnation: self.incarnation, next };
-            self.told = Told { heard: true, twice: self.told.twice, ..Told::default() };
+            self.told = PeerNotices { heard: true, twice: self.told.twice, ..PeerNotices::default() };
             if self.restart_told_ns == 0 || now_ns >= self.restart_told_ns + RESTARTS_TOLD_NS {
                 self.restart_told_ns = now_ns;
                 deliver.event(Event::Restarted { peer: way.from });
             }
         }
         self.window = match (first, was) {
-            // What is missing from there on was sent to this life of ours, and is lost.
+            // What is missing from there on was sent to this incarnation of ours, and is lost.
             (Some(first), _) => Window::going_on(first),
             // What it sent before may have been delivered.
             (None, Some(_)) => Window::going_on(head.sequence),
@@ -133,7 +133,7 @@ impl Peer {
         true
     }
 
-    /// Whether a datagram of the life that is heard may be where it says. Far ahead is also a peer that was not reached for long; far behind,
+    /// Whether a datagram of the incarnation that is heard may be where it says. Far ahead is also a peer that was not reached for long; far behind,
     /// one of which the only datagram that came was no true one.
     fn is_plausible(&mut self, now_ns: u64, head: &FrameHead) -> bool {
         let next = self.window.next();
@@ -154,7 +154,7 @@ impl Peer {
         true
     }
 
-    fn end_life(&mut self, way: &Way<'_>, deliver: &mut impl Deliver) {
+    fn end_incarnation(&mut self, way: &PeerContext<'_>, deliver: &mut impl Deliver) {
         way.peer.received.lost.add(self.window.close());
         way.peer.received.restarts.add(1);
         self.reassembly.clear(|head, body, change| way.partial(head, body, change, deliver));
@@ -171,10 +171,10 @@ impl Peer {
     }
 
     /// Notes that it is there, and takes something from us or not.
-    pub(super) fn is_heard(&mut self, now_ns: u64, way: &Way<'_>, deliver: &mut impl Deliver) {
+    pub(super) fn is_heard(&mut self, now_ns: u64, way: &PeerContext<'_>, deliver: &mut impl Deliver) {
         let link = &way.peer.link;
         if !self.told.heard {
-            self.told = Told { heard: true, silent: false, ..self.told };
+            self.told = PeerNotices { heard: true, silent: false, ..self.told };
             link.begin(now_ns);
             deliver.event(Event::Heard { peer: way.from });
         }
@@ -196,7 +196,7 @@ impl Peer {
     }
 
     /// Counts a datagram by its sequence; whether it is to be read.
-    pub(super) fn is_new(&mut self, sequence: u64, way: &Way<'_>) -> bool {
+    pub(super) fn is_new(&mut self, sequence: u64, way: &PeerContext<'_>) -> bool {
         let received = &way.peer.received;
         let mut lost = 0;
         let arrival = self.window.arrive(sequence, &mut lost);
@@ -217,7 +217,7 @@ impl Peer {
     }
 
     /// Begins to wait for it anew: nobody could have been heard.
-    pub(super) fn excuse(&self, now_ns: u64, way: &Way<'_>) {
+    pub(super) fn excuse(&self, now_ns: u64, way: &PeerContext<'_>) {
         if self.told.heard {
             way.peer.link.heard_ns.set(now_ns);
             way.peer.link.denied_ns.set(0);
@@ -225,11 +225,11 @@ impl Peer {
     }
 
     /// Notices silence, and that nothing of ours reaches it.
-    pub(super) fn look_after(&mut self, now_ns: u64, way: &Way<'_>, deliver: &mut impl Deliver) {
+    pub(super) fn look_after(&mut self, now_ns: u64, way: &PeerContext<'_>, deliver: &mut impl Deliver) {
         let peer = way.from;
         let state = way.stats.state(peer, now_ns);
         if state == State::Silent && !self.told.silent {
-            self.told = Told { silent: true, heard: false, ..self.told };
+            self.told = PeerNotices { silent: true, heard: false, ..self.told };
             deliver.event(Event::Silent { peer });
         }
         let is_unheard = state == State::Unheard;
@@ -242,13 +242,13 @@ impl Peer {
 
 /// Who something came from, and where it is counted.
 #[derive(Clone, Copy)]
-pub(super) struct Way<'a> {
+pub(super) struct PeerContext<'a> {
     pub(super) from: NodeIndex,
     pub(super) stats: &'a Stats,
     pub(super) peer: &'a PeerStats,
 }
 
-impl Way<'_> {
+impl PeerContext<'_> {
     /// Delivers a package that is there as a whole, unless it is `refused`, or says why not.
     pub(super) fn pass(&self, refused: Option<Cause>, head: &Head, body: &[u8], deliver: &mut impl Deliver) {
         self.peer.received.packages.add(1);

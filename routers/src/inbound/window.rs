@@ -1,4 +1,4 @@
-//! Which datagrams of a peer's life have come: what comes twice is dropped, and what is missing is counted.
+//! Which datagrams of a peer's incarnation have come: what comes twice is dropped, and what is missing is counted.
 //!
 //! ```text
 //!        copies      lost, unless it still comes        may still come        not yet
@@ -26,7 +26,7 @@ pub(crate) enum Arrival {
     Copy,
 }
 
-/// Sequences of one life of one peer; at first all from 0 on are to come.
+/// Sequences of one incarnation of one peer; at first all from 0 on are to come.
 #[derive(Debug, Default)]
 pub(crate) struct Window {
     next: u64,
@@ -40,7 +40,7 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Of a life that may have begun long before us: what it sent before this sequence is not missed. Near its beginning both have just
+    /// Of an incarnation that may have begun long before us: what it sent before this sequence is not missed. Near its beginning both have just
     /// begun, and what is missing is lost, also if nobody listened yet: a router sends to a peer of which it knows nothing, so packages
     /// may have been in it, and no account may forget them.
     pub(crate) fn joining(sequence: u64) -> Self {
@@ -48,7 +48,7 @@ impl Window {
         Self { next: start, settled: start, start, ticks: [start; 2], ..Self::default() }
     }
 
-    /// Of a life that was heard before: what it sent before this sequence has come.
+    /// Of an incarnation that was heard before: what it sent before this sequence has come.
     pub(crate) fn going_on(sequence: u64) -> Self {
         let came = [u64::MAX; (WINDOW / 64) as usize];
         Self { next: sequence, settled: sequence, start: sequence, came, ticks: [sequence; 2] }

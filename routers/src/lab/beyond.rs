@@ -20,7 +20,7 @@ const HOME_PORT: Device = FAR_BRIDGE + 1;
 const FAR: Device = LAN + 1;
 
 impl Lab {
-    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. Once in the life of a lab.
+    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. Deduplicator in the incarnation of a lab.
     ///
     /// # Errors
     /// As for [`Lab::new`].

@@ -15,7 +15,7 @@ mod beyond;
 mod capture;
 mod error;
 mod namespace;
-pub mod stalls;
+pub mod stall_detector;
 
 pub use capture::{Capture, Crossing};
 pub use error::LabError;
@@ -143,7 +143,7 @@ impl Lab {
     ///
     /// # Errors
     /// As for [`Lab::cut`]; [`LabError::NoCarrier`].
-    pub fn mend(&self, node: &str) -> Result<(), LabError> {
+    pub fn fix(&self, node: &str) -> Result<(), LabError> {
         let node = self.node(node)?;
         told(&format!("join {} again", node.spec.name), self.hub.netlink()?.set_up(node.port, true))?;
         self.wait_until_it_runs(node)

@@ -123,7 +123,7 @@ impl Outbound {
         let Settings { system, own, digest, incarnation, .. } = self.settings;
         let sequence = self.stats.peer(to).sent.datagrams.get();
         let head = FrameHead { kind, system, from: own, to, digest, incarnation, sequence };
-        if self.acquaintances.is_none() {
+        if self.peer_sessions.is_none() {
             return head.to_bytes(rest);
         }
         let mut bytes = [0; frame::HEAD_BYTES];
@@ -136,7 +136,7 @@ impl Outbound {
         sent.datagrams.add(1);
         sent.bytes.add((bytes + self.settings.network.security.tag_bytes()) as u64);
         self.stats.on_wire_bytes.add((bytes + self.pace.overhead_bytes) as u64);
-        let is_doubted = self.acquaintances.is_none() && !self.in_slots && sent.datagrams.get() == 1;
+        let is_doubted = self.peer_sessions.is_none() && !self.in_slots && sent.datagrams.get() == 1;
         self.peers[usize::from(to)].quiet_until_ns = now_ns + if is_doubted { SAY_AGAIN_NS } else { ALIVE_EVERY_NS };
         self.pace.left(now_ns, bytes, level);
     }

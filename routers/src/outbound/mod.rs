@@ -14,7 +14,7 @@ use crate::frame::{self, Fragment, Kind, NodeIndex};
 use crate::link::State;
 use crate::queue::{Place, Queue, Waiting};
 use crate::report::Report;
-use crate::security::Acquaintances;
+use crate::security::PeerSessions;
 use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
@@ -100,12 +100,12 @@ pub struct Outbound {
     datagram_bytes: usize,
     aboard: Aboard,
     /// Where datagrams are sealed: who is known. What is for others waits.
-    acquaintances: Option<Arc<Acquaintances>>,
+    peer_sessions: Option<Arc<PeerSessions>>,
     /// Those to whom it sends, one bit each.
     reached: u64,
     /// Those whose way has no room just now, one bit each: they are passed over.
     full: u64,
-    /// Peers to which packages may go since they have said that they hear this life, one bit each; all where that is not waited for.
+    /// Peers to which packages may go since they have said that they hear this incarnation, one bit each; all where that is not waited for.
     hearing: u64,
     /// What is real time, if this is not: all that leaves leaves at one rate. And how much of it was counted, bytes.
     shares_with: Option<(Arc<Stats>, u64)>,
@@ -121,7 +121,7 @@ struct Peer {
     /// When it is to be told at the latest that we are still there: if nothing goes to it, and anyway, ns.
     quiet_until_ns: u64,
     tell_ns: u64,
-    /// The life of it that was heard when that was looked at last.
+    /// The incarnation of it that was heard when that was looked at last.
     life: u64,
 }
 
@@ -142,7 +142,7 @@ impl Outbound {
             peers: vec![Peer::default(); settings.nodes.len()].into(),
             datagram_bytes: settings.datagram_bytes(),
             aboard: Aboard::new(settings.datagram_bytes()),
-            acquaintances: None,
+            peer_sessions: None,
             reached: u64::MAX,
             full: 0,
             hearing: u64::MAX,
@@ -157,12 +157,12 @@ impl Outbound {
 
     /// From now on datagrams are sealed, by who has them sent, and only for those who are known.
     #[must_use]
-    pub fn sealed(self, acquaintances: Arc<Acquaintances>) -> Self {
-        Self { reached: 0, hearing: u64::MAX, acquaintances: Some(acquaintances), ..self }
+    pub fn sealed(self, peer_sessions: Arc<PeerSessions>) -> Self {
+        Self { reached: 0, hearing: u64::MAX, peer_sessions: Some(peer_sessions), ..self }
     }
 
     /// From now on it sends what is not real time, at the rate that what is real time leaves. Where nothing is sealed, a package waits until its
-    /// peer has said that it hears this life: before that the peer takes nothing of it at the port of what is not real time. To be called
+    /// peer has said that it hears this incarnation: before that the peer takes nothing of it at the port of what is not real time. To be called
     /// before [`Self::sealed`].
     #[must_use]
     pub fn behind(self, real_time: &Arc<Stats>) -> Self {
@@ -178,7 +178,7 @@ impl Outbound {
 
     /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram; nor need one
     /// so large that no second of its size would fit. Where there are time slots, each waits for one. So does what is for a peer that was not
-    /// told yet that we are there: it doubts the first datagram of a life.
+    /// told yet that we are there: it doubts the first datagram of an incarnation.
     pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
         let head = if broken!(Hurries) { package.head } else { capped(&package.head) };
         self.stats.out.came(head.priority);
@@ -353,7 +353,7 @@ impl Outbound {
     }
 
     fn reaches(&self, peer: NodeIndex) -> bool {
-        let is_known = self.acquaintances.as_ref().is_none_or(|all| all.reached() & 1 << peer != 0);
+        let is_known = self.peer_sessions.as_ref().is_none_or(|all| all.reached() & 1 << peer != 0);
         is_known && self.full & 1 << peer == 0 && self.hearing & 1 << peer != 0
     }
 
@@ -368,7 +368,7 @@ impl Outbound {
         let bytes = real_time.on_wire_bytes.get();
         self.pace.takes(now_ns, bytes.wrapping_sub(*counted) as usize);
         *counted = bytes;
-        if self.acquaintances.is_some() {
+        if self.peer_sessions.is_some() {
             return;
         }
         let hears = |peer: &NodeIndex| real_time.peer(*peer).link.hears_us_ns.get() > 0;
@@ -380,15 +380,15 @@ impl Outbound {
 
     /// Whoever is known since just now is told at once that we are there.
     fn look_who_is_known(&mut self) {
-        let Some(all) = &self.acquaintances else { return };
+        let Some(all) = &self.peer_sessions else { return };
         let reached = all.reached();
         if reached != self.reached {
             (self.reached, self.alive_ns) = (reached, 0);
         }
     }
 
-    /// A peer in a new life is told soon that it is heard: it may wait for that.
-    fn greet_new_lives(&mut self) {
+    /// A peer in a new incarnation is told soon that it is heard: it may wait for that.
+    fn greet_new_incarnations(&mut self) {
         for (peer, stats) in self.peers.iter_mut().zip(0..).map(|(peer, node)| (peer, self.stats.peer(node))) {
             let life = stats.link.incarnation.get();
             if std::mem::replace(&mut peer.life, life) != life {
@@ -433,7 +433,7 @@ impl Outbound {
     /// Drops what has waited too long behind others, and what goes to peers that are not there any more.
     fn sweep(&mut self, now_ns: u64, report: &mut impl Report) {
         self.sweep_ns = now_ns + SWEEP_EVERY_NS;
-        self.greet_new_lives();
+        self.greet_new_incarnations();
         for peer in 0..self.settings.nodes.len() as NodeIndex {
             for level in 0..LEVELS as u8 {
                 while let Some(place) = self.queue.first_of(peer, level) {

@@ -1,9 +1,9 @@
 //! What stands before the incoming half of a router that seals: it opens what comes before anything else is done with it, and asks
 //! those who are not known.
 
-use super::acquaintances::{Acquaintances, Port};
-use super::greeter::Greeter;
+use super::handshake::Handshake;
 use super::opening::{Greeting, Opened, Opening};
+use super::peer_sessions::{PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::tally::Tally;
 use crate::frame::{self, BadFrame, FrameHead, NodeIndex};
@@ -19,7 +19,7 @@ pub const ASK_EVERY_NS: u64 = 100_000_000;
 const EAGER_FOR_NS: u64 = 10_000_000_000;
 /// See [`EAGER_FOR_NS`].
 const ASK_SELDOM_NS: u64 = 1_000_000_000;
-/// A peer that says something of another life than the one that is known is asked so often at most.
+/// A peer that says something of another incarnation than the one that is known is asked so often at most.
 const DOUBT_EVERY_NS: u64 = 20_000_000;
 
 /// Who is to be asked is looked for so often at most, however many datagrams come.
@@ -34,16 +34,16 @@ pub struct Said {
     pub bytes: usize,
     /// It answers one.
     pub is_reply: bool,
-    /// A life begins when it has left.
+    /// An incarnation begins when it has left.
     pub begins: bool,
 }
 
 /// One, in the thread that receives packages.
 pub struct Gate {
-    all: Arc<Acquaintances>,
+    all: Arc<PeerSessions>,
     opening: Opening,
     /// None at a port where nobody is greeted: who lives is found out at that of packages.
-    greeter: Option<Greeter>,
+    handshake: Option<Handshake>,
     tally: Tally,
     peers: Box<[Asked]>,
     /// Nobody is to be asked before this, ns.
@@ -54,27 +54,27 @@ pub struct Gate {
 struct Asked {
     /// When it was asked last, ns; none: never.
     at_ns: Option<u64>,
-    /// When its present life began, ns.
+    /// When its present incarnation began, ns.
     began_ns: u64,
     /// Since when it is not known, or silent, ns.
     missed_since_ns: Option<u64>,
 }
 
 impl Gate {
-    /// `seed` comes from a source of random numbers that is fit for keys; each life has another.
-    pub fn new(all: &Arc<Acquaintances>, seed: [u8; 32]) -> Self {
-        Self::of(all, Port::Packages, Some(Greeter::new(all, seed)))
+    /// `seed` comes from a source of random numbers that is fit for keys; each incarnation has another.
+    pub fn new(all: &Arc<PeerSessions>, seed: [u8; 32]) -> Self {
+        Self::of(all, Port::Packages, Some(Handshake::new(all, seed)))
     }
 
     /// One at the port of what is not real time, in the thread that receives there.
-    pub fn of_rest(all: &Arc<Acquaintances>) -> Self {
+    pub fn of_rest(all: &Arc<PeerSessions>) -> Self {
         Self::of(all, Port::Rest, None)
     }
 
-    fn of(all: &Arc<Acquaintances>, port: Port, greeter: Option<Greeter>) -> Self {
+    fn of(all: &Arc<PeerSessions>, port: Port, handshake: Option<Handshake>) -> Self {
         Self {
             opening: Opening::new(all, port),
-            greeter,
+            handshake,
             tally: Tally::new(all.rejections(port)),
             peers: vec![Asked::default(); all.who.nodes.into()].into(),
             all: all.clone(),
@@ -103,10 +103,10 @@ impl Gate {
                 inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
             }
             Ok(Opened::Hello(head, greeting)) => {
-                if let Some(greeter) = &mut self.greeter
+                if let Some(handshake) = &mut self.handshake
                     && inbound.may_greet(now_ns, came.source, &head, deliver)
                 {
-                    let greeted = greeter.greet(now_ns, &head, &greeting, reply);
+                    let greeted = handshake.greet(now_ns, &head, &greeting, reply);
                     let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: greeted.begins };
                     return greeted.reply_bytes.map(said);
                 }
@@ -135,19 +135,19 @@ impl Gate {
         inbound: &Inbound,
         reply: &mut [u8],
     ) -> Option<Said> {
-        let greeted = self.greeter.as_mut()?.greet_other(now_ns, head, greeting, reply);
+        let greeted = self.handshake.as_mut()?.greet_other(now_ns, head, greeting, reply);
         if greeted.proves && greeting.hello.next[Port::Time as usize] > 0 {
             inbound.tells_other(now_ns, head);
         }
         greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
     }
 
-    /// From which sequence on the present life of a peer is heard; what is missing from there on is lost.
+    /// From which sequence on the present incarnation of a peer is heard; what is missing from there on is lost.
     pub fn first(&self, peer: NodeIndex) -> u64 {
         self.opening.first(peer)
     }
 
-    /// Has a hello wait for a slot: `put` says whether there was room. Nothing is sealed to a life that begins by it before it has left; but if it
+    /// Has a hello wait for a slot: `put` says whether there was room. Nothing is sealed to an incarnation that begins by it before it has left; but if it
     /// is lost, nothing waits for it.
     pub fn waits(&self, said: Said, put: impl FnOnce() -> bool) {
         let waits = said.begins && self.all.reply_waits(said.to);
@@ -156,9 +156,9 @@ impl Gate {
         }
     }
 
-    /// Lets the life begin that what was taken last has shown to live; whether one does. To be done when the reply has left.
+    /// Lets the incarnation begin that what was taken last has shown to live; whether one does. To be done when the reply has left.
     pub fn begin(&mut self, now_ns: u64) -> bool {
-        let began = self.greeter.as_mut().and_then(Greeter::begin);
+        let began = self.handshake.as_mut().and_then(Handshake::begin);
         if let Some(peer) = began {
             self.peers[usize::from(peer)].began_ns = now_ns;
         }
@@ -167,7 +167,7 @@ impl Gate {
 
     /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
     pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
-        if now_ns < self.look_ns || self.greeter.is_none() {
+        if now_ns < self.look_ns || self.handshake.is_none() {
             return None;
         }
         let mut peers = 0..self.all.who.nodes;
@@ -177,7 +177,7 @@ impl Gate {
         };
         self.peers[usize::from(to)].at_ns = Some(now_ns);
         self.all.doubted(to);
-        self.greeter.as_mut()?.refresh(now_ns, to);
+        self.handshake.as_mut()?.refresh(now_ns, to);
         self.all.ask(to, datagram).map(|bytes| Said { to, bytes, is_reply: false, begins: false })
     }
 

@@ -9,14 +9,14 @@
 
 pub use rohrpost_network::HELLO_BYTES;
 
-/// "This life of mine asks whether you live", the answer to that, or the last word.
+/// "This incarnation of mine asks whether you live", the answer to that, or the last word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hello {
     /// Whoever answers it shows that it lives now; 0: no answer is wanted.
     pub challenge: u64,
     /// The challenge that this answers; 0: it is a question.
     pub answer: u64,
-    /// From which sequence on the receiver is to take what this life sends it: of packages, and of time.
+    /// From which sequence on the receiver is to take what this incarnation sends it: of packages, and of time.
     pub next: [u64; 2],
 }
 

@@ -1,4 +1,4 @@
-//! The keys of an installation, and those that are derived from them: one for each direction, port and pair of lives.
+//! The keys of an installation, and those that are derived from them: one for each direction, port and pair of incarnations.
 
 use super::seal::Seal;
 use crate::frame::NodeIndex;
@@ -100,7 +100,7 @@ impl KeyRing {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Purpose {
-    /// Hellos: of any life to any.
+    /// Hellos: of any incarnation to any.
     Hello = 1,
     /// Packages.
     Packages = 2,
@@ -114,12 +114,12 @@ pub(super) enum Purpose {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct End {
     pub(super) node: NodeIndex,
-    /// Its life; 0: any.
+    /// Its incarnation; 0: any.
     pub(super) incarnation: u64,
 }
 
 impl End {
-    /// Whatever life the node has.
+    /// Whatever incarnation the node has.
     pub(super) fn any(node: NodeIndex) -> Self {
         Self { node, incarnation: 0 }
     }

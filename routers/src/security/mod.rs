@@ -4,44 +4,44 @@
 //!  head 36, of which all but the check is signed │ what follows it, sealed │ tag 16
 //!
 //!  A                                   B
-//!  ── question: challenge a ─────────▶      any life of A may have said it, today or last year: nothing begins by it
-//!  ◀── answer to a: challenge b ──────      a is A's own, and new: this life of B lives. A takes its datagrams, and seals to it
+//!  ── question: challenge a ─────────▶      any incarnation of A may have said it, today or last year: nothing begins by it
+//!  ◀── answer to a: challenge b ──────      a is A's own, and new: this incarnation of B lives. A takes its datagrams, and seals to it
 //!  ── last word: answer to b ────────▶      so does B
-//!  ══ packages, time: sealed by A's present life to B's present life ══▶
+//!  ══ packages, time: sealed by A's present incarnation to B's present incarnation ══▶
 //! ```
 //!
-//! A *hello* (one of these three) is sealed from node to node, packages from life to life, time from life to node: so nothing that was recorded in
-//! another life of either end is taken in this one. A challenge serves once, and not for long, then there is another; and a hello says from which
-//! sequence on its life will be heard, so nothing that a life had sent before is taken either.
+//! A *hello* (one of these three) is sealed from node to node, packages from incarnation to incarnation, time from incarnation to node: so nothing that was recorded in
+//! another incarnation of either end is taken in this one. A challenge serves once, and not for long, then there is another; and a hello says from which
+//! sequence on its incarnation will be heard, so nothing that an incarnation had sent before is taken either.
 //!
 //! ```text
-//!  arrivals:   Gate: Opening (packages), Greeter ──── Acquaintances: who lives ────▶ departures: Sealing (packages)
+//!  arrivals:   Gate: Opening (packages), Handshake ──── PeerSessions: who lives ────▶ tx_thread: Sealing (packages)
 //!                                                                        └────▶ clock:     Sealing, Opening (time)
 //! ```
 //!
-//! No sockets, threads or clocks here. Sealing and opening take nothing from the heap and no lock; keys are derived when a life begins, which
+//! No sockets, threads or clocks here. Sealing and opening take nothing from the heap and no lock; keys are derived when an incarnation begins, which
 //! nobody brings about who has no key.
 
-mod acquaintances;
 mod gate;
-mod greeter;
+mod handshake;
 mod hello;
 mod keys;
 mod opening;
-mod overheard;
+mod peer_sessions;
 mod random;
 mod rejection;
 mod seal;
 mod sealing;
 mod tally;
+mod unverified;
 mod waiting;
 
-pub use acquaintances::{Acquaintances, Port, Who};
 pub use gate::{ASK_EVERY_NS, Gate, Said};
-pub use greeter::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Greeter, PER_NS};
+pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Handshake, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 pub use opening::{Greeting, Opened, Opening};
+pub use peer_sessions::{PeerSessions, Port, Who};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;

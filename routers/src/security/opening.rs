@@ -1,12 +1,12 @@
 //! The half that opens: one for each port, in the thread that receives there.
 
 use super::HELLO_DATAGRAM_BYTES;
-use super::acquaintances::{Acquaintances, Known, Port};
 use super::hello::Hello;
 use super::keys::End;
-use super::overheard::Overheard;
+use super::peer_sessions::{Known, PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::seal::{self, Seal};
+use super::unverified::UnverifiedIncarnations;
 use crate::broken::broken;
 use crate::frame::{FrameHead, Kind, NodeIndex};
 use crate::inbound::window::{Arrival, Window};
@@ -15,9 +15,9 @@ use std::sync::Arc;
 /// A datagram whose seal was right.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Opened<'a> {
-    /// Of the peer's present life to our present one, and not opened before: its head and what was sealed.
+    /// Of the peer's present incarnation to our present one, and not opened before: its head and what was sealed.
     Frame(FrameHead, &'a [u8]),
-    /// Of some life of the peer, perhaps long ago: for the [`Greeter`](super::Greeter) alone.
+    /// Of some incarnation of the peer, perhaps long ago: for the [`Handshake`](super::Handshake) alone.
     Hello(FrameHead, Greeting),
 }
 
@@ -32,11 +32,11 @@ pub struct Greeting {
 
 /// Opens datagrams of one port.
 pub struct Opening {
-    all: Arc<Acquaintances>,
+    all: Arc<PeerSessions>,
     port: Port,
     peers: Box<[Known<Heard>]>,
-    /// By node: lives of it that are not known to live.
-    overheard: Box<[Overheard]>,
+    /// By node: incarnations of it that are not known to live.
+    overheard: Box<[UnverifiedIncarnations]>,
     /// By node; the one that was heard last stands first.
     past: Box<[[Past; PAST]]>,
 }
@@ -44,14 +44,14 @@ pub struct Opening {
 /// Lives of a peer that took turns: of so many it is remembered what was opened of them at the port of what is not real time.
 const PAST: usize = 4;
 
-/// A life that was heard at that port, and from which sequence on it is heard when it is taken for the present one again.
+/// An incarnation that was heard at that port, and from which sequence on it is heard when it is taken for the present one again.
 #[derive(Clone, Copy, Default)]
 struct Past {
     incarnation: u64,
     next: u64,
 }
 
-/// A peer's present life as it is heard.
+/// A peer's present incarnation as it is heard.
 struct Heard {
     incarnation: u64,
     /// By the place of the key: which of two the peer seals with is its choice.
@@ -63,9 +63,9 @@ struct Heard {
 
 impl Opening {
     /// For a port; there is one.
-    pub fn new(all: &Arc<Acquaintances>, port: Port) -> Self {
+    pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
         let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
-        let overheard = (0..all.who.nodes).map(|_| Overheard::default()).collect();
+        let overheard = (0..all.who.nodes).map(|_| UnverifiedIncarnations::default()).collect();
         let past = vec![<[Past; PAST]>::default(); all.who.nodes.into()].into();
         Self { peers, overheard, past, all: all.clone(), port }
     }
@@ -106,7 +106,7 @@ impl Opening {
         let heard = Self::heard(&mut self.peers, &self.overheard, past, all, self.port, head.from);
         let heard = heard.filter(|heard| heard.incarnation == head.incarnation).ok_or_else(|| {
             all.doubt(head.from);
-            Rejection::OtherLife
+            Rejection::OtherIncarnation
         })?;
         if heard.window.is_copy(head.sequence) && !broken!(OpensTwice) {
             return Err(Rejection::Replay.into());
@@ -122,7 +122,7 @@ impl Opening {
         Ok(Opened::Frame(head, text))
     }
 
-    /// Whether a datagram of time says that it is of another life of its node than the known one, or none is known: then it can be overheard.
+    /// Whether a datagram of time says that it is of another incarnation of its node than the known one, or none is known: then it can be overheard.
     pub fn is_strange(&mut self, datagram: &[u8]) -> bool {
         let Ok((head, _)) = FrameHead::read(datagram) else { return false };
         let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != Kind::Hello;
@@ -134,7 +134,7 @@ impl Opening {
         is_theirs && !heard(self)
     }
 
-    /// Opens a datagram that [`Self::is_strange`]: some life of its node has said it to this node at some time. For each life that is named a key is
+    /// Opens a datagram that [`Self::is_strange`]: some incarnation of its node has said it to this node at some time. For each incarnation that is named a key is
     /// derived, which costs about as much as to open a datagram.
     ///
     /// # Errors
@@ -178,7 +178,7 @@ impl Opening {
         all.is_peer(head.from) && head.to == all.who.own && head.system == all.who.system
     }
 
-    /// From which sequence on the life of a peer is heard that was opened last; what is missing from there on is lost.
+    /// From which sequence on the incarnation of a peer is heard that was opened last; what is missing from there on is lost.
     pub(super) fn first(&self, peer: NodeIndex) -> u64 {
         self.peers[usize::from(peer)].made.as_ref().and_then(|heard| heard.first).unwrap_or(0)
     }
@@ -198,16 +198,16 @@ impl Opening {
 
     fn heard<'a>(
         peers: &'a mut [Known<Heard>],
-        overheard: &[Overheard],
+        overheard: &[UnverifiedIncarnations],
         past: &mut [Past; PAST],
-        all: &Acquaintances,
+        all: &PeerSessions,
         port: Port,
         from: NodeIndex,
     ) -> Option<&'a mut Heard> {
         peers[usize::from(from)].of(all, from, |life| {
             let peer = End { node: from, incarnation: life.incarnation };
             let from = match port {
-                // What is sealed there is sealed to this life of ours: all of it may be opened, and once.
+                // What is sealed there is sealed to this incarnation of ours: all of it may be opened, and once.
                 Port::Rest => remembered(past, life.incarnation),
                 // What was overheard is not proven a second time.
                 Port::Packages | Port::Time => {
@@ -224,7 +224,7 @@ impl Opening {
     }
 }
 
-/// From which sequence on a life is heard that becomes the present one, and has it stand first among those that are remembered. Of a life
+/// From which sequence on an incarnation is heard that becomes the present one, and has it stand first among those that are remembered. Of an incarnation
 /// that is forgotten again and again nothing is opened twice as long as no more than [`PAST`] routers of one node live at once.
 fn remembered(past: &mut [Past; PAST], incarnation: u64) -> u64 {
     let at = past.iter().position(|past| past.incarnation == incarnation);

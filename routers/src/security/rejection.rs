@@ -17,9 +17,9 @@ pub enum Rejection {
     /// Not from another node of ours to this one.
     #[error("it is not from one of our nodes to this one")]
     NotOurs,
-    /// Of a life of its node, or to one of ours, that is over or has not begun.
-    #[error("it is of another life of that node")]
-    OtherLife,
+    /// Of an incarnation of its node, or to one of ours, that is over or has not begun.
+    #[error("it is of another incarnation of that node")]
+    OtherIncarnation,
     /// It came before, or is so old that it cannot be told.
     #[error("it came before")]
     Replay,
@@ -42,7 +42,7 @@ impl Rejection {
         Self::Unsealed,
         Self::OtherKey,
         Self::NotOurs,
-        Self::OtherLife,
+        Self::OtherIncarnation,
         Self::Replay,
         Self::Forged,
         Self::Address,
@@ -55,7 +55,7 @@ impl Rejection {
             Self::Unsealed => Some(Reason::Sealed),
             Self::OtherKey | Self::Forged => Some(Reason::Key),
             Self::Version => Some(Reason::Version),
-            Self::NotOurs | Self::OtherLife | Self::Replay | Self::Address => None,
+            Self::NotOurs | Self::OtherIncarnation | Self::Replay | Self::Address => None,
         }
     }
 
@@ -65,7 +65,7 @@ impl Rejection {
             Self::Unsealed => "unsealed",
             Self::OtherKey => "other-key",
             Self::NotOurs => "not-ours",
-            Self::OtherLife => "other-life",
+            Self::OtherIncarnation => "other-incarnation",
             Self::Replay => "replay",
             Self::Forged => "forged",
             Self::Address => "address",

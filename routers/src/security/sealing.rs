@@ -1,44 +1,44 @@
 //! The half that seals: one for each port, in the thread that sends there.
 
-use super::acquaintances::{Acquaintances, Known, Port};
 use super::keys::End;
+use super::peer_sessions::{Known, PeerSessions, Port};
 use super::seal::{self, Seal};
 use crate::frame::{self, FrameHead, NodeIndex};
 use std::sync::Arc;
 
-/// No life of the peer is known to live, so there is nobody to seal to.
+/// No incarnation of the peer is known to live, so there is nobody to seal to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("no router has answered there yet")]
 pub struct Unacquainted;
 
 /// Seals datagrams of one port.
 pub struct Sealing {
-    all: Arc<Acquaintances>,
+    all: Arc<PeerSessions>,
     port: Port,
-    peers: Box<[Known<Way>]>,
-    /// By node and place of the key: what any life of it opens. Empty where nothing is sealed to who is not known.
+    peers: Box<[Known<PeerSeal>]>,
+    /// By node and place of the key: what any incarnation of it opens. Empty where nothing is sealed to who is not known.
     strangers: Box<[Vec<Seal>]>,
 }
 
-/// To a peer's present life.
-struct Way {
+/// To a peer's present incarnation.
+struct PeerSeal {
     /// Place of the key.
     key: usize,
     seal: Seal,
 }
 
-/// Of so many datagrams to a peer one is sealed with the other key while there are two: its next life may have only that.
+/// Of so many datagrams to a peer one is sealed with the other key while there are two: its next incarnation may have only that.
 const OTHER_KEY_EVERY: u64 = 4;
 
 impl Sealing {
     /// For a port; there is one.
-    pub fn new(all: &Arc<Acquaintances>, port: Port) -> Self {
+    pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
         let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
         Self { peers, strangers: Box::default(), all: all.clone(), port }
     }
 
     /// Of time in time slots: seals to whoever has a key, known or not. Whoever begins there must hear it before it may ask who lives.
-    pub fn of_slots(all: &Arc<Acquaintances>) -> Self {
+    pub fn of_slots(all: &Arc<PeerSessions>) -> Self {
         let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), End::any(node)));
         Self { strangers: (0..all.who.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
     }
@@ -80,7 +80,7 @@ impl Sealing {
         Ok(())
     }
 
-    /// Which key a peer has whose life may be over, or is not known: mostly that of the known life, else each in turn.
+    /// Which key a peer has whose incarnation may be over, or is not known: mostly that of the known incarnation, else each in turn.
     fn key_to_stranger(known: Option<usize>, keys: usize, sequence: u64) -> usize {
         match known {
             Some(key) if !sequence.is_multiple_of(OTHER_KEY_EVERY) => key,
@@ -95,17 +95,22 @@ impl Sealing {
     /// If that was not done to it.
     pub fn reopen(&mut self, datagram: &mut [u8]) {
         let (to, sequence) = frame::place_of(datagram);
-        // With the very key: another life may have begun meanwhile.
+        // With the very key: another incarnation may have begun meanwhile.
         let way = self.peers[usize::from(to)].made.as_ref();
         let opened = way.and_then(|way| way.seal.open(seal::of_sequence(sequence), datagram));
         assert!(opened.is_some(), "what was just closed opens again");
     }
 
-    fn way<'a>(peers: &'a mut [Known<Way>], all: &Acquaintances, port: Port, to: NodeIndex) -> Option<&'a mut Way> {
+    fn way<'a>(
+        peers: &'a mut [Known<PeerSeal>],
+        all: &PeerSessions,
+        port: Port,
+        to: NodeIndex,
+    ) -> Option<&'a mut PeerSeal> {
         peers[usize::from(to)].of(all, to, |life| {
             let peer = End { node: to, incarnation: life.incarnation };
             let seal = all.keys.derive(life.key, &all.binding(port, all.own(), peer));
-            Way { key: life.key, seal }
+            PeerSeal { key: life.key, seal }
         })
     }
 

@@ -34,11 +34,11 @@ impl Rejections {
 #[derive(Debug)]
 pub struct Tally {
     counts: Arc<Rejections>,
-    told: Box<[Told]>,
+    told: Box<[TallyReport]>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Told {
+struct TallyReport {
     /// Not before this time again, ns.
     not_before_ns: u64,
     since: u64,
@@ -47,7 +47,7 @@ struct Told {
 impl Tally {
     /// For a port; there is one.
     pub fn new(counts: &Arc<Rejections>) -> Self {
-        Self { told: vec![Told::default(); counts.sources.len()].into(), counts: counts.clone() }
+        Self { told: vec![TallyReport::default(); counts.sources.len()].into(), counts: counts.clone() }
     }
 
     /// Counts a datagram; if it is to be told, how many were not taken since that was done last, with this one.
@@ -60,7 +60,7 @@ impl Tally {
             return None;
         }
         let since = told.since;
-        *told = Told { not_before_ns: now_ns + TELL_EVERY_NS, since: 0 };
+        *told = TallyReport { not_before_ns: now_ns + TELL_EVERY_NS, since: 0 };
         Some(since)
     }
 }

@@ -1,7 +1,7 @@
 //! Hellos that wait for a time slot: of each peer the newest question and the newest reply, since who waits for a slot is asked anew meanwhile.
 
-use super::acquaintances::Acquaintances;
 use super::gate::Said;
+use super::peer_sessions::PeerSessions;
 use super::{CHALLENGE_MAX_NS, HELLO_DATAGRAM_BYTES, TAG_BYTES};
 use crate::frame::NodeIndex;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ pub const HELLO_SLOT_BYTES: usize = HELLO_DATAGRAM_BYTES - TAG_BYTES;
 
 /// Whoever sends in time slots has one, in the thread that sends.
 pub struct Waiting {
-    all: Arc<Acquaintances>,
+    all: Arc<PeerSessions>,
     peers: Box<[Peer]>,
     /// Whose turn it is.
     next: usize,
@@ -28,18 +28,18 @@ struct Peer {
 struct Word {
     /// When it was made, ns.
     at_ns: u64,
-    /// A life begins by it.
+    /// An incarnation begins by it.
     begins: bool,
     datagram: [u8; HELLO_DATAGRAM_BYTES],
 }
 
 impl Waiting {
     /// Nothing waits.
-    pub fn new(all: &Arc<Acquaintances>) -> Self {
+    pub fn new(all: &Arc<PeerSessions>) -> Self {
         Self { peers: vec![Peer::default(); all.who.nodes.into()].into(), all: all.clone(), next: 0 }
     }
 
-    /// A hello that is to leave. It takes the place of the one before; but a reply by which a life begins gives way to another of that sort alone.
+    /// A hello that is to leave. It takes the place of the one before; but a reply by which an incarnation begins gives way to another of that sort alone.
     ///
     /// # Panics
     /// If the datagram is shorter than a hello.

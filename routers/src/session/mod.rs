@@ -15,17 +15,17 @@
 
 pub mod client;
 mod counts;
+mod estimate;
 pub mod frame;
 mod ledger;
 mod outgoing;
-mod reckoning;
 pub mod server;
 mod splitter;
 mod table;
 
 pub use counts::{Cause, ClassCounts, Counts};
+pub use estimate::{Bounded, ServerClockEstimate};
 pub use outgoing::BATCH_BYTES;
-pub use reckoning::{Bounded, Reckoning};
 pub use table::{Conflict, ENTRIES_MAX, Table};
 
 use rohrpost_mailbox::{Head, Kind, Name, Options, Type};

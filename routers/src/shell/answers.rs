@@ -1,6 +1,6 @@
 //! The answers that senders of undeliverable commands get: so they need not wait for their timeout, and learn why.
 
-use super::ways::Ways;
+use super::sender_cache::SenderCache;
 use crate::counts::Cause;
 use crate::frame::NodeIndex;
 use crate::link::State;
@@ -42,7 +42,7 @@ pub(super) struct Answers {
     settings: Arc<Settings>,
     stats: Arc<Stats>,
     faults: Arc<dyn Faults>,
-    ways: Ways,
+    sender_cache: SenderCache,
     /// The router's own mailbox, which leads to other nodes.
     via: Name,
     body: Vec<u8>,
@@ -60,14 +60,14 @@ impl Answers {
             settings: settings.clone(),
             stats: stats.clone(),
             faults: faults.clone(),
-            ways: Ways::everywhere(participant),
+            sender_cache: SenderCache::everywhere(participant),
             via,
             body: Vec::with_capacity(ANSWER_BYTES_MAX),
         }
     }
 
-    /// Answers a command that came from another node, unless this life of the router has just begun: then it may be a copy of one that
-    /// the life before has delivered. Its caller's next try brings the truth. Who asks in a name that no node has gets none.
+    /// Answers a command that came from another node, unless this incarnation of the router has just begun: then it may be a copy of one that
+    /// the incarnation before has delivered. Its caller's next try brings the truth. Who asks in a name that no node has gets none.
     pub(super) fn answer_arrived(
         &mut self,
         peer: Option<NodeIndex>,
@@ -82,7 +82,7 @@ impl Answers {
     }
 
     /// Answers a command, of whose body this is the beginning; for all other packages nobody waits. Of one that is handed out again
-    /// nothing is said: the router's life that died with it in its hand may have sent it.
+    /// nothing is said: the router's incarnation that died with it in its hand may have sent it.
     pub(super) fn answer(
         &mut self,
         peer: Option<NodeIndex>,
@@ -118,8 +118,8 @@ impl Answers {
         };
         // Who has gone, or takes no more answers, waits for its timeout. On other nodes callers choose the name, so that it is not looked for.
         let _ = match settings.node_of(answer.to) {
-            Some(_) => self.ways.send_by(self.via, &answer, &self.body),
-            None => self.ways.send(&answer, &self.body),
+            Some(_) => self.sender_cache.send_by(self.via, &answer, &self.body),
+            None => self.sender_cache.send(&answer, &self.body),
         };
     }
 }
@@ -197,7 +197,7 @@ mod tests {
             ground.answers.answer(Some(1), &again, b"call", cause, None);
             let again = arrived(again.options);
             ground.answers.answer_arrived(Some(1), &again, b"call", cause, None);
-            assert_eq!(ground.answered(), None, "{cause:?}: the life before may have sent it");
+            assert_eq!(ground.answered(), None, "{cause:?}: the incarnation before may have sent it");
         }
         ground.answers.answer(Some(1), &command(Options::default()), b"call", Cause::Silent, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::Silent.word()));
@@ -209,7 +209,7 @@ mod tests {
         let mut ground = Ground::new(None);
         for cause in [Cause::NoMailbox, Cause::MailboxFull, Cause::TooLarge, Cause::Stale] {
             ground.answers.answer_arrived(Some(1), &came, b"call", cause, None);
-            assert_eq!(ground.answered(), None, "{cause:?}: it may be a copy of what the life before delivered");
+            assert_eq!(ground.answered(), None, "{cause:?}: it may be a copy of what the incarnation before delivered");
         }
         ground.answers.answer(Some(1), &left, b"call", Cause::Stale, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::Stale.word()), "what is to leave is no copy");

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! A program of the classic packet filter: it needs no rights, and costs some nanoseconds a datagram. It looks at the address alone; who
-//! writes a node's address into what it sends passes, and is judged as before.
+//! writes a node's address into what it sends passes, and is repeated_on_stall as before.
 
 use crate::frame::{self, Kind};
 use crate::security::TAG_BYTES;

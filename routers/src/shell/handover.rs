@@ -1,7 +1,7 @@
 //! From the thread that reads the router's mailbox to the one that sends what is not real time: a few batches of packages that go round.
 //!
 //! ```text
-//!  mailbox ─▶ departures: Giver ── full ──▶ rest: Taker ─▶ Outbound
+//!  mailbox ─▶ tx_thread: Giver ── full ──▶ rest: Taker ─▶ Outbound
 //!                         ▲                   │
 //!                         └────── empty ◀─────┘      none empty: what is not real time stays in the mailbox
 //! ```

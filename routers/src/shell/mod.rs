@@ -1,16 +1,16 @@
 //! The router at work: its mailbox, its sockets and its two threads.
 //!
 //! ```text
-//!                              ┌──────────────── departures ────────────────┐
+//!                              ┌──────────────── tx_thread ────────────────┐
 //!  modules ─▶ router.I.3 ─────▶│ Outbound: at once, or by levels and pace   │─▶ a socket to each peer ═▶
 //!                              └─────────────▲──────────────────────────────┘
 //!                     errors, by the mailbox │ Stats: who is there, what was heard (atomics)
-//!                              ┌─────────────┴── arrivals ──────────────────┐
+//!                              ┌─────────────┴── rx_thread ──────────────────┐
 //!  modules ◀─ their mailboxes ◀│ Inbound: gaps, copies, parts, order        │◀─ one socket for all ◀═
 //!                              └────────────────────────────────────────────┘
 //! ```
 //!
-//! Where there are time slots, the thread of [`slots`] stands in the place of departures, and has the clock besides; else that has a thread
+//! Where there are time slots, the thread of [`slots`] stands in the place of tx_thread, and has the clock besides; else that has a thread
 //! of its own ([`clock`]).
 //!
 //! Each thread is a participant of its own, since a participant has one bell. Neither waits for the other, takes from the heap for a
@@ -18,22 +18,22 @@
 
 mod ages;
 mod answers;
-mod arrivals;
 pub mod clock;
-mod departures;
 mod failure;
 mod filter;
 mod handover;
 mod hosted;
 mod news;
 mod rest;
+mod rx_thread;
+pub(crate) mod sender_cache;
 mod sending;
 pub mod slots;
 mod socket;
 mod threads;
 pub(crate) mod transit;
 pub mod tunnel;
-pub(crate) mod ways;
+mod tx_thread;
 mod wire;
 
 pub use ages::Ages;
@@ -46,16 +46,16 @@ pub use socket::{SocketError, listen};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
-use crate::security::{self, Acquaintances, Gate, KeyRing, NoRandom, Port, Rejections, Sealing, Waiting, Who};
+use crate::security::{self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, Sealing, Waiting, Who};
 use crate::settings::Settings;
 use crate::stats::Stats;
-use crate::tdma::{Discipline, Table};
+use crate::tdma::{SlotScheduler, Table};
 use answers::Answers;
-use arrivals::{Arrivals, Desk};
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
-use departures::Departures;
 use news::News;
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
+use rx_thread::{PackageDelivery, RxThread};
+use sender_cache::SenderCache;
 use sending::Sending;
 use slots::Slots;
 use socket::InSocket;
@@ -65,7 +65,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use threads::Shared;
-use ways::Ways;
+use tx_thread::TxThread;
 use wire::Wire;
 
 /// Why a router did not start.
@@ -132,7 +132,7 @@ pub struct Shell {
     slots: Option<Arc<slots::State>>,
     tunnel: Option<Arc<tunnel::Passed>>,
     /// Where datagrams are sealed.
-    acquaintances: Option<Arc<Acquaintances>>,
+    peer_sessions: Option<Arc<PeerSessions>>,
     /// The clock's own thread.
     service: Option<ClockService>,
     threads: Vec<JoinHandle<()>>,
@@ -148,7 +148,7 @@ impl Shell {
     }
 
     /// The same of a router that seals what it sends, and takes only what is sealed. In place of the incarnation in its settings it draws one:
-    /// two lives with one incarnation would have one key.
+    /// two incarnations with one incarnation would have one key.
     ///
     /// # Errors
     /// [`ShellError`]
@@ -185,7 +185,7 @@ impl Shell {
         }
         let settings = Arc::new(settings);
         let stats = Stats::new(&settings, monotonic_ns());
-        let all = keys.map(|keys| Acquaintances::new(Who::of(&settings), keys));
+        let all = keys.map(|keys| PeerSessions::new(Who::of(&settings), keys));
         let mut outbound = Outbound::new(&settings, stats.clone());
         if let Some(all) = &all {
             outbound = outbound.sealed(all.clone());
@@ -206,14 +206,14 @@ impl Shell {
             wire: Wire::new(&settings, settings.network.port, sealing, impair, &failures),
             datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
         };
-        let mut departures =
-            Departures { shared: shared.clone(), transit, sending, settings: settings.clone(), rest: None };
-        let mut arrivals = Arrivals {
+        let mut tx_thread =
+            TxThread { shared: shared.clone(), transit, sending, settings: settings.clone(), rest: None };
+        let mut rx_thread = RxThread {
             shared: shared.clone(),
             socket: socket.clone(),
             inbound: Inbound::new(&settings, stats.clone()),
-            desk: Desk {
-                ways: Ways::here(&receiver, &settings.hosts),
+            delivery: PackageDelivery {
+                sender_cache: SenderCache::here(&receiver, &settings.hosts),
                 answers: answers(&receiver),
                 news: Some(News::new(&settings)),
                 ages: ages.clone(),
@@ -239,17 +239,17 @@ impl Shell {
             tunnel: None,
             service: None,
             threads: Vec::new(),
-            acquaintances: all,
+            peer_sessions: all,
         };
         if shell.settings.tdma.is_some() {
-            arrivals.answers = Some(shell.send_in_slots(name, departures, clock.ok_or(ShellError::NoTime)?)?);
+            rx_thread.answers = Some(shell.send_in_slots(name, tx_thread, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
-            let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.acquaintances.as_ref()));
+            let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.peer_sessions.as_ref()));
             shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
-            departures.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
-            shell.begin("departures", move || {
+            tx_thread.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
+            shell.begin("tx_thread", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                     tracing::warn!(
                         "the router's threads run as modules do, and not before them: {error}; allow it with a limit `rtprio` of {} \
@@ -257,13 +257,13 @@ impl Shell {
                         threads::ARRIVALS_FIFO
                     );
                 }
-                departures.run();
+                tx_thread.run();
             })?;
         }
-        shell.begin("arrivals", move || {
+        shell.begin("rx_thread", move || {
             // A refusal was told by the other.
             let _ = threads::schedule(threads::ARRIVALS_FIFO);
-            arrivals.run();
+            rx_thread.run();
         })?;
         Ok(shell)
     }
@@ -272,21 +272,21 @@ impl Shell {
     fn send_in_slots(
         &mut self,
         name: Name,
-        departures: Departures,
+        tx_thread: TxThread,
         clock: ClockParts,
     ) -> Result<SyncSender<slots::Answer>, ShellError> {
         let settings = self.settings.clone();
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
-        let works = Works::new(clock)?.sealed_in_slots(self.acquaintances.as_ref()).in_slots(table.for_clock());
+        let works = Works::new(clock)?.sealed_in_slots(self.peer_sessions.as_ref()).in_slots(table.for_clock());
         let spin_ns = slots::spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(slots::ANSWERS);
-        let hellos = self.acquaintances.as_ref().map(Waiting::new);
-        let line = slots::Line::new(waiting, hellos, self.sockets[0].clone(), settings.clone());
-        let discipline = Discipline::new(table, spin_ns);
+        let hellos = self.peer_sessions.as_ref().map(Waiting::new);
+        let line = slots::AnswerQueue::new(waiting, hellos, self.sockets[0].clone(), settings.clone());
+        let scheduler = SlotScheduler::new(table, spin_ns);
         let own = slots::Own { router: name, nodes: settings.nodes.len(), network: settings.network };
-        let slots = Slots::new(own, departures, works, discipline, line);
+        let slots = Slots::new(own, tx_thread, works, scheduler, line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(answers)
@@ -339,7 +339,7 @@ impl Shell {
 
     /// What was not taken at a port, since it was not sealed as it must be; none where nothing is sealed.
     pub fn rejections(&self, port: Port) -> Option<&Arc<Rejections>> {
-        self.acquaintances.as_ref().map(|all| all.rejections(port))
+        self.peer_sessions.as_ref().map(|all| all.rejections(port))
     }
 
     /// What it counts.

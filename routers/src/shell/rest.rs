@@ -4,12 +4,12 @@
 //! receives at that port: so the kernel parts both kinds before any thread runs, and no flood of the one takes room or time from the other.
 
 use super::answers::{Answers, Faults};
-use super::arrivals::{Arrivals, Desk};
 use super::handover::{Giver, Taker, Waited, handover};
+use super::rx_thread::{PackageDelivery, RxThread};
+use super::sender_cache::SenderCache;
 use super::sending::Sending;
 use super::socket::{InSocket, REST_BYTES};
 use super::threads::{Shared, schedule_below};
-use super::ways::Ways;
 use super::wire::Wire;
 use super::{Shell, ShellError, transit};
 use crate::impair;
@@ -26,7 +26,7 @@ use std::time::Duration;
 const BURST: usize = 64;
 /// The router's end is looked for so often.
 const LOOK: Duration = Duration::from_millis(100);
-/// What waits while its peer does not hear this life yet is looked at so often.
+/// What waits while its peer does not hear this incarnation yet is looked at so often.
 const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
 /// What the thread has.
@@ -84,7 +84,7 @@ impl Shell {
         let own = (settings.nodes[usize::from(settings.own)].address, port).into();
         let socket = Arc::new(InSocket::kept(socket, own, &settings.peer_addresses(), REST_BYTES)?);
         let stats = Stats::of_rest(&settings, &self.stats);
-        let all = self.acquaintances.as_ref();
+        let all = self.peer_sessions.as_ref();
         let mut outbound = Outbound::new(&settings, stats.clone()).behind(&self.stats);
         if let Some(all) = all {
             outbound = outbound.sealed(all.clone());
@@ -102,12 +102,12 @@ impl Shell {
             wire: Wire::new(&settings, port, sealing, impair, &self.failures),
             datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
         };
-        let arrivals = Arrivals {
+        let rx_thread = RxThread {
             shared: shared.clone(),
             socket: socket.clone(),
             inbound: Inbound::new(&settings, stats.clone()),
-            desk: Desk {
-                ways: Ways::here(&receiver, &settings.hosts),
+            delivery: PackageDelivery {
+                sender_cache: SenderCache::here(&receiver, &settings.hosts),
                 answers: answers(&receiver),
                 news: None,
                 ages: self.ages.clone(),
@@ -121,14 +121,14 @@ impl Shell {
         };
         self.sockets.push(socket);
         self.rest_stats = Some(stats);
-        let departures = Rest { shared, taker, sending };
+        let tx_thread = Rest { shared, taker, sending };
         self.begin("rest-out", move || {
             schedule_below();
-            departures.run();
+            tx_thread.run();
         })?;
         self.begin("rest-in", move || {
             schedule_below();
-            arrivals.run();
+            rx_thread.run();
         })?;
         Ok(Some(giver))
     }

@@ -26,16 +26,16 @@ pub(super) struct Shared {
     /// Bytes of packets from the tunnel that wait in the queue, as the sending thread last saw it.
     pub(super) tunnel_bytes: AtomicU64,
     /// Of the sending thread, whose bell wakes it.
-    departures: Arc<Participant>,
+    tx_thread: Arc<Participant>,
 }
 
 impl Shared {
-    pub(super) fn new(departures: &Arc<Participant>) -> Self {
+    pub(super) fn new(tx_thread: &Arc<Participant>) -> Self {
         Self {
             ends: AtomicBool::new(false),
             departures_due_ns: AtomicU64::new(u64::MAX),
             tunnel_bytes: AtomicU64::new(0),
-            departures: departures.clone(),
+            tx_thread: tx_thread.clone(),
         }
     }
 
@@ -47,18 +47,18 @@ impl Shared {
     /// From now on it does.
     pub(super) fn end(&self) {
         self.ends.store(true, Ordering::Release);
-        self.departures.ring();
+        self.tx_thread.ring();
     }
 
     /// Wakes the sending thread: it has something to send that nobody published.
     pub(super) fn ring(&self) {
-        self.departures.ring();
+        self.tx_thread.ring();
     }
 
     /// Wakes the sending thread if its time has come. Said again until that sleeps anew: who is about to sleep may not hear it.
     pub(super) fn ring_if_due(&self, now_ns: u64) {
         if self.departures_due_ns.load(Ordering::Acquire) <= now_ns {
-            self.departures.ring();
+            self.tx_thread.ring();
         }
     }
 }

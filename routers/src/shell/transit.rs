@@ -21,7 +21,7 @@ pub(crate) fn name(router: Name) -> Name {
     router.with_local(local::TRANSIT)
 }
 
-/// What that mailbox is made as: the same in each life of the router, so that what waits there outlives it.
+/// What that mailbox is made as: the same in each incarnation of the router, so that what waits there outlives it.
 pub(crate) fn shape() -> Shape {
     Shape {
         slots: TRANSIT.slots,

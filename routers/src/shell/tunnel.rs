@@ -7,8 +7,8 @@
 //! An IP packet is a package like any other, of the least priority, with a quota of its own. Little of it may wait in the queue: then packets are
 //! dropped, which is how TCP learns how much a network carries. Both threads are ordinary ones.
 
+use super::sender_cache::SenderCache;
 use super::threads::Shared;
-use super::ways::Ways;
 use crate::admission::{Addresses, Admission, PACKET, PACKET_PRIORITY, TUNNEL};
 use crate::counts::Count;
 use crate::frame::NodeIndex;
@@ -91,7 +91,7 @@ struct Common {
 /// From the kernel to other nodes.
 pub(super) struct Out {
     common: Common,
-    ways: Ways,
+    sender_cache: SenderCache,
     /// The router's name.
     own: Name,
     tunnel: Tunnel,
@@ -133,7 +133,7 @@ pub(super) fn ends(
     let incoming = In { common: common(device.twin()?), mailbox, admission: settings.admission.clone() };
     let outgoing = Out {
         common: common(device),
-        ways: Ways::everywhere(sender),
+        sender_cache: SenderCache::everywhere(sender),
         own: own.with_local(TUNNEL),
         tunnel: *tunnel,
         node: settings.own,
@@ -175,7 +175,7 @@ impl Out {
             ..Head::default()
         };
         let full = self.common.shared.tunnel_bytes.load(Ordering::Relaxed) >= WAITING_BYTES_MAX;
-        let count = if full || self.ways.send(&head, packet).is_err() { &passed.dropped } else { &passed.sent };
+        let count = if full || self.sender_cache.send(&head, packet).is_err() { &passed.dropped } else { &passed.sent };
         count.add(1);
     }
 }

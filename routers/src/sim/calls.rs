@@ -1,7 +1,7 @@
 //! Callers and servers of a simulated network: three tries of each command, and a guard that lets it run at most once.
 
-use super::book::Book;
 use super::clock::Now;
+use super::oracle::Oracle;
 use super::package::Answer;
 use super::promise::Promise;
 use rohrpost_mailbox::Name;
@@ -44,10 +44,10 @@ pub enum Ruling {
     Ignore,
 }
 
-/// Decides whether a command runs: `Once` of the crate `modules`, which this crate does not know.
+/// Decides whether a command runs: `Deduplicator` of the crate `modules`, which this crate does not know.
 pub trait Guard {
     /// Looks at a command; the clock is the node's monotonic one.
-    fn judge(&mut self, attempt: &Attempt, now_ns: u64) -> Ruling;
+    fn validate(&mut self, attempt: &Attempt, now_ns: u64) -> Ruling;
     /// It was run, as this run of all.
     fn done(&mut self, attempt: &Attempt, now_ns: u64, run: u32);
 }
@@ -72,7 +72,7 @@ pub struct Call {
     /// What the caller was told first.
     pub outcome: Option<Answer>,
     runs: Vec<u32>,
-    /// Server's life that ran it last.
+    /// Server's incarnation that ran it last.
     life: Option<u32>,
     /// Run twice where no server could have known: a first try, still on its way while a server ran its repeat and died.
     unknowable: bool,
@@ -168,7 +168,7 @@ impl Calls {
     /// at some step of it, and the command stays.
     pub fn serve(
         &mut self,
-        book: &mut Book,
+        oracle: &mut Oracle,
         server: &mut Server,
         now: Now,
         from: Name,
@@ -185,16 +185,16 @@ impl Calls {
             repeat: waiting.age_ns > 0,
             redelivered: waiting.redelivered,
         };
-        let (what, answer) = match server.guard.judge(&attempt, now.monotonic_ns) {
+        let (what, answer) = match server.guard.validate(&attempt, now.monotonic_ns) {
             Ruling::Run => ("run", Some(Answer::Ran(self.runs))),
             Ruling::Again(run) => ("run before", Some(Answer::Ran(run))),
             Ruling::Refuse => ("refused by its server", Some(Answer::NotRun)),
             Ruling::Interrupted => ("interrupted", Some(Answer::Interrupted)),
             Ruling::Ignore => ("ignored", None),
         };
-        book.saw(what);
+        oracle.saw(what);
         if what == "run" {
-            self.run(book, now, server.life, &waiting);
+            self.run(oracle, now, server.life, &waiting);
             if !dies {
                 server.guard.done(&attempt, now.monotonic_ns, self.runs - 1);
             }
@@ -209,7 +209,7 @@ impl Calls {
         Some((waiting, answer))
     }
 
-    fn run(&mut self, book: &mut Book, now: Now, life: u32, waiting: &Waiting) {
+    fn run(&mut self, oracle: &mut Oracle, now: Now, life: u32, waiting: &Waiting) {
         let call = &mut self.all[waiting.call];
         let on_the_way = waiting.age_ns == 0 && waiting.posted_ns < waiting.published_true_ns;
         call.unknowable |= on_the_way && call.life.is_some_and(|before| before != life);
@@ -217,14 +217,14 @@ impl Calls {
         call.runs.push(self.runs);
         self.runs += 1;
         if call.runs.len() > 1 && !call.unknowable {
-            book.broken(now, Promise::AtMostOnce, format!("call {} was run {} times", waiting.call, call.runs.len()));
+            oracle.broken(now, Promise::AtMostOnce, format!("call {} was run {} times", waiting.call, call.runs.len()));
         } else if call.outcome == Some(Answer::NotRun) {
-            book.broken(now, Promise::AtMostOnce, format!("call {} was said not to run, and is run", waiting.call));
+            oracle.broken(now, Promise::AtMostOnce, format!("call {} was said not to run, and is run", waiting.call));
         }
     }
 
     /// The caller has an answer.
-    pub fn answered(&mut self, book: &mut Book, now: Now, index: usize, answer: Answer) {
+    pub fn answered(&mut self, oracle: &mut Oracle, now: Now, index: usize, answer: Answer) {
         let call = &mut self.all[index];
         if call.outcome.is_some() || now.monotonic_ns - call.began_ns >= call.valid_for_ns {
             return;
@@ -241,9 +241,9 @@ impl Calls {
         };
         if wrong {
             let text = format!("call {index} was answered {answer:?}, its runs are {:?}", call.runs);
-            book.broken(now, Promise::AtMostOnce, text);
+            oracle.broken(now, Promise::AtMostOnce, text);
         }
-        book.saw(match answer {
+        oracle.saw(match answer {
             Answer::Ran(_) => "answered",
             Answer::Interrupted => "told that it was interrupted",
             Answer::NotRun => "told that it was not run",

@@ -32,7 +32,7 @@ impl Plan {
         plan.faults.clear();
         plan.calls.clear();
         plan.flows.clear();
-        plan.quality = super::plan::mended(plan.quality);
+        plan.quality = super::plan::fixed(plan.quality);
         for (index, node) in plan.nodes.iter_mut().enumerate() {
             let classes = CLASSES.iter().chain(&[FLOOD_CLASS]);
             node.modules = classes.map(|class| Name::new(super::plan::SYSTEM, *class, index as u8, 0)).collect();
@@ -44,7 +44,7 @@ impl Plan {
         // Each flow publishes something.
         let longest_ns = plan.flows.iter().map(|flow| flow.period_ns).max().unwrap_or(0);
         plan.traffic_end_ns = BEGIN_NS + TRAFFIC_NS.max(longest_ns);
-        (plan.mended_ns, plan.timed_ns, plan.stepped_ns) = (plan.traffic_end_ns, BEGIN_NS, BEGIN_NS);
+        (plan.fixed_ns, plan.timed_ns, plan.stepped_ns) = (plan.traffic_end_ns, BEGIN_NS, BEGIN_NS);
         plan.end_ns = plan.traffic_end_ns + DRAIN_NS;
         if let Some(slots) = &mut plan.slots {
             (slots.late_ppm, slots.divisions) = (0, Divisions::default());

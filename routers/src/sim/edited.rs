@@ -125,16 +125,16 @@ impl Plan {
             _ => chance.pick(&Edit::ALL),
         });
         plan.edited = edits.collect::<Vec<_>>().into_iter().map(|edit| edit.of(&slots, nodes, &mut chance)).collect();
-        let all_at_once = chance.percent(20).then(|| chance.below(plan.mended_ns / 4));
+        let all_at_once = chance.percent(20).then(|| chance.below(plan.fixed_ns / 4));
         for node in 0..plan.nodes.len() {
-            let from_ns = all_at_once.unwrap_or_else(|| chance.below(plan.mended_ns / 2));
-            let until_ns = chance.between(from_ns + 300 * MS, plan.mended_ns);
+            let from_ns = all_at_once.unwrap_or_else(|| chance.below(plan.fixed_ns / 2));
+            let until_ns = chance.between(from_ns + 300 * MS, plan.fixed_ns);
             let edition = 1 + chance.below(EDITIONS) as usize;
             if chance.percent(60) {
                 plan.faults.push(Planned { from_ns, until_ns, fault: Fault::Edited { node, edition } });
             }
         }
-        plan.mended_ns += LISTENS_NS;
+        plan.fixed_ns += LISTENS_NS;
         plan.time_slots();
         plan.divide();
         plan

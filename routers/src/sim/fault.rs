@@ -47,7 +47,7 @@ pub enum Fault {
         module: Name,
     },
     /// The mailboxes of a module are full.
-    Full {
+    OverflowPolicy {
         /// Where it is.
         node: usize,
         /// Which.
@@ -114,7 +114,7 @@ pub enum Fault {
         /// How many packages.
         count: u64,
     },
-    /// Datagrams such as a router could have sent, of a life that never was or of a place far from its own.
+    /// Datagrams such as a router could have sent, of an incarnation that never was or of a place far from its own.
     Forged {
         /// In whose name.
         from: usize,

@@ -6,7 +6,7 @@ use super::fault::Fault;
 use super::host::DATA_MAILBOXES;
 use super::package::Role;
 use super::packages::{ROUTER_CLASS, digest};
-use super::plan::{SYSTEM, incarnation, mended};
+use super::plan::{SYSTEM, fixed, incarnation};
 use super::seals::altered;
 use super::spans::MS;
 use super::station::Arrived;
@@ -25,48 +25,48 @@ impl World<'_> {
         self.trace.line(self.now_ns, || format!("begins: {fault:?}"));
         match fault {
             Fault::Freeze { node, whole } => {
-                self.book.saw("frozen");
+                self.oracle.saw("frozen");
                 self.stations[node].frozen += 1;
                 self.stations[node].asleep += u32::from(whole);
             }
             Fault::Restart { node } => {
-                self.book.saw("router killed");
+                self.oracle.saw("router killed");
                 self.kill(node);
             }
             Fault::Sleep { node, .. } => {
-                self.book.saw("asleep");
+                self.oracle.saw("asleep");
                 self.stations[node].frozen += 1;
                 self.stations[node].asleep += 1;
                 self.stations[node].sleeps += 1;
             }
             Fault::Slew { node, slewed_ppb } => {
-                self.book.saw("slewed");
+                self.oracle.saw("slewed");
                 self.slew(node, slewed_ppb);
             }
             Fault::Edited { node, edition } => {
-                self.book.saw("edited");
+                self.oracle.saw("edited");
                 self.edit(node, edition);
             }
             Fault::Cut { from, to } => {
-                self.book.saw("cut");
+                self.oracle.saw("cut");
                 self.links[from][to].cuts += 1;
             }
             Fault::Split { side } => {
-                self.book.saw("split");
+                self.oracle.saw("split");
                 self.split(side, |cuts| *cuts += 1);
             }
             Fault::Bad { from, to, quality } => {
-                self.book.saw("bad link");
+                self.oracle.saw("bad link");
                 self.links[from][to].quality = quality;
             }
             Fault::Echo { to, delay_ns } => {
-                self.book.saw("echoed");
+                self.oracle.saw("echoed");
                 self.stations[to].echo_ns = Some(delay_ns);
             }
             Fault::Absent { node, module } => self.mailboxes(node, module, |mailbox| mailbox.absent += 1),
-            Fault::Full { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full += 1),
+            Fault::OverflowPolicy { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full += 1),
             Fault::ModuleRestart { node, module } => {
-                self.book.saw("module killed");
+                self.oracle.saw("module killed");
                 let dies = self.chance.percent(70);
                 self.serve_or_die(node, module, dies);
                 if let Some(server) = self.servers.get_mut(&module) {
@@ -75,7 +75,7 @@ impl World<'_> {
             }
             Fault::Unsendable { node } => self.stations[node].host.unsendable += 1,
             Fault::Step { node, by_ns } => {
-                self.book.saw("clock stepped");
+                self.oracle.saw("clock stepped");
                 self.stations[node].clock.step_realtime(by_ns);
             }
             Fault::Foreign { to, count } => {
@@ -90,7 +90,7 @@ impl World<'_> {
             }
             Fault::Intruder { node, count } => (0..count).for_each(|_| self.intrude(node)),
             Fault::Forged { from, to, count } => {
-                self.book.saw("forged");
+                self.oracle.saw("forged");
                 for _ in 0..count {
                     let bytes = self.forged(from, to);
                     let arrived = Arrived { port: 0, source: Some(from), bytes, stamp: Now::default(), damaged: false };
@@ -134,7 +134,7 @@ impl World<'_> {
             Fault::Sleep { node, wrong_ns } => {
                 let slept_ns = self.now_ns - self.plan.faults[index].from_ns;
                 self.stations[node].clock.wakes(self.now_ns, slept_ns, wrong_ns);
-                self.book.times.changes(&self.stations[node].clock, node);
+                self.oracle.times.changes(&self.stations[node].clock, node);
                 self.stations[node].frozen -= 1;
                 self.stations[node].asleep -= 1;
                 self.stations[node].sleeps -= 1;
@@ -148,7 +148,7 @@ impl World<'_> {
             Fault::Split { side } => self.split(side, |cuts| *cuts -= 1),
             Fault::Bad { from, to, .. } => self.links[from][to].quality = self.plan.quality,
             Fault::Absent { node, module } => self.mailboxes(node, module, |mailbox| mailbox.absent -= 1),
-            Fault::Full { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full -= 1),
+            Fault::OverflowPolicy { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full -= 1),
             Fault::ModuleRestart { node, module } => self.restart_module(node, module),
             Fault::Unsendable { node } => self.stations[node].host.unsendable -= 1,
             Fault::Echo { to, .. } => self.stations[to].echo_ns = None,
@@ -159,7 +159,7 @@ impl World<'_> {
 
     fn slew(&mut self, node: usize, slewed_ppb: i64) {
         self.stations[node].clock.slew(self.now_ns, slewed_ppb);
-        self.book.times.changes(&self.stations[node].clock, node);
+        self.oracle.times.changes(&self.stations[node].clock, node);
     }
 
     /// A router is started anew, from another file.
@@ -171,9 +171,9 @@ impl World<'_> {
     }
 
     /// After the last fault all links are as good as they get.
-    pub(super) fn mend(&mut self) {
+    pub(super) fn fix(&mut self) {
         self.trace.line(self.now_ns, || "all faults are over".into());
-        let quality = mended(self.plan.quality);
+        let quality = fixed(self.plan.quality);
         self.links.iter_mut().flatten().for_each(|link| link.quality = quality);
     }
 
@@ -215,7 +215,7 @@ impl World<'_> {
         let kind = if to.local() == local::REPLIES { Type::reply(16) } else { PACKET };
         let len = chance.between(8, 200) as u16;
         let priority = Priority(chance.pick(&[0, 100, u8::MAX]));
-        self.book.saw("intruder");
+        self.oracle.saw("intruder");
         self.post(node, Head { to, from, len, kind, priority, ..Head::default() }, Role::Intruder);
     }
 
@@ -237,7 +237,7 @@ impl World<'_> {
             let rest = Refusal { version: frame::VERSION, reason, digest: head.digest }.to_bytes();
             return Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat());
         }
-        let is_of_life = chance.percent(50);
+        let is_of_incarnation = chance.percent(50);
         // Far from all that is sent in these seconds.
         let any = chance.between(1 << 32, SEQUENCE_MAX);
         let sequence = chance.pick(&[SEQUENCE_MAX, SEQUENCE_MAX / 2, any]);
@@ -247,8 +247,8 @@ impl World<'_> {
             from: from as u8,
             to: to as u8,
             digest: digest(self.stations[to].edition),
-            incarnation: if is_of_life { incarnation(self.plan.seed, life) } else { chance.bits() | 1 },
-            sequence: if is_of_life { sequence } else { chance.below(1 << 20) },
+            incarnation: if is_of_incarnation { incarnation(self.plan.seed, life) } else { chance.bits() | 1 },
+            sequence: if is_of_incarnation { sequence } else { chance.below(1 << 20) },
         };
         let rest = Alive { heard_incarnation: chance.bits(), ..Alive::default() }.to_bytes();
         Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat())

@@ -1,4 +1,4 @@
-//! What the books keep of each life of a router: what it sends, and what it takes.
+//! What the books keep of each incarnation of a router: what it sends, and what it takes.
 
 use super::table::{Group, Table};
 use crate::frame::NodeIndex;
@@ -6,7 +6,7 @@ use rohrpost_mailbox::Name;
 use rohrpost_network::LEVELS;
 use std::collections::BTreeSet;
 
-/// Packages that one life of a router has to account for.
+/// Packages that one incarnation of a router has to account for.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub struct Account {
     /// Taken from its computer.
@@ -17,7 +17,7 @@ pub struct Account {
     pub lost: u64,
 }
 
-/// What one life of a router sends.
+/// What one incarnation of a router sends.
 #[derive(Default, Debug)]
 pub struct Sending {
     /// Its packages.
@@ -41,20 +41,20 @@ pub(super) struct Waiting {
     pub(super) bytes: usize,
 }
 
-/// What one life of a router takes.
+/// What one incarnation of a router takes.
 #[derive(Default, Debug)]
 pub struct Receiving {
     /// Packages of which something came.
     pub(super) receipts: Table<u32, Receipt>,
     /// Datagrams, by the sender's incarnation.
     pub(super) taken: Table<u64, Taken>,
-    /// The life of each peer that was heard last.
+    /// The incarnation of each peer that was heard last.
     pub(super) present: Table<NodeIndex, u64>,
     /// Last place that was delivered, of sender, receiver and priority.
     pub(super) last: Table<(Name, Name, u8), u32>,
 }
 
-/// What one life of a router has had of a package.
+/// What one incarnation of a router has had of a package.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct Receipt {
     pub(super) parts: u32,
@@ -62,7 +62,7 @@ pub(super) struct Receipt {
     pub(super) ended: bool,
 }
 
-/// What one life of a router has taken of another.
+/// What one incarnation of a router has taken of another.
 #[derive(Default, Debug)]
 pub(super) struct Taken {
     pub(super) from: NodeIndex,

@@ -3,12 +3,11 @@
 //! ```text
 //!  Plan (from the seed) ─▶ World: events ─▶ Station: clocks, mailboxes, modules ─▶ Router: one Layer for each port
 //!                            │ Link: loss, delay, copies…   │ Calls: at most once               packages │ time │ …
-//!                            └──────────────▶ Book: every package, every broken Promise ◀──────────────────────┘
+//!                            └──────────────▶ Oracle: every package, every broken Promise ◀──────────────────────┘
 //! ```
 //!
 //! A new protocol comes as one more [`station::Layer`]; what must hold of it as one more [`promise::Promise`].
 
-pub mod book;
 pub mod calls;
 pub mod chance;
 pub mod clock;
@@ -21,6 +20,7 @@ pub mod host;
 pub mod link;
 pub mod lives;
 mod modules;
+pub mod oracle;
 pub mod package;
 pub mod packages;
 pub mod plan;

@@ -3,7 +3,7 @@
 use super::calls::Waiting;
 use super::host::{DATA_MAILBOXES, Parcel};
 use super::package::Answer;
-use super::package::{Role, Way, admitted};
+use super::package::{Role, SendStage, admitted};
 use super::promise::{Problem, Promise};
 use super::spans::{MS, US};
 use super::world::{Event, World};
@@ -18,7 +18,7 @@ impl World<'_> {
     /// The next packages of a flow.
     pub(super) fn flow(&mut self, index: usize) {
         let flow = self.plan.flows[index];
-        let end_ns = if flow.burst > 1 { self.plan.mended_ns } else { self.plan.traffic_end_ns };
+        let end_ns = if flow.burst > 1 { self.plan.fixed_ns } else { self.plan.traffic_end_ns };
         if self.now_ns >= end_ns {
             return;
         }
@@ -49,11 +49,11 @@ impl World<'_> {
     /// A module sends a package to another node.
     pub(super) fn post(&mut self, node: usize, head: Head, role: Role) {
         let now = self.now(node);
-        let (number, head, body) = self.book.post(now, head, (node, usize::from(head.to.instance())), role);
+        let (number, head, body) = self.oracle.post(now, head, (node, usize::from(head.to.instance())), role);
         let station = &mut self.stations[node];
         let displaced = station.host.transit.post(Parcel { number, head, body, published_ns: now.monotonic_ns });
         if let Some(parcel) = displaced {
-            self.book.saw("no room in the transit mailbox");
+            self.oracle.saw("no room in the transit mailbox");
             self.trace.line(self.now_ns, || format!("{node} no room in the transit mailbox for {}", parcel.number));
         }
         self.trace.line(self.now_ns, || format!("{node} posts {number}, {head:?}, {role:?}"));
@@ -115,8 +115,10 @@ impl World<'_> {
         let now = self.now(node);
         let Some(server) = self.servers.get_mut(&module).filter(|server| server.dead == 0) else { return };
         let Some(first) = server.waiting.front() else { return };
-        let command = self.book.packages[first.number as usize].head;
-        let Some((waiting, answer)) = self.calls.serve(&mut self.book, server, now, command.from, dies) else { return };
+        let command = self.oracle.packages[first.number as usize].head;
+        let Some((waiting, answer)) = self.calls.serve(&mut self.oracle, server, now, command.from, dies) else {
+            return;
+        };
         if let Some(mailbox) = self.stations[node].host.boxes.get_mut(&command.to) {
             mailbox.waiting = mailbox.waiting.saturating_sub(1);
         }
@@ -159,12 +161,12 @@ impl World<'_> {
     pub(super) fn receive(&mut self, node: usize) {
         let now = self.now(node);
         for number in std::mem::take(&mut self.stations[node].host.arrived) {
-            let package = &self.book.packages[number as usize];
+            let package = &self.oracle.packages[number as usize];
             let (head, posted_ns) = (package.head, package.posted_ns);
             match package.role {
                 Role::Data | Role::Intruder => {}
-                Role::Answer { call, answer } => self.calls.answered(&mut self.book, now, call, answer),
-                Role::Report { call } => self.calls.answered(&mut self.book, now, call, Answer::NotRun),
+                Role::Answer { call, answer } => self.calls.answered(&mut self.oracle, now, call, answer),
+                Role::Report { call } => self.calls.answered(&mut self.oracle, now, call, Answer::NotRun),
                 Role::Command { call, age_ns } => {
                     let Some(server) = self.servers.get_mut(&head.to.module()) else { continue };
                     server.waiting.push_back(Waiting {
@@ -182,8 +184,8 @@ impl World<'_> {
             }
         }
         for number in std::mem::take(&mut self.stations[node].host.returned) {
-            let Role::Command { call, .. } = self.book.packages[number as usize].role else { continue };
-            self.calls.answered(&mut self.book, now, call, Answer::NotRun);
+            let Role::Command { call, .. } = self.oracle.packages[number as usize].role else { continue };
+            self.calls.answered(&mut self.oracle, now, call, Answer::NotRun);
         }
     }
 
@@ -193,24 +195,24 @@ impl World<'_> {
             let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
             self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.close(io)));
         }
-        let well_ns = self.book.well_ns;
+        let well_ns = self.oracle.well_ns;
         let now = self.now(0);
         for (index, call) in self.calls.all.iter().enumerate() {
             let meant = call.began_true_ns > well_ns && call.valid_for_ns >= ANSWERED_WITHIN_NS;
             if meant && !matches!(call.outcome, Some(Answer::Ran(_))) {
                 let text = format!("call {index}, begun at {} ns, has {:?}", call.began_true_ns, call.outcome);
-                self.book.problems.push(Problem { promise: Promise::Recovery, at_ns: self.now_ns, text });
+                self.oracle.problems.push(Problem { promise: Promise::Recovery, at_ns: self.now_ns, text });
             }
         }
-        for number in 0..self.book.packages.len() {
-            let package = &self.book.packages[number];
+        for number in 0..self.oracle.packages.len() {
+            let package = &self.oracle.packages[number];
             let is_answer = !matches!(package.role, Role::Data | Role::Command { .. });
             if package.posted_ns > well_ns && !is_answer && package.deliveries.is_empty() {
                 let text = format!("package {number} was not delivered: {package:?}");
-                self.book.broken(now, Promise::Recovery, text);
+                self.oracle.broken(now, Promise::Recovery, text);
             }
-            if self.book.packages[number].way == Way::Accepted {
-                self.book.saw("died with its router");
+            if self.oracle.packages[number].way == SendStage::Accepted {
+                self.oracle.saw("died with its router");
             }
         }
     }

@@ -44,7 +44,7 @@ pub enum Role {
 
 /// How far a package has come at its sender's side.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Way {
+pub enum SendStage {
     /// It waits for the router, or was lost there: by the mailbox, which counts it.
     Transit,
     /// Its router has it.
@@ -71,7 +71,7 @@ pub struct Package {
     /// Its place among those of its sender, receiver and priority.
     pub(super) place: u32,
     /// How far it has come.
-    pub way: Way,
+    pub way: SendStage,
     /// Life of the router that accepted it.
     pub life: u32,
     /// When it was published, on its node's monotonic clock.
@@ -84,7 +84,7 @@ pub struct Package {
     pub(super) held: bool,
     /// Whether it came marked as one that was handed out before.
     pub redelivered: bool,
-    /// At each delivery, incarnation of the router that sent it and life of the one that delivered.
+    /// At each delivery, incarnation of the router that sent it and incarnation of the one that delivered.
     pub deliveries: Vec<(u64, u32)>,
 }
 

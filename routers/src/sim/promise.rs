@@ -18,7 +18,7 @@ pub enum Promise {
     Accounts,
     /// No command runs twice, and one that is said not to have run has not.
     AtMostOnce,
-    /// A router delivers no package twice within one life of both ends.
+    /// A router delivers no package twice within one incarnation of both ends.
     NoCopies,
     /// Of one sender and priority, packages come in their order.
     Order,

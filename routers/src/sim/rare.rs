@@ -47,14 +47,14 @@ impl Plan {
         let joins_ns = plan.joins_ns();
         plan.faults.clear();
         plan.flows.retain(|flow| flow.burst == 1);
-        plan.quality = super::plan::mended(plan.quality);
+        plan.quality = super::plan::fixed(plan.quality);
         plan.checksum = true;
         for node in 0..plan.nodes.len() {
             let from_ns = joins_ns * (1 + node as u64) + S + chance.below(S);
             let until_ns = from_ns + chance.scale(5 * MS, S / 4);
             plan.faults.push(Planned { from_ns, until_ns, fault: Fault::Restart { node } });
         }
-        plan.mended_ns = joins_ns * plan.nodes.len() as u64 + 3 * S;
+        plan.fixed_ns = joins_ns * plan.nodes.len() as u64 + 3 * S;
         plan.give_time_to_join();
         if let Some(slots) = &mut plan.slots {
             slots.joins_ns = Some(joins_ns);
@@ -88,7 +88,7 @@ impl Plan {
         }
     }
 
-    /// So long a router needs at most from its beginning until it sends, however rare the slots are: see the book, Security.
+    /// So long a router needs at most from its beginning until it sends, however rare the slots are: see the oracle, Security.
     fn joins_ns(&self) -> u64 {
         let Some(slots) = &self.slots else { return 0 };
         let rarest = slots.table.slots.iter().map(|slot| slot.period).max().unwrap_or(1).max(4);
@@ -99,7 +99,7 @@ impl Plan {
     /// All is well only when who began last has joined; and who was divided from another joins it as if it began.
     fn give_time_to_join(&mut self) {
         let (joins_ns, is_rare) = (self.joins_ns(), is_rare(self.seed));
-        self.mended_ns += joins_ns;
+        self.fixed_ns += joins_ns;
         self.time_slots();
         self.divide();
         if let Some(slots) = &mut self.slots {

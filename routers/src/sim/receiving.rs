@@ -1,8 +1,8 @@
 //! The books of the receiver's side: what a router took, and what it delivered or lost.
 
-use super::book::Book;
 use super::clock::Now;
 use super::lives::{Receipt, Taken};
+use super::oracle::Oracle;
 use super::package::{Package, Role, admitted};
 use super::packages::ROUTER_CLASS;
 use super::promise::Promise;
@@ -10,9 +10,9 @@ use crate::frame::{Frame, NodeIndex};
 use crate::inbound::{REORDER_MAX, WINDOW};
 use rohrpost_mailbox::{Head, local};
 
-impl Book {
+impl Oracle {
     /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was the last
-    /// part that was missing. `first`: where datagrams are sealed, the sequence from which on its life is heard.
+    /// part that was missing. `first`: where datagrams are sealed, the sequence from which on its incarnation is heard.
     pub fn took(&mut self, now: Now, life: u32, (datagram, first): (&[u8], Option<u64>), digest: u64) {
         let Ok((head, frame)) = Frame::parse(datagram) else {
             return self.broken(now, Promise::Unchanged, "a datagram that is no frame was taken".into());
@@ -21,11 +21,11 @@ impl Book {
             self.broken(now, Promise::Unchanged, format!("a datagram of digest {:#x} was taken", head.digest));
         }
         let receiving = self.receiving.entry(life).or_default();
-        let is_first_life = !receiving.present.contains_key(&head.from);
+        let is_first_incarnation = !receiving.present.contains_key(&head.from);
         let before = receiving.present.insert(head.from, head.incarnation);
         let start = match first {
             Some(first) => first,
-            None if is_first_life && head.sequence >= REORDER_MAX => head.sequence,
+            None if is_first_incarnation && head.sequence >= REORDER_MAX => head.sequence,
             None => 0,
         };
         let is_known = receiving.taken.contains_key(&head.incarnation);
@@ -39,7 +39,7 @@ impl Book {
         }
         match frame {
             Frame::Packages(packages) => {
-                for number in packages.filter_map(|(_, body)| super::book::number_of(body)) {
+                for number in packages.filter_map(|(_, body)| super::oracle::number_of(body)) {
                     self.part(now, life, number, 1);
                 }
             }
@@ -88,7 +88,7 @@ impl Book {
 
     /// A router hands a package to a mailbox. Its number, if it is one that was sent there, and unchanged.
     pub fn arrives(&mut self, now: Now, node: usize, head: &Head, body: &[u8]) -> Option<u32> {
-        let known = super::book::number_of(body).filter(|number| {
+        let known = super::oracle::number_of(body).filter(|number| {
             self.packages.get(*number as usize).is_some_and(|package| {
                 let same = Head { options: package.head.options, priority: package.head.priority, ..*head };
                 same == package.head && usize::from(package.to_node) == node && self.is_body(*number, body)
@@ -120,7 +120,7 @@ impl Book {
     }
 
     /// A mailbox took it. `lives`: incarnation of the router that sent the datagram, not of the one that has the package by now (it may
-    /// have found it again when it began), and life of the one that delivers.
+    /// have found it again when it began), and incarnation of the one that delivers.
     pub fn delivered(&mut self, now: Now, lives: (u64, u32), number: u32, redelivered: bool) {
         let (_, life) = lives;
         self.receipt(life, number).ended = true;
@@ -149,7 +149,7 @@ impl Book {
         }
     }
 
-    /// How many datagrams of a peer never came, as a life of a router should have counted by now; none if that is not clear.
+    /// How many datagrams of a peer never came, as an incarnation of a router should have counted by now; none if that is not clear.
     pub fn missing(&self, life: u32, from: NodeIndex) -> Option<u64> {
         let lives = || self.receiving.get(&life).into_iter().flat_map(|its| its.taken.values());
         let lives = || lives().filter(|taken| taken.from == from);

@@ -37,7 +37,7 @@ impl Plan {
         };
         plan.quality = QUALITY;
         (plan.masters, plan.has_stamps, plan.checksum) = (vec![0, 1, 2], true, false);
-        plan.mended_ns = MENDED_NS;
+        plan.fixed_ns = MENDED_NS;
         plan.timed_ns = MENDED_NS + 2 * S;
         plan.traffic_end_ns = MENDED_NS + RECOVERY_NS + WELL_NS;
         plan.end_ns = plan.traffic_end_ns + DRAIN_NS;
@@ -110,7 +110,7 @@ impl Plan {
     fn rough_slotted_faults(&mut self, chance: &mut Chance) {
         self.faults.clear();
         let nodes = self.nodes.len();
-        let last_ns = self.mended_ns - S / 2;
+        let last_ns = self.fixed_ns - S / 2;
         let mut fault = |longest_ns: u64, chance: &mut Chance, fault| {
             let from_ns = chance.between(S / 2, last_ns);
             let until_ns = from_ns + chance.between(3 * MS, longest_ns);

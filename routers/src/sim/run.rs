@@ -55,10 +55,11 @@ fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticki
     let layers = routers(&plan, change);
     let mut world = World::new(plan.clone(), guard, layers, trace);
     world.run();
-    let book = world.book;
-    let slowest = |flow: &Flow| book.slowest_ns.get(&(flow.from, flow.to, flow.priority)).copied().unwrap_or_default();
+    let oracle = world.oracle;
+    let slowest =
+        |flow: &Flow| oracle.slowest_ns.get(&(flow.from, flow.to, flow.priority)).copied().unwrap_or_default();
     let slowest_ns = plan.flows.iter().map(slowest).collect();
-    Outcome { problems: book.problems, seen: book.seen, slowest_ns, trace: world.trace.lines }
+    Outcome { problems: oracle.problems, seen: oracle.seen, slowest_ns, trace: world.trace.lines }
 }
 
 /// Routers as this version has them.
@@ -71,7 +72,7 @@ fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayer
         let mut ticking =
             Ticking::new(ticking::settings(&plan, node, incarnation, edition), now, page, plan.has_stamps);
         if plan.sealed {
-            let all = seals::acquaintances(&settings);
+            let all = seals::peer_sessions(&settings);
             (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all, plan.slots.is_some()));
         }
         change(&mut ticking);

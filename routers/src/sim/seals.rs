@@ -3,7 +3,7 @@
 use super::chance::Chance;
 use crate::frame::{self, FrameHead};
 use crate::security::{
-    Acquaintances, Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, Port, Rejection, Sealing,
+    Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection, Sealing,
     TAG_BYTES, Waiting, Who,
 };
 use crate::settings::Settings;
@@ -14,9 +14,9 @@ use std::sync::Arc;
 /// Of all routers.
 const KEY: [u8; KEY_BYTES] = [0x5a; KEY_BYTES];
 
-/// Whom a life of a router knows; nobody yet.
-pub(super) fn acquaintances(settings: &Settings) -> Arc<Acquaintances> {
-    Acquaintances::new(Who::of(settings), KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &KEY), None))
+/// Whom an incarnation of a router knows; nobody yet.
+pub(super) fn peer_sessions(settings: &Settings) -> Arc<PeerSessions> {
+    PeerSessions::new(Who::of(settings), KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &KEY), None))
 }
 
 /// What the layer of packages has.
@@ -25,12 +25,12 @@ pub(super) struct PackageSeals {
     pub(super) sealing: Sealing,
     /// Hellos that wait for a slot.
     pub(super) waiting: Waiting,
-    all: Arc<Acquaintances>,
+    all: Arc<PeerSessions>,
 }
 
 impl PackageSeals {
-    /// Of a life with this incarnation, which nobody can guess.
-    pub(super) fn new(all: &Arc<Acquaintances>, incarnation: u64) -> Self {
+    /// Of an incarnation with this incarnation, which nobody can guess.
+    pub(super) fn new(all: &Arc<PeerSessions>, incarnation: u64) -> Self {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
         let (gate, sealing) = (Gate::new(all, seed), Sealing::new(all, Port::Packages));
@@ -42,7 +42,7 @@ impl PackageSeals {
         self.all.reached() & 1 << node != 0
     }
 
-    /// From which sequence on the life is heard that said a datagram, as it said when it began.
+    /// From which sequence on the incarnation is heard that said a datagram, as it said when it began.
     pub(super) fn first(&self, datagram: &[u8]) -> u64 {
         FrameHead::read(datagram).map_or(0, |(head, _)| self.gate.first(head.from))
     }
@@ -60,12 +60,12 @@ pub(super) struct TimeSeals {
 }
 
 impl TimeSeals {
-    pub(super) fn new(all: &Arc<Acquaintances>, in_slots: bool) -> Self {
+    pub(super) fn new(all: &Arc<PeerSessions>, in_slots: bool) -> Self {
         let sealing = if in_slots { Sealing::of_slots(all) } else { Sealing::new(all, Port::Time) };
         Self { sealing, opening: Opening::new(all, Port::Time) }
     }
 
-    /// The datagram as it was before it was sealed, if it was sealed to this node, and whether by a life that is known to live. `overhears`: whether
+    /// The datagram as it was before it was sealed, if it was sealed to this node, and whether by an incarnation that is known to live. `overhears`: whether
     /// others are of any use.
     pub(super) fn open(&mut self, datagram: &[u8], overhears: bool) -> Option<(Rc<[u8]>, bool)> {
         let mut bytes = datagram.to_vec();

@@ -1,9 +1,9 @@
 //! The books of the sender's side: what a router accepted, and how it left or was lost.
 
-use super::book::Book;
 use super::clock::Now;
 use super::lives::Account;
-use super::package::Way;
+use super::oracle::Oracle;
+use super::package::SendStage;
 use super::plan::Shape;
 use super::promise::Promise;
 use super::spans::MS;
@@ -17,7 +17,7 @@ use rohrpost_network::LEVELS;
 /// What leaves may be so far ahead of its rate.
 const AHEAD_NS_MAX: u64 = MS + 1000;
 
-impl Book {
+impl Oracle {
     /// A router is given a package.
     pub fn accepted(&mut self, life: u32, number: u32, published_ns: u64) {
         let level = self.level(self.packages[number as usize].head.priority.0);
@@ -25,7 +25,7 @@ impl Book {
         sending.account.accepted += 1;
         sending.newest = number;
         let package = &mut self.packages[number as usize];
-        (package.way, package.life, package.published_ns) = (Way::Accepted, life, published_ns);
+        (package.way, package.life, package.published_ns) = (SendStage::Accepted, life, published_ns);
         (package.ticket, package.lower) = (sending.account.accepted, sending.below[level]);
         let waiting = sending.waiting.entry(package.head.from.module()).or_default();
         waiting.packages.insert((level, package.ticket, number));
@@ -47,7 +47,7 @@ impl Book {
         }
     }
 
-    /// What a life of a router has to account for.
+    /// What an incarnation of a router has to account for.
     pub fn account(&self, life: u32) -> Account {
         self.sending.get(&life).map(|sending| sending.account).unwrap_or_default()
     }
@@ -70,13 +70,13 @@ impl Book {
                 self.broken(now, Promise::Displacing, text);
             }
         }
-        self.waits_no_more(life, number, Way::Counted);
+        self.waits_no_more(life, number, SendStage::Counted);
         Some(number)
     }
 
     fn is_waiting(&mut self, now: Now, life: u32, number: u32, what: &str) -> bool {
         let package = &self.packages[number as usize];
-        let is_waiting = package.way == Way::Accepted && package.life == life;
+        let is_waiting = package.way == SendStage::Accepted && package.life == life;
         if !is_waiting {
             let text = format!("package {number} {what}, but is {:?}: {:?}", package.way, package.head);
             self.broken(now, Promise::Accounts, text);
@@ -84,7 +84,7 @@ impl Book {
         is_waiting
     }
 
-    fn waits_no_more(&mut self, life: u32, number: u32, way: Way) {
+    fn waits_no_more(&mut self, life: u32, number: u32, way: SendStage) {
         let level = self.level(self.packages[number as usize].head.priority.0);
         let package = &mut self.packages[number as usize];
         package.way = way;
@@ -102,7 +102,7 @@ impl Book {
             Ok((_, Frame::Packages(packages))) => {
                 for (head, body) in packages {
                     first = first.min(self.level(head.priority.0));
-                    if let Some(number) = super::book::number_of(body) {
+                    if let Some(number) = super::oracle::number_of(body) {
                         self.begins(now, life, number, &head);
                         self.left(now, life, number);
                     }
@@ -112,7 +112,7 @@ impl Book {
                 first = self.level(part.head.priority.0);
                 let place = (head.incarnation, head.to, part.first);
                 if part.index == 0
-                    && let Some(number) = super::book::number_of(part.bytes)
+                    && let Some(number) = super::oracle::number_of(part.bytes)
                 {
                     self.by_part.insert(place, number);
                     self.begins(now, life, number, &part.head);
@@ -217,7 +217,7 @@ impl Book {
 
     fn left(&mut self, now: Now, life: u32, number: u32) {
         if self.is_waiting(now, life, number, "leaves") {
-            self.waits_no_more(life, number, Way::Left);
+            self.waits_no_more(life, number, SendStage::Left);
             self.sending.entry(life).or_default().account.left += 1;
         }
     }

@@ -64,10 +64,10 @@ impl Slots {
 
     /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late nor so often
     /// that others take over from a master: not again before it `has_rested`.
-    pub fn late_ns(&self, mended: bool, has_rested: bool, chance: &mut Chance) -> u64 {
-        if chance.per_million(if mended { self.late_ppm.min(LATE_PPM) } else { self.late_ppm }) {
+    pub fn late_ns(&self, fixed: bool, has_rested: bool, chance: &mut Chance) -> u64 {
+        if chance.per_million(if fixed { self.late_ppm.min(LATE_PPM) } else { self.late_ppm }) {
             let late_ns = chance.scale(50 * US, LATE_NS_MAX);
-            match mended {
+            match fixed {
                 false => return late_ns,
                 true if has_rested => return late_ns.min(self.table.cycle.as_nanos() as u64),
                 true => {}

@@ -4,10 +4,10 @@
 //! its own clocks, the datagrams of its sockets, the mailboxes of its computer. When its router dies, all layers are dropped, and made
 //! anew.
 
-use super::book::Book;
 use super::chance::Chance;
 use super::clock::{Clock, Now};
 use super::host::Host;
+use super::oracle::Oracle;
 use super::plan::Plan;
 use super::trace::Trace;
 use std::collections::VecDeque;
@@ -30,12 +30,12 @@ pub struct Io<'a> {
     pub plan: &'a Plan,
     /// Counts the router's lives, over all nodes.
     pub life: u32,
-    /// The life of each node's router; 0: none.
+    /// The incarnation of each node's router; 0: none.
     pub lives: &'a [u32],
     /// Its computer.
     pub host: &'a mut Host,
     /// The books.
-    pub book: &'a mut Book,
+    pub oracle: &'a mut Oracle,
     /// Chance.
     pub chance: &'a mut Chance,
     /// Datagrams that leave.
@@ -105,7 +105,7 @@ pub trait Layer {
 
 /// A router that lives.
 pub struct Router {
-    /// Which life this is, over all nodes.
+    /// Which incarnation this is, over all nodes.
     pub life: u32,
     /// Its protocols: one for each socket, or one for all.
     pub layers: Vec<Box<dyn Layer>>,

@@ -8,11 +8,11 @@ use super::spans::S;
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::times::Left;
 use crate::frame::{FrameHead, NodeIndex};
-use crate::security::Acquaintances;
-use crate::tdma::{Permit, Table};
+use crate::security::PeerSessions;
+use crate::tdma::{Table, TransmitWindow};
 use crate::time::message::Message;
 use crate::time::{
-    Allowed, Clock, JOINING_SYNCS, Looked, RATE_MAX_PPB, Reckoning, Role, SentId, Stamp, Step, TIME_BYTES, Term,
+    Allowed, Clock, JOINING_SYNCS, Looked, RATE_MAX_PPB, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeEstimate,
     TimeSettings,
 };
 use std::collections::{BTreeMap, VecDeque};
@@ -33,7 +33,7 @@ const STARTED_NS: u64 = S;
 /// Stamps that are waited for at a time.
 const AWAITED_MAX: usize = 16;
 
-/// What one life of a router's time is configured with.
+/// What one incarnation of a router's time is configured with.
 pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> TimeSettings {
     let slots = plan.slots_of(edition);
     TimeSettings {
@@ -49,7 +49,7 @@ pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> T
 
 /// A frame that told the time.
 #[derive(Clone, Copy, Debug)]
-struct Told {
+struct TimeFrame {
     term: Term,
     /// It is of another configuration, and so of another table.
     is_other: bool,
@@ -60,28 +60,28 @@ struct Told {
 }
 
 /// Whom a node hears of which it does not know whether it lives.
-pub(super) struct Voice {
+pub(super) struct UnverifiedPeer {
     pub(super) from: NodeIndex,
-    pub(super) reckoning: Reckoning,
+    pub(super) estimate: TimeEstimate,
     pub(super) term: Term,
     pub(super) is_misled: bool,
 }
 
 /// What a frame told of the time, if it did.
-fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &Message) -> Option<Told> {
+fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &Message) -> Option<TimeFrame> {
     let (term, sent_ns) = match message {
         Message::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
         Message::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
         _ => return None,
     };
     let came_ns = arrived.stamp.true_ns;
-    let now_ns = io.book.times.of_term_ns(io.now, (head.digest, term));
+    let now_ns = io.oracle.times.of_term_ns(io.now, (head.digest, term));
     let way_ns = now_ns.map(|now_ns| now_ns.saturating_sub(sent_ns).saturating_sub(io.now.true_ns - came_ns));
-    Some(Told { term, is_other: head.digest != own, way_ns, came_ns })
+    Some(TimeFrame { term, is_other: head.digest != own, way_ns, came_ns })
 }
 
 /// Of as many as count for what a node goes by.
-fn note(all: &mut VecDeque<Told>, told: Told) {
+fn note(all: &mut VecDeque<TimeFrame>, told: TimeFrame) {
     all.push_back(told);
     if all.len() > usize::from(JOINING_SYNCS) {
         all.pop_front();
@@ -89,12 +89,12 @@ fn note(all: &mut VecDeque<Told>, told: Told) {
 }
 
 /// Whether all of them were on their way for longer, or may have been.
-fn are_late(told: &VecDeque<Told>, now: Now, most_ns: u64) -> bool {
-    let drifted_ns = |told: &Told| (now.true_ns - told.came_ns) * 2 * RATE_MAX_PPB.unsigned_abs() / S;
+fn are_late(told: &VecDeque<TimeFrame>, now: Now, most_ns: u64) -> bool {
+    let drifted_ns = |told: &TimeFrame| (now.true_ns - told.came_ns) * 2 * RATE_MAX_PPB.unsigned_abs() / S;
     told.iter().all(|told| told.way_ns.is_none_or(|way_ns| way_ns + drifted_ns(told) > most_ns))
 }
 
-/// One life of a router's time.
+/// One incarnation of a router's time.
 pub struct Ticking {
     clock: Clock,
     has_stamps: bool,
@@ -102,9 +102,9 @@ pub struct Ticking {
     heard: (Term, u64),
     was_master: bool,
     /// The last frames that told the time, newest last.
-    told: VecDeque<Told>,
-    /// Those of lives that had not shown that they live.
-    overheard: BTreeMap<(NodeIndex, u64), VecDeque<Told>>,
+    told: VecDeque<TimeFrame>,
+    /// Those of incarnations that had not shown that they live.
+    overheard: BTreeMap<(NodeIndex, u64), VecDeque<TimeFrame>>,
     /// Which datagrams of this layer are to be stamped, by how many went before.
     awaited: VecDeque<(u64, SentId)>,
     sent: u64,
@@ -112,7 +112,7 @@ pub struct Ticking {
 }
 
 impl Ticking {
-    /// A life that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
+    /// An incarnation that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
     pub fn new(settings: TimeSettings, now: Now, left: Left, has_stamps: bool) -> Self {
         let mut clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, left.record)
             .watching(now.monotonic_ns, left.watched);
@@ -131,7 +131,7 @@ impl Ticking {
     }
 
     /// The same, sealing what it sends.
-    pub(super) fn sealed(self, all: &Arc<Acquaintances>, in_slots: bool) -> Self {
+    pub(super) fn sealed(self, all: &Arc<PeerSessions>, in_slots: bool) -> Self {
         Self { seals: Some(TimeSeals::new(all, in_slots)), ..self }
     }
 
@@ -146,21 +146,21 @@ impl Ticking {
     }
 
     /// With time slots: sends what a window is for, as long as it fits; without one does what passing time does. When to ask again.
-    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, mut permit: Option<&mut Permit>) -> u64 {
+    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, mut tx_window: Option<&mut TransmitWindow>) -> u64 {
         self.look_at_clocks(io);
         let (mut datagram, now_ns) = ([0; TIME_BYTES], io.now.monotonic_ns);
         loop {
-            let fits = permit.as_ref().filter(|permit| permit.fits(now_ns, TIME_BYTES));
-            let allowed = fits.map_or(Allowed::Nothing, |permit| permit.allowed());
+            let fits = tx_window.as_ref().filter(|tx_window| tx_window.fits(now_ns, TIME_BYTES));
+            let allowed = fits.map_or(Allowed::Nothing, |tx_window| tx_window.allowed());
             let step = self.clock.poll_in(now_ns, allowed, &mut datagram);
             self.look(io);
-            match (step, &mut permit) {
-                (Step::Send { to, stamp }, Some(permit)) => {
-                    permit.takes(now_ns, TIME_BYTES);
+            match (step, &mut tx_window) {
+                (Step::Send { to, stamp }, Some(tx_window)) => {
+                    tx_window.takes(now_ns, TIME_BYTES);
                     self.send(io, to, stamp, &datagram);
                 }
                 (Step::Send { .. }, None) => {
-                    io.book.broken(io.now, Promise::Exclusive, "a clock sends outside of its windows".into());
+                    io.oracle.broken(io.now, Promise::Exclusive, "a clock sends outside of its windows".into());
                 }
                 (Step::Wait { until_ns }, _) => return until_ns,
             }
@@ -188,14 +188,14 @@ impl Ticking {
     }
 
     /// By what this node would say a hello that knows no time: whom it hears, by which term, and whether it [is misled](Self::is_misled).
-    pub(super) fn overheard(&self, now: Now, way_ns: u64) -> Option<Voice> {
-        let (from, reckoning) = self.clock.overheard(now.monotonic_ns)?;
-        // Of several lives of a node it does not say by which: then any of them may mislead it.
+    pub(super) fn overheard(&self, now: Now, way_ns: u64) -> Option<UnverifiedPeer> {
+        let (from, estimate) = self.clock.overheard(now.monotonic_ns)?;
+        // Of several incarnations of a node it does not say by which: then any of them may mislead it.
         let lives = self.overheard.iter().filter(|((node, _), _)| *node == from).map(|(_, told)| told);
-        let is_other = |told: &VecDeque<Told>| told.iter().any(|told| told.is_other);
+        let is_other = |told: &VecDeque<TimeFrame>| told.iter().any(|told| told.is_other);
         let is_misled = lives.clone().any(|told| are_late(told, now, way_ns) || is_other(told));
         let latest = lives.filter_map(|told| told.back()).max_by_key(|told| told.came_ns);
-        Some(Voice { from, reckoning, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
+        Some(UnverifiedPeer { from, estimate, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
     }
 
     /// A hello left by it.
@@ -211,14 +211,14 @@ impl Ticking {
         }
     }
 
-    /// What some life of a node said at some time.
+    /// What some incarnation of a node said at some time.
     fn overhear(&mut self, io: &mut Io<'_>, arrived: &Arrived, stamp: Stamp, head: &FrameHead, rest: &[u8]) {
         let (now_ns, was_master) = (io.now.monotonic_ns, self.clock.role() == Role::Master);
         let taken = self.clock.overhear(now_ns, stamp, head, rest);
         io.line(|| format!("time: overhears {:?} from {}: {taken:?}", head.kind, head.from));
-        io.book.saw("time: overheard");
+        io.oracle.saw("time: overheard");
         if was_master && self.clock.role() == Role::Listening {
-            io.book.saw("time: stepped back");
+            io.oracle.saw("time: stepped back");
         }
         if let (Ok(()), Ok(message)) = (taken, Message::parse(head.kind, rest))
             && let Some(told) = told(io, arrived, head, self.clock.digest(), &message)
@@ -231,13 +231,13 @@ impl Ticking {
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, stamp: Option<SentId>, datagram: &[u8; TIME_BYTES]) {
         if self.replaces_in_vain(datagram) {
             let text = format!("node {} sends in the place of a master that it has heard", io.node);
-            io.book.broken(io.now, Promise::OneMaster, text);
+            io.oracle.broken(io.now, Promise::OneMaster, text);
         }
         let bytes = match &mut self.seals {
             None => Some(Rc::from(&datagram[..])),
             Some(seals) => seals.close(datagram),
         };
-        let Some(bytes) = bytes else { return io.book.saw("time: nobody known") };
+        let Some(bytes) = bytes else { return io.oracle.saw("time: nobody known") };
         if let Some(id) = stamp {
             self.awaited.push_back((self.sent, id));
             if self.awaited.len() > AWAITED_MAX {
@@ -259,17 +259,17 @@ impl Ticking {
     fn look_at_clocks(&mut self, io: &mut Io<'_>) {
         if let Some(why) = self.clock.look_at_clocks(seen(io.now)) {
             io.line(|| format!("time: {why}"));
-            io.book.saw("time: unsteady");
+            io.oracle.saw("time: unsteady");
         }
     }
 
     fn look(&mut self, io: &mut Io<'_>) {
         let is_master = self.clock.role() == Role::Master;
         if is_master && !std::mem::replace(&mut self.was_master, is_master) && io.now.true_ns > STARTED_NS {
-            io.book.saw("took over");
+            io.oracle.saw("took over");
         }
         self.was_master = is_master;
-        io.book.times.look(io.now, io.node, &self.clock, &mut io.book.problems);
+        io.oracle.times.look(io.now, io.node, &self.clock, &mut io.oracle.problems);
     }
 }
 
@@ -288,8 +288,8 @@ impl Layer for Ticking {
             None => Some((arrived.bytes.clone(), true)),
             Some(seals) => seals.open(&arrived.bytes, overhears),
         };
-        let Some((bytes, is_proven)) = opened else { return io.book.saw("time: rejected") };
-        let Ok((head, rest)) = FrameHead::parse(&bytes) else { return io.book.saw("time: no frame") };
+        let Some((bytes, is_proven)) = opened else { return io.oracle.saw("time: rejected") };
+        let Ok((head, rest)) = FrameHead::parse(&bytes) else { return io.oracle.saw("time: no frame") };
         if !is_proven {
             return self.overhear(io, arrived, stamp, &head, rest);
         }
@@ -297,13 +297,13 @@ impl Layer for Ticking {
             let node = arrived.source.map(|source| source as NodeIndex);
             let taken = self.clock.handle_other(now_ns, stamp, node, &head, rest);
             io.line(|| format!("time: {:?} of another configuration: {taken:?}", head.kind));
-            io.book.saw(if taken.is_ok() { "time: of another configuration" } else { "time: ignored" });
+            io.oracle.saw(if taken.is_ok() { "time: of another configuration" } else { "time: ignored" });
             return self.look(io);
         }
         let heard_before = self.clock.coarse(now_ns);
         let taken = self.clock.handle(now_ns, stamp, &head, rest);
         io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));
-        io.book.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
+        io.oracle.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
         let message = Message::parse(head.kind, rest);
         if let (Ok(()), Ok(message)) = (taken, &message) {
             self.is_told(io, arrived, &head, message);
@@ -312,7 +312,7 @@ impl Layer for Ticking {
             self.heard = if sync.replacement { self.heard } else { (sync.term, sync.cycle) };
             if sync.replacement && self.clock.coarse(now_ns) != heard_before {
                 let text = format!("node {} goes by what {} says in the place of the master", io.node, head.from);
-                io.book.broken(io.now, Promise::OneMaster, text);
+                io.oracle.broken(io.now, Promise::OneMaster, text);
             }
         }
         self.look(io);
@@ -348,14 +348,14 @@ impl Layer for Ticking {
     fn dies(&mut self, _: &mut Io<'_>) {}
 
     fn check(&mut self, io: &mut Io<'_>, _: bool) {
-        io.book.times.read(io.now, io.node, &mut io.book.problems);
+        io.oracle.times.read(io.now, io.node, &mut io.oracle.problems);
         if io.now.true_ns < io.plan.timed_ns {
             return;
         }
         let reading = self.clock.reading(io.now.monotonic_ns);
         let own = (self.clock.master(), self.clock.term());
         io.line(|| format!("time: {:?} of {own:?}, {reading:?}", self.clock.role()));
-        let agreed = *io.book.master.get_or_insert(own);
+        let agreed = *io.oracle.master.get_or_insert(own);
         let role = if own.0.map(usize::from) == Some(io.node) { Role::Master } else { Role::Slave };
         let has_time = (reading.synchronised && reading.term == own.1) || io.now.true_ns < io.plan.stepped_ns;
         if agreed != own || self.clock.role() != role || !has_time {
@@ -364,7 +364,7 @@ impl Layer for Ticking {
                 io.node,
                 self.clock.role()
             );
-            io.book.broken(io.now, Promise::OneMaster, text);
+            io.oracle.broken(io.now, Promise::OneMaster, text);
         }
     }
 

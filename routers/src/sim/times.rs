@@ -14,7 +14,7 @@ const NOTICED_NS: u64 = 120_000_000;
 
 /// The line of a term.
 #[derive(Clone, Copy, Debug)]
-struct Line {
+struct TermTimeline {
     node: usize,
     record: TimeRecord,
     /// None: it goes on from one that nobody knows.
@@ -58,7 +58,7 @@ pub struct Times {
     /// The clocks of all nodes.
     pub clocks: Vec<Clock>,
     /// By the digest of the configuration, and the term.
-    lines: BTreeMap<(u64, Term), Line>,
+    lines: BTreeMap<(u64, Term), TermTimeline>,
     pages: Vec<Page>,
     /// Largest bound of a node that follows a master, and largest error, ns.
     pub worst_ns: (u64, u64),
@@ -151,12 +151,12 @@ impl Times {
         self.worst_ns = (self.worst_ns.0.max(record.error_ns), self.worst_ns.1.max(off_ns as u64));
     }
 
-    fn at(&self, line: &Line, true_ns: u64) -> Option<i128> {
+    fn at(&self, line: &TermTimeline, true_ns: u64) -> Option<i128> {
         Some(i128::from(self.of_line_ns(line, true_ns)) + line.shift_ns?)
     }
 
     /// What its master says.
-    fn of_line_ns(&self, line: &Line, true_ns: u64) -> u64 {
+    fn of_line_ns(&self, line: &TermTimeline, true_ns: u64) -> u64 {
         line.record.at(self.clocks[line.node].at(true_ns).monotonic_ns).ns
     }
 
@@ -170,7 +170,7 @@ impl Times {
             }
             return;
         }
-        let mut line = Line { node, record, shift_ns: Some(0), is_void: self.clocks[node].is_slewed() };
+        let mut line = TermTimeline { node, record, shift_ns: Some(0), is_void: self.clocks[node].is_slewed() };
         let page = self.pages[node];
         if let (Some(before), Some(old)) = (self.lines.get(&(page.digest, page.term)), page.record)
             && old.epoch == record.epoch

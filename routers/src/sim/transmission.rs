@@ -1,6 +1,6 @@
 //! A datagram on the wire of a network with time slots, and by what its node sends.
 
-use crate::time::{Reckoning, Term};
+use crate::time::{Term, TimeEstimate};
 
 /// By what a node finds its windows.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
@@ -42,7 +42,7 @@ pub struct Says {
     /// The term whose time that is, as far as it knows.
     pub term: Term,
     /// The line by which it reckons.
-    pub reckoning: Option<Reckoning>,
+    pub estimate: Option<TimeEstimate>,
 }
 
 /// A datagram that is being transmitted.

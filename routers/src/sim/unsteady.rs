@@ -34,11 +34,11 @@ impl Plan {
 
     fn disturb_clocks(&mut self) {
         let mut chance = Chance::new(self.seed ^ 0x51_ee);
-        let last_ns = self.mended_ns - S / 2;
+        let last_ns = self.fixed_ns - S / 2;
         for _ in 0..chance.between(1, 3) {
             let node = chance.below(self.nodes.len() as u64) as usize;
             let from_ns = chance.between(S / 2, last_ns);
-            let until_ns = chance.between(from_ns + 100 * MS, self.mended_ns);
+            let until_ns = chance.between(from_ns + 100 * MS, self.fixed_ns);
             // One thing after the other: who sleeps is not slewed meanwhile.
             if self.faults.iter().all(|other| node_of(&other.fault) != Some(node)) {
                 let fault = match chance.percent(50) {
@@ -46,7 +46,7 @@ impl Plan {
                     false => Fault::Slew { node, slewed_ppb: chance.pick(&SLEWED_PPB) },
                 };
                 let until_ns = if let Fault::Sleep { .. } = fault { until_ns.max(from_ns + S / 2) } else { until_ns };
-                let until_ns = until_ns.min(self.mended_ns);
+                let until_ns = until_ns.min(self.fixed_ns);
                 if let Fault::Sleep { .. } = fault {
                     // On a computer that sleeps nothing starts, and nobody ends it.
                     self.faults
@@ -55,7 +55,7 @@ impl Plan {
                 self.faults.push(Planned { from_ns, until_ns, fault });
             }
         }
-        self.mended_ns += STEADY_NS;
+        self.fixed_ns += STEADY_NS;
     }
 }
 

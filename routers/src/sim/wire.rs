@@ -48,10 +48,10 @@ impl Wire {
 
     /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its node.
     pub fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 3]) -> Option<String> {
-        let Some(reckoning) = self.says[node].reckoning else {
+        let Some(estimate) = self.says[node].estimate else {
             return Some(format!("node {node}, {bytes} bytes, by no time"));
         };
-        let [called_ns, begin_ns, end_ns] = local_ns.map(|local_ns| reckoning.system_ns(local_ns));
+        let [called_ns, begin_ns, end_ns] = local_ns.map(|local_ns| estimate.system_ns(local_ns));
         let window = slots.window(node, called_ns + LEAD_NS.1);
         let is_well = window.as_ref().is_some_and(|(window, late_ns)| {
             // Who does not know its lead yet may end later by as much, who does by what it varies.

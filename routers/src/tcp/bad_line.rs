@@ -1,13 +1,13 @@
 //! A bad network between a client and its server, where a test wants one: all bytes go through a thread that makes them late.
 //!
 //! ```text
-//!  client ═ loopback ═▶ near ─▶ Line ─▶ far ═ TCP ═▶ server          and back by another Line
+//!  client ═ loopback ═▶ near ─▶ BandwidthQueue ─▶ far ═ TCP ═▶ server          and back by another BandwidthQueue
 //! ```
 //!
 //! The client and its kernel see what they would see of such a network: what a line does not carry yet is not read, so that it waits where it
 //! was sent from. When the client closes, what has not arrived at the server by then is gone.
 
-use crate::impair::{Line, Settings};
+use crate::impair::{BandwidthQueue, Settings};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use rohrpost_mailbox::monotonic_ns;
 use socket2::{Domain, Protocol, Socket, Type};
@@ -116,8 +116,8 @@ impl Work {
         far.set_nonblocking(true)?;
         far.set_nodelay(true)?;
         // Each connection has accidents of its own, and so has each way.
-        let line = |stream| Line::new(self.settings, stream);
-        let way = |stream| Way { line: line(stream), is_over: false, is_full: false, is_cut: false };
+        let line = |stream| BandwidthQueue::new(self.settings, stream);
+        let way = |stream| Direction { line: line(stream), is_over: false, is_full: false, is_cut: false };
         let (mut up, mut down) = (way(2 * self.connections), way(2 * self.connections + 1));
         self.connections += 1;
         let (mut piece, mut far_ended) = (vec![0; PIECE_BYTES], false);
@@ -156,8 +156,8 @@ fn millis(wait: Duration) -> PollTimeout {
 }
 
 /// From one socket to the other.
-struct Way {
-    line: Line,
+struct Direction {
+    line: BandwidthQueue,
     /// Nothing more comes.
     is_over: bool,
     /// Who is to get it takes nothing now.
@@ -166,7 +166,7 @@ struct Way {
     is_cut: bool,
 }
 
-impl Way {
+impl Direction {
     fn step(&mut self, now_ns: u64, mut from: &TcpStream, mut to: &TcpStream, piece: &mut [u8]) {
         let room = self.line.room(now_ns).min(piece.len());
         if room > 0 && !self.is_over {

@@ -10,18 +10,18 @@
 
 mod bad_line;
 mod client;
-mod desk;
+mod fault_writer;
 mod hush;
 mod pace;
 mod seal;
-mod seen;
 mod server;
+mod snapshots;
 mod stream;
 mod validity;
 
 pub use client::{ClientError, ClientParts, ClientShell};
 pub use seal::{AUTHORITY, Authority, ClientSeal, Holder, PREFIX, SealError, Sealed, ServerSeal, is_about};
-pub use seen::{Class, Link, LinkState, MEMBERS_MAX, Member, Members, Outage};
 pub use server::{ServerError, ServerParts, ServerShell};
+pub use snapshots::{Class, Link, LinkState, MEMBERS_MAX, Member, Members, Outage};
 pub use stream::{Moved, Stream};
 pub use validity::holds_until_s;

@@ -1,9 +1,9 @@
 //! Time slots: when this node may send, and what it does when it does not know (seed 002, section 4).
 //!
 //! ```text
-//!  Clock ─ system time, its bound ─▶ Discipline ─ next ──▶ a window, in local time: when to wake, when to call ─▶ who sleeps and spins
-//!  Table ─ windows in system time ─▶     │      ◀─ judge ── it is awake: now                                            │
-//!                                        └──────── Permit ─▶ datagram after datagram, as long as the wire is free before the guard
+//!  Clock ─ system time, its bound ─▶ SlotScheduler ─ next ──▶ a window, in local time: when to wake, when to call ─▶ who sleeps and spins
+//!  Table ─ windows in system time ─▶     │      ◀─ validate ── it is awake: now                                            │
+//!                                        └──────── TransmitWindow ─▶ datagram after datagram, as long as the wire is free before the guard
 //! ```
 //!
 //! A node sends in its own windows only, by its own clock, whether or not the last [`Sync`](crate::time::message::Sync) came. Two nodes are
@@ -20,24 +20,24 @@
 //! by the time of the one before: two of them are then as far apart as their bounds and that of the new master together.
 //!
 //! # What who sends does
-//! 1. [`Discipline::next`]; sleep until [`Planned::wake_ns`], or until a datagram of time comes.
+//! 1. [`SlotScheduler::next`]; sleep until [`Planned::wake_ns`], or until a datagram of time comes.
 //! 2. Hand all datagrams of time that came to the [`Clock`](crate::time::Clock), so that it knows whether the master was heard. Spin until [`Planned::call_ns`].
-//! 3. [`Discipline::judge`]. With a [`Permit`]: as long as a datagram of time fits, [`Clock::poll_in`](crate::time::Clock::poll_in) with
-//!    [`Permit::allowed`], until it waits. Then what must be said, then packages, each asked for by [`Permit::room_bytes`] and told by
-//!    [`Permit::takes`]. At last [`Discipline::close`].
-//! 4. The kernel's stamp of the first datagram of a window goes to [`Discipline::left`].
+//! 3. [`SlotScheduler::validate`]. With a [`TransmitWindow`]: as long as a datagram of time fits, [`Clock::poll_in`](crate::time::Clock::poll_in) with
+//!    [`TransmitWindow::allowed`], until it waits. Then what must be said, then packages, each asked for by [`TransmitWindow::room_bytes`] and told by
+//!    [`TransmitWindow::takes`]. At last [`SlotScheduler::close`].
+//! 4. The kernel's stamp of the first datagram of a window goes to [`SlotScheduler::left`].
 
-mod discipline;
 mod lead;
-mod permit;
+mod scheduler;
 pub mod table;
 #[cfg(test)]
 mod tests;
+mod tx_window;
 pub mod wire;
 
-pub use discipline::{Counts, Discipline, Next, Planned, Silent, Verdict};
-pub use permit::{Carries, Permit};
+pub use scheduler::{Counts, Next, Planned, Silent, SlotScheduler, Verdict};
 pub use table::{Kind, Owner, Table, UNPROVEN_CYCLES, Window};
+pub use tx_window::{Carries, TransmitWindow};
 pub use wire::Wire;
 
 /// Bounds reckon with slots that are begun so much after their beginning.

@@ -9,9 +9,9 @@ mod slots;
 mod steady;
 
 use super::broken::Broken;
+use super::clock_model::{ClockModel, EVEN_PPB};
 use super::election::{Election, Origin, State};
 use super::history::{History, RATE_MAX};
-use super::line::{EVEN_PPB, Line};
 use super::message::{Message, Request};
 use super::others::Others;
 use super::steadiness::Steadiness;
@@ -72,7 +72,7 @@ pub struct Clock {
     interval_ns: u64,
     exchange_ns: u64,
     election: Election,
-    line: Line,
+    line: ClockModel,
     history: History,
     /// How much system time is faster than the local clock, as last known.
     usual_rate: f64,
@@ -108,7 +108,7 @@ pub struct Clock {
 
 impl Clock {
     /// A clock that has heard nobody yet. `wall_ns` is this computer's wall clock, by which the first epoch begins if this node becomes
-    /// the first master; `page` what the node's time page says, if there is one: an earlier life's time goes on.
+    /// the first master; `page` what the node's time page says, if there is one: an earlier incarnation's time goes on.
     pub fn new(settings: TimeSettings, now_ns: u64, wall_ns: u64, page: Option<TimeRecord>) -> Self {
         let interval_ns = u64::try_from(settings.interval.as_nanos()).unwrap_or(u64::MAX).max(1);
         let exchange_ns = (interval_ns / EXCHANGES).max(interval_ns.min(EXCHANGE_NS_MIN));
@@ -116,10 +116,10 @@ impl Clock {
             Some(page)
                 if page.source == TimeSource::Master && page.monotonic_ns <= now_ns.saturating_add(SECOND_NS) =>
             {
-                Line::adopted(now_ns, page)
+                ClockModel::adopted(now_ns, page)
             }
-            Some(page) => Line::unsynchronised(now_ns, wall_ns, page.epoch.saturating_add(1)),
-            None => Line::unsynchronised(now_ns, wall_ns, 0),
+            Some(page) => ClockModel::unsynchronised(now_ns, wall_ns, page.epoch.saturating_add(1)),
+            None => ClockModel::unsynchronised(now_ns, wall_ns, 0),
         };
         let nodes = usize::from(settings.nodes);
         Self {

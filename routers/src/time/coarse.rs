@@ -1,8 +1,8 @@
 //! The time of a node that cannot ask yet: by the one of the last eight frames that took the least time. Masters say what time it is in
 //! their Syncs, and who has time but hears no master in the question for one.
 
-use super::line::EVEN_PPB;
-use super::{RATE_MAX_PPB, Reckoning};
+use super::clock_model::EVEN_PPB;
+use super::{RATE_MAX_PPB, TimeEstimate};
 use rohrpost_mailbox::{TimeRecord, TimeSource};
 
 /// So many Syncs a node hears before it sends anything.
@@ -60,12 +60,12 @@ impl Coarse {
     /// The way is taken to last from nothing to `delay_max_ns`: that is an assumption. So half of it is the best guess, and half how far that
     /// is off at most. What the sender may be off is not in it: who becomes master
     /// by this makes it the time of all, and a network whose slaves are less sure than that would have none until they fall silent.
-    pub(super) fn reckoning(&self, now_ns: u64, delay_max_ns: u64) -> Option<Reckoning> {
+    pub(super) fn estimate(&self, now_ns: u64, delay_max_ns: u64) -> Option<TimeEstimate> {
         if self.count < JOINING_SYNCS {
             return None;
         }
         let (best, half_ns) = (self.best(now_ns)?, delay_max_ns / 2);
-        Some(Reckoning::new(TimeRecord {
+        Some(TimeEstimate::new(TimeRecord {
             epoch: self.epoch,
             source: TimeSource::Master,
             monotonic_ns: best.local_ns,

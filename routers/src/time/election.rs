@@ -1,7 +1,7 @@
 //! Who is master: the order, the silence after which the next takes over, and which of two masters yields.
 
 use super::message::{Request, Sync};
-use super::overheard::Overheard;
+use super::unverified::UnverifiedPeers;
 use super::{TAKEOVER_HALF_INTERVALS, Term};
 use crate::broken::broken;
 use crate::frame::NodeIndex;
@@ -290,7 +290,7 @@ impl Election {
     }
 
     /// Somebody was heard that may live.
-    pub(super) fn overhears(&mut self, overheard: &Overheard) {
+    pub(super) fn overhears(&mut self, overheard: &UnverifiedPeers) {
         (self.overheard_ns, self.apart_ns) = (overheard.until_ns(), overheard.apart_ns());
     }
 

@@ -1,10 +1,10 @@
 //! The time of a node that no master's Sync reaches: it goes by what the TCP router tells, and knows how far off that is at most.
 //!
-//! Ways through a stream are long, unequal and seldom twice the same, so nothing is measured of the rate of the clock: the line goes on as
+//! SenderCache through a stream are long, unequal and seldom twice the same, so nothing is measured of the rate of the clock: the line goes on as
 //! the local clock does, and is bent when an answer knows better than it does.
 
 use super::RATE_MAX_PPB;
-use super::line::{EVEN_PPB, Line};
+use super::clock_model::{ClockModel, EVEN_PPB};
 use crate::broken::broken;
 use rohrpost_mailbox::TimeRecord;
 
@@ -16,7 +16,7 @@ const MEND_NS: u64 = 2_000_000_000;
 /// What the node takes for system time.
 #[derive(Debug)]
 pub struct Follower {
-    line: Line,
+    line: ClockModel,
     /// Answers since the line has another epoch than theirs.
     heard: u8,
     /// How many answers there were when one was looked at last.
@@ -26,12 +26,12 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// Goes on from the page that an earlier life has left; else from the wall clock, of which nothing is known.
+    /// Goes on from the page that an earlier incarnation has left; else from the wall clock, of which nothing is known.
     pub fn new(now_ns: u64, wall_ns: u64, page: Option<TimeRecord>) -> Self {
         let line = match page {
-            Some(page) if page.error_ns < super::UNSYNCHRONISED_NS => Line::adopted(now_ns, page),
-            Some(page) => Line::unsynchronised(now_ns, page.at(now_ns).ns, page.epoch),
-            None => Line::unsynchronised(now_ns, wall_ns, 0),
+            Some(page) if page.error_ns < super::UNSYNCHRONISED_NS => ClockModel::adopted(now_ns, page),
+            Some(page) => ClockModel::unsynchronised(now_ns, page.at(now_ns).ns, page.epoch),
+            None => ClockModel::unsynchronised(now_ns, wall_ns, 0),
         };
         Self { line, heard: 0, answers: 0, last: None }
     }
@@ -74,7 +74,7 @@ impl Follower {
     /// The local clock did what bounds exclude, or two that cannot both be true say what time it is: nothing is known, and it begins as one that has
     /// heard nobody.
     pub fn distrusts(&mut self, now_ns: u64) {
-        self.line = Line::unsynchronised(now_ns, self.line.at(now_ns).ns, 0);
+        self.line = ClockModel::unsynchronised(now_ns, self.line.at(now_ns).ns, 0);
         (self.heard, self.last) = (0, None);
     }
 

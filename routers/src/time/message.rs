@@ -43,7 +43,7 @@ pub enum Message {
 /// The master's time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Sync {
-    /// Matches what belongs together; never 0, never twice in one life of a master.
+    /// Matches what belongs together; never 0, never twice in one incarnation of a master.
     pub id: u64,
     /// Counts intervals of system time since 1970, so that every master counts the same.
     pub cycle: u64,

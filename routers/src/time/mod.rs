@@ -27,14 +27,14 @@
 //!
 //! Of two masters that hear each other, the one that nobody follows yields; if both or neither are followed, that of the lower term.
 //! Terms are never shared, since a term has its master's rank in it. Who yields is a slave with the next [`Sync`](message::Sync), so
-//! after a split is mended there is one master after at most two intervals, as long as some of its datagrams arrive. The nodes of the other part slew if they are off by
+//! after a split is fixed there is one master after at most two intervals, as long as some of its datagrams arrive. The nodes of the other part slew if they are off by
 //! at most [`STEP_MIN_NS`]; else they say so, and the master begins a new epoch, in which they step.
 //!
 //! # In time slots
 //! [`Clock::in_slots`] makes the interval the cycle, and takes from the clock when it sends: [`Clock::poll_in`] is asked window by window,
 //! and a Sync leaves in the master's own alone (see [`tdma`](crate::tdma)). Questions wait for a slot, so between t2 and t3 may lie a cycle or more; what
 //! clocks drift meanwhile is in the sample. Whoever starts, yields to another master, or turns to one whose time is another goes by
-//! nothing until it has measured: by [`Clock::coarse`] it may ask. [`Clock::reckoning`] is what slots are found by; its bound leaves
+//! nothing until it has measured: by [`Clock::coarse`] it may ask. [`Clock::estimate`] is what slots are found by; its bound leaves
 //! out what the master may be off an earlier term, as all nodes are off alike. Whoever becomes master without time of its own goes on by
 //! what it heard, from Syncs or from those who have time and hear no master; a time is begun only where for 100 ms and eight cycles nobody who
 //! has one was heard. Until others have turned to it, for eight cycles, such a master sends nothing but Syncs.
@@ -57,28 +57,28 @@
 )]
 mod broken;
 mod clock;
+mod clock_model;
 mod coarse;
 mod election;
+mod estimate;
 mod follower;
 mod history;
 mod limits;
-mod line;
 pub mod message;
 mod others;
-mod overheard;
-mod reckoning;
 mod steadiness;
 #[cfg(test)]
 mod tests;
 mod types;
+mod unverified;
 
 #[cfg(any(test, feature = "broken-variants"))]
 pub use broken::Broken;
 pub use clock::{Allowed, Clock};
 pub use coarse::JOINING_SYNCS;
+pub use estimate::TimeEstimate;
 pub use follower::Follower;
 pub use limits::{ClockLimits, LIMITS};
-pub use reckoning::Reckoning;
 pub(crate) use steadiness::Steadiness;
 pub use steadiness::{Looked, Unsteady};
 pub use types::{Exchange, Ignored, InSlots, Reading, Role, SentId, Step, SyncCounts, TimeSettings};

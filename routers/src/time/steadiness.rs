@@ -39,7 +39,7 @@ pub enum Unsteady {
         /// About so long.
         slept_ns: u64,
     },
-    /// Shortly before this router was started, its earlier life found one of the others.
+    /// Shortly before this router was started, its earlier incarnation found one of the others.
     #[error("shortly before this router was started the computer slept, or its clock was slewed")]
     Before,
     /// A time daemon slews it.
@@ -64,7 +64,7 @@ pub(crate) struct Steadiness {
 }
 
 impl Steadiness {
-    /// Goes on from what an earlier life has seen.
+    /// Goes on from what an earlier incarnation has seen.
     pub(crate) fn of(watched: Option<Watched>) -> Self {
         let Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns: until_ns }) =
             watched
@@ -75,7 +75,7 @@ impl Steadiness {
         Self { began, rate_ppb, slept_ns: Some(slept_ns), until_ns, why: Some(Unsteady::Before) }
     }
 
-    /// What the next life goes on from.
+    /// What the next incarnation goes on from.
     pub(crate) fn watched(&self) -> Option<Watched> {
         let Looked { local_ns, unslewed_ns, apart_ns, .. } = self.began?;
         let (slept_ns, rate_ppb, unsteady_until_ns) = (self.slept_ns?, self.rate_ppb, self.until_ns);

@@ -20,7 +20,7 @@ pub struct TimeSettings {
     pub interval: Duration,
     /// What must be equal on both ends of a wire.
     pub digest: u64,
-    /// Tells this life of the router from its others; not 0.
+    /// Tells this incarnation of the router from its others; not 0.
     pub incarnation: u64,
 }
 

@@ -388,9 +388,9 @@ pub(crate) struct Judged {
 
 /// A frame is its sender's if it starts in a window of it or in the guard behind, or so little before that the guard of who was there
 /// before still holds: half of it, which is what a node's clock may be off.
-pub(crate) fn judge(crossed: &[Crossed], time: &TimeRecord) -> Judged {
+pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
     let table = Table::new(&table(), &MASTERS, 0, NODES, 28);
-    let mut judged = Judged { frames: crossed.len(), ..Judged::default() };
+    let mut repeated_on_stall = Judged { frames: crossed.len(), ..Judged::default() };
     let mut last = None;
     for frame in crossed {
         let at_ns = time.at(frame.at_ns).ns;
@@ -398,33 +398,33 @@ pub(crate) fn judge(crossed: &[Crossed], time: &TimeRecord) -> Judged {
         let owner = moments.into_iter().filter_map(|ns| table.owner(ns)).find(|owner| owner.node == frame.from);
         let Some(owner) = owner else {
             let in_cycle_us = at_ns % table.cycle_ns() / 1000;
-            judged.outside.push(Outside { from: frame.from, kind: frame.kind, in_cycle_us });
+            repeated_on_stall.outside.push(Outside { from: frame.from, kind: frame.kind, in_cycle_us });
             continue;
         };
         if last != Some((frame.from, owner.window)) {
             last = Some((frame.from, owner.window));
-            judged.starts_ns.push(at_ns.wrapping_sub(owner.window.begin_ns).cast_signed());
+            repeated_on_stall.starts_ns.push(at_ns.wrapping_sub(owner.window.begin_ns).cast_signed());
         }
     }
-    judged.starts_ns.sort_unstable();
-    judged
+    repeated_on_stall.starts_ns.sort_unstable();
+    repeated_on_stall
 }
 
 /// Of the frames, one and so many in a thousand may be outside of their sender's slots: the thread looks at the clock before each, and may lose
 /// its processor between that and the system call. TDMA.md found 0.03 % to 0.5 % of wake-ups that late on a computer that works.
 const OUTSIDE_PER_THOUSAND: usize = 3;
 
-fn tell(what: &str, judged: &Judged) {
+fn tell(what: &str, repeated_on_stall: &Judged) {
     let at = |per_thousand: usize| {
-        judged
+        repeated_on_stall
             .starts_ns
-            .get(judged.starts_ns.len().saturating_sub(1) * per_thousand / 1000)
+            .get(repeated_on_stall.starts_ns.len().saturating_sub(1) * per_thousand / 1000)
             .map_or(f64::NAN, |ns| *ns as f64 / 1e3)
     };
     println!(
         "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us after their nominal time",
-        judged.frames,
-        judged.outside.len(),
+        repeated_on_stall.frames,
+        repeated_on_stall.outside.len(),
         at(10),
         at(500),
         at(990),
@@ -434,14 +434,14 @@ fn tell(what: &str, judged: &Judged) {
 
 /// All but a few of these frames were in their senders' slots.
 pub(crate) fn assert_kept(what: &str, crossed: &[Crossed], time: &TimeRecord) {
-    let judged = judge(crossed, time);
-    tell(what, &judged);
-    assert!(judged.frames > 100, "{judged:?}");
-    assert_inside(what, &judged);
+    let repeated_on_stall = validate(crossed, time);
+    tell(what, &repeated_on_stall);
+    assert!(repeated_on_stall.frames > 100, "{repeated_on_stall:?}");
+    assert_inside(what, &repeated_on_stall);
 }
 
 /// All but a few were where they belong.
-pub(crate) fn assert_inside(what: &str, judged: &Judged) {
-    let most = 1 + judged.frames * OUTSIDE_PER_THOUSAND / 1000;
-    assert!(judged.outside.len() <= most, "{what}: {judged:?}");
+pub(crate) fn assert_inside(what: &str, repeated_on_stall: &Judged) {
+    let most = 1 + repeated_on_stall.frames * OUTSIDE_PER_THOUSAND / 1000;
+    assert!(repeated_on_stall.outside.len() <= most, "{what}: {repeated_on_stall:?}");
 }

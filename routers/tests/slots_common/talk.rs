@@ -11,28 +11,28 @@ pub(crate) const PAUSE: Duration = Duration::from_micros(2300);
 const GREETING: u16 = u16::MAX;
 
 /// These nodes speak to each other for so many rounds, and lose nothing.
-pub(crate) fn talk(segment: &Segment, ears: &mut Ears, nodes: &[u8], rounds: u16) {
-    let mut mouths = mouths(segment, nodes);
-    ears.acquaint(&mut mouths);
-    ears.say_all(&mut mouths, rounds);
-    ears.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
+pub(crate) fn talk(segment: &Segment, listeners: &mut Listeners, nodes: &[u8], rounds: u16) {
+    let mut talkers = talkers(segment, nodes);
+    listeners.acquaint(&mut talkers);
+    listeners.say_all(&mut talkers, rounds);
+    listeners.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
 }
 
 /// Speaks from one node to another.
-pub(crate) struct Mouth {
+pub(crate) struct Talker {
     from: u8,
     to: u8,
     sender: Sender,
 }
 
-impl Mouth {
+impl Talker {
     /// Says a number; if the router's mailbox is full just now, a little later.
     pub(crate) fn say(&mut self, id: u16) {
         let began = Instant::now();
         loop {
             match self.sender.send(&label(self.from, 100, id), &[&id.to_le_bytes()]) {
                 Ok(()) => return,
-                Err(SendError::Full(_)) => std::thread::sleep(Duration::from_micros(100)),
+                Err(SendError::OverflowPolicy(_)) => std::thread::sleep(Duration::from_micros(100)),
                 Err(error) => panic!("{} to {}: {error}", self.from, self.to),
             }
             assert!(began.elapsed() < PATIENCE, "{} to {}: {id}", self.from, self.to);
@@ -41,21 +41,21 @@ impl Mouth {
 }
 
 /// From each of these nodes to each other of them.
-pub(crate) fn mouths(segment: &Segment, nodes: &[u8]) -> Vec<Mouth> {
+pub(crate) fn talkers(segment: &Segment, nodes: &[u8]) -> Vec<Talker> {
     let pairs = nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to)));
-    let mouth = |(from, to): (u8, u8)| Mouth { from, to, sender: segment.stations[usize::from(from)].sender(to) };
-    pairs.filter(|(from, to)| from != to).map(mouth).collect()
+    let talker = |(from, to): (u8, u8)| Talker { from, to, sender: segment.stations[usize::from(from)].sender(to) };
+    pairs.filter(|(from, to)| from != to).map(talker).collect()
 }
 
 /// What each node has heard of each, in order.
-pub(crate) struct Ears {
+pub(crate) struct Listeners {
     receivers: Vec<Receiver>,
     heard: Vec<Vec<Vec<u16>>>,
     /// Whom each was greeted by since the last acquaintance began.
     greeted: Vec<Vec<bool>>,
 }
 
-impl Ears {
+impl Listeners {
     pub(crate) fn new(segment: &Segment) -> Self {
         Self {
             receivers: segment.stations.iter().map(|station| station.receiver()).collect(),
@@ -77,9 +77,9 @@ impl Ears {
     }
 
     /// So many rounds of packages.
-    pub(crate) fn say_all(&mut self, mouths: &mut [Mouth], rounds: u16) {
+    pub(crate) fn say_all(&mut self, talkers: &mut [Talker], rounds: u16) {
         for id in 0..rounds {
-            mouths.iter_mut().for_each(|mouth| mouth.say(id));
+            talkers.iter_mut().for_each(|talker| talker.say(id));
             self.listen();
             std::thread::sleep(PAUSE);
         }
@@ -87,12 +87,12 @@ impl Ears {
 
     /// All of them speak until each has heard each. Before, one may take another for silent, on a computer that is slow to join; then it loses
     /// what is for that one, as it has to.
-    pub(crate) fn acquaint(&mut self, mouths: &mut [Mouth]) {
+    pub(crate) fn acquaint(&mut self, talkers: &mut [Talker]) {
         let began = Instant::now();
         self.greeted.iter_mut().flatten().for_each(|greeted| *greeted = false);
-        while !mouths.iter().all(|mouth| self.greeted[usize::from(mouth.to)][usize::from(mouth.from)]) {
+        while !talkers.iter().all(|talker| self.greeted[usize::from(talker.to)][usize::from(talker.from)]) {
             assert!(began.elapsed() < PATIENCE, "who has heard whom: {:?}", self.greeted);
-            mouths.iter_mut().for_each(|mouth| mouth.say(GREETING));
+            talkers.iter_mut().for_each(|talker| talker.say(GREETING));
             std::thread::sleep(PAUSE);
             self.listen();
         }

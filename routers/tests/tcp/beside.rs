@@ -5,7 +5,7 @@ use crate::hostile::Target;
 use crate::lan::{Pair, label, module};
 use crate::sessions::Raw;
 use rohrpost_mailbox::{Head, Priority, Shape, Type, monotonic_ns};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::session::frame::{Carried, Message};
 use std::io::{Read, Write};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -22,7 +22,7 @@ const FLOOD_BYTES: u64 = 100_000;
 
 #[test]
 fn packages_on_the_lan_come_beside_a_flood_of_a_tcp_router() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let (target, pair) = (Target::start(None), Pair::new());
         let [mut from, mut to] = [4, 3].map(|system| {
             let mut raw = Raw::new(target.address, system, crate::ground::COMMON);

@@ -5,7 +5,7 @@ use crate::sealed::{Authority, Holds};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use rohrpost_mailbox::{Head, Priority, Type};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
 use rohrpost_routers::tcp::{ClientSeal, LinkState, Moved, ServerSeal, Stream};
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
@@ -301,14 +301,14 @@ fn others_are_served(authority: Option<&Authority>) {
 
 #[test]
 fn who_is_well_behaved_is_served_while_others_attack() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         others_are_served(None);
     });
 }
 
 #[test]
 fn who_has_a_certificate_is_served_while_those_without_attack() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         others_are_served(Some(&Authority::new()));
     });
 }

@@ -118,7 +118,7 @@ fn seen_on_the_wire(authority: Option<&Authority>) -> Option<[usize; 3]> {
     // It begins anew, so that the beginning of a session is seen as well.
     network.lab.cut("far").unwrap();
     wait("far is away", || (network.far.client.link().state == LinkState::Away).then_some(()));
-    network.lab.mend("far").unwrap();
+    network.lab.fix("far").unwrap();
     network.far.wait_up();
     let label = Label { from: module(1), kind: Type::data(1), priority: Priority(100), ..Label::default() };
     let mut sender = network.far.sender(2);

@@ -149,7 +149,7 @@ fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
         }
         (last > Some(number.saturating_sub(20))).then_some(())
     });
-    wait("a connection to each life", || (one.client.link().connections >= 5).then_some(()));
+    wait("a connection to each incarnation", || (one.client.link().connections >= 5).then_some(()));
 }
 
 #[test]

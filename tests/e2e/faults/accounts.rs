@@ -4,7 +4,7 @@ use super::calls::{Calls, assert_once};
 use super::flow::{PLAIN, Sink, Source, balance};
 use super::{Field, TRANSIT_MAX};
 use crate::harness::wait;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::Duration;
 
 const IMPAIR: &str = "loss=5%,delay=2ms,reorder=5%,duplicate=1%,seed=7";
@@ -18,7 +18,7 @@ const CALL: Duration = Duration::from_millis(900);
 
 #[test]
 fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(mut field) = Field::new(2, "") else { return };
         field.launch(&["base", "arm"], &[("ROHRPOST_IMPAIR", IMPAIR)]);
         let mut sink = Sink::new(field.robot("arm"), "arm");

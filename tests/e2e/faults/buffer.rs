@@ -5,7 +5,7 @@ use super::flow::{ALONE_BYTES, PLAIN, Sink, Source, URGENT, balance, carried, lo
 use crate::harness::{halt, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::LinkState;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::Duration;
 
 /// Datagrams that a node's kernel dropped since a buffer was full.
@@ -20,7 +20,7 @@ fn dropped(field: &Field, node: &str) -> u64 {
 
 #[test]
 fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_after_them_come() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(mut field) = Field::new(2, "rate = \"4 GiB\"") else { return };
         field.launch(&["base", "arm"], &[]);
         let mut sink = Sink::new(field.robot("arm"), "arm");

@@ -6,7 +6,7 @@ use crate::harness::{PATIENCE, halt, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};
 
 /// Longer than any package may be under way.
@@ -43,7 +43,7 @@ fn freeze_arm(field: &Field, pids: &[u32], old: std::ops::Range<u32>, after: u32
 
 #[test]
 fn what_grew_old_while_a_router_or_a_node_was_frozen_is_never_run() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(field) = Field::launched() else { return };
         field.wait_counted("base", "probe.1", 1);
         freeze_arm(&field, &[field.router("arm")], 10..20, 2);

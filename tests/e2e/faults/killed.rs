@@ -7,7 +7,7 @@ use crate::harness::{runs, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::{CallError, Class, Fault};
 use rohrpost_mailbox::{Loss, local};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::outbound::WAIT_MAX_NS;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -79,7 +79,7 @@ fn account(field: &Field, node: &str, other: &str) -> String {
 
 #[test]
 fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_nothing_runs_twice() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(field) = Field::launched() else { return };
         let traffic = [Traffic::new(&field, "base", "arm"), Traffic::new(&field, "arm", "base")];
         let mut numbers = 0..;

@@ -14,7 +14,7 @@ fn a_link_that_is_cut_is_told_at_both_ends_and_once_mended_carries_as_before() {
             assert_eq!(field.fault(node, module), Fault::NodeSilent { node: peer.into() });
         }
         field.wait_told("router.0", &["node arm", "is silent"], round);
-        field.lab.mend("arm").unwrap();
+        field.lab.fix("arm").unwrap();
         field.wait_counted("base", "probe.1", round as u32);
         field.wait_counted("arm", "probe.0", round as u32);
         // Else what is known of the next cut would be that of this one.

@@ -5,7 +5,7 @@ use crate::harness::{halt, runs, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, RouterInterface};
 use rohrpost_mailbox::{SystemClock, SystemTime, monotonic_ns};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -95,7 +95,7 @@ fn agreed(field: &Field, nodes: &[&str]) -> (String, u64) {
 
 #[test]
 fn when_the_master_dies_the_next_takes_over_and_no_node_s_time_goes_back_or_leaves_its_bound() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(mut field) = Field::new(3, "") else { return };
         field.launch(&NODES, &[]);
         let (first, term) = agreed(&field, &NODES);

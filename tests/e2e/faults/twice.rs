@@ -7,7 +7,7 @@ use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_mailbox::{Head, Type};
 use rohrpost_routers::frame::{FrameHead, Kind};
-use rohrpost_routers::lab::stalls::{Watched, judged};
+use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::net::UdpSocket;
 use std::time::Duration;
 
@@ -50,7 +50,7 @@ impl Second {
 
 #[test]
 fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() {
-    judged(Watched::Ordinary, || {
+    repeated_on_stall(Watched::Ordinary, || {
         let Some(field) = Field::launched() else { return };
         field.wait_counted("base", "probe.1", 1);
         let mut sink = Sink::new(field.robot("base"), "base");
@@ -70,7 +70,7 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
             (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
         });
         let numbers = sink.numbers(PLAIN);
-        // The first datagram of another life is doubted until a second one says the same, and lost.
+        // The first datagram of another incarnation is doubted until a second one says the same, and lost.
         let turn = numbers.iter().position(|number| *number >= SECOND).unwrap();
         assert!(turn <= 2, "{turn} of the first came before");
         assert!(

@@ -3,7 +3,7 @@
 use crate::split::Bytes;
 use rohrpost_config::Principal;
 use rohrpost_mailbox::Name;
-use rohrpost_modules::call::{CallEnvelope, Fault, Once, ReplyEnvelope, Request, Verdict};
+use rohrpost_modules::call::{CallEnvelope, Deduplicator, Fault, ReplyEnvelope, Request, Verdict};
 use rohrpost_modules::common::{Change, DataHead, DescriptionPart, SetParameters, Status, Subscribe};
 use rohrpost_modules::interfaces::Page;
 use rohrpost_modules::launcher::Children;
@@ -62,7 +62,7 @@ fn round<T: Data + std::fmt::Debug>(body: &[u8]) {
 fn once(body: &[u8]) {
     let mut bytes = Bytes(body);
     let mut now_ns = bytes.long();
-    let mut once = Once::new(now_ns, &[]);
+    let mut once = Deduplicator::new(now_ns, &[]);
     while !bytes.is_empty() {
         let flags = bytes.byte();
         // Steps of 0 to 2.5 s, sometimes of 2^63 ns.
@@ -79,10 +79,10 @@ fn once(body: &[u8]) {
             redelivered: flags & 2 != 0,
             idempotent: flags & 4 != 0,
         };
-        if once.judge(&request, now_ns) == Verdict::Run {
+        if once.validate(&request, now_ns) == Verdict::Run {
             let answer = bytes.take(3);
             once.done(&request, now_ns, flags & 128 != 0, answer);
-            let repeated = once.judge(&Request { repeat: true, ..request }, now_ns);
+            let repeated = once.validate(&Request { repeat: true, ..request }, now_ns);
             assert_eq!(repeated, Verdict::Again(flags & 128 != 0, answer), "{request:?}");
         }
     }

@@ -9,13 +9,13 @@ pub(crate) fn run(data: &[u8]) {
     let path = "robot/fuzzed.toml".as_ref();
     let mut installation = match Installation::parse(text, path) {
         Ok(installation) => installation,
-        Err(errors) => return judge(&errors, text),
+        Err(errors) => return validate(&errors, text),
     };
     let again = Installation::parse(text, path).unwrap_or_else(|errors| panic!("the second time: {errors}"));
     assert_eq!(installation.digest(), again.digest());
     match Saved::parse(saved, "robot/saved.toml".as_ref(), &installation) {
         Ok(values) => installation.saved = Some(values),
-        Err(errors) => judge(&errors, saved),
+        Err(errors) => validate(&errors, saved),
     }
     all_of(&installation);
     let lines = |text: &str| text.lines().count().max(1);
@@ -24,7 +24,7 @@ pub(crate) fn run(data: &[u8]) {
 }
 
 /// There is a reason, and a place that can be found in the file.
-pub(crate) fn judge(errors: &Errors, text: &str) {
+pub(crate) fn validate(errors: &Errors, text: &str) {
     assert!(!errors.problems().is_empty(), "refused, and nobody says why");
     let lines = text.lines().count().max(1);
     errors.problems().iter().for_each(|problem| told(problem, lines));

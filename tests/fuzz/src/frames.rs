@@ -5,10 +5,10 @@ use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, PARTS_MAX, VERSION};
 use rohrpost_routers::time::message::Message;
 
 pub(crate) fn run(data: &[u8]) {
-    judge(data);
+    validate(data);
     // A fuzzer does not find the check by trying, so it is given, as by a sender that makes mistakes of its own.
     if let Some((head, rest)) = data.split_first_chunk::<HEAD_BYTES>() {
-        judge(&[&checked(head, rest)[..], rest].concat());
+        validate(&[&checked(head, rest)[..], rest].concat());
     }
 }
 
@@ -21,7 +21,7 @@ pub(crate) fn checked(head: &[u8; HEAD_BYTES], rest: &[u8]) -> [u8; HEAD_BYTES] 
     head
 }
 
-fn judge(datagram: &[u8]) {
+fn validate(datagram: &[u8]) {
     let (head, frame) = match Frame::parse(datagram) {
         Ok(read) => read,
         Err(error) => return assert!(!error.to_string().is_empty()),

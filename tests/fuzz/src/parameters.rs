@@ -1,7 +1,7 @@
 //! Files of saved parameters (`param save`, `param load`) for the demonstration's installation: values with their lines,
 //! or what is wrong, line by line; and a value that a parameter takes reads back as the same.
 
-use crate::config::judge;
+use crate::config::validate;
 use crate::split;
 use rohrpost_config::{Installation, Saved};
 use rohrpost_modules::builtin::check_saved;
@@ -20,7 +20,7 @@ pub(crate) fn run(data: &[u8]) {
     on_a_command_line(word);
     let saved = match Saved::parse(file, "saved.toml".as_ref(), &INSTALLATION) {
         Ok(saved) => saved,
-        Err(errors) => return judge(&errors, file),
+        Err(errors) => return validate(&errors, file),
     };
     let lines = file.lines().count();
     for module in saved.modules() {

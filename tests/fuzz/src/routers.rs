@@ -1,4 +1,4 @@
-//! Two routers and a wire that does anything: whatever comes, accounts balance, memory is bounded, and nothing of one life of a
+//! Two routers and a wire that does anything: whatever comes, accounts balance, memory is bounded, and nothing of one incarnation of a
 //! sender is delivered twice or out of order.
 
 use crate::frames::checked;
@@ -105,7 +105,7 @@ struct World {
     /// Datagrams that left; they arrive as the program says.
     wire: Vec<Vec<u8>>,
     next_id: u16,
-    /// The program made datagrams of its own: then only memory and accounts are judged.
+    /// The program made datagrams of its own: then only memory and accounts are repeated_on_stall.
     forged: bool,
 }
 

@@ -1,11 +1,11 @@
-//! Two routers that seal, and a wire that keeps all and does anything: what opens was sealed by the present life of the one for the present
-//! life of the other, is as it was, and opens once; and a life begins only by what was said since the last one did.
+//! Two routers that seal, and a wire that keeps all and does anything: what opens was sealed by the present incarnation of the one for the present
+//! incarnation of the other, is as it was, and opens once; and an incarnation begins only by what was said since the last one did.
 
 use crate::frames::checked;
 use crate::split::Bytes;
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
 use rohrpost_routers::security::{
-    Acquaintances, Greeter, HELLO_DATAGRAM_BYTES, InstallationKey, KeyId, KeyRing, Opened, Opening, Port, Sealing,
+    HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Sealing,
     TAG_BYTES, Who,
 };
 use std::num::NonZeroU8;
@@ -24,16 +24,16 @@ pub(crate) fn run(data: &[u8]) {
     }
 }
 
-/// One life of a router.
+/// One incarnation of a router.
 struct Router {
     own: NodeIndex,
     incarnation: u64,
-    all: Arc<Acquaintances>,
-    greeter: Greeter,
+    all: Arc<PeerSessions>,
+    handshake: Handshake,
     sealing: [Sealing; 2],
     opening: [Opening; 2],
     next: [u64; 2],
-    /// The step at which the peer's last life began: the challenge is no older.
+    /// The step at which the peer's last incarnation began: the challenge is no older.
     drawn: usize,
     /// Places on the wire of what it has opened.
     opened: Vec<usize>,
@@ -44,13 +44,13 @@ impl Router {
         let incarnation = life << 8 | u64::from(own);
         let who = Who { system: 1, own, nodes: 2, digest: 7, incarnation };
         let key = |id| InstallationKey::new(KeyId(NonZeroU8::MIN.saturating_add(id)), &[id; 32]);
-        let all = Acquaintances::new(who, KeyRing::new(key(1), Some(key(0))));
+        let all = PeerSessions::new(who, KeyRing::new(key(1), Some(key(0))));
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
         Self {
             own,
             incarnation,
-            greeter: Greeter::new(&all, seed),
+            handshake: Handshake::new(&all, seed),
             sealing: PORTS.map(|port| Sealing::new(&all, port)),
             opening: PORTS.map(|port| Opening::new(&all, port)),
             all,
@@ -66,7 +66,7 @@ struct Sent {
     datagram: Vec<u8>,
     from: NodeIndex,
     port: usize,
-    /// Incarnations of the sender, and of the life that it sealed to; of a hello 0.
+    /// Incarnations of the sender, and of the incarnation that it sealed to; of a hello 0.
     lives: (u64, u64),
     text: Vec<u8>,
     step: usize,
@@ -136,19 +136,19 @@ impl World {
         let mut room = [0; HELLO_DATAGRAM_BYTES];
         let answer = match router.opening[sent.port].open(&mut datagram) {
             Ok(Opened::Frame(head, text)) => {
-                assert_eq!(sent.lives.0, head.incarnation, "of this life");
-                // Time is sealed to a node, whichever life of it takes it.
-                assert!(sent.port == 1 || sent.lives.1 == router.incarnation, "to this life");
+                assert_eq!(sent.lives.0, head.incarnation, "of this incarnation");
+                // Time is sealed to a node, whichever incarnation of it takes it.
+                assert!(sent.port == 1 || sent.lives.1 == router.incarnation, "to this incarnation");
                 assert_eq!((known, text), (Some(head.incarnation), &sent.text[..]));
                 assert!(!router.opened.contains(&place), "it was opened before");
                 router.opened.push(place);
                 None
             }
             Ok(Opened::Hello(head, greeting)) => {
-                let greeted = router.greeter.greet(0, &head, &greeting, &mut room);
-                router.greeter.begin();
+                let greeted = router.handshake.greet(0, &head, &greeting, &mut room);
+                router.handshake.begin();
                 if greeted.begins {
-                    assert!(sent.step >= router.drawn, "a life began by what was said before");
+                    assert!(sent.step >= router.drawn, "an incarnation began by what was said before");
                     router.drawn = self.step;
                 }
                 greeted.reply_bytes

@@ -7,8 +7,8 @@
 use crate::split::Bytes;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
-    Full, Label, ModuleState, Name, Node, Participant, Priority, Publications, Receiver, Sender, Shape, SystemClock,
-    TimeKeeper, TimeSource, Type, Waiting, monotonic_ns, wait_any,
+    Label, ModuleState, Name, Node, OverflowPolicy, Participant, Priority, Publications, Receiver, Sender, Shape,
+    SystemClock, TimeKeeper, TimeSource, Type, Waiting, monotonic_ns, wait_any,
 };
 use rohrpost_modules::description::noted;
 use rohrpost_modules::survey::Survey;
@@ -56,7 +56,7 @@ struct Robot {
 
 impl Robot {
     fn new(path: PathBuf, how: u8) -> Self {
-        let full = Full::ALL[usize::from(how & 3) % Full::ALL.len()];
+        let full = OverflowPolicy::ALL[usize::from(how & 3) % OverflowPolicy::ALL.len()];
         // More than 64 slots lie closer together.
         let slots = [1, 2, 5, 70][usize::from(how >> 2 & 3)];
         let max_age = (how & 16 != 0).then_some(Duration::from_millis(1));

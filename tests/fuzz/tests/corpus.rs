@@ -1,4 +1,4 @@
-//! Every input of the corpus once: what was mended stays mended. And a target that fails is noticed.
+//! Every input of the corpus once: what was fixed stays fixed. And a target that fails is noticed.
 
 use rohrpost_fuzz::{PLANTED, TARGETS, Target};
 use std::fs;

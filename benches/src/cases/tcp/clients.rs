@@ -85,7 +85,7 @@ struct Turn {
 }
 
 /// What was seen in a turn besides how late packages came.
-struct Seen {
+struct ClientFigures {
     who: &'static str,
     sent_s: f64,
     came_s: f64,
@@ -120,7 +120,7 @@ impl Case for Clients {
         rows.retain(|row| row.who != bound || self.versus.iter().any(|versus| versus.name == bound));
         for turn in &self.turns {
             let seen = seen.borrow();
-            let own: Vec<&Seen> = seen.iter().filter(|one| one.who == turn.who).collect();
+            let own: Vec<&ClientFigures> = seen.iter().filter(|one| one.who == turn.who).collect();
             rows.extend(turn.rows(self.name, &own));
         }
         Ok(rows)
@@ -128,7 +128,7 @@ impl Case for Clients {
 }
 
 impl Turn {
-    fn take(&self, settings: &Settings) -> Result<(Vec<f64>, Seen), Failure> {
+    fn take(&self, settings: &Settings) -> Result<(Vec<f64>, ClientFigures), Failure> {
         let habits = self.habits(settings);
         let mut systems = Systems::start(settings, self.security)?;
         let mut crowd = Crowd::gather(&systems, habits)?;
@@ -142,7 +142,7 @@ impl Turn {
         systems.check()?;
         let seconds = habits.counted.as_secs_f64();
         let (sent, came) = (tally.sent.get(), tally.came.get());
-        let seen = Seen {
+        let seen = ClientFigures {
             who: self.who,
             sent_s: sent as f64 / seconds,
             came_s: tally.meanwhile.get() as f64 / seconds,
@@ -163,9 +163,9 @@ impl Turn {
     }
 
     /// Rate, losses and what the computer did meanwhile; none if there was no turn.
-    fn rows(&self, case: &str, seen: &[&Seen]) -> Vec<Row> {
+    fn rows(&self, case: &str, seen: &[&ClientFigures]) -> Vec<Row> {
         let subject = |what: &str, unit| Subject { case: format!("{case}, {what}"), bytes: Some(BYTES), unit };
-        let figure = |what: &str, unit, of: fn(&Seen) -> Option<f64>| {
+        let figure = |what: &str, unit, of: fn(&ClientFigures) -> Option<f64>| {
             let middle = median(seen.iter().filter_map(|one| of(one)))?;
             Some(Row::alone(subject(what, unit), self.who, Ok(Summary::single(middle))))
         };

@@ -2,7 +2,7 @@
 
 use super::contest::{ALWAYS, Contest, Figure, Watched};
 use super::goals::Goal;
-use super::observed::Way;
+use super::observed::RunConditions;
 use super::plans::BRISK;
 use super::slots::{OMITTED, UNLOADED};
 use crate::cases::Case;
@@ -29,8 +29,11 @@ impl Case for Brisk {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched =
-            |who, loaded| Watched { who, plan: BRISK, way: Way { rights: Rights::RealTime, loaded, junk: false } };
+        let watched = |who, loaded| Watched {
+            who,
+            plan: BRISK,
+            way: RunConditions { rights: Rights::RealTime, loaded, junk: false },
+        };
         let contest = Contest {
             case: "cycle-1ms",
             watched: vec![watched("loaded", true), watched(UNLOADED, false)],

@@ -1,7 +1,7 @@
 //! Contenders that differ in their table or in how routers run, watched in turn; and the rows that come of it.
 
 use super::goals::{Goal, figure};
-use super::observed::{Observed, Way, watched};
+use super::observed::{Observed, RunConditions, watched};
 use crate::Failure;
 use crate::rounds::{Contender, Row, Subject, Versus, compare};
 use crate::settings::Settings;
@@ -19,7 +19,7 @@ pub(super) struct Watched {
     /// Its slots.
     pub plan: Plan,
     /// How its routers run.
-    pub way: Way,
+    pub way: RunConditions,
 }
 
 /// Something else that was seen in a turn, besides how far off slots began.
@@ -60,13 +60,13 @@ const OMITTED: &str = "omitted";
 const OF_BARE: [Goal; 1] = [Goal { name: "hoped 1.5", most: 1.5 }];
 
 /// What was seen of a contender, round after round.
-pub(super) type Seen = Vec<Observed>;
+pub(super) type ObservedRounds = Vec<Observed>;
 
 /// What became of a contest.
 pub(super) struct Held {
     pub rows: Vec<Row>,
     /// Of each contender.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<ObservedRounds>,
     /// Of the floor, round after round.
     pub bare: Vec<Bare>,
 }
@@ -91,7 +91,7 @@ impl Contest {
     /// Watches all, round after round.
     pub(super) fn hold(&self, settings: &Settings) -> Held {
         let stage = Stage::new();
-        let all: Vec<RefCell<Seen>> = self.watched.iter().map(|_| RefCell::default()).collect();
+        let all: Vec<RefCell<ObservedRounds>> = self.watched.iter().map(|_| RefCell::default()).collect();
         let turn = |at: usize| -> Result<Summary, Failure> {
             let Watched { plan, way, .. } = &self.watched[at];
             let seen = Observed::turn(stage.as_ref().map_err(Clone::clone)?, plan, *way, settings)?;
@@ -118,7 +118,7 @@ impl Contest {
         let contenders: Vec<Contender> = contenders.chain(self.bounds.iter().map(fixed)).collect();
         let mut rows = compare(settings, &self.subject("us", None), &contenders, &self.versus);
         drop(contenders);
-        let seen: Vec<Seen> = all.into_iter().map(RefCell::into_inner).collect();
+        let seen: Vec<ObservedRounds> = all.into_iter().map(RefCell::into_inner).collect();
         for figure in &self.figures {
             rows.extend(self.told(figure, &seen));
         }
@@ -128,7 +128,7 @@ impl Contest {
     }
 
     /// Slots that bare threads would have left out, and how many times as many the first contender has.
-    fn beside_bare(&self, seen: &Seen, bare: &[Bare]) -> Vec<Row> {
+    fn beside_bare(&self, seen: &ObservedRounds, bare: &[Bare]) -> Vec<Row> {
         let omitted: Vec<f64> = bare.iter().map(Bare::omitted_percent).collect();
         let mut rows = figure(&self.subject("%", Some(OMITTED)), BARE, &omitted, &[]);
         // A round in which nobody was late says nothing about their ratio.
@@ -139,7 +139,7 @@ impl Contest {
     }
 
     /// The rows of a figure: of those who are judged beside its goals, of the others alone.
-    fn told(&self, told: &Figure, seen: &[Seen]) -> Vec<Row> {
+    fn told(&self, told: &Figure, seen: &[ObservedRounds]) -> Vec<Row> {
         let subject = self.subject(told.unit, Some(told.what));
         let rows = self.watched.iter().zip(seen).enumerate().map(|(at, (watched, seen))| {
             let rounds: Vec<f64> = seen.iter().map(told.of).collect();

@@ -5,7 +5,7 @@
 
 use super::contest::BARE;
 use super::goals::{Goal, figure};
-use super::observed::{Observed, PORTS, Way, watched};
+use super::observed::{Observed, PORTS, RunConditions, watched};
 use super::plans::LOADED;
 use crate::cases::Case;
 use crate::harness::Failure;
@@ -33,7 +33,7 @@ impl Case for Junked {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let stage = Stage::new()?;
         let turn = |junk| {
-            let way = Way { rights: Rights::RealTime, loaded: false, junk };
+            let way = RunConditions { rights: Rights::RealTime, loaded: false, junk };
             Observed::turn(&stage, &LOADED, way, settings)
         };
         let bare = |junk: bool| {

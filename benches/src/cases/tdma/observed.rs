@@ -28,7 +28,7 @@ pub(super) const ALL: [u8; NODES as usize] = [0, 1, 2];
 
 /// How routers run in a turn.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(super) struct RunConditions {
     /// How they may be scheduled.
     pub rights: Rights,
     /// Whether everything else is busy, too.
@@ -62,7 +62,7 @@ impl Observed {
     ///
     /// # Errors
     /// When a part of it fails, or routers are not scheduled as they should be.
-    pub(super) fn turn(stage: &Stage, plan: &Plan, way: Way, settings: &Settings) -> Result<Self, Failure> {
+    pub(super) fn turn(stage: &Stage, plan: &Plan, way: RunConditions, settings: &Settings) -> Result<Self, Failure> {
         let routers = Routers::start(stage, plan, way.rights, settings)?;
         let mut capture = Capture::start(stage)?;
         let _traffic = Traffic::start(&routers)?;

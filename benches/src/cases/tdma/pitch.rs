@@ -3,7 +3,7 @@
 
 use super::contest::{ALWAYS, Contest, Figure, Held, Watched};
 use super::goals::{Goal, NONE, figure};
-use super::observed::{Observed, Way};
+use super::observed::{Observed, RunConditions};
 use super::plans::{SHORT_PITCH, SHORTEST_PITCH, WIDE_GUARD};
 use super::slots::{OMITTED, OMITTED_MUST};
 use crate::cases::Case;
@@ -32,8 +32,11 @@ impl Case for Pitch {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched =
-            |who, plan| Watched { who, plan, way: Way { rights: Rights::RealTime, loaded: true, junk: false } };
+        let watched = |who, plan| Watched {
+            who,
+            plan,
+            way: RunConditions { rights: Rights::RealTime, loaded: true, junk: false },
+        };
         let tables = [
             ("250 us, guard 80", SHORT_PITCH),
             ("320 us, guard 150", WIDE_GUARD),

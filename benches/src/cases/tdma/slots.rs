@@ -1,8 +1,8 @@
 //! How far off their nominal beginning slots begin, with everything else at work, without, and with routers that the kernel denies real time.
 
-use super::contest::{ALWAYS, BARE, Contest, Figure, Held, Seen, Watched};
+use super::contest::{ALWAYS, BARE, Contest, Figure, Held, ObservedRounds, Watched};
 use super::goals::{Goal, figure};
-use super::observed::{Observed, Way};
+use super::observed::{Observed, RunConditions};
 use super::plans::LOADED;
 use crate::cases::Case;
 use crate::harness::Failure;
@@ -71,7 +71,8 @@ impl Case for Slots {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, rights, loaded| Watched { who, plan: LOADED, way: Way { rights, loaded, junk: false } };
+        let watched =
+            |who, rights, loaded| Watched { who, plan: LOADED, way: RunConditions { rights, loaded, junk: false } };
         let at_most = |p50: Option<f64>, p99: f64| (p50.map(Target::AtMost), Some(Target::AtMost(p99)));
         let versus = [
             (MUST.0, at_most(Some(1.0), 1.0)),
@@ -131,7 +132,7 @@ fn not_kept(seen: &Observed) -> (u64, u64) {
 }
 
 /// Share of ours by that of the other, in each round. Who had none is taken to have had one.
-fn ratios(ours: &Seen, others: &Seen, far: Far) -> Vec<f64> {
+fn ratios(ours: &ObservedRounds, others: &ObservedRounds, far: Far) -> Vec<f64> {
     let share = |seen| {
         let (some, all) = far(seen);
         some.max(1) as f64 / all.max(1) as f64

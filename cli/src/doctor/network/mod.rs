@@ -105,11 +105,11 @@ fn stamps(lan: &Lan) -> Option<Finding> {
         "time stamps",
         "clocks of nodes are compared by when the kernel sent and received; else by when a thread came to run",
     );
-    let mend = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and software-receive";
+    let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and software-receive";
     Some(match &lan.stamps {
         Stamps::Both => Finding::ok(what, "sending and receiving", why),
-        Stamps::NoSent => Finding::not(State::Warn, what, "receiving only", why, mend),
-        Stamps::None(error) => Finding::not(State::Warn, what, format!("none ({error})"), why, mend),
+        Stamps::NoSent => Finding::not(State::Warn, what, "receiving only", why, fix),
+        Stamps::None(error) => Finding::not(State::Warn, what, format!("none ({error})"), why, fix),
         Stamps::Unknown => return None,
     })
 }

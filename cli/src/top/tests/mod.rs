@@ -166,7 +166,7 @@ fn a_filter_is_typed_kept_taken_back_and_cleared() {
     let robot = Robot::new();
     let mut app = App::new();
     press(&mut app, &robot, "/odom");
-    assert_eq!(order(&app, &robot), ["motor.0"], "a face counts");
+    assert_eq!(order(&app, &robot), ["motor.0"], "an alias counts");
     press(&mut app, &robot, "x\x08\n");
     assert_eq!((app.filter.as_str(), &app.prompt), ("odom", &Prompt::None));
     assert_eq!(press(&mut app, &robot, "f"), Some(Action::Switch(robot.name("motor.0"), false)), "of those shown");

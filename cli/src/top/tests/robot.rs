@@ -17,7 +17,8 @@ use rohrpost::survey::{ModuleSurvey, Survey, Usage, sum};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{
-    Class, ClassTraffic, FlowInfo, Full, Latency, Loss, MailboxInfo, ModuleState, ParticipantInfo, Shape, Type, local,
+    Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, ModuleState, OverflowPolicy, ParticipantInfo, Shape,
+    Type, local,
 };
 use std::path::Path;
 use std::time::Duration;
@@ -202,7 +203,7 @@ fn module(installation: &Installation, at_ns: u64, counts: &Counts) -> ModuleSur
         child: None,
         error: (counts.state == Some(ModuleState::Error)).then(|| "no scan has come for 5 s".to_owned()),
         name,
-        faces: configured.faces.clone(),
+        aliases: configured.aliases.clone(),
         process,
         received: counts.received,
         bytes_in: counts.received * 100,
@@ -223,7 +224,8 @@ fn mailbox(module: &ModuleSurvey) -> MailboxInfo {
         losses: module.losses,
         latency: module.waited.clone(),
     };
-    let full = if module.losses[Loss::Replaced as usize] > 0 { Full::Latest } else { Full::Displace };
+    let full =
+        if module.losses[Loss::Replaced as usize] > 0 { OverflowPolicy::Latest } else { OverflowPolicy::Displace };
     MailboxInfo {
         name: module.name.with_local(local::COMMANDS),
         shape: Shape { full, ..Shape::default() },

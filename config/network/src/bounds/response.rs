@@ -182,7 +182,7 @@ pub(crate) fn worst(
 ) -> Result<Worst, Never> {
     let largest_ns = others.iter().map(|(stream, _)| stream).chain([own]).map(|stream| stream.largest_ns).max();
     let analysis = Analysis { supply, own, others, largest_ns: largest_ns.unwrap_or(1).max(1), longest_ns };
-    analysis.judge()?;
+    analysis.validate()?;
     let mut worst: Option<Worst> = None;
     let firsts = if mistake!(OneSlotFirst) { 1 } else { supply.windows.len() };
     for first in 0..firsts {
@@ -243,7 +243,7 @@ impl Analysis<'_> {
     }
 
     /// Whether all that comes can leave in the long run.
-    fn judge(&self) -> Result<(), Never> {
+    fn validate(&self) -> Result<(), Never> {
         let count = self.supply.windows.len();
         let carried: Work = (0..count).map(|index| self.carries(index)).sum();
         if carried.datagrams == 0 {

@@ -522,8 +522,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("slots", "claim.place.map_or(ticket, Word::ticket)", "claim.place.map_or(0, Word::ticket)"),
             edit(
                 "rig",
-                "                self.last = (self.full == Full::Latest).then_some(posted);",
-                "                if let Some(old) = late {\n                    if slots.take(old.slot, old.word).map(|old| slots.release(old)).is_some() {\n                        self.mailbox.count(Victim { priority: Priority(priority), replaced: true });\n                    }\n                }\n                self.last = (self.full == Full::Latest).then_some(posted);",
+                "                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);",
+                "                if let Some(old) = late {\n                    if slots.take(old.slot, old.word).map(|old| slots.release(old)).is_some() {\n                        self.mailbox.count(Victim { priority: Priority(priority), replaced: true });\n                    }\n                }\n                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);",
             ),
         ],
         caught_by: "the_newest_replaces_what_waits",

@@ -4,7 +4,7 @@
 use crate::name::Priority;
 use crate::queue::Queue;
 use crate::rig::{Mailbox, Receiver, Sender, Sent, of_first, sorted};
-use crate::slots::{Full, Published};
+use crate::slots::{OverflowPolicy, Published};
 use crate::step::{dies_at, reached};
 use crate::sync::Ordering;
 use loom::thread;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// One slot, used again and again: the body goes from sender to receiver and the slot back, without a race.
 pub(crate) fn a_body_is_handed_over_whole() {
     let mailbox = Mailbox::new(1);
-    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let sender = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
     let mut receiver = mailbox.receiver();
     let mut received = receiver.take_times(2);
     let accepted = sender.join().unwrap();
@@ -27,8 +27,8 @@ pub(crate) fn a_body_is_handed_over_whole() {
 /// Two senders, enough slots: everything arrives, once, and each sender's packages in its order.
 pub(crate) fn everything_arrives_once_and_in_order() {
     let mailbox = Mailbox::new(3);
-    let twice = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
-    let once = mailbox.send_from(2, Full::Reject, &[(10, 3)]);
+    let twice = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
+    let once = mailbox.send_from(2, OverflowPolicy::Reject, &[(10, 3)]);
     let mut receiver = mailbox.receiver();
     let mut received = receiver.take_times(1);
     assert_eq!((twice.join().unwrap(), once.join().unwrap()), (vec![1, 2], vec![3]));
@@ -41,7 +41,7 @@ pub(crate) fn everything_arrives_once_and_in_order() {
 /// the level: what it finds it takes, without another look.
 pub(crate) fn a_second_package_never_passes_the_first() {
     let (mailbox, queue) = one_received(&[(10, 9)]);
-    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let sender = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
     receiver.queue.rescan(&mailbox.slots());
     let mut received = receiver.take_times(1);
@@ -54,8 +54,9 @@ pub(crate) fn a_second_package_never_passes_the_first() {
 pub(crate) fn publishing_gives_the_order() {
     let mailbox = Mailbox::new(2);
     let slots = mailbox.slots();
-    let mut sender = mailbox.sender(1, Full::Reject);
-    let claims = [1, 2].map(|_| slots.claim(sender.by, &mut sender.cursor, Priority(10), Full::Reject, None).unwrap());
+    let mut sender = mailbox.sender(1, OverflowPolicy::Reject);
+    let claims =
+        [1, 2].map(|_| slots.claim(sender.by, &mut sender.cursor, Priority(10), OverflowPolicy::Reject, None).unwrap());
     for (claim, body) in claims.into_iter().rev().zip([1, 2]) {
         // SAFETY: the claim is ours.
         mailbox.bodies[claim.slot].with_mut(|cell| unsafe { *cell = body });
@@ -67,8 +68,8 @@ pub(crate) fn publishing_gives_the_order() {
 /// Of what waits, the more important goes first, also before what the receiver has seen long ago.
 pub(crate) fn the_more_important_goes_first() {
     let mailbox = Mailbox::new(3);
-    let low = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
-    let high = mailbox.send_from(2, Full::Reject, &[(20, 3)]);
+    let low = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
+    let high = mailbox.send_from(2, OverflowPolicy::Reject, &[(20, 3)]);
     let mut receiver = mailbox.receiver();
     let first = receiver.take();
     low.join().unwrap();
@@ -88,7 +89,7 @@ pub(crate) fn the_more_important_goes_first() {
 /// The receiver has taken the first of these packages, and said of what priority it was. The others are still there.
 fn one_received(packages: &[(u8, u8)]) -> (Arc<Mailbox>, Queue) {
     let mailbox = Mailbox::new(4);
-    assert_eq!(mailbox.sender(3, Full::Displace).send_all(packages).len(), packages.len());
+    assert_eq!(mailbox.sender(3, OverflowPolicy::Displace).send_all(packages).len(), packages.len());
     let mut receiver = mailbox.receiver();
     assert_eq!(receiver.take(), Some(packages[0].1));
     let queue = receiver.queue;
@@ -99,7 +100,7 @@ fn one_received(packages: &[(u8, u8)]) -> (Arc<Mailbox>, Queue) {
 pub(crate) fn the_urgent_passes_what_is_known() {
     let (mailbox, queue) = one_received(&[(10, 1), (10, 2), (10, 3)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
-    let urgent = mailbox.send_from(1, Full::Displace, &[(20, 9)]);
+    let urgent = mailbox.send_from(1, OverflowPolicy::Displace, &[(20, 9)]);
     let first = receiver.take();
     urgent.join().unwrap();
     let expected: &[u8] = if first == Some(9) { &[2, 3] } else { &[9, 3] };
@@ -110,7 +111,7 @@ pub(crate) fn the_urgent_passes_what_is_known() {
 pub(crate) fn what_comes_as_the_level_sinks_is_next() {
     let (mailbox, queue) = one_received(&[(20, 1), (10, 2), (10, 3)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
-    let between = mailbox.send_from(1, Full::Displace, &[(15, 9)]);
+    let between = mailbox.send_from(1, OverflowPolicy::Displace, &[(15, 9)]);
     let first = receiver.take();
     between.join().unwrap();
     let expected: &[u8] = if first == Some(9) { &[2, 3] } else { &[9, 3] };
@@ -121,8 +122,8 @@ pub(crate) fn what_comes_as_the_level_sinks_is_next() {
 pub(crate) fn no_alert_is_lost() {
     let (mailbox, queue) = one_received(&[(20, 1), (20, 2)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
-    let one = mailbox.send_from(1, Full::Displace, &[(30, 7), (30, 8)]);
-    let other = mailbox.send_from(2, Full::Displace, &[(40, 9)]);
+    let one = mailbox.send_from(1, OverflowPolicy::Displace, &[(30, 7), (30, 8)]);
+    let other = mailbox.send_from(2, OverflowPolicy::Displace, &[(40, 9)]);
     let first = receiver.take();
     one.join().unwrap();
     other.join().unwrap();
@@ -138,7 +139,7 @@ pub(crate) fn no_alert_is_lost() {
 /// The receiver dies, and what it said of the level stays. Its successor knows nothing yet, and says so before it relies on it.
 pub(crate) fn a_new_owner_says_its_own_level() {
     let (mailbox, _dead) = one_received(&[(30, 1), (10, 2), (10, 3)]);
-    let between = mailbox.send_from(1, Full::Displace, &[(20, 9)]);
+    let between = mailbox.send_from(1, OverflowPolicy::Displace, &[(20, 9)]);
     let mut owner = mailbox.receiver();
     owner.search();
     let first = owner.take();
@@ -151,7 +152,7 @@ pub(crate) fn a_new_owner_says_its_own_level() {
 pub(crate) fn who_dies_before_it_alerts_is_heard() {
     let (mailbox, queue) = one_received(&[(10, 1), (10, 2), (10, 3)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
-    let dead = mailbox.dies_sending(1, Full::Displace, "publish: hint", &[(20, 9)]);
+    let dead = mailbox.dies_sending(1, OverflowPolicy::Displace, "publish: hint", &[(20, 9)]);
     let first = receiver.take();
     assert!(dead.join().unwrap());
     receiver.search();
@@ -164,8 +165,8 @@ pub(crate) fn who_dies_before_it_alerts_is_heard() {
 pub(crate) fn two_alerts_are_two() {
     let (mailbox, queue) = one_received(&[(20, 1), (20, 2), (20, 3)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
-    let one = mailbox.send_from(1, Full::Displace, &[(30, 8)]);
-    let other = mailbox.send_from(2, Full::Displace, &[(30, 9)]);
+    let one = mailbox.send_from(1, OverflowPolicy::Displace, &[(30, 8)]);
+    let other = mailbox.send_from(2, OverflowPolicy::Displace, &[(30, 9)]);
     receiver.queue.look(&mailbox.slots());
     let before = receiver.take_times(2);
     one.join().unwrap();
@@ -178,9 +179,9 @@ pub(crate) fn two_alerts_are_two() {
 /// A state that waited below the level is sent anew as important as the level, in its old place: before all that is known of it.
 pub(crate) fn a_state_raised_to_the_level_is_found() {
     let mailbox = Mailbox::new(5);
-    let mut state = mailbox.sender(1, Full::Latest);
+    let mut state = mailbox.sender(1, OverflowPolicy::Latest);
     assert_eq!(state.send(5, 1), Sent::Accepted);
-    assert_eq!(mailbox.sender(2, Full::Reject).send_all(&[(10, 7), (10, 8), (10, 9)]), [7, 8, 9]);
+    assert_eq!(mailbox.sender(2, OverflowPolicy::Reject).send_all(&[(10, 7), (10, 8), (10, 9)]), [7, 8, 9]);
     let mut receiver = mailbox.receiver();
     assert_eq!(receiver.take(), Some(7));
     assert_eq!(state.send(10, 2), Sent::Accepted);
@@ -190,10 +191,10 @@ pub(crate) fn a_state_raised_to_the_level_is_found() {
 /// A state that the receiver knows is sent anew: the newer one is received in the place of the older, not after all that is known.
 pub(crate) fn the_newest_is_found_in_its_place() {
     let mailbox = Mailbox::new(4);
-    assert_eq!(mailbox.sender(2, Full::Reject).send(10, 5), Sent::Accepted);
-    let mut state = mailbox.sender(1, Full::Latest);
+    assert_eq!(mailbox.sender(2, OverflowPolicy::Reject).send(10, 5), Sent::Accepted);
+    let mut state = mailbox.sender(1, OverflowPolicy::Latest);
     assert_eq!(state.send(10, 1), Sent::Accepted);
-    assert_eq!(mailbox.sender(3, Full::Reject).send(10, 6), Sent::Accepted);
+    assert_eq!(mailbox.sender(3, OverflowPolicy::Reject).send(10, 6), Sent::Accepted);
     let mut receiver = mailbox.receiver();
     assert_eq!(receiver.take(), Some(5));
     assert_eq!(state.send(10, 2), Sent::Accepted);
@@ -205,8 +206,8 @@ pub(crate) fn the_newest_is_found_in_its_place() {
 /// One slot, wanted by an unimportant sender, an important one and the receiver.
 pub(crate) fn who_is_displaced_is_counted_and_not_received() {
     let mailbox = Mailbox::new(1);
-    let low = mailbox.send_from(1, Full::Displace, &[(10, 10)]);
-    let high = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let low = mailbox.send_from(1, OverflowPolicy::Displace, &[(10, 10)]);
+    let high = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
     let mut receiver = mailbox.receiver();
     let mut seen = receiver.take_times(1);
     let accepted = [low.join().unwrap(), high.join().unwrap()].concat();
@@ -219,9 +220,9 @@ pub(crate) fn who_is_displaced_is_counted_and_not_received() {
 /// Slots change their packages while the receiver has them in its heap: what is left still comes in order.
 pub(crate) fn displacing_keeps_the_order() {
     let mailbox = Mailbox::new(2);
-    mailbox.sender(1, Full::Reject).send(10, 1);
-    let low = mailbox.send_from(1, Full::Reject, &[(10, 2)]);
-    let high = mailbox.send_from(2, Full::Displace, &[(20, 3)]);
+    mailbox.sender(1, OverflowPolicy::Reject).send(10, 1);
+    let low = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 2)]);
+    let high = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 3)]);
     let mut receiver = mailbox.receiver();
     let mut received = receiver.take_times(1);
     let accepted = 1 + low.join().unwrap().len() + high.join().unwrap().len();
@@ -234,8 +235,8 @@ pub(crate) fn displacing_keeps_the_order() {
 /// Two slots, both full, a receiver that empties them, and one sender who outranks all: there is always room for it.
 pub(crate) fn who_outranks_all_is_not_refused() {
     let mailbox = Mailbox::new(2);
-    mailbox.sender(1, Full::Displace).send_all(&[(10, 10), (11, 11)]);
-    let high = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    mailbox.sender(1, OverflowPolicy::Displace).send_all(&[(10, 10), (11, 11)]);
+    let high = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
     let mut receiver = mailbox.receiver();
     let mut seen = receiver.take_times(2);
     assert_eq!(high.join().unwrap(), [20]);
@@ -248,9 +249,9 @@ pub(crate) fn who_outranks_all_is_not_refused() {
 /// Two slots, both full: the newest of the least important gives way, once for each that is more important.
 pub(crate) fn two_displace_two() {
     let mailbox = Mailbox::new(2);
-    mailbox.sender(1, Full::Displace).send_all(&[(10, 10), (11, 11)]);
-    let one = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
-    let other = mailbox.send_from(3, Full::Displace, &[(21, 21)]);
+    mailbox.sender(1, OverflowPolicy::Displace).send_all(&[(10, 10), (11, 11)]);
+    let one = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
+    let other = mailbox.send_from(3, OverflowPolicy::Displace, &[(21, 21)]);
     let accepted = [vec![10, 11], one.join().unwrap(), other.join().unwrap()].concat();
     assert_eq!(accepted, [10, 11, 20, 21]);
     let mut seen = mailbox.receiver().drain();
@@ -265,7 +266,7 @@ pub(crate) fn two_displace_two() {
 /// One sender, one receiver: what is received never goes back and ends with the newest; the rest is counted as replaced.
 fn only_the_newest(slots: usize, packages: &'static [(u8, u8)]) {
     let mailbox = Mailbox::new(slots);
-    let sender = mailbox.send_from(1, Full::Latest, packages);
+    let sender = mailbox.send_from(1, OverflowPolicy::Latest, packages);
     let mut receiver = mailbox.receiver();
     let mut received = receiver.take_times(2);
     let accepted = sender.join().unwrap();
@@ -290,9 +291,9 @@ pub(crate) fn the_newest_reuses_the_only_slot() {
 /// keeps nobody out.
 pub(crate) fn the_newest_keeps_its_place() {
     let mailbox = Mailbox::new(3);
-    let mut fast = mailbox.sender(1, Full::Latest);
+    let mut fast = mailbox.sender(1, OverflowPolicy::Latest);
     assert_eq!(fast.send(10, 1), Sent::Accepted);
-    let other = mailbox.send_from(2, Full::Latest, &[(10, 10)]);
+    let other = mailbox.send_from(2, OverflowPolicy::Latest, &[(10, 10)]);
     fast.send_all(&[(10, 2), (10, 3)]);
     // The other one is refused if its search for a free slot meets the state wherever it moves to.
     let expected = [vec![3], other.join().unwrap()].concat();
@@ -305,12 +306,12 @@ pub(crate) fn the_newest_keeps_its_place() {
 /// comes late takes 3, whole; and nobody misses anything.
 pub(crate) fn a_word_comes_back_with_the_newer_package() {
     let mailbox = Mailbox::new(2);
-    let mut first = mailbox.sender(1, Full::Latest);
+    let mut first = mailbox.sender(1, OverflowPolicy::Latest);
     first.send(10, 1);
     let (last, cursor) = (first.last, first.cursor);
     let sender = mailbox.clone();
     let sender = thread::spawn(move || {
-        let mut sender = Sender { last, cursor, ..sender.sender(1, Full::Latest) };
+        let mut sender = Sender { last, cursor, ..sender.sender(1, OverflowPolicy::Latest) };
         sender.send_all(&[(10, 2), (10, 3)]);
         sender.last
     });
@@ -335,8 +336,8 @@ pub(crate) fn a_word_comes_back_with_the_newer_package() {
 /// A state is sent anew while somebody more important takes a slot: each is received or counted, once.
 pub(crate) fn who_is_displaced_is_not_replaced_too() {
     let mailbox = Mailbox::new(1);
-    let state = mailbox.send_from(1, Full::Latest, &[(10, 1), (10, 2)]);
-    let high = mailbox.send_from(2, Full::Latest, &[(20, 20)]);
+    let state = mailbox.send_from(1, OverflowPolicy::Latest, &[(10, 1), (10, 2)]);
+    let high = mailbox.send_from(2, OverflowPolicy::Latest, &[(20, 20)]);
     let accepted = state.join().unwrap().len() + high.join().unwrap().len();
     let received = mailbox.receiver().drain();
     assert_eq!(received.len() + mailbox.replaced() + mailbox.displaced().len(), accepted);
@@ -346,11 +347,12 @@ pub(crate) fn who_is_displaced_is_not_replaced_too() {
 /// The owner gives the mailbox up while a newer package replaces the older: none of what was accepted is hidden.
 pub(crate) fn a_retired_mailbox_counts_the_replaced() {
     let mailbox = Mailbox::new(2);
-    let mut first = mailbox.sender(1, Full::Latest);
+    let mut first = mailbox.sender(1, OverflowPolicy::Latest);
     first.send(10, 1);
     let last = first.last;
     let sender = mailbox.clone();
-    let sender = thread::spawn(move || Sender { last, ..sender.sender(1, Full::Latest) }.send_all(&[(10, 2)]));
+    let sender =
+        thread::spawn(move || Sender { last, ..sender.sender(1, OverflowPolicy::Latest) }.send_all(&[(10, 2)]));
     let slots = mailbox.slots();
     let mut owner = mailbox.receiver();
     slots.retire();
@@ -370,7 +372,7 @@ pub(crate) fn a_retired_mailbox_counts_the_replaced() {
 /// A receiver that sleeps whenever there is nothing gets everything. No assertion: a lost wake-up never ends.
 pub(crate) fn no_wake_up_is_lost() {
     let mailbox = Mailbox::new(2);
-    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let sender = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
     let mut receiver = mailbox.receiver();
     assert_eq!([receiver.receive(), receiver.receive()], [Some(1), Some(2)]);
     sender.join().unwrap();
@@ -379,8 +381,8 @@ pub(crate) fn no_wake_up_is_lost() {
 /// The same with two senders: the wake-up for one is none for the other.
 pub(crate) fn no_wake_up_is_lost_between_two() {
     let mailbox = Mailbox::new(2);
-    let one = mailbox.send_from(1, Full::Reject, &[(10, 1)]);
-    let other = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let one = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1)]);
+    let other = mailbox.send_from(2, OverflowPolicy::Reject, &[(10, 2)]);
     let mut receiver = mailbox.receiver();
     assert_eq!(sorted([receiver.receive(), receiver.receive()].into_iter().flatten().collect()), [1, 2]);
     one.join().unwrap();
@@ -391,10 +393,10 @@ pub(crate) fn no_wake_up_is_lost_between_two() {
 /// package, whoever has other work for the receiver; here the sender that was refused.
 pub(crate) fn no_wake_up_is_lost_when_displaced() {
     let mailbox = Mailbox::new(1);
-    let low = mailbox.send_from(1, Full::Displace, &[(10, 10)]);
+    let low = mailbox.send_from(1, OverflowPolicy::Displace, &[(10, 10)]);
     let high = mailbox.clone();
     let high = thread::spawn(move || {
-        if high.sender(2, Full::Displace).send(20, 20) != Sent::Accepted {
+        if high.sender(2, OverflowPolicy::Displace).send(20, 20) != Sent::Accepted {
             high.other.store(1, Ordering::Relaxed);
             high.ring();
         }
@@ -408,7 +410,7 @@ pub(crate) fn no_wake_up_is_lost_when_displaced() {
 /// As the two before, by one who sleeps in `poll`, where the kernel compares nothing.
 pub(crate) fn no_wake_up_is_lost_in_poll() {
     let mailbox = Mailbox::new(2);
-    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let sender = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
     let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
     assert_eq!([receiver.receive(), receiver.receive()], [Some(1), Some(2)]);
     sender.join().unwrap();
@@ -416,8 +418,8 @@ pub(crate) fn no_wake_up_is_lost_in_poll() {
 
 pub(crate) fn no_wake_up_is_lost_in_poll_between_two() {
     let mailbox = Mailbox::new(2);
-    let one = mailbox.send_from(1, Full::Reject, &[(10, 1)]);
-    let other = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let one = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1)]);
+    let other = mailbox.send_from(2, OverflowPolicy::Reject, &[(10, 2)]);
     let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
     assert_eq!(sorted([receiver.receive(), receiver.receive()].into_iter().flatten().collect()), [1, 2]);
     one.join().unwrap();
@@ -427,7 +429,7 @@ pub(crate) fn no_wake_up_is_lost_in_poll_between_two() {
 /// One who rang dies before it writes into the pipe: whoever rings after that wakes the sleeper all the same.
 pub(crate) fn a_dead_ringer_takes_no_wake_up_along() {
     let mailbox = Mailbox::new(1);
-    let dead = mailbox.dies_sending(1, Full::Reject, "bell: rung", &[(10, 1)]);
+    let dead = mailbox.dies_sending(1, OverflowPolicy::Reject, "bell: rung", &[(10, 1)]);
     let mut receiver = Receiver { polls: true, ..mailbox.receiver() };
     assert_eq!(receiver.receive(), Some(1));
     dead.join().unwrap();
@@ -437,7 +439,7 @@ pub(crate) fn a_dead_ringer_takes_no_wake_up_along() {
 pub(crate) fn no_wake_up_is_lost_between_two_mailboxes() {
     let first = Mailbox::new(1);
     let second = Mailbox::beside(&first, 1);
-    let senders = [&first, &second].map(|mailbox| mailbox.send_from(1, Full::Reject, &[(10, 1)]));
+    let senders = [&first, &second].map(|mailbox| mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1)]));
     let mut receivers = [first.receiver(), second.receiver()];
     let mut received = [0, 0];
     while received != [1, 1] {
@@ -457,7 +459,7 @@ pub(crate) fn no_wake_up_is_lost_between_two_mailboxes() {
 /// its sender's hands.
 pub(crate) fn a_retired_mailbox_keeps_nothing() {
     let mailbox = Mailbox::new(2);
-    let sender = mailbox.send_from(1, Full::Reject, &[(10, 1), (10, 2)]);
+    let sender = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
     let slots = mailbox.slots();
     let mut owner = mailbox.receiver();
     slots.retire();
@@ -470,9 +472,9 @@ pub(crate) fn a_retired_mailbox_keeps_nothing() {
 /// As above; the owner before had died with a package in hand.
 pub(crate) fn a_retired_mailbox_keeps_nothing_of_the_dead() {
     let mailbox = Mailbox::new(2);
-    mailbox.sender(1, Full::Reject).send(20, 1);
+    mailbox.sender(1, OverflowPolicy::Reject).send(20, 1);
     assert!(dies_at("take: taken", || _ = mailbox.receiver().take()));
-    let sender = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let sender = mailbox.send_from(2, OverflowPolicy::Reject, &[(10, 2)]);
     let slots = mailbox.slots();
     let mut owner = mailbox.receiver();
     slots.retire();
@@ -487,8 +489,8 @@ pub(crate) fn a_retired_mailbox_keeps_nothing_of_the_dead() {
 /// displaced it goes elsewhere.
 pub(crate) fn a_retired_mailbox_counts_the_displaced() {
     let mailbox = Mailbox::new(1);
-    mailbox.sender(1, Full::Displace).send(10, 10);
-    let sender = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    mailbox.sender(1, OverflowPolicy::Displace).send(10, 10);
+    let sender = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
     let slots = mailbox.slots();
     let mut owner = mailbox.receiver();
     slots.retire();
@@ -504,8 +506,8 @@ pub(crate) fn a_retired_mailbox_counts_the_displaced() {
 /// ever see of this mailbox, so the victim must be in hand or counted by then.
 pub(crate) fn a_replaced_mailbox_hides_no_loss() {
     let mailbox = Mailbox::new(1);
-    mailbox.sender(1, Full::Displace).send(10, 10);
-    let sender = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    mailbox.sender(1, OverflowPolicy::Displace).send(10, 10);
+    let sender = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
     let slots = mailbox.slots();
     let mut owner = mailbox.receiver();
     slots.retire();
@@ -521,8 +523,8 @@ pub(crate) fn a_replaced_mailbox_hides_no_loss() {
 /// accepted, so it is found by the owner, or counted by who displaced it, where it goes on.
 pub(crate) fn a_replaced_mailbox_hides_no_late_loss() {
     let mailbox = Mailbox::new(1);
-    let low = mailbox.send_from(1, Full::Displace, &[(10, 10)]);
-    let high = mailbox.send_from(2, Full::Displace, &[(20, 20)]);
+    let low = mailbox.send_from(1, OverflowPolicy::Displace, &[(10, 10)]);
+    let high = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
     let slots = mailbox.slots();
     let mut owner = mailbox.receiver();
     slots.retire();
@@ -542,8 +544,8 @@ pub(crate) fn a_replaced_mailbox_hides_no_late_loss() {
 /// a package, its slot is usable again, and the other one notices nothing.
 fn a_sender_dies(step: &'static str, arrives: bool) {
     let mailbox = Mailbox::new(2);
-    let dead = mailbox.dies_sending(1, Full::Displace, step, &[(10, 1)]);
-    let living = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let dead = mailbox.dies_sending(1, OverflowPolicy::Displace, step, &[(10, 1)]);
+    let living = mailbox.send_from(2, OverflowPolicy::Reject, &[(10, 2)]);
     let mut receiver = mailbox.receiver();
     receiver.search();
     let mut received = receiver.take_times(1);
@@ -576,9 +578,9 @@ pub(crate) fn a_sender_dies_after_its_hint() {
 /// At least once: who dies between counting and publishing has counted it, and whoever frees the slot cannot know.
 pub(crate) fn a_displacer_dies() {
     let mailbox = Mailbox::new(1);
-    mailbox.sender(3, Full::Displace).send(10, 10);
-    let dead = mailbox.dies_sending(1, Full::Displace, "displace: claimed", &[(20, 20)]);
-    let living = mailbox.send_from(2, Full::Displace, &[(15, 15)]);
+    mailbox.sender(3, OverflowPolicy::Displace).send(10, 10);
+    let dead = mailbox.dies_sending(1, OverflowPolicy::Displace, "displace: claimed", &[(20, 20)]);
+    let living = mailbox.send_from(2, OverflowPolicy::Displace, &[(15, 15)]);
     let mut receiver = mailbox.receiver();
     let mut seen = receiver.take_times(1);
     receiver.search();
@@ -597,7 +599,7 @@ pub(crate) fn a_displacer_dies() {
 /// the newer is received if it was published; both slots are usable again.
 fn a_replacer_dies(slots: usize, step: &'static str) {
     let mailbox = Mailbox::new(slots);
-    let dead = mailbox.dies_sending(1, Full::Latest, step, &[(10, 1), (10, 2)]);
+    let dead = mailbox.dies_sending(1, OverflowPolicy::Latest, step, &[(10, 1), (10, 2)]);
     let mut receiver = mailbox.receiver();
     let mut received = receiver.take_times(1);
     receiver.search();
@@ -630,9 +632,9 @@ pub(crate) fn a_replacer_dies_in_the_only_slot() {
 pub(crate) fn a_package_without_hint_is_found_in_turn() {
     let mailbox = Mailbox::new(2);
     assert!(dies_at("publish: ready", || {
-        mailbox.sender(1, Full::Reject).send(10, 1);
+        mailbox.sender(1, OverflowPolicy::Reject).send(10, 1);
     }));
-    let living = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let living = mailbox.send_from(2, OverflowPolicy::Reject, &[(10, 2)]);
     let mut receiver = mailbox.receiver();
     let mut received = receiver.take_times(1);
     living.join().unwrap();
@@ -644,9 +646,9 @@ pub(crate) fn a_package_without_hint_is_found_in_turn() {
 /// the second time marked, then it is poison. The other package arrives once.
 pub(crate) fn a_package_in_dead_hands_is_delivered_once_more() {
     let mailbox = Mailbox::new(2);
-    mailbox.sender(1, Full::Reject).send(20, 1);
+    mailbox.sender(1, OverflowPolicy::Reject).send(20, 1);
     assert!(dies_at("take: taken", || _ = mailbox.receiver().take()));
-    let sender = mailbox.send_from(2, Full::Reject, &[(10, 2)]);
+    let sender = mailbox.send_from(2, OverflowPolicy::Reject, &[(10, 2)]);
     let slots = mailbox.slots();
     let mut owner = mailbox.receiver();
     slots.adopt(|_| unreachable!("it is handed out for the second time only"));

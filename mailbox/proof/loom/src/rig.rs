@@ -7,7 +7,7 @@ use crate::name::Priority;
 use crate::bell::Bell;
 use crate::queue::Queue;
 use crate::hot::Hot;
-use crate::slots::{Bodies, Full, NoSlot, Posted, Published, Slots};
+use crate::slots::{Bodies, OverflowPolicy, NoSlot, Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use crate::word::{Claimant, FREE, Victim, Word};
@@ -72,7 +72,7 @@ impl Mailbox {
         Slots::new(&self.hot, &self.words, 1, self.words.len(), unseen)
     }
 
-    pub(super) fn sender(&self, participant: u16, full: Full) -> Sender<'_> {
+    pub(super) fn sender(&self, participant: u16, full: OverflowPolicy) -> Sender<'_> {
         Sender { mailbox: self, by: Claimant { participant, incarnation: 1 }, cursor: 0, full, last: None }
     }
 
@@ -81,7 +81,7 @@ impl Mailbox {
     }
 
     /// Sends these packages (priority, body) from a thread of its own; returns the bodies of the accepted ones.
-    pub(super) fn send_from(self: &Arc<Self>, participant: u16, full: Full, packages: &'static [(u8, u8)]) -> JoinHandle<Vec<u8>> {
+    pub(super) fn send_from(self: &Arc<Self>, participant: u16, full: OverflowPolicy, packages: &'static [(u8, u8)]) -> JoinHandle<Vec<u8>> {
         let mailbox = self.clone();
         thread::spawn(move || mailbox.sender(participant, full).send_all(packages))
     }
@@ -90,7 +90,7 @@ impl Mailbox {
     pub(super) fn dies_sending(
         self: &Arc<Self>,
         participant: u16,
-        full: Full,
+        full: OverflowPolicy,
         step: &'static str,
         packages: &'static [(u8, u8)],
     ) -> JoinHandle<bool> {
@@ -173,7 +173,7 @@ pub(super) struct Sender<'a> {
     pub(super) mailbox: &'a Mailbox,
     pub(super) by: Claimant,
     pub(super) cursor: usize,
-    pub(super) full: Full,
+    pub(super) full: OverflowPolicy,
     /// The last package: all that one sender sends here is of one state.
     pub(super) last: Option<Posted>,
 }
@@ -183,7 +183,7 @@ impl Sender<'_> {
         let slots = self.mailbox.slots();
         let mut claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full, self.last) {
             Ok(claim) => claim,
-            Err(NoSlot::Full) => return Sent::Refused,
+            Err(NoSlot::OverflowPolicy) => return Sent::Refused,
             Err(NoSlot::Retired) => return Sent::Retired,
         };
         let cell = &self.mailbox.bodies[claim.slot];
@@ -196,7 +196,7 @@ impl Sender<'_> {
         }
         match slots.publish(claim, Priority(priority)) {
             Published::Accepted { posted, wake } => {
-                self.last = (self.full == Full::Latest).then_some(posted);
+                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);
                 if wake {
                     self.mailbox.ring();
                 }

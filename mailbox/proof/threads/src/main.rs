@@ -50,7 +50,7 @@ fn scaled(usual: u64) -> u64 {
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match &arguments[..] {
-        [] => judge(),
+        [] => validate(),
         [variant, run] => match find(variant, run) {
             Some(run) => {
                 std::thread::spawn(|| {
@@ -79,7 +79,7 @@ fn find(variant: &str, run: &str) -> Option<fn()> {
     if variant == "real" { whole() } else { broken() }
 }
 
-fn judge() -> ExitCode {
+fn validate() -> ExitCode {
     let mut wrong = 0;
     for (run, _) in real::runs::ALL {
         let ended = process("real", run);

@@ -6,7 +6,7 @@
 use super::bell::Bell;
 use super::hot::Hot;
 use super::queue::Queue;
-use super::slots::{Bodies, Full, NoSlot, Posted, Published, Slots};
+use super::slots::{Bodies, NoSlot, OverflowPolicy, Posted, Published, Slots};
 use super::word::{Claimant, FREE, State, Victim};
 use crate::name::Priority;
 use crate::step::{dice, reached, shake};
@@ -55,7 +55,7 @@ pub(crate) struct Mailbox {
 }
 
 // SAFETY: the bodies are the only part that is not Sync by itself. Whether the slot core keeps two threads from one body is
-// what is tested here, and ThreadSanitizer is the judge.
+// what is tested here, and ThreadSanitizer is the validate.
 unsafe impl Sync for Mailbox {}
 
 impl Mailbox {
@@ -102,7 +102,7 @@ impl Mailbox {
     pub(crate) fn send_from(
         &'static self,
         participant: u16,
-        full: Full,
+        full: OverflowPolicy,
         priority: u8,
         packages: u64,
     ) -> JoinHandle<()> {
@@ -121,7 +121,7 @@ impl Mailbox {
     }
 
     /// A sender that claims a slot, begins to fill it, and dies.
-    pub(crate) fn dies_filling(&'static self, participant: u16, full: Full, priority: u8) -> JoinHandle<()> {
+    pub(crate) fn dies_filling(&'static self, participant: u16, full: OverflowPolicy, priority: u8) -> JoinHandle<()> {
         self.senders.fetch_add(1, Ordering::Relaxed);
         thread::spawn(move || {
             shake(participant.into());
@@ -186,7 +186,7 @@ pub(crate) struct Sender {
     mailbox: &'static Mailbox,
     by: Claimant,
     cursor: usize,
-    full: Full,
+    full: OverflowPolicy,
     /// The last package: all that one sender sends here is of one state.
     last: Option<Posted>,
     sent: u64,
@@ -201,7 +201,7 @@ pub(crate) enum Sent {
 }
 
 impl Sender {
-    pub(crate) fn new(mailbox: &'static Mailbox, participant: u16, full: Full) -> Self {
+    pub(crate) fn new(mailbox: &'static Mailbox, participant: u16, full: OverflowPolicy) -> Self {
         Self { mailbox, by: Claimant { participant, incarnation: 1 }, cursor: 0, full, last: None, sent: 0 }
     }
 
@@ -224,7 +224,7 @@ impl Sender {
         let (slots, counts) = (self.slots(), &self.mailbox.counts);
         let mut claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full, self.last) {
             Ok(claim) => claim,
-            Err(NoSlot::Full) => {
+            Err(NoSlot::OverflowPolicy) => {
                 add(&counts.refused);
                 return Sent::Refused;
             }
@@ -238,7 +238,7 @@ impl Sender {
         }
         match slots.publish(claim, Priority(priority)) {
             Published::Accepted { posted, wake } => {
-                self.last = (self.full == Full::Latest).then_some(posted);
+                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);
                 add(&counts.accepted);
                 if wake {
                     self.mailbox.ring();

@@ -1,7 +1,7 @@
 //! The runs: each lets threads do one thing many times, and judges the accounts at the end.
 
 use super::rig::{Mailbox, Receiver, Sender, Sent};
-use super::slots::Full;
+use super::slots::OverflowPolicy;
 use crate::scaled;
 use crate::step::shake;
 use std::sync::atomic::Ordering;
@@ -30,7 +30,7 @@ fn join(threads: impl IntoIterator<Item = JoinHandle<()>>) {
 /// Two slots, two senders, a receiver that never sleeps.
 pub(crate) fn handing_over() {
     let mailbox = Mailbox::new(2);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, Full::Reject, 10, scaled(60_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Reject, 10, scaled(60_000)));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -40,7 +40,7 @@ pub(crate) fn handing_over() {
 /// The receiver sleeps whenever there is nothing.
 pub(crate) fn sleeping() {
     let mailbox = Mailbox::new(4);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, Full::Reject, 10, scaled(20_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Reject, 10, scaled(20_000)));
     Receiver::new(mailbox).drain(true);
     join(senders);
     mailbox.is_accounted();
@@ -49,7 +49,7 @@ pub(crate) fn sleeping() {
 /// Two slots, three senders of which each outranks the one before.
 pub(crate) fn displacing() {
     let mailbox = Mailbox::new(2);
-    let senders = [1, 2, 3].map(|me| mailbox.send_from(me, Full::Displace, 10 * me as u8, scaled(50_000)));
+    let senders = [1, 2, 3].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10 * me as u8, scaled(50_000)));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -59,7 +59,7 @@ pub(crate) fn displacing() {
 /// States: each newer package replaces the one of its sender that still waits.
 pub(crate) fn replacing() {
     let mailbox = Mailbox::new(4);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, Full::Latest, 10 * me as u8, scaled(50_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Latest, 10 * me as u8, scaled(50_000)));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -69,7 +69,7 @@ pub(crate) fn replacing() {
 /// The same with one slot: the newer is written where the older was.
 pub(crate) fn reusing() {
     let mailbox = Mailbox::new(1);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, Full::Latest, 10 * me as u8, scaled(50_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Latest, 10 * me as u8, scaled(50_000)));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -80,8 +80,8 @@ pub(crate) fn reclaiming() {
     let rounds = (0..scaled(40)).map(|round| {
         let mailbox = Mailbox::new(3);
         shake(round + 1);
-        let dying = [1, 2].map(|me| mailbox.dies_filling(me, Full::Displace, 20));
-        let living = [3, 4].map(|me| mailbox.send_from(me, Full::Displace, 10, 200));
+        let dying = [1, 2].map(|me| mailbox.dies_filling(me, OverflowPolicy::Displace, 20));
+        let living = [3, 4].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10, 200));
         let mut receiver = Receiver::new(mailbox);
         while mailbox.has_senders() {
             receiver.take();
@@ -103,7 +103,7 @@ pub(crate) fn reclaiming() {
 /// Receivers die with a package in hand, one after the other, while packages come in.
 pub(crate) fn adopting() {
     let mailbox = Mailbox::new(3);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, Full::Displace, 10 * me as u8, scaled(20_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10 * me as u8, scaled(20_000)));
     for life in 0..scaled(250) {
         let receiver = thread::spawn(move || {
             shake(life + 100);
@@ -127,7 +127,8 @@ pub(crate) fn retiring() {
         let senders = [1, 2].map(|me| {
             thread::spawn(move || {
                 shake(me.into());
-                let [mut here, mut there] = [old, new].map(|mailbox| Sender::new(mailbox, me, Full::Displace));
+                let [mut here, mut there] =
+                    [old, new].map(|mailbox| Sender::new(mailbox, me, OverflowPolicy::Displace));
                 for _ in 0..100 {
                     if here.send(10 * me as u8) == Sent::Retired {
                         there.send(10 * me as u8);

@@ -84,7 +84,7 @@ impl Admission {
     }
 
     /// Judges a line, and bounds what it claims. Says whose share it used.
-    pub(super) fn judge(
+    pub(super) fn validate(
         &mut self,
         installation: &Installation,
         from: Name,
@@ -141,7 +141,7 @@ impl Admission {
         &mut self.writers[at]
     }
 
-    /// A line cannot be later than now, nor tell of more lines than its module can have said since the last one; of the first in this life
+    /// A line cannot be later than now, nor tell of more lines than its module can have said since the last one; of the first in this incarnation
     /// of the collector, since the computer started. What it said stands in its text.
     fn bound(&mut self, line: &mut OutputLine, now_ns: u64, lost_max: u64, quiet_ns: u64) {
         let mut marks = String::new();
@@ -195,12 +195,12 @@ mod tests {
     fn a_line_is_said_in_the_senders_name_or_by_launch_of_its_node() {
         let installation = installation();
         let mut admission = Admission::new(100, 200);
-        let (base, desk) = (Name::new(1, 16, 0, 0), Name::new(1, 16, 4, 0));
+        let (base, command_server) = (Name::new(1, 16, 0, 0), Name::new(1, 16, 4, 0));
         for (from, named, taken, why) in [
             (MOTOR, MOTOR, true, "its own"),
             (MOTOR.with_local(1), MOTOR, true, "from any of its mailboxes"),
             (base, MOTOR, true, "what it printed, from launch of its node"),
-            (desk, MOTOR, false, "launch of another node"),
+            (command_server, MOTOR, false, "launch of another node"),
             (Name::new(1, 16, 1, 0), MOTOR, false, "a tool"),
             (Name::new(1, 32, 0, 0), MOTOR, false, "another module"),
             (MOTOR, base, false, "a module in the name of launch"),
@@ -209,7 +209,7 @@ mod tests {
             (Name::new(2, 16, 0, 0), MOTOR, false, "and in ours"),
             (Name::new(1, 150, 9, 0), Name::new(1, 150, 9, 0), true, "a program that the file does not know"),
         ] {
-            assert_eq!(admission.judge(&installation, from, &mut line(named), NOW).is_ok(), taken, "{why}");
+            assert_eq!(admission.validate(&installation, from, &mut line(named), NOW).is_ok(), taken, "{why}");
         }
         let counts = RefusedLines { foreign_name: 4, other_system: 2, ..RefusedLines::default() };
         assert_eq!(admission.counts, counts);
@@ -223,12 +223,12 @@ mod tests {
         let strangers = (0..20_000_u64).filter(|n| {
             let name = Name::new(1, 150, 1 + (n % 200) as u8, 0);
             let came = Came { mono_ns: NOW.mono_ns + n * SECOND_NS / 20_000, ..NOW };
-            admission.judge(&installation, name, &mut line(name), came).is_ok()
+            admission.validate(&installation, name, &mut line(name), came).is_ok()
         });
         let taken = strangers.count() as u64;
         assert!(taken > 20 && taken <= most, "{taken} of at most {most}");
         assert_eq!(admission.counts.beyond_share, 20_000 - taken);
-        assert!(admission.judge(&installation, MOTOR, &mut line(MOTOR), NOW).is_ok());
+        assert!(admission.validate(&installation, MOTOR, &mut line(MOTOR), NOW).is_ok());
     }
 
     #[test]
@@ -238,7 +238,7 @@ mod tests {
         let mut told = Vec::new();
         for n in 0..100 {
             let came = Came { mono_ns: NOW.mono_ns + n * SECOND_NS / 10, ..NOW };
-            let refused = admission.judge(&installation, Name::new(2, 9, 0, 0), &mut line(MOTOR), came).unwrap_err();
+            let refused = admission.validate(&installation, Name::new(2, 9, 0, 0), &mut line(MOTOR), came).unwrap_err();
             told.extend(refused.0);
         }
         let begins: Vec<&str> = told.iter().map(|text| text.split(' ').next().unwrap()).collect();
@@ -252,7 +252,7 @@ mod tests {
         let mut judged = |mono_ns: u64, change: fn(&mut OutputLine)| {
             let mut said = line(MOTOR);
             change(&mut said);
-            admission.judge(&installation, MOTOR, &mut said, Came { mono_ns, ..NOW }).unwrap();
+            admission.validate(&installation, MOTOR, &mut said, Came { mono_ns, ..NOW }).unwrap();
             said
         };
         assert_eq!(judged(SECOND_NS, |line| line.time_ns += AHEAD_MAX_NS), {

@@ -38,7 +38,7 @@ impl super::settings::Settings for Settings {}
 pub(super) struct OutputModule {
     admission: Admission,
     ring: Ring,
-    /// Tells this life's numbers from earlier ones.
+    /// Tells this incarnation's numbers from earlier ones.
     life: u32,
     format: LineFormat,
     file: Option<LogFile>,
@@ -85,7 +85,7 @@ impl OutputModule {
         let came = Came { mono_ns: monotonic_ns(), time_ns: context.now().ns };
         let read = postcard::from_bytes(data.value);
         let mut line: OutputLine = read.map_err(|_| self.admission.unreadable(data.from, came.mono_ns))?;
-        let principal = self.admission.judge(context.installation(), data.from, &mut line, came)?;
+        let principal = self.admission.validate(context.installation(), data.from, &mut line, came)?;
         Ok((principal, line))
     }
 

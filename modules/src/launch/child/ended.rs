@@ -28,7 +28,7 @@ impl Child {
         // Started again, it would find the same configuration.
         let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
         let success = status.success();
-        let next = if misconfigured || self.last_life { Next::Stay } else { self.policy.ended(success, now) };
+        let next = if misconfigured || self.last_incarnation { Next::Stay } else { self.policy.ended(success, now) };
         self.follow(next, success, &how, &printed, now)
     }
 

@@ -63,7 +63,7 @@ impl Child {
 
     /// Tells its process to end; `step` sees to it that it does. A later wish replaces an earlier one.
     pub(in crate::launch) fn tell_to_end(&mut self, then: Then, node: &Node, now: Instant) {
-        self.last_life |= then == Then::End;
+        self.last_incarnation |= then == Then::End;
         if then == Then::Start {
             self.policy.begin_anew();
             self.repeats = Repeats::default();

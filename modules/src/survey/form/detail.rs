@@ -1,7 +1,7 @@
 //! One mailbox down to its slots, as it travels.
 
 use super::{MailboxForm, mailbox, mailbox_form};
-use crate::survey::MailboxLook;
+use crate::survey::MailboxSnapshot;
 use rohrpost_mailbox::{MailboxDetail, Name, Party, Priority, SlotInfo, VictimInfo, WaitingPackage};
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ struct PartyForm {
     is_alive: bool,
 }
 
-pub(super) fn detail_form(look: &MailboxLook) -> DetailForm {
+pub(super) fn detail_form(look: &MailboxSnapshot) -> DetailForm {
     let detail = &look.detail;
     DetailForm {
         stopped: look.stopped.clone(),
@@ -49,14 +49,14 @@ pub(super) fn detail_form(look: &MailboxLook) -> DetailForm {
     }
 }
 
-pub(super) fn detail(form: DetailForm) -> MailboxLook {
+pub(super) fn detail(form: DetailForm) -> MailboxSnapshot {
     let detail = MailboxDetail {
         info: mailbox(form.info),
         receiver: form.receiver.map(party),
         is_retired: form.is_retired,
         slots: form.slots.into_iter().map(slot).collect(),
     };
-    MailboxLook { detail, stopped: form.stopped }
+    MailboxSnapshot { detail, stopped: form.stopped }
 }
 
 fn slot_form(slot: &SlotInfo) -> SlotForm {

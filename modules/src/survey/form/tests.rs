@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use rohrpost_mailbox::{Class, ClassTraffic, FlowInfo, FlowSecond, Latency, Type};
 
 /// A look with something in each of its parts.
-fn seen() -> Seen {
+fn seen() -> Snapshot {
     let waited = Latency { max: Duration::from_micros(3), ..Latency::default() };
     let class = ClassTraffic {
         class: Some(Class(140)),
@@ -29,7 +29,7 @@ fn seen() -> Seen {
         node: "base".into(),
         at_ns: Some(9),
         name,
-        faces: vec![Name::new(1, 141, 0, 0)],
+        aliases: vec![Name::new(1, 141, 0, 0)],
         process: Some(process),
         usage: Some(Usage { cpu: Duration::from_millis(30), memory_bytes: 1 << 20 }),
         scheduling: Some(Scheduling::Normal(-3)),
@@ -76,7 +76,7 @@ fn seen() -> Seen {
     };
     let mailbox = MailboxInfo {
         name,
-        shape: Shape { max_age: Some(Duration::from_secs(2)), full: Full::Latest, ..Shape::default() },
+        shape: Shape { max_age: Some(Duration::from_secs(2)), full: OverflowPolicy::Latest, ..Shape::default() },
         owner: Some(4711),
         adoptions: 1,
         depth: 1,
@@ -84,7 +84,7 @@ fn seen() -> Seen {
         sent: 8,
         classes: vec![class.clone()],
     };
-    Seen::Survey(Box::new(Survey {
+    Snapshot::Survey(Box::new(Survey {
         node: "base".into(),
         at_ns: 9,
         modules: vec![module],
@@ -97,7 +97,7 @@ fn seen() -> Seen {
 #[test]
 fn what_travels_arrives_field_by_field() {
     let there = seen();
-    let here = Seen::from_bytes(&there.to_bytes()).unwrap();
+    let here = Snapshot::from_bytes(&there.to_bytes()).unwrap();
     assert_eq!(format!("{there:?}"), format!("{here:?}"));
 }
 
@@ -110,9 +110,9 @@ proptest! {
         let at = at.index(changed.len());
         changed[at] = with;
         for bytes in [bytes, changed] {
-            if let Ok(seen) = Seen::from_bytes(&bytes) {
+            if let Ok(seen) = Snapshot::from_bytes(&bytes) {
                 // What was read is written as it is read: a second way through changes nothing.
-                let again = Seen::from_bytes(&seen.to_bytes()).unwrap();
+                let again = Snapshot::from_bytes(&seen.to_bytes()).unwrap();
                 prop_assert_eq!(format!("{seen:?}"), format!("{again:?}"));
             }
         }

@@ -63,10 +63,10 @@ pub(super) fn check_restart() {
     assert_eq!(base.log.events, [Event::Heard { peer: 1 }, Event::Restarted { peer: 1 }]);
     base.take(START + MS, 1, &old[1]);
     base.take(START + MS, 1, &new[1]);
-    assert_eq!(base.log.ids(), [0, 1], "nothing of the old life, nothing twice");
+    assert_eq!(base.log.ids(), [0, 1], "nothing of the old incarnation, nothing twice");
     let received = &base.stats.peer(1).received;
     assert_eq!((received.restarts.get(), received.old.get(), received.copies.get()), (1, 2, 1));
-    assert_eq!(received.lost.get(), 1, "the first life's first, which only said that it is there");
+    assert_eq!(received.lost.get(), 1, "the first incarnation's first, which only said that it is there");
 
     // A second router that goes on as the same node is noticed, and kept out.
     for step in 0..30 {
@@ -116,7 +116,7 @@ fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
     old[1..4].iter().for_each(|datagram| base.take(START, 1, datagram));
     new[..2].iter().for_each(|datagram| base.take(START, 1, datagram));
     let before = base.log.delivered.len();
-    // The second life is silent, and the wire or a stranger has kept what the first one sent.
+    // The second incarnation is silent, and the wire or a stranger has kept what the first one sent.
     let now_ns = START + 3 * S;
     old[..4].iter().for_each(|datagram| base.take(now_ns, 1, datagram));
     let stats = base.stats.clone();
@@ -128,7 +128,7 @@ fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
     );
     assert!(!base.log.events.contains(&Event::Twice { peer: 1 }), "that router may have ended");
     base.take(now_ns, 1, &new[2]);
-    assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 1, 1), "the second life goes on");
+    assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 1, 1), "the second incarnation goes on");
     base.take(now_ns + S, 1, &old[4]);
     assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 2, 2), "what goes on is no copy");
     new.iter().for_each(|datagram| base.take(now_ns + 2 * S, 1, datagram));
@@ -245,7 +245,7 @@ fn one_datagram_that_is_far_ahead_changes_nothing() {
     check_jump();
 }
 
-pub(super) fn check_forged_lives() {
+pub(super) fn check_forged_incarnations() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, quick));
     let mut send = || arm.send(START, data(1, 0), b"", true).unwrap().1;
     base.take(START, 1, &send());
@@ -266,7 +266,7 @@ pub(super) fn check_forged_lives() {
 
 #[test]
 fn lives_that_one_datagram_each_tells_of_change_nothing() {
-    check_forged_lives();
+    check_forged_incarnations();
 }
 
 #[test]
@@ -277,7 +277,7 @@ fn the_first_datagram_that_is_heard_may_be_a_forged_one() {
         for _ in 0..4 {
             base.take(START, 1, &arm.send(START, data(1, 0), b"", true).unwrap().1);
         }
-        assert_eq!(base.log.ids(), [1, 2, 3], "of its life or another: the second true one is believed");
+        assert_eq!(base.log.ids(), [1, 2, 3], "of its incarnation or another: the second true one is believed");
         assert_eq!(base.stats.peer(1).received.old.get(), 1);
     }
 }

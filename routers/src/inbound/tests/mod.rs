@@ -19,7 +19,7 @@ pub(crate) const CHECKS: &[fn()] = &[
     lives::check_silence,
     lives::check_restart,
     lives::check_jump,
-    lives::check_forged_lives,
+    lives::check_forged_incarnations,
     check_whole,
     lives::check_one_way,
     lives::check_socket,
@@ -99,7 +99,7 @@ fn check_order() {
         assert_eq!(order.admit(&head, position(sequence, index)), admitted, "{why}");
     }
     order.clear();
-    assert!(order.admit(&a, position(0, 0)), "another life counts anew");
+    assert!(order.admit(&a, position(0, 0)), "another incarnation counts anew");
 }
 
 use rohrpost_mailbox::Head;

@@ -41,7 +41,7 @@ pub(super) fn check_digest() {
     assert!(base.log.delivered.is_empty() && arm.refusals(now_ns).is_empty(), "a refusal is not refused");
     assert_eq!(base.stats.peer(1).received.refused.get(), 25);
 
-    // Its configuration is mended: it is started anew.
+    // Its configuration is fixed: it is started anew.
     base.take(now_ns, 1, &datagram(|settings| settings.incarnation = 999));
     assert_eq!((base.stats.state(1, now_ns), base.log.delivered.len()), (State::Alive, 1));
     assert!(base.stats.state(1, now_ns + 10 * S) == State::Silent, "and a refusal holds for a while only");

@@ -336,7 +336,7 @@ fn an_idle_peer_hears_every_200_ms_and_a_busy_one_every_500_ms_what_we_heard() {
     assert_eq!(
         (of(1, 0, 2 * S), of(2, 0, 2 * S), of(2, 2 * S, 4 * S)),
         (11, 10, 10),
-        "and once more 10 ms after the first, and to who begins a life"
+        "and once more 10 ms after the first, and to who begins an incarnation"
     );
     assert_eq!(of(1, 2 * S, 4 * S), 4, "a busy one");
     assert_eq!((ALIVE_EVERY_NS, TELL_EVERY_NS), (200 * MS, S / 2));
@@ -436,7 +436,7 @@ fn what_is_not_real_time_leaves_at_the_rate_that_is_left() {
     let slow = |settings: &mut Settings| settings.network.rate_bytes_s = 1_000_000;
     let (mut first, mut rest) = (End::new(0, slow), End::new(0, slow));
     rest.outbound = Outbound::new(&rest.settings, rest.stats.clone()).behind(&first.stats);
-    assert_eq!(rest.send(START, to(1, 90), b"", true), None, "it has not said that it hears this life");
+    assert_eq!(rest.send(START, to(1, 90), b"", true), None, "it has not said that it hears this incarnation");
     assert!(rest.poll(START).is_err(), "so nothing leaves");
     for end in [&mut first, &mut rest] {
         end.hears(1, START);

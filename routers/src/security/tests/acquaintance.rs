@@ -48,11 +48,11 @@ fn whichever_hellos_are_lost_asking_again_joins_them() {
 #[test]
 fn a_router_that_was_started_anew_is_known_after_it_has_asked() {
     let (mut a, mut b) = pair();
-    let old = a.seal(Port::Packages, 1, b"of the old life").unwrap();
+    let old = a.seal(Port::Packages, 1, b"of the old incarnation").unwrap();
     let mut a = Router::new(0, 101);
     acquaint(&mut a, &mut b);
     assert_eq!(b.all.incarnation(0), Some(101));
-    assert_eq!(b.open(Port::Packages, &old), Err(Rejection::OtherLife.into()), "it came too late");
+    assert_eq!(b.open(Port::Packages, &old), Err(Rejection::OtherIncarnation.into()), "it came too late");
     let new = a.seal(Port::Packages, 1, b"of the new").unwrap();
     assert_eq!(b.open(Port::Packages, &new).unwrap().1, b"of the new");
 }
@@ -80,7 +80,7 @@ pub(super) fn check_only_who_lives_begins() {
     let challenge = b.all.challenge(0);
     for hello in &kept {
         if let Ok((began, _)) = b.greet(hello) {
-            assert!(!began, "a life began by what was recorded");
+            assert!(!began, "an incarnation began by what was recorded");
         }
     }
     assert_eq!((b.all.incarnation(0), b.all.challenge(0)), (Some(300), challenge));
@@ -98,10 +98,10 @@ fn an_answer_serves_once_and_only_to_whom_it_was_given() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
     let answer = b.greet(&a.ask(1)).unwrap().1.unwrap();
     let mut other = Router::new(0, 101);
-    assert_eq!(other.greet(&answer), Ok((false, None)), "the challenge was another life's");
+    assert_eq!(other.greet(&answer), Ok((false, None)), "the challenge was another incarnation's");
     assert!(a.greet(&answer).unwrap().0);
     assert_eq!(a.greet(&answer), Ok((false, None)));
-    // Said again after the life that it began has ended.
+    // Said again after the incarnation that it began has ended.
     let mut next = Router::new(1, 201);
     acquaint(&mut next, &mut a);
     assert_eq!((a.greet(&answer), a.all.incarnation(1)), (Ok((false, None)), Some(201)));
@@ -114,7 +114,7 @@ fn a_life_that_comes_back_is_heard_from_where_it_is_now() {
     let kept_back = a.seal(Port::Packages, 1, b"kept back").unwrap();
     b.open(Port::Packages, &taken).unwrap();
     acquaint(&mut Router::new(0, 101), &mut b);
-    assert_eq!(b.open(Port::Packages, &kept_back), Err(Rejection::OtherLife.into()));
+    assert_eq!(b.open(Port::Packages, &kept_back), Err(Rejection::OtherIncarnation.into()));
     // The first was only frozen, and is there again.
     acquaint(&mut a, &mut b);
     assert_eq!(b.all.incarnation(0), Some(100));
@@ -191,7 +191,7 @@ fn recorded_questions_cost_a_bounded_number_of_answers() {
     let mut answer_at = |now_ns| {
         let (mut datagram, mut room) = (question.clone(), [0; HELLO_DATAGRAM_BYTES]);
         let Ok(Opened::Hello(head, greeting)) = b.opening[0].open(&mut datagram) else { panic!() };
-        b.greeter.greet(now_ns, &head, &greeting, &mut room).reply_bytes.is_some()
+        b.handshake.greet(now_ns, &head, &greeting, &mut room).reply_bytes.is_some()
     };
     let mut answered_in = |from_ns: u64| (0..1000).filter(|later| answer_at(from_ns + later)).count();
     assert_eq!(answered_in(PER_NS), ANSWERS_MAX as usize);
@@ -209,7 +209,7 @@ fn an_answer_that_is_kept_back_begins_nothing() {
         let of_b = b.greet(&a.ask(1)).unwrap().1.unwrap();
         let last_word = a.greet(&of_b).unwrap().1.unwrap();
         let command = a.seal(Port::Packages, 1, b"a command").unwrap();
-        // That life ends, and only then B gets what it said.
+        // That incarnation ends, and only then B gets what it said.
         drop(a);
         for kept in [&answer, &last_word] {
             assert_eq!(b.greet_at(after_ns, kept).unwrap().0, begins && kept == &answer, "after {after_ns} ns");
@@ -224,10 +224,10 @@ fn nothing_is_sealed_to_a_life_before_the_last_word_has_left() {
     let mut answer = b.greet(&a.ask(1)).unwrap().1.unwrap();
     let mut room = [0; HELLO_DATAGRAM_BYTES];
     let Ok(Opened::Hello(head, greeting)) = a.opening[0].open(&mut answer) else { panic!() };
-    let greeted = a.greeter.greet(0, &head, &greeting, &mut room);
+    let greeted = a.handshake.greet(0, &head, &greeting, &mut room);
     assert!(greeted.begins && greeted.reply_bytes.is_some());
     assert_eq!((a.all.known(), a.seal(Port::Packages, 1, b"too early")), (0, Err(Unacquainted)));
-    assert_eq!((a.greeter.begin(), a.all.known()), (Some(1), 0b10));
+    assert_eq!((a.handshake.begin(), a.all.known()), (Some(1), 0b10));
     let first = a.seal(Port::Packages, 1, b"first").unwrap();
     b.greet(&room).unwrap();
     assert!(b.open(Port::Packages, &first).is_ok());

@@ -11,7 +11,7 @@ use rohrpost_network::Security;
 
 struct Router {
     gate: Gate,
-    all: Arc<Acquaintances>,
+    all: Arc<PeerSessions>,
     end: End,
 }
 
@@ -29,7 +29,7 @@ impl Router {
     }
 
     fn with_keys(end: End, keys: KeyRing, own: u8) -> Self {
-        let all = Acquaintances::new(Who::of(&end.settings), keys);
+        let all = PeerSessions::new(Who::of(&end.settings), keys);
         Self { gate: Gate::new(&all, [own; 32]), all, end }
     }
 
@@ -75,7 +75,7 @@ fn who_is_not_known_is_asked_again_and_again_and_who_speaks_of_another_life_soon
     let mut again = Router::new(1);
     again.ask(now_ns);
     assert!(again.take(now_ns, 0, &datagram).is_none());
-    assert_eq!(again.all.rejections(Port::Packages).of(Some(0), Rejection::OtherLife), 1);
+    assert_eq!(again.all.rejections(Port::Packages).of(Some(0), Rejection::OtherIncarnation), 1);
     assert_eq!(again.ask(now_ns + 20 * MS).len(), 1, "sooner than who says nothing");
     let told = again.end.log.events.iter().filter(|event| matches!(event, Event::Rejected { .. })).count();
     assert_eq!(told, 1);

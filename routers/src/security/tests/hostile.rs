@@ -73,7 +73,7 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
     let wanted = std::env::var("HOSTILE_DATAGRAMS").ok();
     let datagrams = wanted.map_or(NORMALLY, |wanted| wanted.parse().expect("HOSTILE_DATAGRAMS is a number"));
     let mut hostile = Hostile { chance: ChaCha8Rng::seed_from_u64(4), recorded: Vec::new() };
-    // Earlier lives, which said much that was never delivered; then two that stay.
+    // Earlier incarnations, which said much that was never delivered; then two that stay.
     let mut routers = None;
     for life in 0..20 {
         let (mut a, mut b) = (Router::new(0, 100 + life), Router::new(1, 200 + life / 3));
@@ -100,8 +100,8 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
             match router.opening[port as usize].open(&mut datagram) {
                 Ok(Opened::Frame(head, _)) => panic!("datagram {number} was taken: {head:?}, {sent:?}"),
                 Ok(Opened::Hello(head, greeting)) => {
-                    let greeted = router.greeter.greet(number, &head, &greeting, &mut room);
-                    assert!(!greeted.begins, "a life began by datagram {number}: {sent:?}");
+                    let greeted = router.handshake.greet(number, &head, &greeting, &mut room);
+                    assert!(!greeted.begins, "an incarnation began by datagram {number}: {sent:?}");
                 }
                 Err(_) => {}
             }

@@ -30,12 +30,12 @@ pub(super) fn ring(ids: &[u8]) -> KeyRing {
     KeyRing::new(key(ids[0]), ids.get(1).map(|id| key(*id)))
 }
 
-/// One life of a router.
+/// One incarnation of a router.
 pub(super) struct Router {
     pub(super) own: NodeIndex,
     pub(super) incarnation: u64,
-    pub(super) all: Arc<Acquaintances>,
-    pub(super) greeter: Greeter,
+    pub(super) all: Arc<PeerSessions>,
+    pub(super) handshake: Handshake,
     /// By port.
     pub(super) sealing: [Sealing; 3],
     pub(super) opening: [Opening; 3],
@@ -49,13 +49,13 @@ impl Router {
 
     pub(super) fn with_keys(own: NodeIndex, incarnation: u64, keys: KeyRing) -> Self {
         let who = Who { system: SYSTEM, own, nodes: 3, digest: DIGEST, incarnation };
-        let all = Acquaintances::new(who, keys);
+        let all = PeerSessions::new(who, keys);
         let mut seed = [own; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
         Self {
             own,
             incarnation,
-            greeter: Greeter::new(&all, seed),
+            handshake: Handshake::new(&all, seed),
             sealing: Port::ALL.map(|port| Sealing::new(&all, port)),
             opening: Port::ALL.map(|port| Opening::new(&all, port)),
             next: [0; 3],
@@ -89,7 +89,7 @@ impl Router {
         }
     }
 
-    /// Takes a hello: whether a life began by it, and the answer.
+    /// Takes a hello: whether an incarnation began by it, and the answer.
     pub(super) fn greet(&mut self, datagram: &[u8]) -> Result<(bool, Option<Vec<u8>>), NotOpened> {
         self.greet_at(0, datagram)
     }
@@ -98,8 +98,8 @@ impl Router {
         let mut room = [0; HELLO_DATAGRAM_BYTES];
         match self.opening[0].open(&mut datagram.to_vec())? {
             Opened::Hello(head, greeting) => {
-                let greeted = self.greeter.greet(now_ns, &head, &greeting, &mut room);
-                assert_eq!(self.greeter.begin().is_some(), greeted.begins);
+                let greeted = self.handshake.greet(now_ns, &head, &greeting, &mut room);
+                assert_eq!(self.handshake.begin().is_some(), greeted.begins);
                 Ok((greeted.begins, greeted.reply_bytes.map(|bytes| room[..bytes].to_vec())))
             }
             Opened::Frame(..) => panic!("a frame in the place of a hello"),

@@ -73,13 +73,17 @@ fn what_is_for_another_node_port_or_life_does_not_open() {
     }
     let mut later = Router::new(1, 201);
     acquaint(&mut a, &mut later);
-    assert_eq!(later.open(Port::Packages, &for_b), rejected(Rejection::Replay), "said before this life was known");
+    assert_eq!(
+        later.open(Port::Packages, &for_b),
+        rejected(Rejection::Replay),
+        "said before this incarnation was known"
+    );
     assert!(b.open(Port::Packages, &for_b).is_ok());
-    // A life of the receiver that its sender does not know of yet.
+    // An incarnation of the receiver that its sender does not know of yet.
     let mut unknown = Router::new(1, 202);
     acquaint(&mut unknown, &mut Router::new(0, 100));
     let for_later = a.seal(Port::Packages, 1, b"text").unwrap();
-    assert_eq!(unknown.open(Port::Packages, &for_later), rejected(Rejection::Forged), "for another life");
+    assert_eq!(unknown.open(Port::Packages, &for_later), rejected(Rejection::Forged), "for another incarnation");
     assert!(later.open(Port::Packages, &for_later).is_ok());
 }
 
@@ -105,7 +109,7 @@ fn no_two_derived_keys_are_the_same() {
     let mut number = 0;
     for place in [0, 1] {
         for purpose in [Purpose::Hello, Purpose::Packages, Purpose::Time, Purpose::Rest] {
-            for (system, from, from_life, to, to_life) in [
+            for (system, from, from_incarnation, to, to_incarnation) in [
                 (1, 0, 5, 1, 6),
                 (2, 0, 5, 1, 6),
                 (1, 1, 5, 0, 6),
@@ -115,7 +119,8 @@ fn no_two_derived_keys_are_the_same() {
                 (1, 0, 5, 2, 6),
                 (1, 2, 5, 1, 6),
             ] {
-                let (from, to) = (End { node: from, incarnation: from_life }, End { node: to, incarnation: to_life });
+                let (from, to) =
+                    (End { node: from, incarnation: from_incarnation }, End { node: to, incarnation: to_incarnation });
                 let mut datagram = [0; HEAD_BYTES + 32 + TAG_BYTES];
                 ring.derive(place, &Binding { purpose, system, from, to }).close([0; 12], &mut datagram);
                 seen.insert(datagram[HEAD_BYTES..].to_vec());
@@ -157,7 +162,7 @@ fn what_could_not_be_sent_can_be_read_again_whoever_lives_by_then() {
     assert_eq!(&datagram[HEAD_BYTES..][..9], b"a package");
 }
 
-/// At the port of what is not real time no hello says what comes first; still nothing is opened twice, also when a life begins again, and when
+/// At the port of what is not real time no hello says what comes first; still nothing is opened twice, also when an incarnation begins again, and when
 /// another was taken for its successor meanwhile.
 #[test]
 fn what_is_not_real_time_opens_once_however_often_its_life_begins() {
@@ -177,7 +182,7 @@ fn what_is_not_real_time_opens_once_however_often_its_life_begins() {
         let next = a.seal(Port::Rest, 1, b"text").unwrap();
         assert!(b.open(Port::Rest, &next).is_ok(), "{why}");
     };
-    again(&mut a, &mut b, "the same life");
+    again(&mut a, &mut b, "the same incarnation");
     acquaint(&mut a, &mut b);
     again(&mut a, &mut b, "it is greeted again");
     let mut other = Router::new(0, 101);

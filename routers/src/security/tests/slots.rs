@@ -26,7 +26,7 @@ fn is_strange(router: &mut Router, datagram: &[u8]) -> bool {
 fn who_is_not_known_is_overheard_and_proves_nothing() {
     let [mut a, mut b, mut c] = three();
     let before = a.seal(Port::Time, 1, b"now").unwrap();
-    assert_eq!(b.open(Port::Time, &before), Err(Rejection::OtherLife.into()));
+    assert_eq!(b.open(Port::Time, &before), Err(Rejection::OtherIncarnation.into()));
     assert!(is_strange(&mut b, &before));
     assert_eq!(
         (overhears(&mut b, &before).unwrap(), overhears(&mut b, &before).unwrap()),
@@ -60,7 +60,7 @@ fn another_life_of_who_is_known_is_overheard_and_the_known_one_goes_on() {
     assert_eq!(b.open(Port::Time, &known).unwrap().1, b"on");
     let mut again = in_slots(Router::new(1, 201));
     let known = a.seal(Port::Time, 1, b"on").unwrap();
-    assert_eq!(overhears(&mut again, &known).unwrap(), b"on", "another life of the receiver hears it as well");
+    assert_eq!(overhears(&mut again, &known).unwrap(), b"on", "another incarnation of the receiver hears it as well");
     let packages = a.seal(Port::Packages, 1, b"on").unwrap();
     assert!(overhears(&mut again, &packages).is_err(), "but no packages");
 }
@@ -71,7 +71,7 @@ fn while_keys_are_changed_who_has_either_hears_enough() {
         let mut a = in_slots(Router::with_keys(0, 100, ring(&[2, 1])));
         let mut b = in_slots(Router::with_keys(1, 200, ring(ids)));
         if known {
-            // An earlier life that had the other key.
+            // An earlier incarnation that had the other key.
             let mut before = Router::with_keys(1, 199, ring(&[3 - ids[0]]));
             acquaint(&mut before, &mut a);
             assert_eq!(a.all.incarnation(1), Some(199));
@@ -104,7 +104,7 @@ fn the_newest_hellos_wait_and_replies_go_first() {
     put(1, said(1, true, true), 4);
     put(2, said(1, true, false), 5);
     put(2, said(9, true, false), 6);
-    assert_eq!(next(&mut waiting, 2, Some(2)), Some((1, true, 4)), "a life begins by it; nobody is node 9");
+    assert_eq!(next(&mut waiting, 2, Some(2)), Some((1, true, 4)), "an incarnation begins by it; nobody is node 9");
     assert_eq!(next(&mut waiting, 2, Some(1)), Some((1, false, 2)), "the newest, and to whom is to be asked first");
     assert_eq!(next(&mut waiting, 2, Some(1)), Some((2, false, 3)));
     assert_eq!(next(&mut waiting, 2, None), None);
@@ -154,7 +154,7 @@ fn what_was_overheard_is_not_proven_afterwards() {
     assert!(overhears(&mut b, &between[1]).is_ok());
     let mut other = in_slots(Router::new(0, 101));
     let old = other.seal(Port::Time, 1, b"old").unwrap();
-    assert!(overhears(&mut b, &old).is_ok(), "another life meanwhile");
+    assert!(overhears(&mut b, &old).is_ok(), "another incarnation meanwhile");
     let last_word = b.greet(&answer).unwrap().1.unwrap();
     a.greet(&last_word).unwrap();
     assert_eq!(b.all.incarnation(0), Some(100));
@@ -169,7 +169,7 @@ fn what_is_forged_takes_nobodys_place() {
     let [mut a, _, _] = three();
     let said = a.seal(Port::Time, 1, b"now").unwrap();
     let (head, _) = FrameHead::read(&said).unwrap();
-    let (mut overheard, peer) = (overheard::Overheard::default(), Router::new(1, 200));
+    let (mut overheard, peer) = (unverified::UnverifiedIncarnations::default(), Router::new(1, 200));
     let seal = |incarnation| {
         let from = keys::End { node: 0, incarnation };
         peer.all.keys.derive(0, &peer.all.binding(Port::Time, from, peer.all.own()))

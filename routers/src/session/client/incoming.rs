@@ -1,12 +1,12 @@
 //! What comes from the server.
 
 use super::asking::Asking;
-use super::{Client, Event, Host, Package, REGISTER_AGAIN_NS, Registration, State, Told};
-use crate::admission::{Refused, Way, capped};
+use super::{Client, Event, Host, Package, REGISTER_AGAIN_NS, Registration, Reported, State};
+use crate::admission::{ArrivalPath, Refused, capped};
 use crate::broken::broken;
 use crate::session::counts::Cause;
+use crate::session::estimate::ServerClockEstimate;
 use crate::session::frame::{BadFrame, Carried, LENGTH_MAX, Message, Reason, Refusal, VERSION, Verdict, Welcome};
-use crate::session::reckoning::Reckoning;
 use crate::session::{AGE_MAX_NS, answer_to};
 
 impl Client {
@@ -36,7 +36,7 @@ impl Client {
             (State::Member, Message::Registered(verdict)) => self.registered(now_ns, verdict, host),
             (State::Member, Message::Package(carried)) => self.take(now_ns, carried, host),
             (State::Member, Message::Answer(answer)) => {
-                self.reckoning.heard(now_ns, answer);
+                self.estimate.heard(now_ns, answer);
             }
             _ => self.damaged(now_ns, BadFrame::Damaged("a frame that is not for now"), host),
         }
@@ -49,11 +49,11 @@ impl Client {
             let refusal = Refusal { version: VERSION, reason: Reason::Common, yours, ours, text };
             return self.refused(now_ns, &refusal, host);
         }
-        if welcome.life != self.server_life {
-            self.server_life = welcome.life;
-            self.reckoning = Reckoning::default();
+        if welcome.life != self.server_incarnation {
+            self.server_incarnation = welcome.life;
+            self.estimate = ServerClockEstimate::default();
         }
-        self.reckoning.heard(now_ns, &welcome.time);
+        self.estimate.heard(now_ns, &welcome.time);
         self.state = State::Member;
         self.joined_ns = Some(now_ns);
         self.asking = Asking::begin(now_ns);
@@ -65,12 +65,12 @@ impl Client {
         }
         if verdict.objection.is_none() {
             self.registration = Registration::Holds;
-            self.told = Some(Told::Up);
+            self.told = Some(Reported::Up);
             return host.event(Event::Up);
         }
         self.registration = Registration::Due(now_ns + REGISTER_AGAIN_NS);
-        if self.told != Some(Told::Objected) {
-            self.told = Some(Told::Objected);
+        if self.told != Some(Reported::Objected) {
+            self.told = Some(Reported::Objected);
             host.event(Event::Objected(verdict));
         }
     }
@@ -84,7 +84,7 @@ impl Client {
         let oldest_ns = session.ns.saturating_add(session.error_ns).saturating_sub(carried.published_ns);
         let shift = i128::from(now_ns) - i128::from(session.ns);
         let published_ns = u64::try_from(i128::from(carried.published_ns) + shift).unwrap_or(0).min(now_ns);
-        let delivered = match self.judge(&carried, host) {
+        let delivered = match self.validate(&carried, host) {
             Err(cause) => Err(cause),
             Ok(()) if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) => Err(Cause::Stale),
             Ok(()) => host.deliver(&Carried { published_ns, ..carried }).map_err(Cause::from),
@@ -100,11 +100,11 @@ impl Client {
         }
     }
 
-    fn judge(&self, carried: &Carried<'_>, host: &mut impl Host) -> Result<(), Cause> {
+    fn validate(&self, carried: &Carried<'_>, host: &mut impl Host) -> Result<(), Cause> {
         let (head, admission) = (&carried.head, &self.settings.admission);
         // The server knows who hosts a name, and brings nothing back to who sent it.
         let is_our_name = self.ranges.iter().any(|range| range.has(head.from));
-        admission.judge(Way::Beyond { is_our_name }, head, carried.body).map_err(|why| {
+        admission.validate(ArrivalPath::Beyond { is_our_name }, head, carried.body).map_err(|why| {
             if why == Refused::NotAllowed {
                 host.not_allowed(admission.access.line(head.to.class()));
             }
@@ -117,15 +117,15 @@ impl Client {
         if matches!(reason, Reason::Version | Reason::Common | Reason::System | Reason::Certificate) {
             self.backoff.hopeless();
         }
-        self.over(now_ns, Told::Refused(reason), Event::Refused(refusal), host);
+        self.over(now_ns, Reported::Refused(reason), Event::Refused(refusal), host);
     }
 
     fn damaged(&mut self, now_ns: u64, bad: BadFrame, host: &mut impl Host) {
-        self.over(now_ns, Told::Damaged, Event::Damaged(bad), host);
+        self.over(now_ns, Reported::Damaged, Event::Damaged(bad), host);
     }
 
     /// The connection is to be closed. Why is told last: it is what people are to know.
-    fn over(&mut self, now_ns: u64, told: Told, event: Event<'_>, host: &mut impl Host) {
+    fn over(&mut self, now_ns: u64, told: Reported, event: Event<'_>, host: &mut impl Host) {
         if self.is_up() {
             self.down_ns = now_ns;
             host.event(Event::Down);

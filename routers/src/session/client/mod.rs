@@ -14,9 +14,9 @@ mod sending;
 pub use backoff::BACKOFF_MAX_NS;
 
 use super::counts::{Cause, Counts};
+use super::estimate::{Bounded, ServerClockEstimate};
 use super::frame::{Carried, Hello, Message, Range, Reason, Refusal, Verdict};
 use super::outgoing::Outgoing;
-use super::reckoning::{Bounded, Reckoning};
 use super::splitter::Splitter;
 use super::{Answers, GREETING_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
 use crate::admission::Admission;
@@ -48,7 +48,7 @@ pub struct ClientSettings {
     pub common: u64,
     /// Digest of what must be equal inside a system.
     pub system_digest: u64,
-    /// Tells this life from others; not 0. Also what its waits are drawn from.
+    /// Tells this incarnation from others; not 0. Also what its waits are drawn from.
     pub life: u64,
     /// Bytes of packages that wait.
     pub quota_bytes: usize,
@@ -156,13 +156,13 @@ pub struct Client {
     outgoing: Outgoing,
     is_blocked: bool,
     is_slow: bool,
-    reckoning: Reckoning,
+    estimate: ServerClockEstimate,
     /// Whose clocks that is about.
-    server_life: u64,
+    server_incarnation: u64,
     out: Counts,
     inn: Counts,
     /// What people know: the last refusal, or that it is up.
-    told: Option<Told>,
+    told: Option<Reported>,
     /// When it was welcomed, if it was, ns.
     joined_ns: Option<u64>,
     /// Since when packages cannot leave, ns.
@@ -174,7 +174,7 @@ pub struct Client {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Told {
+enum Reported {
     Up,
     Refused(Reason),
     Objected,
@@ -195,8 +195,8 @@ impl Client {
             outgoing: Outgoing::new(settings.quota_bytes),
             is_blocked: false,
             is_slow: false,
-            reckoning: Reckoning::default(),
-            server_life: 0,
+            estimate: ServerClockEstimate::default(),
+            server_incarnation: 0,
             out: Counts::default(),
             inn: Counts::default(),
             told: None,
@@ -247,27 +247,27 @@ impl Client {
 
     /// The shortest way there and back of late, ns.
     pub fn round_trip_ns(&self) -> Option<u64> {
-        self.reckoning.round_trip_ns()
+        self.estimate.round_trip_ns()
     }
 
     /// The server's session clock.
     pub fn session(&self, now_ns: u64) -> Option<Bounded> {
-        self.reckoning.session(now_ns)
+        self.estimate.session(now_ns)
     }
 
     /// System time as the server has it, with what the way adds to its bound.
     pub fn system_time(&self, now_ns: u64) -> Option<TimeRecord> {
-        self.reckoning.system(now_ns)
+        self.estimate.system(now_ns)
     }
 
     /// What was heard of the server's clocks does not count any more: this computer slept, or its clock is slewed.
     pub fn forget_time(&mut self) {
-        self.reckoning.forget();
+        self.estimate.forget();
     }
 
-    /// How many answers the server gave about its clocks in this life of it.
+    /// How many answers the server gave about its clocks in this incarnation of it.
     pub fn answers(&self) -> u64 {
-        self.reckoning.answers()
+        self.estimate.answers()
     }
 
     /// Bytes of memory that what waits takes up.

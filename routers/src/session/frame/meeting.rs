@@ -18,9 +18,9 @@ pub struct Hello<'a> {
     pub common: u64,
     /// Digest of what must be equal inside a system.
     pub system_digest: u64,
-    /// Tells this life of the client from others; not 0.
+    /// Tells this incarnation of the client from others; not 0.
     pub life: u64,
-    /// Counts the connections of this life, from 1: of two the later is the true one.
+    /// Counts the connections of this incarnation, from 1: of two the later is the true one.
     pub attempt: u64,
     /// Its own time, ns: the first question for the time.
     pub asked_ns: u64,
@@ -70,7 +70,7 @@ impl<'a> Hello<'a> {
 pub struct Welcome {
     /// Digest of what must be equal everywhere.
     pub common: u64,
-    /// Tells this life of the server from others: times of two lives have nothing to do with each other.
+    /// Tells this incarnation of the server from others: times of two incarnations have nothing to do with each other.
     pub life: u64,
     /// To the question of the hello.
     pub time: TimeAnswer,
@@ -109,7 +109,7 @@ pub enum Reason {
     /// Another digest of what must be equal inside a system.
     System = 3,
     /// It has as many clients as it takes.
-    Full = 4,
+    OverflowPolicy = 4,
     /// A later connection of the same client is there.
     Replaced = 5,
     /// It sent what is no frame, or no frame for then.
@@ -129,7 +129,7 @@ impl Reason {
         Self::Version,
         Self::Common,
         Self::System,
-        Self::Full,
+        Self::OverflowPolicy,
         Self::Replaced,
         Self::Damaged,
         Self::Silent,
@@ -144,7 +144,7 @@ impl Reason {
             Self::Version => "version",
             Self::Common => "common-digest",
             Self::System => "system-digest",
-            Self::Full => "full",
+            Self::OverflowPolicy => "full",
             Self::Replaced => "replaced",
             Self::Damaged => "damaged",
             Self::Silent => "silent",
@@ -210,10 +210,10 @@ impl std::fmt::Display for Refusal<'_> {
                 "the system's digest here is {yours:016x}, that of {text} {ours:016x}; start all of a system from the same file \
                  (`rohrpost check`, on both)"
             ),
-            Reason::Full if text.is_empty() => {
+            Reason::OverflowPolicy if text.is_empty() => {
                 write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some")
             }
-            Reason::Full => {
+            Reason::OverflowPolicy => {
                 write!(f, "the TCP router has as many clients as it takes, and {text}; raise `clients`, or end some")
             }
             Reason::Replaced if text.is_empty() => write!(f, "a later connection of this client has taken its place"),

@@ -77,7 +77,7 @@ impl Server {
         if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
             return self.refuse(now_ns, client, reason, digests, &holder, host);
         }
-        let older = self.places.of_life(hello.life);
+        let older = self.places.of_incarnation(hello.life);
         if let Some((older, attempt)) = older.and_then(|older| Some((older, self.member(older)?.attempt))) {
             if attempt >= hello.attempt {
                 return self.refuse(now_ns, client, Reason::Replaced, (0, 0), "", host);
@@ -85,7 +85,7 @@ impl Server {
             self.refuse(now_ns, older, Reason::Replaced, (0, 0), "", host);
         }
         if !self.take_in(now_ns, client, hello, host) {
-            return self.refuse(now_ns, client, Reason::Full, (0, 0), "", host);
+            return self.refuse(now_ns, client, Reason::OverflowPolicy, (0, 0), "", host);
         }
         if let Some(member) = self.member(client) {
             host.event(Event::Joined { name: &member.name });

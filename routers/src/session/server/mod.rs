@@ -46,7 +46,7 @@ pub struct ServerSettings {
     /// What the file gives the nodes of that. A client that has shown a certificate has [other
     /// rights](Server::certify).
     pub own_nodes: OwnNodes,
-    /// Tells this life from others; not 0.
+    /// Tells this incarnation from others; not 0.
     pub life: u64,
     /// Clients that may take part at a time.
     pub clients_max: u16,

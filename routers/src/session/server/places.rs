@@ -40,7 +40,7 @@ pub(super) struct Places {
     greetings: Crowd<Principal>,
     /// Who takes part.
     pub(super) principals: Principals,
-    /// Who takes part, by its life.
+    /// Who takes part, by its incarnation.
     lives: BTreeMap<u64, ClientIndex>,
     /// Who takes part, by its system.
     systems: BTreeSet<(u8, ClientIndex)>,
@@ -54,8 +54,8 @@ impl Places {
         self.systems.range(least..).next().filter(|(of, _)| *of == system).map(|(_, client)| *client)
     }
 
-    /// Who takes part in this life.
-    pub(super) fn of_life(&self, life: u64) -> Option<ClientIndex> {
+    /// Who takes part in this incarnation.
+    pub(super) fn of_incarnation(&self, life: u64) -> Option<ClientIndex> {
         self.lives.get(&life).copied()
     }
 
@@ -123,7 +123,7 @@ impl Server {
             let Some(newest) = self.gives_way_to(&whose) else { return false };
             self.places.crowded.clients += 1;
             let text = "who has most connections gives way to who has fewer";
-            self.refuse(now_ns, newest, Reason::Full, (0, 0), text, host);
+            self.refuse(now_ns, newest, Reason::OverflowPolicy, (0, 0), text, host);
         }
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return false };
         self.places.greets_no_more(client, member);

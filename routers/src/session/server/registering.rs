@@ -33,7 +33,7 @@ impl Server {
         let of_client = &mut member.registrations;
         let is_its_turn = now_ns >= of_client.next_ns && of_client.waiting.is_none() && is_left;
         if is_its_turn || broken!(RegistersAtOnce) {
-            return self.judge(now_ns, client, ranges.number, ranges, host);
+            return self.validate(now_ns, client, ranges.number, ranges, host);
         }
         let waiting = Waiting { number: ranges.number, ranges: ranges.collect() };
         if of_client.waiting.replace(waiting).is_some() {
@@ -63,7 +63,7 @@ impl Server {
             }
             let waiting = self.member_mut(client).and_then(|member| member.registrations.waiting.take());
             if let Some(Waiting { number, ranges }) = waiting {
-                self.judge(now_ns, client, number, ranges.into_iter(), host);
+                self.validate(now_ns, client, number, ranges.into_iter(), host);
             }
         }
     }
@@ -88,7 +88,7 @@ impl Server {
         (comes_home && !is_known(holder) && client != holder).then_some(holder)
     }
 
-    fn judge(
+    fn validate(
         &mut self,
         now_ns: u64,
         client: ClientIndex,

@@ -1,10 +1,10 @@
 //! Sessions in simulated networks, and the same with a mistake switched on: `ROHRPOST_SIM_SEEDS=1000` for more of them.
 
 mod admitted;
-mod book;
 mod ends;
 mod ground;
 mod newest;
+mod oracle;
 mod pipe;
 mod plan;
 mod registering;
@@ -55,25 +55,25 @@ fn run(plan: Plan) -> World {
     world.run(15 * S);
     (world.may_fail, world.may_post) = (false, false);
     world.run(WELL_NS);
-    if world.book.problems.is_empty() {
+    if world.oracle.problems.is_empty() {
         for index in 0..world.nodes.len() {
             if !world.nodes[index].client.is_up() {
-                world.book.broken(format!("client {index} is not up again"));
+                world.oracle.broken(format!("client {index} is not up again"));
             }
         }
         all_are_reached(&mut world);
         world.check_server(true);
         world.check_clients();
         let replaced = world.replaced();
-        world.book.seen.insert("replaced", replaced);
+        world.oracle.seen.insert("replaced", replaced);
     }
-    world.book.problems.iter_mut().for_each(|problem| *problem = format!("seed {seed}, {problem}"));
+    world.oracle.problems.iter_mut().for_each(|problem| *problem = format!("seed {seed}, {problem}"));
     world
 }
 
 /// Each sends something to each other, and all of it comes, but what a mailbox does not take.
 fn all_are_reached(world: &mut World) {
-    let before = world.book.packages.len();
+    let before = world.oracle.packages.len();
     let clients = world.nodes.len();
     for (from, to) in (0..clients).flat_map(|from| (0..clients).map(move |to| (from, to))).filter(|(a, b)| a != b) {
         let (priority, kind) = (Priority(60), Type::command(16));
@@ -83,9 +83,9 @@ fn all_are_reached(world: &mut World) {
     }
     world.run(3 * S);
     let lost =
-        world.book.packages[before..].iter().filter(|package| package.delivered.is_empty() && !package.said_lost);
+        world.oracle.packages[before..].iter().filter(|package| package.delivered.is_empty() && !package.said_lost);
     let lost: Vec<String> = lost.map(|package| format!("{:?} never came", package.head)).collect();
-    lost.into_iter().for_each(|text| world.book.broken(text));
+    lost.into_iter().for_each(|text| world.oracle.broken(text));
 }
 
 fn seeds() -> u64 {
@@ -97,8 +97,8 @@ fn sessions_keep_their_promises_whatever_goes_wrong() {
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     for seed in 0..seeds() {
         let world = run(Plan::rough(seed));
-        assert_eq!(world.book.problems, [""; 0]);
-        world.book.seen.iter().for_each(|(what, count)| *seen.entry(what).or_default() += count);
+        assert_eq!(world.oracle.problems, [""; 0]);
+        world.oracle.seen.iter().for_each(|(what, count)| *seen.entry(what).or_default() += count);
     }
     eprintln!("{} networks: {seen:#?}", seeds());
     for (what, least) in SEEN_IN_TEN {
@@ -114,8 +114,8 @@ fn a_client_that_stands_still_changes_nothing_for_the_others() {
         let ages = |is_stalled: bool| {
             let mut world = World::new(Plan { stalled: is_stalled.then_some(stalled), ..Plan::calm(seed) });
             world.run(8 * S);
-            assert_eq!(world.book.problems, [""; 0]);
-            let others = world.book.log.iter().filter(|(_, from, to)| *from != stalled && *to != stalled);
+            assert_eq!(world.oracle.problems, [""; 0]);
+            let others = world.oracle.log.iter().filter(|(_, from, to)| *from != stalled && *to != stalled);
             let mut ages: Vec<u64> = others.map(|(age_ns, _, _)| *age_ns).collect();
             ages.sort_unstable();
             ages
@@ -138,13 +138,13 @@ fn check_flood() {
         world.run(8 * S);
         world.may_post = false;
         world.run(3 * S);
-        assert_eq!(world.book.problems, [""; 0], "seed {seed}");
+        assert_eq!(world.oracle.problems, [""; 0], "seed {seed}");
         let flooder = world.plan.flooder.unwrap();
-        let lost = world.server.counts().lost_for(Cause::Full) + world.server.counts().lost_for(Cause::Share);
+        let lost = world.server.counts().lost_for(Cause::OverflowPolicy) + world.server.counts().lost_for(Cause::Share);
         assert!(lost > 1000, "seed {seed}: {lost} lost of what was too much");
         // What goes to all systems nobody says to be lost.
-        let is_one = |package: &&book::Posted| package.head.to.system() != ALL_SYSTEMS;
-        let mut others = world.book.packages.iter().filter(|package| package.from != flooder).filter(is_one);
+        let is_one = |package: &&oracle::Posted| package.head.to.system() != ALL_SYSTEMS;
+        let mut others = world.oracle.packages.iter().filter(|package| package.from != flooder).filter(is_one);
         assert!(others.clone().count() > 100);
         assert!(others.all(|package| !package.delivered.is_empty() || package.said_lost), "seed {seed}");
     }
@@ -174,9 +174,9 @@ fn check_slow_line() {
     for seed in 0..3 {
         let mut world = World::new(Plan::slow(seed));
         world.run(60 * S);
-        assert_eq!(world.book.problems, [""; 0]);
-        let large = |package: &&book::Posted| package.from == 0 && package.head.len > 30_000;
-        let left = world.book.packages.iter().filter(large).filter(|package| !package.said_lost).count();
+        assert_eq!(world.oracle.problems, [""; 0]);
+        let large = |package: &&oracle::Posted| package.from == 0 && package.head.len > 30_000;
+        let left = world.oracle.packages.iter().filter(large).filter(|package| !package.said_lost).count();
         assert!(left > 3, "{left} large packages left by the slow line");
         assert_eq!(world.nodes[0].attempts, 1, "seed {seed}: one connection, all the time");
         assert!(world.nodes[0].client.is_up());
@@ -198,7 +198,7 @@ fn every_mistake_is_noticed() {
             .chain(shares::CHECKS)
             .chain(&[check_backoff as fn(), check_slow_line, check_flood, registering::check_growth])
             .any(fails);
-        let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).book.problems.is_empty());
+        let breaks = |seed: &u64| with(broken, || !run(Plan::rough(*seed)).oracle.problems.is_empty());
         let by_network = (!by_check).then(|| (0..SEEDS).find(breaks)).flatten();
         eprintln!("{broken:?}: check {by_check}, network {by_network:?}");
         if !by_check && by_network.is_none() {
@@ -210,7 +210,7 @@ fn every_mistake_is_noticed() {
 
 #[test]
 fn accounts_of_a_network_do_not_balance_without_those_that_were_replaced() {
-    let breaks = |seed| with(Broken::ForgetsReplaced, || run(Plan::rough(seed)).book.problems);
+    let breaks = |seed| with(Broken::ForgetsReplaced, || run(Plan::rough(seed)).oracle.problems);
     let problems: Vec<String> = (0..SEEDS).map(breaks).find(|problems| !problems.is_empty()).unwrap_or_default();
     assert!(problems.iter().any(|problem| problem.contains("are accounted for")), "{problems:?}");
 }

@@ -110,7 +110,7 @@ pub struct ClockService {
 }
 
 impl ClockService {
-    /// Binds the socket and starts the thread. What an earlier life of this router wrote in the node's page goes on.
+    /// Binds the socket and starts the thread. What an earlier incarnation of this router wrote in the node's page goes on.
     ///
     /// # Errors
     /// [`ClockError`]

@@ -1,7 +1,7 @@
 //! Clocks on this computer, each with a wrong monotonic clock of its own: so the true error of each reading is known.
 
 use super::{ClockParts, ClockService, Skew, Snapshot};
-use crate::lab::stalls::{Watched, judged};
+use crate::lab::stall_detector::{Watched, repeated_on_stall};
 use crate::time::{Exchange, Role, TimeSettings};
 use rohrpost_mailbox::monotonic_ns;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
@@ -122,7 +122,7 @@ impl Clocks {
 
 #[test]
 fn bounds_hold_without_stamps_by_the_kernel() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let clocks = Clocks::new(3, Duration::from_millis(50), false);
         let master = clocks.check_bounds();
         assert!([1 - master, 2].iter().all(|slave| !clocks.snapshot(*slave).by_kernel));
@@ -131,7 +131,7 @@ fn bounds_hold_without_stamps_by_the_kernel() {
 
 #[test]
 fn slaves_know_the_masters_time_within_their_bounds_and_go_on_when_it_ends() {
-    judged(Watched::RealTime, || {
+    repeated_on_stall(Watched::RealTime, || {
         let mut clocks = Clocks::new(3, Duration::from_millis(50), true);
         let first = clocks.check_bounds();
         clocks.services[usize::from(first)] = None;

@@ -7,7 +7,7 @@ use super::state::{ClockState, Snapshot};
 use super::{ClockError, ClockParts};
 use crate::frame::{BadFrame, FrameHead, NodeIndex};
 use crate::impair::{Impairment, Output};
-use crate::security::{Acquaintances, NotOpened, Opened, Opening, Port, Rejection, Sealing, TAG_BYTES, Tally};
+use crate::security::{NotOpened, Opened, Opening, PeerSessions, Port, Rejection, Sealing, TAG_BYTES, Tally};
 use crate::time::{Clock, Exchange, InSlots, SentId, Stamp, TIME_BYTES};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, realtime_ns};
 use std::net::{IpAddr, SocketAddr};
@@ -55,7 +55,7 @@ struct Seals {
 
 /// A datagram of time that was opened.
 enum Heard<'a> {
-    /// Of a life that is known to live.
+    /// Of an incarnation that is known to live.
     Proven(FrameHead, &'a [u8]),
     /// Of one that may be over.
     Overheard(FrameHead, &'a [u8]),
@@ -97,7 +97,7 @@ impl Seals {
 }
 
 impl Works {
-    /// Binds the socket. What an earlier life of this router wrote in the node's page goes on.
+    /// Binds the socket. What an earlier incarnation of this router wrote in the node's page goes on.
     pub(in crate::shell) fn new(parts: ClockParts) -> Result<Self, ClockError> {
         let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
         let (own, system) = (settings.own, settings.system);
@@ -129,16 +129,16 @@ impl Works {
     }
 
     /// From now on it seals what it sends, and takes only what is sealed to it, if there is something to seal with.
-    pub(in crate::shell) fn sealed(self, all: Option<&Arc<Acquaintances>>) -> Self {
+    pub(in crate::shell) fn sealed(self, all: Option<&Arc<PeerSessions>>) -> Self {
         self.sealing(all, |all| Sealing::new(all, Port::Time))
     }
 
     /// The same in time slots.
-    pub(in crate::shell) fn sealed_in_slots(self, all: Option<&Arc<Acquaintances>>) -> Self {
+    pub(in crate::shell) fn sealed_in_slots(self, all: Option<&Arc<PeerSessions>>) -> Self {
         self.sealing(all, Sealing::of_slots)
     }
 
-    fn sealing(self, all: Option<&Arc<Acquaintances>>, sealing: impl Fn(&Arc<Acquaintances>) -> Sealing) -> Self {
+    fn sealing(self, all: Option<&Arc<PeerSessions>>, sealing: impl Fn(&Arc<PeerSessions>) -> Sealing) -> Self {
         let Some(all) = all else { return self };
         let (opening, tally) = (Opening::new(all, Port::Time), Tally::new(all.rejections(Port::Time)));
         Self { socket: self.socket.sealed(), seals: Some(Seals { sealing: sealing(all), opening, tally }), ..self }

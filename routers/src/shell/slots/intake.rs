@@ -113,7 +113,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
             let join = || Participant::join(&node, Name::NONE).unwrap();
-            let shape = Shape { slots: SLOTS, full: rohrpost_mailbox::Full::Displace, ..Shape::default() };
+            let shape = Shape { slots: SLOTS, full: rohrpost_mailbox::OverflowPolicy::Displace, ..Shape::default() };
             let intake = Intake::new(join().receiver(module(100, 1), shape).unwrap());
             let sender = join().sender(module(100, 1)).unwrap();
             Self {

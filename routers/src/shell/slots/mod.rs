@@ -8,14 +8,14 @@
 //!                                       stamps, datagrams of time ─▶ Clock
 //! ```
 //!
-//! Nothing but this thread sends, and this thread only with a [`Permit`]. It is never rung: who publishes a package makes no system call, and
+//! Nothing but this thread sends, and this thread only with a [`TransmitWindow`]. It is never rung: who publishes a package makes no system call, and
 //! waits for a slot anyway. It takes nothing from the heap.
 
 mod alarm;
+mod answer_queue;
 mod granted;
 mod held;
 mod intake;
-mod line;
 mod speech;
 mod state;
 
@@ -24,20 +24,20 @@ pub use state::{Snapshot, State, Used, WINDOWS};
 
 use super::answers::Answers;
 use super::clock::{ClockState, Works};
-use super::departures::Departures;
 use super::sending::Sending;
 use super::threads::Shared;
+use super::tx_thread::TxThread;
 use super::wire::Wire;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::intake::{MAKING_NS, QUIET_NS};
 use crate::outbound::Outbound;
 use crate::stats::Stats;
-use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Permit, Planned, Verdict};
+use crate::tdma::{Carries, Counts, Kind, Next, Planned, SlotScheduler, TransmitWindow, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
+pub(super) use answer_queue::{ANSWERS, Answer, AnswerQueue, REFUSAL_BYTES};
 use granted::SPIN_NS_MAX;
 use held::Held;
 use intake::Intake;
-pub(super) use line::{ANSWERS, Answer, Line, REFUSAL_BYTES};
 use rohrpost_mailbox::{Name, monotonic_ns};
 use rohrpost_network::{Network, TRANSIT_LOOK};
 use std::sync::Arc;
@@ -73,12 +73,12 @@ pub(super) struct Slots {
     /// In which the thread that receives counts.
     stats: Arc<Stats>,
     works: Works,
-    discipline: Discipline,
+    scheduler: SlotScheduler,
     intake: Intake,
     outbound: Outbound,
     answers: Answers,
     wire: Wire,
-    line: Line,
+    line: AnswerQueue,
     /// Room for the largest datagram.
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
@@ -108,12 +108,18 @@ struct First {
 
 impl Slots {
     /// From what would send as packages come.
-    pub(super) fn new(own: Own, departures: Departures, works: Works, discipline: Discipline, line: Line) -> Self {
-        let Departures { shared, transit, sending, .. } = departures;
+    pub(super) fn new(
+        own: Own,
+        tx_thread: TxThread,
+        works: Works,
+        scheduler: SlotScheduler,
+        line: AnswerQueue,
+    ) -> Self {
+        let TxThread { shared, transit, sending, .. } = tx_thread;
         let Sending { outbound, answers, wire, datagram, stats } = sending;
         let snapshot = Snapshot {
             counts: Counts::default(),
-            silent: discipline.silent(),
+            silent: scheduler.silent(),
             lead_ns: (0, 0),
             granted: Granted::Ordinary,
             held: 0,
@@ -124,7 +130,7 @@ impl Slots {
             shared,
             stats,
             works,
-            discipline,
+            scheduler,
             intake: Intake::new(transit),
             outbound,
             answers,
@@ -155,11 +161,11 @@ impl Slots {
     /// Until the router ends.
     pub(super) fn run(mut self) {
         alarm::be_punctual();
-        self.snapshot.granted = Granted::ask(self.discipline.table());
+        self.snapshot.granted = Granted::ask(self.scheduler.table());
         self.works.runs_in_real_time(self.snapshot.granted != Granted::Ordinary);
         while !self.shared.ends() {
             let now_ns = self.works.now_ns();
-            let next = self.discipline.next(now_ns, &self.works.clock);
+            let next = self.scheduler.next(now_ns, &self.works.clock);
             self.tell_left_out();
             let (planned, wake_ns) = match next {
                 Next::Window(planned) => (Some(planned), planned.wake_ns),
@@ -198,19 +204,19 @@ impl Slots {
         self.intake.relieve(&mut self.outbound, &mut self.answers, left_ns);
         self.tell_tunnel();
         self.wire.deliver(now_ns);
-        if silent || self.works.now_ns().saturating_sub(self.looked_ns) > self.discipline.table().cycle_ns() {
+        if silent || self.works.now_ns().saturating_sub(self.looked_ns) > self.scheduler.table().cycle_ns() {
             self.look();
         }
     }
 
     /// Hands all datagrams of time and stamps that came to the clock, and shows how it stands.
     fn look(&mut self) {
-        let Self { stats, works, discipline, first, snapshot, looked_ns, state, line, own, .. } = self;
+        let Self { stats, works, scheduler, first, snapshot, looked_ns, state, line, own, .. } = self;
         // What comes with a node's address, and is none of its, must not take the time before a slot.
         let most = LOOK_BURST + own.nodes;
         works.take(most, |id, stamp| {
             let Some(First { called_ns, begin_ns, .. }) = first.take_if(|first| first.id == id) else { return };
-            discipline.left(called_ns, stamp);
+            scheduler.left(called_ns, stamp);
             if let Some(Some(used)) = snapshot.windows.last_mut() {
                 used.off_ns = stamp.ns.wrapping_sub(begin_ns).cast_signed();
                 used.by_kernel = stamp.by_kernel;
@@ -225,8 +231,8 @@ impl Slots {
         let _ = works.clock.poll_in(now_ns, Allowed::Nothing, &mut [0; TIME_BYTES]);
         works.publish();
         *looked_ns = now_ns;
-        let counts = discipline.counts(&works.clock);
-        let (silent, lead_ns) = (discipline.silent(), discipline.lead_ns());
+        let counts = scheduler.counts(&works.clock);
+        let (silent, lead_ns) = (scheduler.silent(), scheduler.lead_ns());
         speech::tell_change(snapshot.silent, silent, || line.parted_by(works.clock.parted_by(now_ns)));
         *snapshot = Snapshot { counts, silent, lead_ns, ..*snapshot };
         state.show(snapshot);
@@ -234,38 +240,38 @@ impl Slots {
 
     /// Waits for the call, and uses the window.
     fn window(&mut self, planned: &Planned) {
-        if let (Kind::Slot { .. }, None) = (planned.window.kind, self.discipline.silent()) {
+        if let (Kind::Slot { .. }, None) = (planned.window.kind, self.scheduler.silent()) {
             let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
-            self.intake.open(self.discipline.table().wire().bytes_in(sends_ns));
+            self.intake.open(self.scheduler.table().wire().bytes_in(sends_ns));
         }
         self.spin(planned);
         let called_ns = self.works.now_ns();
-        if let Verdict::Send(permit) = self.discipline.judge(planned, called_ns, &self.works.clock) {
-            self.send(permit, called_ns);
+        if let Verdict::Send(tx_window) = self.scheduler.validate(planned, called_ns, &self.works.clock) {
+            self.send(tx_window, called_ns);
         }
         self.intake.close();
     }
 
     /// `called_ns`: when the window was asked for.
-    fn send(&mut self, mut permit: Permit, called_ns: u64) {
+    fn send(&mut self, mut tx_window: TransmitWindow, called_ns: u64) {
         self.first = None;
-        self.send_time(&mut permit, called_ns);
-        if permit.carries_hello() {
-            self.answer(&mut permit);
+        self.send_time(&mut tx_window, called_ns);
+        if tx_window.carries_hello() {
+            self.answer(&mut tx_window);
         }
-        if permit.carries == Carries::All {
-            self.send_packages(&mut permit);
+        if tx_window.carries == Carries::All {
+            self.send_packages(&mut tx_window);
             self.tell_tunnel();
         }
-        self.discipline.close(&permit);
-        if permit.datagrams() > 0 {
-            let (_, lead_ns) = self.discipline.lead_ns();
+        self.scheduler.close(&tx_window);
+        if tx_window.datagrams() > 0 {
+            let (_, lead_ns) = self.scheduler.lead_ns();
             self.snapshot.used(Used {
-                window: permit.window,
-                off_ns: (called_ns + lead_ns).wrapping_sub(permit.begin_ns).cast_signed(),
+                window: tx_window.window,
+                off_ns: (called_ns + lead_ns).wrapping_sub(tx_window.begin_ns).cast_signed(),
                 by_kernel: false,
-                datagrams: permit.datagrams(),
-                wire_bytes: permit.wire_bytes(),
+                datagrams: tx_window.datagrams(),
+                wire_bytes: tx_window.wire_bytes(),
             });
         }
         self.look();
@@ -294,36 +300,36 @@ impl Slots {
     }
 
     /// `called_ns`: when the window was asked for. From there on it counts how long the first frame takes to the wire.
-    fn send_time(&mut self, permit: &mut Permit, called_ns: u64) {
+    fn send_time(&mut self, tx_window: &mut TransmitWindow, called_ns: u64) {
         let mut datagram = [0; TIME_BYTES];
-        while permit.fits(self.works.now_ns(), TIME_BYTES)
+        while tx_window.fits(self.works.now_ns(), TIME_BYTES)
             && let Step::Send { to, .. } =
-                self.works.clock.poll_in(self.works.now_ns(), permit.allowed(), &mut datagram)
+                self.works.clock.poll_in(self.works.now_ns(), tx_window.allowed(), &mut datagram)
         {
             let now_ns = self.works.now_ns();
-            if !permit.fits(now_ns, TIME_BYTES) {
+            if !tx_window.fits(now_ns, TIME_BYTES) {
                 // The thread stood still: better lost than in another's slot.
                 return;
             }
-            permit.takes(now_ns, TIME_BYTES);
+            tx_window.takes(now_ns, TIME_BYTES);
             self.works.send(to, &datagram);
-            if permit.datagrams() == 1 {
+            if tx_window.datagrams() == 1 {
                 let id = FrameHead::parse(&datagram).ok().map(|(head, _)| SentId { to, sequence: head.sequence });
-                self.first = id.map(|id| First { id, called_ns, begin_ns: permit.begin_ns });
+                self.first = id.map(|id| First { id, called_ns, begin_ns: tx_window.begin_ns });
             }
         }
     }
 
     /// One in a slot: whoever brings refusals or hellos about must not take the slots of packages.
-    fn answer(&mut self, permit: &mut Permit) {
-        let (now_ns, asks) = (self.works.now_ns(), permit.carries == Carries::Hello);
+    fn answer(&mut self, tx_window: &mut TransmitWindow) {
+        let (now_ns, asks) = (self.works.now_ns(), tx_window.carries == Carries::Hello);
         let overheard = if asks { self.works.clock.overheard(now_ns) } else { None };
         let first = overheard.map(|(from, _)| from);
         // What was looked through before takes its time.
         let works = &self.works;
-        let fits = |bytes| permit.fits(works.now_ns(), bytes);
+        let fits = |bytes| tx_window.fits(works.now_ns(), bytes);
         if let Some(bytes) = self.line.answer(monotonic_ns(), first, fits) {
-            permit.takes(self.works.now_ns(), bytes);
+            tx_window.takes(self.works.now_ns(), bytes);
             if asks {
                 self.works.clock.asked_overheard(now_ns);
             }
@@ -346,37 +352,37 @@ impl Slots {
 
     /// Which packages cannot have kept their bounds.
     fn tell_left_out(&mut self) {
-        let left_out = self.discipline.left_out();
-        if left_out != self.left_out || self.discipline.silent().is_some() {
+        let left_out = self.scheduler.left_out();
+        if left_out != self.left_out || self.scheduler.silent().is_some() {
             self.left_out = left_out;
             self.outbound.slot_left_out(monotonic_ns());
         }
     }
 
-    fn send_packages(&mut self, permit: &mut Permit) {
+    fn send_packages(&mut self, tx_window: &mut TransmitWindow) {
         self.drop_if_old();
-        while let Some(made) = self.next_datagram(permit) {
+        while let Some(made) = self.next_datagram(tx_window) {
             let (Held { to, bytes, .. }, now_ns) = (made, self.works.now_ns());
-            if !permit.fits(now_ns, bytes) {
+            if !tx_window.fits(now_ns, bytes) {
                 self.missed(made);
                 break;
             }
-            self.hand_over(permit, now_ns, to, bytes);
+            self.hand_over(tx_window, now_ns, to, bytes);
         }
-        if permit.is_behind(self.works.now_ns()) {
+        if tx_window.is_behind(self.works.now_ns()) {
             self.outbound.slot_left_out(monotonic_ns());
         }
     }
 
     /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread stands still meanwhile.
-    fn next_datagram(&mut self, permit: &Permit) -> Option<Held> {
+    fn next_datagram(&mut self, tx_window: &TransmitWindow) -> Option<Held> {
         if let Some(held) = self.held.take() {
             return Some(held);
         }
         self.outbound.drop_first(monotonic_ns(), &mut self.answers);
-        let busy_ns = || permit.busy_ns(self.works.now_ns());
+        let busy_ns = || tx_window.busy_ns(self.works.now_ns());
         self.intake.take_on(&mut self.outbound, &mut self.answers, busy_ns);
-        let room_bytes = permit.room_bytes(self.works.now_ns() + MAKING_NS)?;
+        let room_bytes = tx_window.room_bytes(self.works.now_ns() + MAKING_NS)?;
         let (made_ns, behind) = (monotonic_ns(), self.intake.first());
         let datagram = (room_bytes, &mut self.datagram[..]);
         let made = self.outbound.poll_slot(made_ns, datagram, behind, &mut self.answers);
@@ -396,20 +402,20 @@ impl Slots {
     }
 
     /// `now_ns`: local; when it was found to fit.
-    fn hand_over(&mut self, permit: &mut Permit, now_ns: u64, to: NodeIndex, bytes: usize) {
+    fn hand_over(&mut self, tx_window: &mut TransmitWindow, now_ns: u64, to: NodeIndex, bytes: usize) {
         let handed_ns = monotonic_ns();
         let sent = self.wire.send_made(handed_ns, to, &mut self.datagram, bytes);
         if sent.is_err_and(super::Failure::is_loss) {
             self.outbound.unsent(&self.datagram[..bytes], &[], &mut self.answers);
         } else if self.outbound.is_measured() {
             // The usual way to the wire; where the call took longer it was perhaps kept up before that.
-            let (usual_ns, _) = self.discipline.lead_ns();
+            let (usual_ns, _) = self.scheduler.lead_ns();
             let to_wire_ns = usual_ns.max(monotonic_ns().saturating_sub(handed_ns));
-            if permit.is_late(now_ns + (to_wire_ns - usual_ns), bytes) {
+            if tx_window.is_late(now_ns + (to_wire_ns - usual_ns), bytes) {
                 self.outbound.slot_left_out(handed_ns);
             }
-            self.outbound.sent(handed_ns + permit.arrives_after_ns(now_ns, bytes, to_wire_ns));
+            self.outbound.sent(handed_ns + tx_window.arrives_after_ns(now_ns, bytes, to_wire_ns));
         }
-        permit.takes(now_ns, bytes);
+        tx_window.takes(now_ns, bytes);
     }
 }

@@ -32,25 +32,25 @@ impl Sums {
 
 impl Packages {
     pub(super) fn check_accounts(&self, io: &mut Io<'_>) {
-        let account = io.book.account(io.life);
+        let account = io.oracle.account(io.life);
         let waiting = self.stats.waiting_in_all();
         if account.accepted != account.left + account.lost + waiting {
             let text = format!("{account:?}, and {waiting} packages wait in router {} of node {}", io.life, io.node);
-            io.book.broken(io.now, Promise::Accounts, text);
+            io.oracle.broken(io.now, Promise::Accounts, text);
         }
         let (out, inn) = (Sums::of(&self.stats.out), Sums::of(&self.stats.inn));
         if out != (Sums { packages: account.accepted, passed: account.left, lost: account.lost }) {
-            io.book.broken(io.now, Promise::Accounts, format!("the router counts {out:?}, but did {account:?}"));
+            io.oracle.broken(io.now, Promise::Accounts, format!("the router counts {out:?}, but did {account:?}"));
         }
         let partial = inn.packages.wrapping_sub(inn.passed + inn.lost);
         let most = (PARTIAL_MAX * (io.plan.nodes.len() - 1)) as u64;
         if partial > most {
-            io.book.broken(io.now, Promise::Bounded, format!("{partial} packages are being put together: {inn:?}"));
+            io.oracle.broken(io.now, Promise::Bounded, format!("{partial} packages are being put together: {inn:?}"));
         }
         let used = self.stats.waiting_bytes.get();
         if used > self.queue_bytes_max {
             let text = format!("the queue takes up {used} bytes, {} at most", self.queue_bytes_max);
-            io.book.broken(io.now, Promise::Bounded, text);
+            io.oracle.broken(io.now, Promise::Bounded, text);
         }
     }
 
@@ -62,7 +62,7 @@ impl Packages {
             self.present_since_ns[peer] = io.now.monotonic_ns;
         }
         let heard = (io.now.true_ns, io.life, io.lives[peer]);
-        io.book.heard.insert((io.node, peer), heard);
+        io.oracle.heard.insert((io.node, peer), heard);
     }
 
     /// What this router says of its peers: a silent one is called so, and one that does not hear us.
@@ -77,14 +77,14 @@ impl Packages {
             let is_there = matches!(state, State::Unknown | State::Alive);
             if is_there && since_ns(self.heard_ns[peer]) > SILENT_AFTER_NS + STILL_NS {
                 let text = format!("node {peer} is {state:?} for node {}, which does not hear it", io.node);
-                io.book.broken(io.now, Promise::Links, text);
+                io.oracle.broken(io.now, Promise::Links, text);
             }
-            let (heard_ns, life, own_life) = io.book.heard.get(&(peer, io.node)).copied().unwrap_or_default();
-            let goes_on = life == io.lives[peer] && own_life == io.life;
+            let (heard_ns, life, own_incarnation) = io.oracle.heard.get(&(peer, io.node)).copied().unwrap_or_default();
+            let goes_on = life == io.lives[peer] && own_incarnation == io.life;
             let doubt_ns = (io.now.true_ns - heard_ns.min(io.now.true_ns)).min(since_ns(self.present_since_ns[peer]));
             if is_there && goes_on && doubt_ns > UNHEARD_AFTER_NS + TELL_EVERY_NS + 2 * STILL_NS {
                 let text = format!("node {peer} is {state:?} for node {}, which it does not hear", io.node);
-                io.book.broken(io.now, Promise::Links, text);
+                io.oracle.broken(io.now, Promise::Links, text);
             }
         }
     }
@@ -93,12 +93,12 @@ impl Packages {
     pub(super) fn check_losses(&self, io: &mut Io<'_>) {
         let is_settled = |peer: &usize| io.now.monotonic_ns - self.present_since_ns[*peer] > SETTLED_NS;
         for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node).filter(is_settled) {
-            let missing = io.book.missing(io.life, peer as NodeIndex);
+            let missing = io.oracle.missing(io.life, peer as NodeIndex);
             let counted = self.stats.peer(peer as NodeIndex).received.missing();
             if missing.is_some_and(|missing| missing != counted) {
                 let text =
                     format!("of node {peer} {missing:?} datagrams never came, node {} counts {counted}", io.node);
-                io.book.broken(io.now, Promise::Links, text);
+                io.oracle.broken(io.now, Promise::Links, text);
             }
         }
     }
@@ -107,13 +107,13 @@ impl Packages {
         for node in (0..io.plan.nodes.len()).filter(|node| *node != io.node) {
             let state = self.stats.state(node as NodeIndex, io.now.monotonic_ns);
             if state != State::Alive {
-                io.book.broken(io.now, Promise::Recovery, format!("for node {}, node {node} is {state:?}", io.node));
+                io.oracle.broken(io.now, Promise::Recovery, format!("for node {}, node {node} is {state:?}", io.node));
             }
         }
         let lost = (Sums::of(&self.stats.out).lost, Sums::of(&self.stats.inn).lost);
         if *self.lost_before.get_or_insert(lost) != lost {
             let text = format!("node {} lost packages: {:?}, then {lost:?}", io.node, self.lost_before);
-            io.book.broken(io.now, Promise::Recovery, text);
+            io.oracle.broken(io.now, Promise::Recovery, text);
         }
     }
 }

@@ -22,7 +22,7 @@ use crate::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use crate::inbound::{self, Datagram, Inbound};
 use crate::intake::hurries;
 use crate::outbound::{Accepted, Outbound, Output, Package};
-use crate::security::{Acquaintances, HELLO_DATAGRAM_BYTES, Said, TAG_BYTES};
+use crate::security::{HELLO_DATAGRAM_BYTES, PeerSessions, Said, TAG_BYTES};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Options, Type};
@@ -43,7 +43,7 @@ const IN_HAND_BYTES_MAX: u16 = 400;
 /// An address that no node has.
 const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
 
-/// One life of a router's packages.
+/// One incarnation of a router's packages.
 pub struct Packages {
     settings: Settings,
     stats: Arc<Stats>,
@@ -76,7 +76,7 @@ impl Packages {
         &self.stats
     }
 
-    /// A life that begins now.
+    /// An incarnation that begins now.
     pub fn new(settings: &Settings, now_ns: u64) -> Self {
         let stats = Stats::new(settings, now_ns);
         Self {
@@ -99,7 +99,7 @@ impl Packages {
     }
 
     /// The same, sealing what it sends.
-    pub(super) fn sealed(self, all: &Arc<Acquaintances>, incarnation: u64) -> Self {
+    pub(super) fn sealed(self, all: &Arc<PeerSessions>, incarnation: u64) -> Self {
         let seals = Some(PackageSeals::new(all, incarnation));
         Self { outbound: self.outbound.sealed(all.clone()), seals, ..self }
     }
@@ -116,20 +116,20 @@ impl Packages {
             if io.now.monotonic_ns.saturating_sub(parcel.published_ns) <= TRANSIT_AGE_MAX_NS {
                 break parcel;
             }
-            io.book.saw("too old in the transit mailbox");
+            io.oracle.saw("too old in the transit mailbox");
         };
-        io.book.accepted(io.life, parcel.number, parcel.published_ns);
-        io.book.saw("accepted");
+        io.oracle.accepted(io.life, parcel.number, parcel.published_ns);
+        io.oracle.saw("accepted");
         let to = self.settings.node_of(parcel.head.to);
         if let (Some(seals), Some(to)) = (&self.seals, to)
             && !seals.knows(to)
         {
-            io.book.held(parcel.number);
+            io.oracle.held(parcel.number);
         }
         let alone = io.host.transit.is_empty() && io.plan.slots.is_none();
-        let does_harm = io.book.packages[parcel.number as usize].role == Role::Intruder;
+        let does_harm = io.oracle.packages[parcel.number as usize].role == Role::Intruder;
         let accepted = harmful(does_harm, || self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone));
-        io.book.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
+        io.oracle.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
         let head = parcel.head;
         self.in_hand = Some(parcel);
         Some((head, accepted))
@@ -140,7 +140,7 @@ impl Packages {
         let mut watch = Watch::out(io, &mut self.undelivered);
         let accepted = self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch);
         if let Accepted::Send { to, head } = &accepted {
-            io.book.saw("sent at once");
+            io.oracle.saw("sent at once");
             self.send(io, *to, Rc::from([&head[..], body].concat()));
         }
         accepted
@@ -160,16 +160,16 @@ impl Packages {
             let mut watch = Watch::out(io, &mut self.undelivered);
             return self.outbound.unsent(&bytes, &[], &mut watch);
         };
-        io.book.leaves(io.now, io.life, &bytes);
+        io.oracle.leaves(io.now, io.life, &bytes);
         if io.plan.slots.is_some() {
             let reaches = |to| self.seals.as_ref().is_none_or(|seals| seals.knows(to));
             // Of those that hurry more than they may, only a few are taken before a datagram.
             let first = io.host.transit.first().filter(|first| !hurries(&first.head));
             let first = first.filter(|first| self.settings.node_of(first.head.to).is_some_and(reaches));
             let behind = first.map(|first| first.number);
-            io.book.is_strict(io.now, io.life, &bytes, behind, reaches);
+            io.oracle.is_strict(io.now, io.life, &bytes, behind, reaches);
         } else {
-            io.book.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
+            io.oracle.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
         }
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
         io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed, handed: io.now });
@@ -179,7 +179,7 @@ impl Packages {
     fn ask(&mut self, io: &mut Io<'_>) {
         let Some(seals) = &mut self.seals else { return };
         while let Some(said) = seals.gate.ask(io.now.monotonic_ns, &self.stats, &mut self.buffer) {
-            io.book.saw("asked");
+            io.oracle.saw("asked");
             let to_say = &self.buffer[..said.bytes];
             say(io, seals, &mut self.refusals, said, to_say);
         }
@@ -209,8 +209,8 @@ impl Packages {
     /// Tells callers on other nodes of commands that were not delivered here.
     fn answer(&mut self, io: &mut Io<'_>) {
         for command in std::mem::take(&mut self.undelivered) {
-            let Some(number) = io.book.number(&command) else { continue };
-            let package = &io.book.packages[number as usize];
+            let Some(number) = io.oracle.number(&command) else { continue };
+            let package = &io.oracle.packages[number as usize];
             let (Role::Command { call, .. }, to_node) = (package.role, package.from_node) else { continue };
             let head = Head {
                 to: command.from,
@@ -222,9 +222,9 @@ impl Packages {
                 options: Options::ERROR,
             };
             let role = Role::Report { call };
-            let (number, head, body) = io.book.post(io.now, head, (io.node, to_node.into()), role);
-            io.book.accepted(io.life, number, io.now.monotonic_ns);
-            io.book.saw("told a caller on another node");
+            let (number, head, body) = io.oracle.post(io.now, head, (io.node, to_node.into()), role);
+            io.oracle.accepted(io.life, number, io.now.monotonic_ns);
+            io.oracle.saw("told a caller on another node");
             self.accept(io, head, io.now.monotonic_ns, &body, false);
         }
     }
@@ -244,7 +244,7 @@ impl Packages {
                 inbound::Output::Refuse { to, bytes } => {
                     let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
                     if let Some(to) = node {
-                        io.book.saw("refused");
+                        io.oracle.saw("refused");
                         let bytes = Rc::from(&self.buffer[..bytes]);
                         self.refusals.push_back(Sent { port: PORT, to, bytes, handed: Now::default() });
                     }
@@ -282,19 +282,19 @@ impl Layer for Packages {
         };
         if taken + copies + dropped != 1 && !(is_answer && taken + copies + dropped == 0) {
             let text = format!("a datagram was counted as {taken} taken, {copies} copies, {dropped} dropped");
-            io.book.broken(io.now, Promise::Accounts, text);
+            io.oracle.broken(io.now, Promise::Accounts, text);
         }
         if taken > 0 {
             let first = self.seals.as_ref().map(|seals| seals.first(&clear));
-            io.book.took(io.now, io.life, (&clear, first), self.settings.digest);
+            io.oracle.took(io.now, io.life, (&clear, first), self.settings.digest);
             self.hears(io, source);
         } else if copies > 0 {
-            io.book.saw("dropped as a copy");
-            io.book.dropped_as_copy(io.now, io.life, &arrived.bytes);
+            io.oracle.saw("dropped as a copy");
+            io.oracle.dropped_as_copy(io.now, io.life, &arrived.bytes);
         } else if dropped > 0 && self.seals.is_some() {
-            io.book.saw("rejected");
+            io.oracle.saw("rejected");
         } else {
-            io.book.saw("dropped as wrong or old");
+            io.oracle.saw("dropped as wrong or old");
         }
         self.answer(io);
     }
@@ -324,7 +324,7 @@ impl Layer for Packages {
         if let Some(parcel) = in_hand.filter(|parcel| !parcel.head.options.has(Options::REDELIVERED))
             && io.chance.percent(50)
         {
-            io.book.saw("in the hand of a router that died");
+            io.oracle.saw("in the hand of a router that died");
             io.host.transit.put_back(parcel);
         }
     }
@@ -338,7 +338,7 @@ impl Layer for Packages {
     }
 
     fn close(&mut self, io: &mut Io<'_>) {
-        io.book.close_receipts(io.now, io.life);
+        io.oracle.close_receipts(io.now, io.life);
         self.check_losses(io);
     }
 }
@@ -348,7 +348,7 @@ fn shown(datagram: &[u8]) -> String {
         Ok((head, frame)) => {
             let numbers = match frame {
                 Frame::Packages(packages) => {
-                    packages.filter_map(|(_, body)| super::book::number_of(body)).map(|n| format!(" {n}")).collect()
+                    packages.filter_map(|(_, body)| super::oracle::number_of(body)).map(|n| format!(" {n}")).collect()
                 }
                 Frame::Fragment(part) => format!(" part {} of {} of {}", part.index, part.count, part.first),
                 _ => String::new(),

@@ -24,7 +24,7 @@ pub fn address(node: usize) -> IpAddr {
     IpAddr::V4(Ipv4Addr::new(10, 77, 0, node as u8 + 1))
 }
 
-/// What one life of a router is configured with.
+/// What one incarnation of a router is configured with.
 pub fn settings(plan: &Plan, node: usize, incarnation: u64, edition: usize) -> Settings {
     let others = plan.nodes.iter().enumerate().filter(|(other, _)| *other != node);
     let mut routes: Vec<Route> = others

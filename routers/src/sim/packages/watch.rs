@@ -1,4 +1,4 @@
-//! What the cores of packages tell of, written into the book: losses, deliveries, events.
+//! What the cores of packages tell of, written into the oracle: losses, deliveries, events.
 
 use crate::counts::Cause;
 use crate::frame::NodeIndex;
@@ -24,7 +24,7 @@ pub(super) struct Watch<'a, 'b> {
     /// The datagram that is being looked at.
     pub(super) came: Option<Came>,
     pub(super) is_out: bool,
-    /// The router began so short a time ago that the wire may hold copies of what its last life took.
+    /// The router began so short a time ago that the wire may hold copies of what its last incarnation took.
     pub(super) is_young: bool,
     pub(super) undelivered: &'a mut Vec<Head>,
 }
@@ -39,15 +39,15 @@ impl<'a, 'b> Watch<'a, 'b> {
 impl Report for Watch<'_, '_> {
     fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, _body: &[u8], cause: Cause) {
         let io = &mut *self.io;
-        io.book.saw(cause.word());
+        io.oracle.saw(cause.word());
         io.line(|| format!("{}: from or to {peer:?}, {head:?}", cause.word()));
         if cause == Cause::Late && io.plan.is_in_order() {
-            io.book.broken(io.now, Promise::Order, format!("late, and nothing was reordered: {head:?}"));
+            io.oracle.broken(io.now, Promise::Order, format!("late, and nothing was reordered: {head:?}"));
         }
         let number = if self.is_out {
-            io.book.lost_before(io.now, io.life, head, cause)
+            io.oracle.lost_before(io.now, io.life, head, cause)
         } else {
-            io.book.lost_behind(io.now, io.life, head)
+            io.oracle.lost_behind(io.now, io.life, head)
         };
         // One that was handed out before may have been delivered then; so may the copy that a router finds on the wire when it begins.
         let is_first = !head.options.has(Options::REDELIVERED) && (self.is_out || !self.is_young);
@@ -65,19 +65,23 @@ impl Report for Watch<'_, '_> {
 impl Deliver for Watch<'_, '_> {
     fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
         let io = &mut *self.io;
-        let Some(number) = io.book.arrives(io.now, io.node, head, body) else { return Ok(()) };
+        let Some(number) = io.oracle.arrives(io.now, io.node, head, body) else { return Ok(()) };
         let taken = io.host.deliver(head.to, number);
         io.line(|| format!("delivers {number} from {from}: {taken:?}"));
         taken.map_err(|closed| match closed {
             Closed::Absent => NotDelivered::NoMailbox,
-            Closed::Full => NotDelivered::MailboxFull,
+            Closed::OverflowPolicy => NotDelivered::MailboxFull,
         })?;
-        io.book.saw("delivered");
+        io.oracle.saw("delivered");
         if self.came.is_some_and(|came| io.now.monotonic_ns.saturating_sub(came.at_ns) > SOCKET_MAX_NS) {
-            io.book.broken(io.now, Promise::Fresh, format!("package {number} waited in the socket, and is delivered"));
+            io.oracle.broken(
+                io.now,
+                Promise::Fresh,
+                format!("package {number} waited in the socket, and is delivered"),
+            );
         }
         let incarnation = self.came.map_or(0, |came| came.incarnation);
-        io.book.delivered(io.now, (incarnation, io.life), number, head.options.has(Options::REDELIVERED));
+        io.oracle.delivered(io.now, (incarnation, io.life), number, head.options.has(Options::REDELIVERED));
         Ok(())
     }
 

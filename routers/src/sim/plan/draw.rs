@@ -50,7 +50,7 @@ impl Plan {
             return;
         }
         for node in 0..self.nodes.len() {
-            let from_ns = chance.between(S, self.mended_ns - S / 2);
+            let from_ns = chance.between(S, self.fixed_ns - S / 2);
             let fault = Fault::Intruder { node, count: chance.scale(4, 60) };
             self.faults.push(Planned { from_ns, until_ns: from_ns, fault });
         }
@@ -72,8 +72,8 @@ impl Plan {
         let count = if chance.percent(10) { 0 } else { chance.below(6 + 2 * self.nodes.len() as u64) };
         for _ in 0..count {
             let fault = self.fault(chance);
-            let from_ns = chance.below(self.mended_ns - S / 2);
-            let longest_ns = self.mended_ns - from_ns;
+            let from_ns = chance.below(self.fixed_ns - S / 2);
+            let longest_ns = self.fixed_ns - from_ns;
             let long_ns = chance.scale(5 * MS, 4 * S).min(longest_ns);
             self.faults.push(Planned { from_ns, until_ns: from_ns + long_ns, fault });
         }
@@ -90,7 +90,7 @@ impl Plan {
             6 => Fault::Split { side: chance.bits() },
             7..9 => Fault::Bad { from: node, to, quality: bad(chance) },
             9 => Fault::Absent { node, module },
-            10 => Fault::Full { node, module },
+            10 => Fault::OverflowPolicy { node, module },
             11..13 => Fault::ModuleRestart { node, module },
             13 | 14 => Fault::Step { node, by_ns: chance.around(5 * S as i64) },
             15 => Fault::Foreign { to, count: chance.scale(1, 200) },

@@ -1,7 +1,7 @@
 //! What happens in one simulated network, drawn from its seed before it begins: nodes, links, traffic and faults.
 //!
 //! ```text
-//!  0 ────────────── faults and floods ───────────────┬ mended ─── RECOVERY ───┬── all must be well ──┬ traffic ends ── DRAIN ──┬ accounts
+//!  0 ────────────── faults and floods ───────────────┬ fixed ─── RECOVERY ───┬── all must be well ──┬ traffic ends ── DRAIN ──┬ accounts
 //! ```
 
 mod draw;
@@ -124,7 +124,7 @@ pub struct Plan {
     /// No data before this, ns.
     pub traffic_begin_ns: u64,
     /// No fault and no flood after this, ns.
-    pub mended_ns: u64,
+    pub fixed_ns: u64,
     /// From then on all nodes follow one master, ns.
     pub timed_ns: u64,
     /// From then on they also have its time, ns; may be after the end.
@@ -147,7 +147,7 @@ impl Plan {
         let shape = draw::shape(&mut chance);
         let nodes: Vec<NodePlan> = (0..count).map(|index| node(index, &mut chance)).collect();
         let quality = draw::quality(&mut chance);
-        let mended_ns = chance.between(2 * S, 6 * S);
+        let fixed_ns = chance.between(2 * S, 6 * S);
         let masters = masters(count, &mut chance);
         let checksum = chance.percent(90);
         let waits_for_epochs = chance.percent(10);
@@ -161,7 +161,7 @@ impl Plan {
             checksum,
             moments_ns: None,
             traffic_begin_ns: 0,
-            mended_ns,
+            fixed_ns,
             traffic_end_ns: 0,
             end_ns: 0,
             timed_ns: 0,
@@ -198,9 +198,9 @@ impl Plan {
     /// When all must be well, and when it ends, from when the last fault is over.
     pub(super) fn time(&mut self) {
         let intervals = TIMED_INTERVALS + self.masters.len() as u64;
-        self.timed_ns = self.mended_ns + intervals * self.shape.interval_ns;
+        self.timed_ns = self.fixed_ns + intervals * self.shape.interval_ns;
         self.stepped_ns = self.timed_ns + EPOCH_PAUSE_NS;
-        self.traffic_end_ns = self.mended_ns + RECOVERY_NS + WELL_NS;
+        self.traffic_end_ns = self.fixed_ns + RECOVERY_NS + WELL_NS;
         self.end_ns = (self.traffic_end_ns + DRAIN_NS).max(self.timed_ns + S);
     }
 
@@ -255,7 +255,7 @@ impl Plan {
             let (to, bytes) = (to.with_local(rohrpost_mailbox::local::DATA), (most / 2, most));
             plan.flows.push(Flow { node: 0, from, to, priority: 0, period_ns, bytes, is_mixed, burst: 1 });
         }
-        plan.mended_ns = S;
+        plan.fixed_ns = S;
         plan.time();
         plan
     }
@@ -265,18 +265,18 @@ impl Plan {
         let mut plan = Self::new(seed);
         plan.faults.clear();
         plan.flows.retain(|flow| flow.burst == 1);
-        plan.quality = mended(plan.quality);
+        plan.quality = fixed(plan.quality);
         plan.checksum = true;
         plan
     }
 }
 
 /// What is left of a link's quality after the faults.
-pub fn mended(quality: Quality) -> Quality {
+pub fn fixed(quality: Quality) -> Quality {
     Quality { loss_ppm: 0, copy_ppm: 0, reorder_ppm: 0, damage_ppm: 0, rate_bytes_s: 0, ..quality }
 }
 
-/// Of a life of a router: never the same again, and in no order.
+/// Of an incarnation of a router: never the same again, and in no order.
 pub(super) fn incarnation(seed: u64, life: u32) -> u64 {
     (seed << 20 | u64::from(life)).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1
 }

@@ -46,7 +46,7 @@ impl Plan {
         let table = table(&plan, link_bytes_s, chance);
         plan.shape.interval_ns = table.cycle.as_nanos() as u64;
         plan.shape.rate_bytes_s = (0..plan.nodes.len()).map(|node| node_bytes_s(&table, node)).min().unwrap_or(0);
-        plan.mended_ns = chance.between(2 * S, 4 * S);
+        plan.fixed_ns = chance.between(2 * S, 4 * S);
         plan.slots = Some(Slots {
             table,
             masters: plan.masters.clone(),
@@ -69,7 +69,7 @@ impl Plan {
         plan.flows.clear();
         plan.calls.clear();
         plan.divide();
-        plan.mended_ns = S + cycles * plan.shape.interval_ns;
+        plan.fixed_ns = S + cycles * plan.shape.interval_ns;
         plan.time_slots();
         plan
     }
@@ -104,8 +104,8 @@ impl Plan {
         let mut chance = Chance::new(self.seed ^ 0xec_40);
         for _ in 0..chance.between(1, 3) {
             let to = chance.below(self.nodes.len() as u64) as usize;
-            let (from_ns, delay_ns) = (chance.below(self.mended_ns / 2), chance.scale(10 * MS, S / 2));
-            let until_ns = chance.between(from_ns, self.mended_ns - S / 2);
+            let (from_ns, delay_ns) = (chance.below(self.fixed_ns / 2), chance.scale(10 * MS, S / 2));
+            let until_ns = chance.between(from_ns, self.fixed_ns - S / 2);
             self.faults.push(Planned { from_ns, until_ns, fault: Fault::Echo { to, delay_ns } });
             let dies_ns = chance.between(from_ns, until_ns);
             let until_ns = dies_ns + chance.scale(5 * MS, S / 4);

@@ -10,7 +10,7 @@ use crate::sim::wire::LEAD_NS;
 use std::rc::Rc;
 
 impl World<'_> {
-    /// Lets the layers of a node do something, if that life of its router still runs, and carries away what comes of it.
+    /// Lets the layers of a node do something, if that incarnation of its router still runs, and carries away what comes of it.
     pub(in crate::sim) fn with_router(&mut self, node: usize, life: u32, what: impl FnOnce(&mut Router, &mut Io<'_>)) {
         let station = &mut self.stations[node];
         let now = station.clock.at(self.now_ns);
@@ -22,7 +22,7 @@ impl World<'_> {
             node,
             life,
             host: &mut station.host,
-            book: &mut self.book,
+            oracle: &mut self.oracle,
             chance: &mut self.chance,
             sent: &mut self.sent,
             trace: &mut self.trace,
@@ -52,13 +52,13 @@ impl World<'_> {
             let left_ns = handed_ns + self.chance.between(US, 30 * US);
             return (left_ns, left_ns);
         };
-        let book = &mut self.book;
+        let oracle = &mut self.oracle;
         let at_ns = handed_ns + self.chance.between(LEAD_NS.0, LEAD_NS.1);
-        let sent = book.wire.transmit(node, at_ns, bytes, slots, &mut book.problems);
+        let sent = oracle.wire.transmit(node, at_ns, bytes, slots, &mut oracle.problems);
         let clock = &self.stations[node].clock;
         let local_ns = [self.now_ns, sent.begin_ns, sent.end_ns].map(|true_ns| clock.at(true_ns).monotonic_ns);
-        if let Some(text) = book.wire.window(node, bytes, slots, local_ns) {
-            book.problems.push(Problem { promise: Promise::InWindow, at_ns: sent.begin_ns, text });
+        if let Some(text) = oracle.wire.window(node, bytes, slots, local_ns) {
+            oracle.problems.push(Problem { promise: Promise::InWindow, at_ns: sent.begin_ns, text });
         }
         self.trace.line(self.now_ns, || format!("{node} transmits from {} to {} ns", sent.begin_ns, sent.end_ns));
         (sent.begin_ns, sent.end_ns)
@@ -69,12 +69,12 @@ impl World<'_> {
         let passages = self.links[from][to].pass(out_ns, bytes.len(), &mut self.chance);
         if passages[0].is_none() {
             self.trace.line(self.now_ns, || format!("the wire loses {} bytes from {from} to {to}:{port}", bytes.len()));
-            self.book.saw("lost on the wire");
+            self.oracle.saw("lost on the wire");
         }
         for passage in passages.into_iter().flatten() {
             let mut bytes = bytes.clone();
             if passage.damaged {
-                self.book.saw("damaged on the wire");
+                self.oracle.saw("damaged on the wire");
                 if self.plan.checksum {
                     continue;
                 }
@@ -89,12 +89,12 @@ impl World<'_> {
     pub(in crate::sim) fn arrive(&mut self, to: usize, mut arrived: Arrived) {
         arrived.stamp = self.now(to);
         if self.stations[to].sleeps > 0 {
-            return self.book.saw("came to a computer that sleeps");
+            return self.oracle.saw("came to a computer that sleeps");
         }
         if !self.stations[to].runs() {
             let is_up = self.stations[to].router.is_some();
             if !is_up || !self.stations[to].keep(arrived) {
-                self.book.saw(if is_up { "socket full" } else { "no router" });
+                self.oracle.saw(if is_up { "socket full" } else { "no router" });
             }
             return;
         }

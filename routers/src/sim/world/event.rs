@@ -10,7 +10,7 @@ pub(in crate::sim) enum Event {
     Wake { node: usize },
     /// A datagram comes out of a link.
     Arrive { to: usize, arrived: Arrived },
-    /// An old one comes once more; if it is for that life, not to another.
+    /// An old one comes once more; if it is for that incarnation, not to another.
     Again { to: usize, life: Option<u32>, arrived: Arrived },
     /// The kernel says when a datagram left.
     Left { node: usize, life: u32, port: Port, index: u64 },
@@ -31,7 +31,7 @@ pub(in crate::sim) enum Event {
     /// A module takes its next command.
     Serve { node: usize, module: Name },
     /// All is looked at; clocks wander.
-    Look,
+    SnapshotRequest,
 }
 
 /// An event in its place among all: by time, and at one moment in the order in which they were planned.

@@ -10,12 +10,12 @@ mod routers;
 
 pub(super) use event::Event;
 
-use super::book::Book;
 use super::calls::{Calls, NewGuard, Server};
 use super::chance::Chance;
 use super::clock::{Clock, Now};
 use super::host::DATA_MAILBOXES;
 use super::link::Link;
+use super::oracle::Oracle;
 use super::plan::Plan;
 use super::promise::Problem;
 use super::spans::{MS, RECOVERY_NS, S};
@@ -31,7 +31,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
 
-/// Makes the layers of a router that begins to live: node, which edition of the configuration it has, life, its clocks, what its page of system
+/// Makes the layers of a router that begins to live: node, which edition of the configuration it has, incarnation, its clocks, what its page of system
 /// time says.
 pub type NewLayers<'a> = Box<dyn FnMut(usize, usize, u32, Now, Left) -> Vec<Box<dyn Layer>> + 'a>;
 
@@ -50,16 +50,16 @@ pub struct World<'a> {
     pub(super) servers: BTreeMap<Name, Server>,
     pub(super) sequences: Vec<u32>,
     /// The books.
-    pub book: Book,
+    pub oracle: Oracle,
     /// The calls.
     pub calls: Calls,
     /// What is written down.
     pub trace: Trace,
     new_layers: NewLayers<'a>,
     lives: u32,
-    /// The life of each node's router.
+    /// The incarnation of each node's router.
     living: Vec<u32>,
-    /// Datagrams that routers had, of which some come again: receiver, its life.
+    /// Datagrams that routers had, of which some come again: receiver, its incarnation.
     pub(super) old: Vec<(usize, u32, Arrived)>,
     sent: Vec<Sent>,
 }
@@ -87,10 +87,10 @@ impl<'a> World<'a> {
             }
             stations.push(station);
         }
-        let mut book = Book::new(plan.shape.bulk_below);
-        book.is_sealed = plan.sealed;
-        book.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
-        (book.wire, book.well_ns) = (Wire::new(count), plan.mended_ns + RECOVERY_NS);
+        let mut oracle = Oracle::new(plan.shape.bulk_below);
+        oracle.is_sealed = plan.sealed;
+        oracle.times = Times::new(stations.iter().map(|station| station.clock.clone()).collect());
+        (oracle.wire, oracle.well_ns) = (Wire::new(count), plan.fixed_ns + RECOVERY_NS);
         let mut world = Self {
             now_ns: 0,
             events: BinaryHeap::new(),
@@ -99,7 +99,7 @@ impl<'a> World<'a> {
             links: vec![vec![Link::new(plan.quality); count]; count],
             servers,
             sequences: vec![1; count],
-            book,
+            oracle,
             calls: Calls::default(),
             trace: Trace::new(trace),
             new_layers: layers,
@@ -122,7 +122,7 @@ impl<'a> World<'a> {
             self.at(its.from_ns, Event::Begin { fault });
             self.at(its.until_ns, Event::End { fault });
         }
-        self.at(plan.mended_ns, Event::Mended);
+        self.at(plan.fixed_ns, Event::Mended);
         for (flow, its) in plan.flows.iter().enumerate() {
             let later_ns = if plan.moment_of(its).is_some() { 0 } else { self.chance.below(its.period_ns) };
             let at_ns = plan.traffic_begin_ns + later_ns;
@@ -132,7 +132,7 @@ impl<'a> World<'a> {
             let at_ns = self.chance.below(its.period_ns);
             self.at(at_ns, Event::Call { caller });
         }
-        self.at(0, Event::Look);
+        self.at(0, Event::SnapshotRequest);
     }
 
     pub(super) fn at(&mut self, at_ns: u64, event: Event) {
@@ -148,17 +148,17 @@ impl<'a> World<'a> {
     /// Runs to the end, or to the first broken promise.
     pub fn run(&mut self) -> &[Problem] {
         while let Some(Reverse(entry)) = self.events.pop() {
-            if entry.at_ns > self.plan.end_ns || !self.book.problems.is_empty() {
+            if entry.at_ns > self.plan.end_ns || !self.oracle.problems.is_empty() {
                 break;
             }
             self.now_ns = entry.at_ns;
             self.happen(entry.event);
         }
-        if self.book.problems.is_empty() {
+        if self.oracle.problems.is_empty() {
             self.look();
             self.close();
         }
-        &self.book.problems
+        &self.oracle.problems
     }
 
     fn happen(&mut self, event: Event) {
@@ -188,14 +188,14 @@ impl<'a> World<'a> {
             Event::Start { node } => self.start(node),
             Event::Begin { fault } => self.begin(fault),
             Event::End { fault } => self.end(fault),
-            Event::Mended => self.mend(),
+            Event::Mended => self.fix(),
             Event::Flow { flow } => self.flow(flow),
             Event::Call { caller } => self.call(caller),
             Event::Try { call } => self.try_call(call),
             Event::Serve { node, module } => self.serve(node, module),
-            Event::Look => {
+            Event::SnapshotRequest => {
                 self.look();
-                self.at(self.now_ns + LOOK_NS, Event::Look);
+                self.at(self.now_ns + LOOK_NS, Event::SnapshotRequest);
             }
         }
     }
@@ -208,9 +208,9 @@ impl<'a> World<'a> {
             if self.stations[node].sleeps > 0 {
                 continue;
             }
-            self.book.times.read(now, node, &mut self.book.problems);
+            self.oracle.times.read(now, node, &mut self.oracle.problems);
             let Some(life) = self.stations[node].router.as_ref().map(|router| router.life) else { continue };
-            let well = self.now_ns >= self.book.well_ns;
+            let well = self.now_ns >= self.oracle.well_ns;
             self.with_router(node, life, |router, io| router.layers.iter_mut().for_each(|layer| layer.check(io, well)));
         }
     }
@@ -223,6 +223,6 @@ impl<'a> World<'a> {
         let drift_ppb = station.drift_ppb + self.chance.around(step_ppb.max(1));
         station.drift_ppb = drift_ppb.clamp(-10 * its.wander_ppb, 10 * its.wander_ppb);
         station.clock.set_rate(self.now_ns, its.rate_ppb + station.drift_ppb);
-        self.book.times.clocks[node] = station.clock.clone();
+        self.oracle.times.clocks[node] = station.clock.clone();
     }
 }

@@ -16,7 +16,7 @@ impl World<'_> {
         let life = self.lives;
         self.living[node] = life;
         let now = self.now(node);
-        let layers = (self.new_layers)(node, self.stations[node].edition, life, now, self.book.times.left(now, node));
+        let layers = (self.new_layers)(node, self.stations[node].edition, life, now, self.oracle.times.left(now, node));
         self.stations[node].router = Some(Router { life, layers, sent: Default::default() });
         self.trace.line(self.now_ns, || format!("{node}/{life} the router starts"));
         if self.stations[node].runs() {
@@ -80,7 +80,7 @@ impl World<'_> {
             Some(slots) => {
                 let station = &mut self.stations[node];
                 let has_rested = self.now_ns >= station.late_at_ns + slots.rest_ns();
-                let late_ns = slots.late_ns(self.now_ns >= self.plan.mended_ns, has_rested, &mut self.chance);
+                let late_ns = slots.late_ns(self.now_ns >= self.plan.fixed_ns, has_rested, &mut self.chance);
                 station.late_at_ns = if late_ns > LATE_NS { self.now_ns } else { station.late_at_ns };
                 late_ns
             }

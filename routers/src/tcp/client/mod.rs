@@ -6,13 +6,13 @@
 //!                   └ sleep ─┘      └──┘  deliver ─▶ mailboxes
 //! ```
 
+mod reporter;
 mod time;
-mod voice;
 
 use super::bad_line::BadLine;
-use super::desk::Desk;
+use super::fault_writer::FaultWriter;
 use super::seal::ClientSeal;
-use super::seen::{Class, Link, LinkState, SAY_EVERY_NS, Seen};
+use super::snapshots::{Class, LatestValue, Link, LinkState, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
 use crate::admission::capped;
 use crate::impair;
@@ -20,8 +20,9 @@ use crate::session::client::{Client, ClientSettings, Output, Package};
 use crate::session::frame::{BadFrame, Range};
 use crate::session::in_system;
 use crate::shell::Faults;
+use crate::shell::sender_cache::SenderCache;
 use crate::shell::transit;
-use crate::shell::ways::Ways;
+use reporter::EventReporter;
 use rohrpost_mailbox::{
     ALL_SYSTEMS, CreateError, Head, Interest, Name, Node, NodeError, Participant, Receiver, Watch, Watches,
     monotonic_ns,
@@ -33,7 +34,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use time::Time;
-use voice::Voice;
 
 /// Packages taken from the mailbox before the socket has its turn.
 const BURST: usize = 64;
@@ -99,7 +99,7 @@ pub struct ClientShell {
 #[derive(Debug, Default)]
 struct Shared {
     ends: AtomicBool,
-    seen: Seen<Link>,
+    seen: LatestValue<Link>,
 }
 
 impl ClientShell {
@@ -123,14 +123,14 @@ impl ClientShell {
             shared: shared.clone(),
             server: bad_line.as_ref().map_or(server, BadLine::near),
             client: Client::new(settings, hosts.iter().copied().map(range).collect(), monotonic_ns()),
-            voice: Voice::new(
+            reporter: EventReporter::new(
                 server,
-                Ways::here(&participant, &hosts),
-                Desk::new(faults, format!("beyond the TCP router at {server}")),
+                SenderCache::here(&participant, &hosts),
+                FaultWriter::new(faults, format!("beyond the TCP router at {server}")),
             ),
             system,
             others: others.into_iter().map(range).collect(),
-            ways_to_others: Ways::everywhere(&participant),
+            ways_to_others: SenderCache::everywhere(&participant),
             seal,
             time,
             mailbox,
@@ -178,11 +178,11 @@ struct Work {
     /// Where it connects to.
     server: SocketAddr,
     client: Client,
-    voice: Voice,
+    reporter: EventReporter,
     /// First byte of the names of its node.
     system: u8,
     others: Box<[Range]>,
-    ways_to_others: Ways,
+    ways_to_others: SenderCache,
     seal: Option<ClientSeal>,
     /// Of the node, if the server tells it.
     time: Option<Time>,
@@ -205,7 +205,7 @@ impl Work {
                 say_ns = now_ns + SAY_EVERY_NS;
                 self.say(now_ns);
             }
-            match self.client.poll(now_ns, &mut self.voice) {
+            match self.client.poll(now_ns, &mut self.reporter) {
                 Output::Connect => self.connect(now_ns),
                 Output::Write => {
                     self.write();
@@ -243,11 +243,11 @@ impl Work {
                 // server reaches knows of no others: the server brings it to them.
                 let to = in_system(head.to, self.system);
                 let is_others = self.others.iter().any(|range| range.has(to));
-                let ways = if is_others { &mut self.ways_to_others } else { &mut self.voice.ways };
-                let own = ways.send(&Head { to, ..head }, body);
+                let sender_cache = if is_others { &mut self.ways_to_others } else { &mut self.reporter.sender_cache };
+                let own = sender_cache.send(&Head { to, ..head }, body);
                 self.client.reached_itself(to, head.priority, own.map_err(Into::into));
             }
-            self.client.send(monotonic_ns(), &Package { head, body, published_ns, hops: 0 }, &mut self.voice);
+            self.client.send(monotonic_ns(), &Package { head, body, published_ns, hops: 0 }, &mut self.reporter);
         }
         true
     }
@@ -267,8 +267,8 @@ impl Work {
                 self.connection = Some(Connection { stream, watch, is_begun: true, awaits_room: true });
             }
             Err(error) => {
-                self.voice.unreached(&error.to_string(), false);
-                self.client.closed(now_ns, &mut self.voice);
+                self.reporter.unreached(&error.to_string(), false);
+                self.client.closed(now_ns, &mut self.reporter);
             }
         }
     }
@@ -295,7 +295,7 @@ impl Work {
     fn read(&mut self) {
         let Some(connection) = self.connection.as_mut().filter(|connection| !connection.is_begun) else { return };
         match connection.stream.read(&mut self.piece) {
-            Moved::Bytes(bytes) => self.client.received(monotonic_ns(), &self.piece[..bytes], &mut self.voice),
+            Moved::Bytes(bytes) => self.client.received(monotonic_ns(), &self.piece[..bytes], &mut self.reporter),
             Moved::Nothing => drop(self.flush()),
             Moved::Over(error) => self.broke(error.as_ref()),
         }
@@ -349,11 +349,11 @@ impl Work {
     fn broke(&mut self, error: Option<&io::Error>) {
         self.forget();
         let (was_up, was_made) = (self.client.is_up(), self.client.is_connected());
-        self.client.closed(monotonic_ns(), &mut self.voice);
+        self.client.closed(monotonic_ns(), &mut self.reporter);
         if !was_up {
             let closed =
                 || if self.client.hears_tls() { BadFrame::Tls.to_string() } else { "it closed the connection".into() };
-            self.voice.unreached(&error.map_or_else(closed, ToString::to_string), was_made);
+            self.reporter.unreached(&error.map_or_else(closed, ToString::to_string), was_made);
         }
     }
 
@@ -379,11 +379,11 @@ impl Work {
         let told = client.system_time(now_ns).map(|record| record.at(now_ns).error);
         self.shared.seen.say(Link {
             state,
-            why: self.voice.why.clone(),
+            why: self.reporter.why.clone(),
             connections: client.connections(),
             round_trip_ns: client.round_trip_ns(),
             time_error_ns: told.map(|error| u64::try_from(error.as_nanos()).unwrap_or(u64::MAX)),
-            outage: self.voice.outage,
+            outage: self.reporter.outage,
             time: self.time.as_ref().map(|time| *time.record()),
             waiting_bytes: client.bytes() as u64,
             out: Class::all(client.out()),

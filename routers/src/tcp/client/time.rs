@@ -16,7 +16,7 @@ pub(super) struct Time {
 }
 
 impl Time {
-    /// What an earlier life of this client wrote goes on.
+    /// What an earlier incarnation of this client wrote goes on.
     pub(super) fn new(node: &Arc<Node>) -> Result<Self, NodeError> {
         let keeper = TimeKeeper::resume(node)?;
         let follower = Follower::new(monotonic_ns(), realtime_ns(), keeper.record());

@@ -3,11 +3,11 @@
 //! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the client's own queue.
 
 mod door;
-mod voice;
+mod reporter;
 
-use super::desk::Desk;
+use super::fault_writer::FaultWriter;
 use super::seal::{Holder, ServerSeal};
-use super::seen::{Class, HOSTS_MAX, MEMBERS_MAX, Member, Members, SAY_EVERY_NS, Seen};
+use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, Member, Members, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
 use crate::session::server::{Names, Output, Rights, Server, ServerSettings, View};
 use crate::session::{Cause, ClientIndex};
@@ -15,6 +15,7 @@ use crate::shell::Faults;
 use door::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
+use reporter::ServerReporter;
 use rohrpost_mailbox::{Node, SystemClock, monotonic_ns};
 use std::collections::BTreeMap;
 use std::io;
@@ -22,7 +23,6 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use voice::Voice;
 
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
@@ -81,7 +81,7 @@ pub struct ServerShell {
 struct Shared {
     ends: AtomicBool,
     bell: EventFd,
-    seen: Seen<Members>,
+    seen: LatestValue<Members>,
 }
 
 impl ServerShell {
@@ -103,12 +103,12 @@ impl ServerShell {
             epoll.add(&bell, EpollEvent::new(EpollFlags::EPOLLIN, BELL))
         };
         watch(&epoll).map_err(|errno| io("epoll")(errno.into()))?;
-        let shared = Arc::new(Shared { ends: AtomicBool::new(false), bell, seen: Seen::default() });
-        let desk = Desk::new(faults, format!("beyond the TCP router at {address}"));
+        let shared = Arc::new(Shared { ends: AtomicBool::new(false), bell, seen: LatestValue::default() });
+        let fault_writer = FaultWriter::new(faults, format!("beyond the TCP router at {address}"));
         let work = Work {
             shared: shared.clone(),
             server: Server::new(settings),
-            host: Voice::new(desk),
+            host: ServerReporter::new(fault_writer),
             seal,
             own,
             names,
@@ -160,7 +160,7 @@ struct Connection {
 struct Work {
     shared: Arc<Shared>,
     server: Server,
-    host: Voice,
+    host: ServerReporter,
     seal: Option<ServerSeal>,
     own: Option<u8>,
     names: BTreeMap<String, Names>,
@@ -342,7 +342,7 @@ impl Work {
             bytes: client.bytes as u64,
         };
         let classes = Class::all(self.server.counts());
-        let Voice { left, refused, ref refusal, .. } = self.host;
+        let ServerReporter { left, refused, ref refusal, .. } = self.host;
         let (refusal, held) = (refusal.clone(), self.host.held());
         let (crowded, overtaken) = (self.server.crowded(), self.server.overtaken());
         let crowded_packages = self.server.counts().lost_for(Cause::Share);

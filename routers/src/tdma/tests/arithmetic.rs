@@ -2,7 +2,7 @@
 
 use super::world::{CYCLE, HEADS, MASTERS, MS, US, table, tdma};
 use crate::tdma::{Kind, Table, Window};
-use crate::time::Reckoning;
+use crate::time::TimeEstimate;
 use proptest::prelude::*;
 use rohrpost_mailbox::{TimeRecord, TimeSource};
 use rohrpost_network::{Tdma, TimeSlot};
@@ -93,7 +93,7 @@ proptest! {
     ) {
         let source = TimeSource::Master;
         let record = TimeRecord { epoch: 1, source, monotonic_ns, system_ns, pace_ppb, error_ns: 0, drift_ns_s: 0 };
-        let line = Reckoning::new(record);
+        let line = TimeEstimate::new(record);
         let wanted_ns = system_ns.saturating_add_signed(away_ns);
         let first_ns = line.first_ns(wanted_ns).unwrap();
         prop_assert!(line.system_ns(first_ns) >= wanted_ns);

@@ -1,4 +1,4 @@
-//! The table by properties, the discipline by scenes; and each mistake must be seen by one of the checks.
+//! The table by properties, the scheduler by scenes; and each mistake must be seen by one of the checks.
 
 mod arithmetic;
 mod overheard;

@@ -2,7 +2,7 @@
 
 use super::world::{CYCLE, MASTERS, SECOND, US, World, table};
 use crate::frame::FrameHead;
-use crate::tdma::{Carries, Discipline, GATE_NS, Kind, Next, Silent, UNPROVEN_CYCLES, Verdict};
+use crate::tdma::{Carries, GATE_NS, Kind, Next, Silent, SlotScheduler, UNPROVEN_CYCLES, Verdict};
 use crate::time::message::{Message, Request, Sync};
 use crate::time::{Clock, Ignored, Role, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
@@ -20,7 +20,7 @@ const APART: u64 = JOINS + 100_000_000 + 8 * CYCLE;
 /// A node that may be master, and overhears another.
 struct Ear {
     clock: Clock,
-    discipline: Discipline,
+    scheduler: SlotScheduler,
     now_ns: u64,
     sequence: u64,
 }
@@ -42,11 +42,11 @@ impl Ear {
         };
         let (now_ns, table) = (10 * SECOND, table(own));
         let clock = Clock::new(settings, now_ns, SECOND, None).in_slots(table.for_clock());
-        Self { clock, discipline: Discipline::new(table, 100 * US), now_ns, sequence: 0 }
+        Self { clock, scheduler: SlotScheduler::new(table, 100 * US), now_ns, sequence: 0 }
     }
 
     fn overhears_of(&mut self, from: u8, message: &Message) -> Result<(), Ignored> {
-        let (kind, sequence, to) = (message.kind(), self.sequence, self.discipline.table().own());
+        let (kind, sequence, to) = (message.kind(), self.sequence, self.scheduler.table().own());
         let head = FrameHead { kind, system: 1, from, to, digest: 7, incarnation: 5, sequence };
         let came = Stamp { ns: self.now_ns, doubt_ns: 0, by_kernel: true };
         self.clock.overhear(self.now_ns, came, &head, &message.to_bytes())
@@ -94,30 +94,31 @@ impl Ear {
 pub(super) fn a_hello_leaves_in_one_of_four_cycles_and_nothing_else() {
     let mut ear = Ear::new(2);
     for _ in 0..8 {
-        assert!(matches!(ear.discipline.next(ear.now_ns, &ear.clock), Next::Silent { why: Silent::NoTime, .. }));
+        assert!(matches!(ear.scheduler.next(ear.now_ns, &ear.clock), Next::Silent { why: Silent::NoTime, .. }));
         ear.overhears().unwrap();
     }
     assert_eq!((ear.clock.role(), ear.clock.coarse(ear.now_ns)), (Role::Listening, None), "it believes nobody");
     let mut before_ns = None;
     for asked in 1..=3 {
-        let Next::Window(planned) = ear.discipline.next(ear.now_ns, &ear.clock) else { panic!("silent") };
-        assert!(matches!(planned.window.kind, Kind::Slot { .. }) && ear.discipline.silent() == Some(Silent::Asking));
+        let Next::Window(planned) = ear.scheduler.next(ear.now_ns, &ear.clock) else { panic!("silent") };
+        assert!(matches!(planned.window.kind, Kind::Slot { .. }) && ear.scheduler.silent() == Some(Silent::Asking));
         while ear.now_ns + CYCLE < planned.call_ns {
             ear.overhears().unwrap();
         }
         ear.now_ns = planned.call_ns;
-        let verdict = ear.discipline.judge(&planned, ear.now_ns, &ear.clock);
-        let Verdict::Send(mut permit) = verdict else { panic!("{verdict:?}") };
-        assert_eq!(permit.carries, Carries::Hello);
-        let step = ear.clock.poll_in(ear.now_ns, permit.allowed(), &mut [0; TIME_BYTES]);
+        let verdict = ear.scheduler.validate(&planned, ear.now_ns, &ear.clock);
+        let Verdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
+        assert_eq!(tx_window.carries, Carries::Hello);
+        let step = ear.clock.poll_in(ear.now_ns, tx_window.allowed(), &mut [0; TIME_BYTES]);
         assert!(matches!(step, Step::Wait { .. }), "{step:?}");
-        assert!(permit.carries_hello() && permit.fits(ear.now_ns, 68));
-        permit.takes(ear.now_ns, 68);
-        ear.discipline.close(&permit);
-        assert_eq!(ear.discipline.counts(&ear.clock).unproven, asked);
-        let paused =
-            before_ns.replace(permit.begin_ns).is_none_or(|before| permit.begin_ns - before >= UNPROVEN_CYCLES * CYCLE);
-        assert!(paused, "after {before_ns:?} at {}", permit.begin_ns);
+        assert!(tx_window.carries_hello() && tx_window.fits(ear.now_ns, 68));
+        tx_window.takes(ear.now_ns, 68);
+        ear.scheduler.close(&tx_window);
+        assert_eq!(ear.scheduler.counts(&ear.clock).unproven, asked);
+        let paused = before_ns
+            .replace(tx_window.begin_ns)
+            .is_none_or(|before| tx_window.begin_ns - before >= UNPROVEN_CYCLES * CYCLE);
+        assert!(paused, "after {before_ns:?} at {}", tx_window.begin_ns);
     }
 }
 
@@ -145,7 +146,7 @@ pub(super) fn who_has_begun_a_time_steps_back_until_it_is_impatient() {
     let first_ns = ear.now_ns;
     ear.overhears().unwrap();
     assert_eq!(
-        (ear.clock.role(), ear.clock.reckoning()),
+        (ear.clock.role(), ear.clock.estimate()),
         (Role::Listening, None),
         "it listens again, and goes by nothing"
     );
@@ -175,7 +176,7 @@ fn the_only_master_that_lost_its_page_asks_each_of_five_that_speak_in_turn() {
         (1..6).for_each(|from| ear.overhears_hello_of(from).unwrap());
         ear.pass(CYCLE);
     }
-    let next = ear.discipline.next(ear.now_ns, &ear.clock);
+    let next = ear.scheduler.next(ear.now_ns, &ear.clock);
     assert!(matches!(next, Next::Window(planned) if planned.carries == Carries::Hello), "{next:?}");
     let asked = [(); 5].map(|()| {
         let (node, _) = ear.clock.overheard(ear.now_ns).unwrap();
@@ -192,32 +193,29 @@ fn a_window_of_what_is_overheard_is_no_slot_of_the_nodes_own_time() {
     assert!(world.run_until(5 * SECOND, World::agrees));
     (0..2).for_each(|other| (world.cut[other][2], world.cut[2][other]) = (true, true));
     let is_unsure = |world: &World| matches!(world.silent(2), Some(Silent::BoundTooLarge { .. }));
-    assert!(
-        world.run_until(60 * SECOND, is_unsure) && world.clock(2).reckoning().is_some(),
-        "it has a time of its own"
-    );
+    assert!(world.run_until(60 * SECOND, is_unsure) && world.clock(2).estimate().is_some(), "it has a time of its own");
     let mut now_ns = world.nodes[2].local_ns(world.now);
     let one = &mut world.nodes[2];
-    let (clock, discipline) = (one.clock.as_mut().unwrap(), &mut one.discipline);
+    let (clock, scheduler) = (one.clock.as_mut().unwrap(), &mut one.scheduler);
     // By a time that is a thousand seconds ahead.
     for sequence in 1..=8 {
         now_ns += CYCLE;
         clock.poll_in(now_ns, crate::time::Allowed::Nothing, &mut [0; TIME_BYTES]);
-        discipline.next(now_ns, clock);
+        scheduler.next(now_ns, clock);
         let sent_ns = clock.reading(now_ns).time.ns + 1000 * SECOND;
         let message = Message::Request(Request { epoch: 9, sent_ns, timed: true, ..Request::default() });
         let head = FrameHead { kind: message.kind(), system: 1, from: 0, to: 2, digest: 7, incarnation: 5, sequence };
         let came = Stamp { ns: now_ns, doubt_ns: 0, by_kernel: true };
         clock.overhear(now_ns, came, &head, &message.to_bytes()).unwrap();
     }
-    let Next::Window(planned) = discipline.next(now_ns, clock) else { panic!("silent") };
+    let Next::Window(planned) = scheduler.next(now_ns, clock) else { panic!("silent") };
     assert_eq!(planned.carries, Carries::Hello);
-    let before = discipline.counts(clock);
+    let before = scheduler.counts(clock);
     let late_ns = planned.begin_ns + GATE_NS + 1;
-    assert!(matches!(discipline.judge(&planned, late_ns, clock), Verdict::Late));
-    assert_eq!(discipline.counts(clock), before, "none of its own slots was late");
-    discipline.next(late_ns, clock);
-    let passed = discipline.counts(clock).silent - before.silent;
+    assert!(matches!(scheduler.validate(&planned, late_ns, clock), Verdict::Late));
+    assert_eq!(scheduler.counts(clock), before, "none of its own slots was late");
+    scheduler.next(late_ns, clock);
+    let passed = scheduler.counts(clock).silent - before.silent;
     let own_slots = 2 * (late_ns - now_ns).div_ceil(CYCLE);
     assert!((1..=own_slots).contains(&passed), "all of them are counted, and once: {passed} of {own_slots}");
 }
@@ -226,7 +224,7 @@ fn a_window_of_what_is_overheard_is_no_slot_of_the_nodes_own_time() {
 fn who_goes_by_who_lives_meanwhile_asks_for_its_window_anew() {
     let mut ear = Ear::new(2);
     (0..8).for_each(|_| ear.overhears().unwrap());
-    let Next::Window(planned) = ear.discipline.next(ear.now_ns, &ear.clock) else { panic!("silent") };
+    let Next::Window(planned) = ear.scheduler.next(ear.now_ns, &ear.clock) else { panic!("silent") };
     for id in 101..=108 {
         let (sent_ns, term) = (ear.now_ns + 1000 * SECOND, Term::new(7, 0));
         let sync = Sync { id, cycle: id, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
@@ -236,8 +234,8 @@ fn who_goes_by_who_lives_meanwhile_asks_for_its_window_anew() {
         let came = Stamp { ns: ear.now_ns, doubt_ns: 0, by_kernel: true };
         ear.clock.handle(ear.now_ns, came, &head, &message.to_bytes()).unwrap();
     }
-    assert!(matches!(ear.discipline.judge(&planned, planned.call_ns, &ear.clock), Verdict::Early));
-    let Next::Window(anew) = ear.discipline.next(planned.call_ns, &ear.clock) else { panic!("silent") };
+    assert!(matches!(ear.scheduler.validate(&planned, planned.call_ns, &ear.clock), Verdict::Early));
+    let Next::Window(anew) = ear.scheduler.next(planned.call_ns, &ear.clock) else { panic!("silent") };
     assert_eq!((anew.window, anew.carries), (planned.window, Carries::Time));
 }
 

@@ -238,7 +238,7 @@ fn in_quiet_times_frames_start_where_slots_do() {
     world.run(2 * SECOND);
     let counts = world.counts(2);
     assert!(counts.used > 400 && world.wire[begins..].iter().any(|frame| frame.from == 2 && !frame.is_time));
-    let lead = world.nodes[2].discipline.lead_ns();
+    let lead = world.nodes[2].scheduler.lead_ns();
     assert!(lead.1 >= 3 * US && lead.1 <= lead.0, "{lead:?}");
     holds(&world, 3);
 }

@@ -2,7 +2,7 @@
 
 use super::world::{CYCLE, MASTERS, SECOND, US, table};
 use crate::frame::{FrameHead, Kind as Frame};
-use crate::tdma::{Carries, Discipline, GATE_NS, LATE_NS, Next, Planned, Silent, Verdict};
+use crate::tdma::{Carries, GATE_NS, LATE_NS, Next, Planned, Silent, SlotScheduler, Verdict};
 use crate::time::message::{Message, Reply, Sync};
 use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
@@ -14,7 +14,7 @@ const TERM: Term = Term(1 << 8 | 255);
 /// Node 2, which hears node 0.
 struct Lonely {
     clock: Clock,
-    discipline: Discipline,
+    scheduler: SlotScheduler,
     now_ns: u64,
     cycle: u64,
     id: u64,
@@ -34,7 +34,7 @@ impl Lonely {
         let now_ns = 10 * SECOND;
         let table = table(2);
         let clock = Clock::new(settings, now_ns, 0, None).in_slots(table.for_clock());
-        Self { clock, discipline: Discipline::new(table, 100 * US), now_ns, cycle: (now_ns + OFFSET) / CYCLE, id: 0 }
+        Self { clock, scheduler: SlotScheduler::new(table, 100 * US), now_ns, cycle: (now_ns + OFFSET) / CYCLE, id: 0 }
     }
 
     fn hears(&mut self, from: u8, at_ns: u64, message: &Message) {
@@ -61,19 +61,19 @@ impl Lonely {
 
     /// Its next window, judged at this moment after its call.
     fn judged(&mut self, after_ns: i64) -> (Planned, Verdict) {
-        let Next::Window(planned) = self.discipline.next(self.now_ns, &self.clock) else { panic!("silent") };
+        let Next::Window(planned) = self.scheduler.next(self.now_ns, &self.clock) else { panic!("silent") };
         self.now_ns = planned.call_ns.saturating_add_signed(after_ns);
-        let verdict = self.discipline.judge(&planned, self.now_ns, &self.clock);
+        let verdict = self.scheduler.validate(&planned, self.now_ns, &self.clock);
         (planned, verdict)
     }
 
     /// Asks in its slot, and is answered. Each way takes 10 µs.
     fn asks(&mut self) {
         let (_, verdict) = self.judged(0);
-        let Verdict::Send(permit) = verdict else { panic!("{verdict:?}") };
+        let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
         let mut datagram = [0; TIME_BYTES];
         let mut kinds = Vec::new();
-        let allowed = permit.allowed();
+        let allowed = tx_window.allowed();
         while let Step::Send { to, stamp } = self.clock.poll_in(self.now_ns, allowed, &mut datagram) {
             assert_eq!(to, 0);
             kinds.push(FrameHead::parse(&datagram).unwrap().0.kind);
@@ -109,7 +109,7 @@ impl Lonely {
 #[test]
 fn a_node_listens_then_asks_then_sends() {
     let mut one = Lonely::new();
-    let silent = |one: &mut Lonely| match one.discipline.next(one.now_ns, &one.clock) {
+    let silent = |one: &mut Lonely| match one.scheduler.next(one.now_ns, &one.clock) {
         Next::Silent { why, .. } => Some(why),
         Next::Window(_) => None,
     };
@@ -120,15 +120,15 @@ fn a_node_listens_then_asks_then_sends() {
     }
     one.hears_sync();
     let (planned, verdict) = one.judged(0);
-    let Verdict::Send(permit) = verdict else { panic!("{verdict:?}") };
-    assert_eq!((permit.carries, one.discipline.silent()), (Carries::Time, Some(Silent::Joining { heard: 8 })));
+    let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
+    assert_eq!((tx_window.carries, one.scheduler.silent()), (Carries::Time, Some(Silent::Joining { heard: 8 })));
     // By coarse time a Sync takes half of what it may take at most.
-    let delay_max_ns = one.discipline.table().for_clock().delay_max_ns;
+    let delay_max_ns = one.scheduler.table().for_clock().delay_max_ns;
     assert_eq!(planned.begin_ns, planned.window.begin_ns - OFFSET + 10 * US - delay_max_ns / 2);
     let mut one = Lonely::joined();
     let (planned, verdict) = one.judged(0);
-    let Verdict::Send(permit) = verdict else { panic!("{verdict:?}") };
-    assert_eq!((permit.carries, one.discipline.silent()), (Carries::All, None));
+    let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
+    assert_eq!((tx_window.carries, one.scheduler.silent()), (Carries::All, None));
     assert!(planned.begin_ns.abs_diff(planned.window.begin_ns - OFFSET) < 2 * US, "{planned:?}");
     assert_eq!(planned.call_ns - planned.wake_ns, 100 * US, "to be spun");
 }
@@ -144,22 +144,22 @@ pub(super) fn what_is_late_is_not_sent() {
             Some(true) => assert!(matches!(verdict, Verdict::Send(_)), "{after_ns}: {verdict:?}"),
             Some(false) => assert!(matches!(verdict, Verdict::Late), "{after_ns}: {verdict:?}"),
         }
-        assert_eq!(one.discipline.counts(&one.clock).late, u64::from(sends == Some(false)));
+        assert_eq!(one.scheduler.counts(&one.clock).late, u64::from(sends == Some(false)));
     }
 }
 
 pub(super) fn silence_begins_right_above_the_allowance() {
     let mut one = Lonely::joined();
     one.clock.poll_in(one.now_ns + SECOND, Allowed::Nothing, &mut [0; TIME_BYTES]);
-    let allowance_ns = one.discipline.table().allowance_ns();
+    let allowance_ns = one.scheduler.table().allowance_ns();
     let (mut sent, mut was_sure) = (0, true);
     for _ in 0..100_000 {
         one.clock.poll_in(one.now_ns, Allowed::Nothing, &mut [0; TIME_BYTES]);
-        match one.discipline.next(one.now_ns, &one.clock) {
+        match one.scheduler.next(one.now_ns, &one.clock) {
             Next::Window(planned) => {
                 one.now_ns = planned.call_ns;
-                let bound_ns = one.clock.reckoning().unwrap().bound_ns(planned.end_ns);
-                let verdict = one.discipline.judge(&planned, one.now_ns, &one.clock);
+                let bound_ns = one.clock.estimate().unwrap().bound_ns(planned.end_ns);
+                let verdict = one.scheduler.validate(&planned, one.now_ns, &one.clock);
                 assert_eq!(matches!(verdict, Verdict::Send(_)), bound_ns <= allowance_ns, "{bound_ns}: {verdict:?}");
                 sent += u32::from(was_sure);
                 was_sure = bound_ns <= allowance_ns;
@@ -179,71 +179,74 @@ pub(super) fn no_frame_starts_before_its_slot() {
     // From the call to the wire it takes 12, 13, … µs.
     for sample in 0..300 {
         let left = Stamp { ns: one.now_ns + 12 * US + sample % 10 * US, doubt_ns: 0, by_kernel: true };
-        one.discipline.left(one.now_ns, left);
+        one.scheduler.left(one.now_ns, left);
     }
     let (planned, verdict) = one.judged(0);
     assert!(matches!(verdict, Verdict::Send(_)), "{verdict:?}");
     assert_eq!(planned.begin_ns - planned.call_ns, 12 * US, "as much as can be compensated");
-    assert_eq!(one.discipline.lead_ns().0, 17 * US, "the median");
+    assert_eq!(one.scheduler.lead_ns().0, 17 * US, "the median");
     let doubtful = Stamp { ns: one.now_ns + 12 * US, doubt_ns: 10_000, by_kernel: true };
-    [doubtful, Stamp::by_us(one.now_ns)].into_iter().for_each(|stamp| one.discipline.left(one.now_ns, stamp));
-    assert_eq!(one.discipline.lead_ns().1, 12 * US, "what may be far off says nothing");
+    [doubtful, Stamp::by_us(one.now_ns)].into_iter().for_each(|stamp| one.scheduler.left(one.now_ns, stamp));
+    assert_eq!(one.scheduler.lead_ns().1, 12 * US, "what may be far off says nothing");
     let last = Stamp { ns: one.now_ns + 3 * US, doubt_ns: 500, by_kernel: true };
-    one.discipline.left(one.now_ns, last);
-    assert_eq!(one.discipline.lead_ns().1, 2_500, "the quickest of all, by the least that its stamp says");
+    one.scheduler.left(one.now_ns, last);
+    assert_eq!(one.scheduler.lead_ns().1, 2_500, "the quickest of all, by the least that its stamp says");
 }
 
 pub(super) fn what_was_handed_over_counts() {
     let mut one = Lonely::joined();
     let (planned, verdict) = one.judged(0);
-    let Verdict::Send(mut permit) = verdict else { panic!("{verdict:?}") };
+    let Verdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
     // 350 µs: 4375 bytes. All are handed over at once, and the wire takes its time.
     assert!((349 * US..=350 * US).contains(&(planned.end_ns - planned.begin_ns)), "{planned:?}");
     let (mut datagrams, wire_ns) = (0, 85_280);
-    let arrives_after_ns = permit.arrives_after_ns(permit.begin_ns, 1_000, 5 * US);
+    let arrives_after_ns = tx_window.arrives_after_ns(tx_window.begin_ns, 1_000, 5 * US);
     assert_eq!(arrives_after_ns, 5 * US + 2 * wire_ns, "to the wire, on it, and once more behind a switch");
-    while permit.fits(one.now_ns, 1_000) {
-        permit.takes(one.now_ns, 1_000);
+    while tx_window.fits(one.now_ns, 1_000) {
+        tx_window.takes(one.now_ns, 1_000);
         datagrams += 1;
         assert!(datagrams < 100, "it does not end");
     }
     assert_eq!(datagrams, 4, "of 1066 bytes each");
-    let arrives_after_ns = permit.arrives_after_ns(permit.begin_ns, 1_000, 5 * US);
+    let arrives_after_ns = tx_window.arrives_after_ns(tx_window.begin_ns, 1_000, 5 * US);
     assert!(arrives_after_ns >= 6 * wire_ns, "behind those: {arrives_after_ns}");
-    assert!(permit.fits(one.now_ns, 40) && !permit.fits(planned.end_ns - 5 * US, 0), "nothing that ends in the guard");
-    one.discipline.close(&permit);
-    let counts = one.discipline.counts(&one.clock);
+    assert!(
+        tx_window.fits(one.now_ns, 40) && !tx_window.fits(planned.end_ns - 5 * US, 0),
+        "nothing that ends in the guard"
+    );
+    one.scheduler.close(&tx_window);
+    let counts = one.scheduler.counts(&one.clock);
     assert_eq!((counts.used, counts.datagrams, counts.wire_bytes), (1, 4, 4 * 1_066));
 }
 
 #[test]
 fn what_leaves_later_than_bounds_reckon_with_is_late() {
     let mut one = Lonely::joined();
-    let (_, Verdict::Send(mut permit)) = one.judged(0) else { panic!() };
+    let (_, Verdict::Send(mut tx_window)) = one.judged(0) else { panic!() };
     let (hand_over_ns, wire_ns, small_wire_ns) = (20 * US, 85_280, 6_720);
-    let called_ns = permit.begin_ns - one.discipline.lead_ns().1;
+    let called_ns = tx_window.begin_ns - one.scheduler.lead_ns().1;
     let turns_at = |after_ns: u64, is_so: &dyn Fn(u64) -> bool| {
         assert_eq!([0, 1].map(|more_ns| is_so(called_ns + after_ns + more_ns)), [false, true], "at {after_ns} ns");
     };
-    turns_at(LATE_NS, &|now_ns| permit.is_behind(now_ns));
-    turns_at(LATE_NS, &|now_ns| permit.is_late(now_ns, 1_000));
+    turns_at(LATE_NS, &|now_ns| tx_window.is_behind(now_ns));
+    turns_at(LATE_NS, &|now_ns| tx_window.is_late(now_ns, 1_000));
     // A small one takes the wire less than the thread, which has the rest to hand it over.
-    turns_at(LATE_NS + hand_over_ns - small_wire_ns, &|now_ns| permit.is_late(now_ns, 0));
-    permit.takes(called_ns, 1_000);
-    turns_at(LATE_NS + wire_ns, &|now_ns| permit.is_behind(now_ns));
-    permit.takes(called_ns + wire_ns, 0);
-    turns_at(LATE_NS + wire_ns + hand_over_ns, &|now_ns| permit.is_behind(now_ns));
-    turns_at(LATE_NS + wire_ns + hand_over_ns, &|now_ns| permit.is_late(now_ns, 1_000));
+    turns_at(LATE_NS + hand_over_ns - small_wire_ns, &|now_ns| tx_window.is_late(now_ns, 0));
+    tx_window.takes(called_ns, 1_000);
+    turns_at(LATE_NS + wire_ns, &|now_ns| tx_window.is_behind(now_ns));
+    tx_window.takes(called_ns + wire_ns, 0);
+    turns_at(LATE_NS + wire_ns + hand_over_ns, &|now_ns| tx_window.is_behind(now_ns));
+    turns_at(LATE_NS + wire_ns + hand_over_ns, &|now_ns| tx_window.is_late(now_ns, 1_000));
 }
 
 #[test]
 fn slots_that_went_by_are_counted() {
     let mut one = Lonely::joined();
     one.judged(0);
-    let before = one.discipline.counts(&one.clock);
+    let before = one.scheduler.counts(&one.clock);
     one.now_ns += 3 * CYCLE + 2 * GATE_NS;
-    one.discipline.next(one.now_ns, &one.clock);
-    let counts = one.discipline.counts(&one.clock);
+    one.scheduler.next(one.now_ns, &one.clock);
+    let counts = one.scheduler.counts(&one.clock);
     // Three cycles have three slots, and one that is there in each third.
     assert_eq!((counts.skipped - before.skipped, counts.silent), (4, before.silent));
 }
@@ -276,6 +279,6 @@ pub(super) fn who_turns_while_the_first_master_lives_is_not_sure() {
         let sync = Sync { id: 1, term, began: term, ..one.sync(one.now_ns + OFFSET) };
         one.hears(1, one.now_ns, &Message::Sync(sync));
         assert_eq!(one.clock.master(), Some(1));
-        assert_eq!(one.clock.reckoning().is_some(), is_sure, "after {silence} ns of silence");
+        assert_eq!(one.clock.estimate().is_some(), is_sure, "after {silence} ns of silence");
     }
 }

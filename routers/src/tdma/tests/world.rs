@@ -4,7 +4,7 @@
 use crate::frame::{FrameHead, NodeIndex};
 use crate::harness::settings;
 use crate::stats::Stats;
-use crate::tdma::{Carries, Counts, Discipline, Kind, Next, Planned, Silent, Table, Verdict};
+use crate::tdma::{Carries, Counts, Kind, Next, Planned, Silent, SlotScheduler, Table, Verdict};
 use crate::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -88,7 +88,7 @@ struct Letter {
 
 pub(super) struct One {
     pub(super) clock: Option<Clock>,
-    pub(super) discipline: Discipline,
+    pub(super) scheduler: SlotScheduler,
     pub(super) file: File,
     offset_ns: u64,
     rate_ppb: i64,
@@ -141,7 +141,7 @@ impl World {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let nodes = (0..3).map(|own| One {
             clock: None,
-            discipline: Discipline::new(table(own), 0),
+            scheduler: SlotScheduler::new(table(own), 0),
             file: File::right(),
             offset_ns: random.random_range(SECOND..100 * SECOND),
             rate_ppb: random.random_range(-80_000..=80_000),
@@ -175,7 +175,7 @@ impl World {
         let table = one.file.table(node);
         let clock = Clock::new(settings, one.local_ns(self.now), wall_ns, one.page).in_slots(table.for_clock());
         one.clock = Some(clock);
-        one.discipline = Discipline::new(table, 0);
+        one.scheduler = SlotScheduler::new(table, 0);
         (one.wakes, one.planned, one.incarnation) = (self.now, None, incarnation);
         one.came.clear();
     }
@@ -215,11 +215,11 @@ impl World {
     }
 
     pub(super) fn counts(&self, node: NodeIndex) -> Counts {
-        self.nodes[usize::from(node)].discipline.counts(self.clock(node))
+        self.nodes[usize::from(node)].scheduler.counts(self.clock(node))
     }
 
     pub(super) fn silent(&self, node: NodeIndex) -> Option<Silent> {
-        self.nodes[usize::from(node)].discipline.silent()
+        self.nodes[usize::from(node)].scheduler.silent()
     }
 
     /// How many frames of a node were on the wire.
@@ -274,9 +274,9 @@ impl World {
         let local_ns = one.local_ns(now);
         let Some(clock) = &mut one.clock else { return };
         if let Some(planned) = planned
-            && let Verdict::Send(permit) = one.discipline.judge(&planned, local_ns, clock)
+            && let Verdict::Send(tx_window) = one.scheduler.validate(&planned, local_ns, clock)
         {
-            self.send(node, permit);
+            self.send(node, tx_window);
         }
         let at = self.now;
         let one = &mut self.nodes[usize::from(node)];
@@ -286,7 +286,7 @@ impl World {
             Step::Wait { until_ns } => until_ns,
             Step::Send { .. } => panic!("a clock in time slots sends when it may not"),
         };
-        let (next, clock_ns) = (one.discipline.next(local_ns, clock), until_ns.max(local_ns + 10_000));
+        let (next, clock_ns) = (one.scheduler.next(local_ns, clock), until_ns.max(local_ns + 10_000));
         let (wakes_ns, planned) = match next {
             // Who has woken up for a window spins until it is there.
             Next::Window(planned) if planned.call_ns <= clock_ns + 100 * US => (planned.call_ns, Some(planned)),
@@ -318,40 +318,40 @@ impl World {
         }
     }
 
-    fn send(&mut self, node: NodeIndex, mut permit: crate::tdma::Permit) {
+    fn send(&mut self, node: NodeIndex, mut tx_window: crate::tdma::TransmitWindow) {
         let mut free = 0;
         loop {
             let one = &mut self.nodes[usize::from(node)];
             let local_ns = one.local_ns(self.now);
             let Some(clock) = &mut one.clock else { return };
             let mut bytes = [0; TIME_BYTES];
-            if !permit.fits(local_ns, TIME_BYTES) {
+            if !tx_window.fits(local_ns, TIME_BYTES) {
                 break;
             }
-            let Step::Send { to, stamp } = clock.poll_in(local_ns, permit.allowed(), &mut bytes) else { break };
-            permit.takes(local_ns, TIME_BYTES);
+            let Step::Send { to, stamp } = clock.poll_in(local_ns, tx_window.allowed(), &mut bytes) else { break };
+            tx_window.takes(local_ns, TIME_BYTES);
             let frame = self.put(node, TIME_BYTES, &mut free, true);
             let one = &mut self.nodes[usize::from(node)];
             let left = Stamp { ns: one.local_ns(frame.begin), doubt_ns: 100, by_kernel: true };
             if let (Some(id), Some(clock)) = (stamp, &mut one.clock) {
                 clock.sent(id, left);
             }
-            one.discipline.left(local_ns, left);
+            one.scheduler.left(local_ns, left);
             let arrives = frame.end + self.random.random_range(5 * US..25 * US);
             if !self.cut[usize::from(node)][usize::from(to)] {
                 self.nodes[usize::from(to)].came.push_back(Letter { from: node, arrives, bytes });
             }
         }
-        while permit.carries == Carries::All {
+        while tx_window.carries == Carries::All {
             let local_ns = self.nodes[usize::from(node)].local_ns(self.now);
-            if !permit.fits(local_ns, DATAGRAM_BYTES) {
+            if !tx_window.fits(local_ns, DATAGRAM_BYTES) {
                 break;
             }
-            permit.takes(local_ns, DATAGRAM_BYTES);
+            tx_window.takes(local_ns, DATAGRAM_BYTES);
             let frame = self.put(node, DATAGRAM_BYTES, &mut free, false);
             self.packages_come_to_others(&frame);
         }
-        self.nodes[usize::from(node)].discipline.close(&permit);
+        self.nodes[usize::from(node)].scheduler.close(&tx_window);
     }
 
     fn packages_come_to_others(&mut self, frame: &OnWire) {
@@ -382,7 +382,7 @@ impl World {
         self.collisions.extend(met.map(|other| (other, frame)));
         self.wire.push(frame);
         let one = &self.nodes[usize::from(from)];
-        let bound_ns = one.clock.as_ref().and_then(Clock::reckoning).map(|own| own.bound_ns(one.local_ns(self.now)));
+        let bound_ns = one.clock.as_ref().and_then(Clock::estimate).map(|own| own.bound_ns(one.local_ns(self.now)));
         if !is_time && bound_ns.is_none_or(|bound_ns| bound_ns > 75 * US) {
             self.unsure += 1;
         }

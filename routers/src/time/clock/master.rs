@@ -3,8 +3,8 @@
 use super::{Clock, Draft, Left, Slave};
 use crate::broken::broken;
 use crate::frame::NodeIndex;
+use crate::time::clock_model::EVEN_PPB;
 use crate::time::election::{Origin, State};
-use crate::time::line::EVEN_PPB;
 use crate::time::message::{Reply, Request, Sync};
 use crate::time::{Ignored, Stamp, Term};
 

@@ -7,8 +7,8 @@ use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::time::election::State;
 use crate::time::message::Message;
-use crate::time::overheard::Told;
-use crate::time::{Ignored, Reckoning, Stamp};
+use crate::time::unverified::TimeReport;
+use crate::time::{Ignored, Stamp, TimeEstimate};
 
 impl Clock {
     /// Whether frames help whose sender has not shown that it lives: those of [`Clock::overhear`].
@@ -17,7 +17,7 @@ impl Clock {
         self.slots.is_some() && (self.is_beginning() || is_listening())
     }
 
-    /// Takes a datagram of time that some life of its node has said at some time, and to this node.
+    /// Takes a datagram of time that some incarnation of its node has said at some time, and to this node.
     ///
     /// # Errors
     /// [`Ignored`]: it changed nothing.
@@ -42,9 +42,9 @@ impl Clock {
         }
         let told = match &message {
             Message::Sync(sync) if sync.replacement => None,
-            Message::Sync(sync) => Some(Told { epoch: sync.epoch, system_ns: sync.sent_ns, error_ns: 0 }),
+            Message::Sync(sync) => Some(TimeReport { epoch: sync.epoch, system_ns: sync.sent_ns, error_ns: 0 }),
             Message::Request(hello) if hello.id == 0 && hello.timed => {
-                Some(Told { epoch: hello.epoch, system_ns: hello.sent_ns, error_ns: hello.error_ns })
+                Some(TimeReport { epoch: hello.epoch, system_ns: hello.sent_ns, error_ns: hello.error_ns })
             }
             _ => return Err(Ignored::Unproven),
         };
@@ -79,10 +79,10 @@ impl Clock {
     }
 
     /// Who may be asked whether it lives, and by what time: none if nobody is heard, or not enough. For hellos alone.
-    pub fn overheard(&self, now_ns: u64) -> Option<(NodeIndex, Reckoning)> {
+    pub fn overheard(&self, now_ns: u64) -> Option<(NodeIndex, TimeEstimate)> {
         let slots = self.slots.as_ref()?;
         let (delay_max_ns, allowance_ns) = (slots.settings.delay_max_ns, slots.settings.allowance_ns);
-        slots.overheard.reckoning(now_ns, delay_max_ns, allowance_ns)
+        slots.overheard.estimate(now_ns, delay_max_ns, allowance_ns)
     }
 
     /// A hello has left by [`Self::overheard`]: the next goes by another's time, if there is one.

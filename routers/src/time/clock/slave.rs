@@ -3,9 +3,9 @@
 use super::{Asked, Clock, Draft, EXCHANGE_NS_MIN, rate_of};
 use crate::frame::FrameHead;
 use crate::time::broken::Broken;
+use crate::time::clock_model::{EVEN_PPB, wander_ns_s};
 use crate::time::election::{Followed, Heard, State};
 use crate::time::history::{Estimate, Sample};
-use crate::time::line::{EVEN_PPB, wander_ns_s};
 use crate::time::message::{Reply, Request, Sync};
 use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
 
@@ -14,7 +14,7 @@ const SAMPLES_MIN: u32 = 4;
 const SAMPLES_EAGER: u32 = 8;
 /// A slave answers a Sync at most so late: meanwhile its clock drifts from the master's.
 const ANSWER_NS_MAX: u64 = 50_000_000;
-/// A slave is mended within so long, or four exchanges.
+/// A slave is fixed within so long, or four exchanges.
 const SERVO_NS_MIN: u64 = 250_000_000;
 /// For so long the stated growth of the bound holds, and at least for four intervals; then a greater one is stated.
 const HORIZON_NS_MIN: u64 = 2_000_000_000;
@@ -92,13 +92,13 @@ impl Clock {
         self.last = Some(exchange);
         self.history.add(sample);
         if self.history.samples() >= SAMPLES_MIN {
-            self.discipline(now_ns, sample);
+            self.scheduler(now_ns, sample);
         }
         Ok(())
     }
 
     /// The servo: from what was measured, where the line is to go.
-    pub(super) fn discipline(&mut self, now_ns: u64, newest: Sample) {
+    pub(super) fn scheduler(&mut self, now_ns: u64, newest: Sample) {
         let State::Slave(master) = self.election.state() else { return };
         let Some(estimate) = self.history.estimate(now_ns, self.usual_rate) else {
             self.contradictions += 1;

@@ -7,12 +7,12 @@ use super::{Clock, Draft};
 use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::stats::Stats;
+use crate::time::clock_model::EVEN_PPB;
 use crate::time::coarse::Coarse;
 use crate::time::election::{Followed, Origin, State};
-use crate::time::line::EVEN_PPB;
 use crate::time::message::{Request, Sync};
-use crate::time::overheard::Overheard;
-use crate::time::{Ignored, InSlots, JOINING_SYNCS, Reckoning, Stamp, Step, SyncCounts, TIME_BYTES, Term};
+use crate::time::unverified::UnverifiedPeers;
+use crate::time::{Ignored, InSlots, JOINING_SYNCS, Stamp, Step, SyncCounts, TIME_BYTES, Term, TimeEstimate};
 use rohrpost_mailbox::TimeRecord;
 
 /// Who reigns by a time that is not its own sends nothing but Syncs in so many cycles: who goes by another hears of it meanwhile.
@@ -50,7 +50,7 @@ pub(super) struct Slots {
     pub(super) settings: InSlots,
     coarse: Coarse,
     /// What was heard of who may not live any more.
-    pub(super) overheard: Overheard,
+    pub(super) overheard: UnverifiedPeers,
     counts: SyncCounts,
     /// The page goes by something else than what others go by now: a master that is not measured yet.
     pub(super) unsure: bool,
@@ -100,7 +100,7 @@ impl Clock {
         self.election.asks_after(JOINING_SYNCS.into(), settings.asks_every_ns);
         let hears_ns = self.interval_ns.saturating_mul(OTHERS_CYCLES);
         self.others.gives(hears_ns.saturating_add(settings.slot_every_ns.saturating_mul(OTHERS_SLOTS)));
-        // Who hears nobody begins its terms anew, but not those of an earlier life, by which others may still go: a reign lasts longer than
+        // Who hears nobody begins its terms anew, but not those of an earlier incarnation, by which others may still go: a reign lasts longer than
         // a millisecond.
         if self.line.record().epoch > 0 {
             self.election.speaks_of(Term::new(self.hello_ns / MS, 0), 0);
@@ -108,7 +108,7 @@ impl Clock {
         self.slots = Some(Box::new(Slots {
             settings,
             coarse: Coarse::default(),
-            overheard: Overheard::new(self.settings.nodes, self.interval_ns, settings.hello_every_ns),
+            overheard: UnverifiedPeers::new(self.settings.nodes, self.interval_ns, settings.hello_every_ns),
             counts: SyncCounts::default(),
             unsure: true,
             master_error_ns: 0,
@@ -290,7 +290,7 @@ impl Clock {
         (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
     }
 
-    /// Something of a node came that is no Sync, packages perhaps: the last of this life of it at `received_ns`, local. If that is the
+    /// Something of a node came that is no Sync, packages perhaps: the last of this incarnation of it at `received_ns`, local. If that is the
     /// master, it lives, though its Syncs may be missing. Matters in time slots alone.
     pub fn hears(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) {
         if let Some(slots) = &mut self.slots
@@ -338,20 +338,20 @@ impl Clock {
 /// What a node in time slots goes by.
 impl Clock {
     /// By what a node in time slots goes. None if it has no time, or one that the present master has not confirmed.
-    pub fn reckoning(&self) -> Option<Reckoning> {
+    pub fn estimate(&self) -> Option<TimeEstimate> {
         let slots = self.slots.as_ref().filter(|slots| !slots.unsure && self.line.is_synchronised())?;
         let record = *self.line.record();
         let error_ns = record.error_ns.saturating_sub(slots.master_error_ns);
         if broken!(TrustsItself) {
-            return Some(Reckoning::new(TimeRecord { error_ns: 0, drift_ns_s: 0, ..record }));
+            return Some(TimeEstimate::new(TimeRecord { error_ns: 0, drift_ns_s: 0, ..record }));
         }
-        Some(Reckoning::new(TimeRecord { error_ns, ..record }))
+        Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))
     }
 
     /// The same, if it is sure enough of it to send by it.
-    pub(super) fn sure(&self, now_ns: u64) -> Option<Reckoning> {
+    pub(super) fn sure(&self, now_ns: u64) -> Option<TimeEstimate> {
         let allowance_ns = self.slots.as_ref()?.settings.allowance_ns;
-        self.reckoning().filter(|own| own.bound_ns(now_ns) <= allowance_ns)
+        self.estimate().filter(|own| own.bound_ns(now_ns) <= allowance_ns)
     }
 
     /// By what time this node would reign: that which others still go by, if it knows it well enough.
@@ -387,9 +387,9 @@ impl Clock {
     }
 
     /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.
-    pub fn coarse(&self, now_ns: u64) -> Option<Reckoning> {
+    pub fn coarse(&self, now_ns: u64) -> Option<TimeEstimate> {
         let slots = self.slots.as_ref()?;
-        slots.coarse.reckoning(now_ns, slots.settings.delay_max_ns)
+        slots.coarse.estimate(now_ns, slots.settings.delay_max_ns)
     }
 
     /// How many Syncs of a master count for [`Clock::coarse`]; none if no master is heard.

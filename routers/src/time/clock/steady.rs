@@ -14,7 +14,7 @@ impl Clock {
         Some(found)
     }
 
-    /// Goes on watching where an earlier life has ended; for a clock that is new.
+    /// Goes on watching where an earlier incarnation has ended; for a clock that is new.
     #[must_use]
     pub fn watching(mut self, now_ns: u64, watched: Option<Watched>) -> Self {
         self.steadiness = Steadiness::of(watched);
@@ -24,7 +24,7 @@ impl Clock {
         self
     }
 
-    /// What the next life of this node's clock goes on from.
+    /// What the next incarnation of this node's clock goes on from.
     pub fn watched(&self) -> Option<Watched> {
         self.steadiness.watched()
     }

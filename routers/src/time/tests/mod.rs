@@ -7,7 +7,7 @@ mod world;
 use super::Broken;
 use scenes::SCENES;
 use std::time::Duration;
-use world::{MS, SECOND, Ways, World};
+use world::{Conditions, MS, SECOND, World};
 
 /// How many seeds each scene is run with: `ROHRPOST_TIME_SEEDS`, else a few.
 fn seeds() -> std::ops::Range<u64> {
@@ -19,12 +19,12 @@ fn seeds() -> std::ops::Range<u64> {
 fn nodes_agree_soon_and_are_as_exact_as_their_network() {
     // Interval, network; true error of 99 of 100 readings and bound of the median, µs.
     for (interval_ms, ways, off_us, bound_us) in [
-        (1, Ways::LAN, 6, 30),
-        (100, Ways::LAN, 6, 30),
-        (1_000, Ways::LAN, 5, 30),
-        (1_000, Ways { kernel_stamps: false, ..Ways::LAN }, 40, 80),
-        (1_000, Ways::BAD, 300, 3_000),
-        (10_000, Ways::LAN, 20, 60),
+        (1, Conditions::LAN, 6, 30),
+        (100, Conditions::LAN, 6, 30),
+        (1_000, Conditions::LAN, 5, 30),
+        (1_000, Conditions { kernel_stamps: false, ..Conditions::LAN }, 40, 80),
+        (1_000, Conditions::BAD, 300, 3_000),
+        (10_000, Conditions::LAN, 20, 60),
     ] {
         for seed in seeds() {
             let interval_ns = interval_ms * MS;

@@ -1,6 +1,6 @@
 //! What may happen to a system, one after the other. The world checks at each moment; a scene says what must come of it, and when.
 
-use super::world::{MS, SECOND, Ways, World};
+use super::world::{Conditions, MS, SECOND, World};
 use crate::time::{Broken, STEP_MIN_NS};
 use std::time::Duration;
 
@@ -24,9 +24,9 @@ pub(super) const SCENES: [(&str, Scene); 9] = [
 /// A system of four that agrees; a third of the seeds have a bad network, a third a very uneven one.
 pub(super) fn begin(name: &str, seed: u64, broken: Option<Broken>) -> World {
     let ways = match seed % 3 {
-        0 => Ways::LAN,
-        1 => Ways { loss: 50, twice: 20, jitter_ns: 200_000, ..Ways::LAN },
-        _ => Ways { asymmetry_ns: 200_000, ..Ways::LAN },
+        0 => Conditions::LAN,
+        1 => Conditions { loss: 50, twice: 20, jitter_ns: 200_000, ..Conditions::LAN },
+        _ => Conditions { asymmetry_ns: 200_000, ..Conditions::LAN },
     };
     let mut world = World::new(seed, 4, &[0, 1, 2], Duration::from_nanos(INTERVAL), ways);
     world.replay = format!("scene \"{name}\", {}", world.replay);

@@ -14,8 +14,8 @@ mod check;
 mod hardware;
 
 use check::TermTime;
+pub(super) use hardware::Conditions;
 use hardware::Oscillator;
-pub(super) use hardware::Ways;
 
 pub(super) const MS: u64 = 1_000_000;
 pub(super) const SECOND: u64 = 1_000 * MS;
@@ -37,12 +37,12 @@ struct Node {
 enum Event {
     Wake(NodeIndex),
     Arrive { to: NodeIndex, bytes: Box<[u8; TIME_BYTES]>, came: Stamp },
-    Look,
+    SnapshotRequest,
 }
 
 pub(super) struct World {
     pub(super) now: u64,
-    pub(super) ways: Ways,
+    pub(super) ways: Conditions,
     pub(super) interval: Duration,
     masters: Vec<NodeIndex>,
     nodes: Vec<Node>,
@@ -64,7 +64,7 @@ pub(super) struct World {
 }
 
 impl World {
-    pub(super) fn new(seed: u64, nodes: u8, masters: &[u8], interval: Duration, ways: Ways) -> Self {
+    pub(super) fn new(seed: u64, nodes: u8, masters: &[u8], interval: Duration, ways: Conditions) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let node = |random: &mut ChaCha8Rng| Node {
             clock: None,
@@ -101,7 +101,7 @@ impl World {
             failures: 0,
             errors: Vec::new(),
         };
-        world.push(world.now, Event::Look);
+        world.push(world.now, Event::SnapshotRequest);
         world
     }
 
@@ -256,10 +256,10 @@ impl World {
         self.now = self.now.max(at);
         let frozen_until = |world: &Self, node: NodeIndex| world.nodes[usize::from(node)].frozen_until;
         match event {
-            Event::Look => {
+            Event::SnapshotRequest => {
                 (0..self.cut.len() as u8).for_each(|node| self.check(node));
                 let next = self.now + (self.interval.as_nanos() as u64 / 7).clamp(100_000, 50 * MS);
-                self.push(next, Event::Look);
+                self.push(next, Event::SnapshotRequest);
             }
             Event::Wake(node) if frozen_until(self, node) > self.now => {
                 // What came meanwhile lies in its socket, and is read first.

@@ -1,6 +1,6 @@
 //! A node of its own for each death, and the loop over the steps.
 
-use rohrpost_mailbox_crash::{Full, Label, Name, Node, Participant, Priority, Receiver, Sender, Shape, Type};
+use rohrpost_mailbox_crash::{Label, Name, Node, OverflowPolicy, Participant, Priority, Receiver, Sender, Shape, Type};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,9 +9,10 @@ use tempfile::TempDir;
 
 pub(crate) const MAILBOX: Name = Name::new(1, 200, 1, 0);
 /// Small, so that it is full at once.
-pub(crate) const SHAPE: Shape = Shape { slots: 4, body_bytes_max: 64, full: Full::Displace, max_age: None, claims: 1 };
+pub(crate) const SHAPE: Shape =
+    Shape { slots: 4, body_bytes_max: 64, full: OverflowPolicy::Displace, max_age: None, claims: 1 };
 pub(crate) const OTHER_SHAPE: Shape = Shape { slots: 5, ..SHAPE };
-pub(crate) const LATEST: Shape = Shape { full: Full::Latest, ..SHAPE };
+pub(crate) const LATEST: Shape = Shape { full: OverflowPolicy::Latest, ..SHAPE };
 pub(crate) const LOW: Priority = Priority(10);
 pub(crate) const HIGH: Priority = Priority(20);
 

@@ -28,7 +28,7 @@ impl World {
                 let Some(connection) = connections.find(|one| one.client == client && one.is_client_open) else {
                     return;
                 };
-                self.book.seen.entry("line faults").and_modify(|count| *count += 1).or_insert(1);
+                self.oracle.seen.entry("line faults").and_modify(|count| *count += 1).or_insert(1);
                 match what {
                     3 | 4 => connection.down.stalled_until_ns = until_ns,
                     5 => connection.up.stalled_until_ns = until_ns,
@@ -59,10 +59,10 @@ impl World {
     }
 
     fn restart_server(&mut self) {
-        self.book.saw("server restarted");
+        self.oracle.saw("server restarted");
         self.check_server(false);
-        self.server_life += 2;
-        self.server = Server::new(server_settings(self.server_life));
+        self.server_incarnation += 2;
+        self.server = Server::new(server_settings(self.server_incarnation));
         self.server_wake_ns = 0;
         self.server_down_until_ns = self.now_ns + self.faults.between(0, 1500) * MS;
         let is_told = self.faults.percent(70);
@@ -74,13 +74,13 @@ impl World {
     }
 
     fn restart_client(&mut self, index: usize) {
-        self.book.saw("client restarted");
+        self.oracle.saw("client restarted");
         let node = &mut self.nodes[index];
         node.life += 2;
         let now_ns = node.clock.at(self.now_ns);
         node.client = Client::new(client_settings(index, node.life), ranges(index), now_ns);
         node.wake_ns = 0;
-        self.book.clients[index].up_ns = None;
+        self.oracle.clients[index].up_ns = None;
         let is_told = self.faults.percent(50);
         for connection in self.connections.iter_mut().filter(|one| one.client == index) {
             connection.is_client_open = false;

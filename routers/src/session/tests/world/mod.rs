@@ -3,7 +3,7 @@
 mod faults;
 mod streams;
 
-use super::book::{Book, Known, Teller};
+use super::oracle::{Known, SessionOracle, Teller};
 use super::plan::{Clock, Plan, client_settings, loud, module, ranges, server_settings, shared, system_of};
 use crate::admission::capped;
 use crate::session::LOOK_EVERY_NS;
@@ -33,10 +33,10 @@ pub(super) struct Node {
 pub(super) struct World {
     pub(super) plan: Plan,
     pub(super) now_ns: u64,
-    pub(super) book: Book,
+    pub(super) oracle: SessionOracle,
     pub(super) server: Server,
     pub(super) server_clock: Clock,
-    server_life: u64,
+    server_incarnation: u64,
     /// Nobody can connect until then.
     server_down_until_ns: u64,
     server_wake_ns: u64,
@@ -65,15 +65,15 @@ impl World {
             up_ns: None,
             refusals: Vec::new(),
         };
-        let mut book = Book::new((0..plan.clients).map(known).collect());
-        book.flooder = plan.flooder;
-        let (may_fail, server_life) = (!plan.calm, chance.bits() | 1);
+        let mut oracle = SessionOracle::new((0..plan.clients).map(known).collect());
+        oracle.flooder = plan.flooder;
+        let (may_fail, server_incarnation) = (!plan.calm, chance.bits() | 1);
         Self {
             now_ns: 0,
-            book,
-            server: Server::new(server_settings(server_life)),
+            oracle,
+            server: Server::new(server_settings(server_incarnation)),
             server_clock: Clock::new(&mut chance),
-            server_life,
+            server_incarnation,
             server_down_until_ns: 0,
             server_wake_ns: 0,
             nodes,
@@ -89,9 +89,9 @@ impl World {
 
     pub(super) fn run(&mut self, for_ns: u64) {
         let end_ns = self.now_ns + for_ns;
-        while self.now_ns < end_ns && self.book.problems.is_empty() {
+        while self.now_ns < end_ns && self.oracle.problems.is_empty() {
             self.now_ns += MS;
-            self.book.now_ns = self.now_ns;
+            self.oracle.now_ns = self.now_ns;
             self.fail();
             self.post();
             self.carry();
@@ -121,22 +121,22 @@ impl World {
             let now_ns = node.clock.at(self.now_ns);
             let session = node.client.session(now_ns).filter(|_| node.client.is_up() && self.is_reached(index));
             if let Some(session) = session.filter(|session| session.ns.abs_diff(server_ns) > session.error_ns) {
-                self.book.problems.push(format!("client {index}: session clock {session:?}, in truth {server_ns}"));
+                self.oracle.problems.push(format!("client {index}: session clock {session:?}, in truth {server_ns}"));
             }
             if let Some(time) = node.client.system_time(now_ns).map(|record| record.at(now_ns)) {
                 let off_ns = time.ns.abs_diff(system_ns);
                 if u128::from(off_ns) > time.error.as_nanos() {
-                    self.book.problems.push(format!("client {index}: system time {time:?} is {off_ns} ns off"));
+                    self.oracle.problems.push(format!("client {index}: system time {time:?} is {off_ns} ns off"));
                 }
             }
             if node.client.bytes() > BYTES_MAX {
-                self.book.problems.push(format!("client {index} takes up {} bytes", node.client.bytes()));
+                self.oracle.problems.push(format!("client {index} takes up {} bytes", node.client.bytes()));
             }
         }
         for (index, _, _) in self.server.clients() {
             let bytes = self.server.bytes_of(index);
             if bytes > BYTES_MAX {
-                self.book.problems.push(format!("the server has {bytes} bytes for {index:?}"));
+                self.oracle.problems.push(format!("the server has {bytes} bytes for {index:?}"));
             }
         }
     }
@@ -195,11 +195,11 @@ impl World {
     }
 
     pub(super) fn send(&mut self, from: usize, head: Head, is_forged: bool) -> usize {
-        let (number, body) = self.book.post(from, capped(&head), is_forged);
-        self.book.saw("posted");
+        let (number, body) = self.oracle.post(from, capped(&head), is_forged);
+        self.oracle.saw("posted");
         let node = &mut self.nodes[from];
         let now_ns = node.clock.at(self.now_ns);
-        let mut teller = Teller { book: &mut self.book, client: from, chance: &mut node.chance };
+        let mut teller = Teller { oracle: &mut self.oracle, client: from, chance: &mut node.chance };
         node.client.send(now_ns, &Package { head, body: &body, published_ns: now_ns, hops: 0 }, &mut teller);
         node.wake_ns = 0;
         number
@@ -211,7 +211,7 @@ impl World {
             return;
         }
         loop {
-            let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
+            let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
             let (server, connections) = (&mut self.server, &mut self.connections);
             let find = |index| move |connection: &&mut Connection| connection.index == Some(index);
             match server.poll(now_ns, &mut teller) {
@@ -242,7 +242,7 @@ impl World {
         }
         loop {
             let node = &mut self.nodes[index];
-            let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
+            let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
             let open = |connection: &&mut Connection| connection.client == index && connection.is_client_open;
             match node.client.poll(now_ns, &mut teller) {
                 client::Output::Connect => self.connect(index),
@@ -270,7 +270,7 @@ impl World {
     /// Every package that came has passed, or was lost with a cause; or still waits, if `waits_none` is false.
     pub(super) fn check_server(&mut self, waits_none: bool) {
         let problems = check_counts("the server", self.server.counts(), waits_none);
-        self.book.problems.extend(problems);
+        self.oracle.problems.extend(problems);
     }
 
     /// Packages that newer ones took the place of, as those ends count them that still live.
@@ -282,8 +282,8 @@ impl World {
 
     pub(super) fn check_clients(&mut self) {
         for (index, node) in self.nodes.iter().enumerate() {
-            self.book.problems.extend(check_counts(&format!("client {index}, out"), node.client.out(), true));
-            self.book.problems.extend(check_counts(&format!("client {index}, in"), node.client.inn(), true));
+            self.oracle.problems.extend(check_counts(&format!("client {index}, out"), node.client.out(), true));
+            self.oracle.problems.extend(check_counts(&format!("client {index}, in"), node.client.inn(), true));
         }
     }
 }

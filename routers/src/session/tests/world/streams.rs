@@ -3,7 +3,7 @@
 use super::S;
 use super::World;
 use crate::session::ClientIndex;
-use crate::session::tests::book::Teller;
+use crate::session::tests::oracle::Teller;
 use crate::session::tests::pipe::Pipe;
 use crate::session::tests::plan::address;
 
@@ -31,7 +31,7 @@ impl World {
     fn carry_up(&mut self, at: usize) {
         let connection = &mut self.connections[at];
         let now_ns = self.server_clock.at(self.now_ns);
-        let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
+        let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
         while let Some(index) = connection.index {
             let Some(bytes) = connection.up.read(self.now_ns) else { break };
             self.server.received(now_ns, index, &bytes, &mut teller);
@@ -57,7 +57,7 @@ impl World {
             return;
         }
         let now_ns = node.clock.at(self.now_ns);
-        let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
+        let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
         while let Some(bytes) = connection.down.read(self.now_ns) {
             node.client.received(now_ns, &bytes, &mut teller);
             node.wake_ns = 0;
@@ -79,11 +79,11 @@ impl World {
         node.attempts += 1;
         let now_ns = node.clock.at(self.now_ns);
         let is_there = self.now_ns >= self.server_down_until_ns;
-        let mut teller = Teller { book: &mut self.book, client: usize::MAX, chance: &mut self.host };
+        let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
         let from = address(index, node.attempts);
         let place = self.server_clock.at(self.now_ns);
         let Some(place) = is_there.then(|| self.server.accept(place, from, &mut teller)).flatten() else {
-            let mut teller = Teller { book: &mut self.book, client: index, chance: &mut node.chance };
+            let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
             return node.client.closed(now_ns, &mut teller);
         };
         let line = self.plan.lines[index];

@@ -27,7 +27,7 @@ impl Oscillator {
 
 /// What the network and the computers do.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Ways {
+pub(in super::super) struct Conditions {
     pub(in super::super) delay_ns: u64,
     /// Of the way to nodes of a higher index: so much more.
     pub(in super::super) asymmetry_ns: u64,
@@ -40,7 +40,7 @@ pub(in super::super) struct Ways {
     pub(in super::super) wakeup_ns: u64,
 }
 
-impl Ways {
+impl Conditions {
     pub(in super::super) const LAN: Self = Self {
         delay_ns: 15_000,
         asymmetry_ns: 3_000,

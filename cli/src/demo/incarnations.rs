@@ -1,0 +1,100 @@
+//! The incarnations of routers: which one died, when, and when the next was there.
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use rohrpost::Name;
+use rohrpost::common::State;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Node, NodeError, monotonic_ns, node_directory};
+use std::sync::Arc;
+
+/// A router that died.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) struct Death {
+    /// Its node, by its place in the configuration.
+    pub(super) node: usize,
+    /// The process.
+    pub(super) pid: u32,
+    /// When it was found dead, monotonic ns.
+    pub(super) at_ns: u64,
+    /// The next process, and when it was found ready; none as long as there is none.
+    pub(super) again: Option<(u32, u64)>,
+}
+
+/// A node whose router is watched.
+struct Watched {
+    /// By its place in the configuration.
+    index: usize,
+    node: Arc<Node>,
+    router: Name,
+    /// The process that is ready; none until there is one.
+    pid: Option<u32>,
+}
+
+/// Watches routers, one of each node at most, in the tables of the nodes' memory: nobody is asked, so nobody is disturbed.
+pub(super) struct Incarnations {
+    nodes: Vec<Watched>,
+    pub(super) deaths: Vec<Death>,
+}
+
+impl Incarnations {
+    /// Of nodes that run; which router of each.
+    pub(super) fn of(installation: &Installation, router: impl Fn(&str) -> Option<Name>) -> Result<Self, NodeError> {
+        let watched = |(index, config): (usize, &rohrpost_config::Node)| {
+            let router = router(&config.name)?;
+            let node = Node::open(&node_directory(&installation.name, &config.name));
+            Some(node.map(|node| Watched { index, node, router, pid: None }))
+        };
+        let nodes: Result<Vec<Watched>, NodeError> =
+            installation.nodes.iter().enumerate().filter_map(watched).collect();
+        let mut incarnations = Self { nodes: nodes?, deaths: Vec::new() };
+        incarnations.look();
+        Ok(incarnations)
+    }
+
+    /// Looks who has died, and who has come back.
+    pub(super) fn look(&mut self) {
+        for watched in &mut self.nodes {
+            let index = watched.index;
+            match watched.pid {
+                Some(pid) if !is_alive(pid) => {
+                    watched.pid = None;
+                    self.deaths.push(Death { node: index, pid, at_ns: monotonic_ns(), again: None });
+                }
+                Some(_) => {}
+                None => {
+                    watched.pid = watched.ready().filter(|pid| is_alive(*pid));
+                    let last = self.deaths.iter_mut().rev().find(|death| death.node == index);
+                    if let (Some(pid), Some(death)) = (watched.pid, last) {
+                        death.again = Some((pid, monotonic_ns()));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Kills the router of a node, as a crash would.
+    pub(super) fn kill(&self, node: usize) -> Option<u32> {
+        let pid = self.nodes.iter().find(|watched| watched.index == node)?.pid?;
+        // Found alive a moment ago, and its number is not given to others so soon.
+        kill(Pid::from_raw(pid.cast_signed()), Signal::SIGKILL).ok().map(|()| pid)
+    }
+}
+
+impl Watched {
+    /// The process that is the router now, if it is ready.
+    fn ready(&self) -> Option<u32> {
+        let all = self.node.participants();
+        let is_ready = |state: State| !matches!(state, State::Starting | State::Stopping);
+        let mut routers = all.into_iter().filter(|participant| participant.module == self.router);
+        routers.find(|router| router.state.is_some_and(|state| is_ready(state.into()))).map(|router| router.pid)
+    }
+}
+
+/// Dead is also who has ended, and whose parent has not noticed yet.
+fn is_alive(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    // The name before it may hold anything, also brackets.
+    let state = stat.rsplit(") ").next().and_then(|rest| rest.chars().next());
+    state.is_some_and(|state| !matches!(state, 'Z' | 'X'))
+}

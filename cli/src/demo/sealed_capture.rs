@@ -1,0 +1,44 @@
+//! What tells the time on the bridge, where that is sealed: the demo has the keys, and so reads what each node reads that does not know who incarnations.
+
+use crate::router::keys;
+use crate::terminal::Failure;
+use rohrpost_config::Installation;
+use rohrpost_routers::frame::FrameHead;
+use rohrpost_routers::security::{Opening, PeerSessions, Port, TAG_BYTES, Who};
+use rohrpost_routers::settings::Settings;
+use rohrpost_routers::time::TIME_BYTES;
+use rohrpost_routers::time::message::Message;
+
+/// An incarnation that says nothing.
+const MUTE: u64 = 1;
+
+/// By node: what is sealed to it. None where nothing is sealed.
+#[derive(Default)]
+pub(super) struct SealedCapture {
+    nodes: Vec<Opening>,
+}
+
+impl SealedCapture {
+    /// With the keys of the LAN of an installation, if it has some.
+    pub(super) fn of(installation: &Installation) -> Result<Self, Failure> {
+        let mut nodes = Vec::new();
+        for node in installation.lan_nodes() {
+            let Some(keys) = keys::of(installation)? else { break };
+            let settings = Settings::new(installation, &node.name, MUTE)?;
+            nodes.push(Opening::new(&PeerSessions::new(Who::of(&settings), keys), Port::Time));
+        }
+        Ok(Self { nodes })
+    }
+
+    /// What a datagram of time says, sealed or not.
+    pub(super) fn hear(&mut self, datagram: &[u8]) -> Option<(FrameHead, Message)> {
+        if let Ok((head, rest)) = FrameHead::parse(datagram) {
+            return Some((head, Message::parse(head.kind, rest).ok()?));
+        }
+        let mut sealed = [0; TIME_BYTES + TAG_BYTES];
+        sealed.copy_from_slice(datagram.get(..TIME_BYTES + TAG_BYTES).filter(|whole| whole.len() == datagram.len())?);
+        let ear = (0..self.nodes.len()).find(|node| self.nodes[*node].is_strange(&sealed))?;
+        let (head, rest) = self.nodes[ear].overhear(&mut sealed).ok()?;
+        Some((head, Message::parse(head.kind, rest).ok()?))
+    }
+}

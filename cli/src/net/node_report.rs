@@ -1,0 +1,66 @@
+//! What the routers of a node say of themselves.
+
+use rohrpost::interfaces::{
+    BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, LinkState, Links, SlotState,
+};
+use serde::Serialize;
+
+/// What a node's router says.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct NodeReport {
+    pub(super) node: String,
+    /// When it said so, system time.
+    pub(super) time_ns: u64,
+    pub(super) links: Option<Links>,
+    pub(super) clock: Option<ClockState>,
+    pub(super) slots: Option<SlotState>,
+    pub(super) flows: Option<FlowStates>,
+    /// How its client stands with the TCP router.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) beyond: Option<BeyondLink>,
+    /// What the TCP router says, if it runs there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) clients: Option<BeyondClients>,
+    /// Bytes and packages a second, by peer; empty at the first look.
+    pub(super) rates: Vec<Rates>,
+    /// Why there is nothing.
+    pub(super) failure: Option<String>,
+}
+
+/// What goes to and comes from a peer, a second.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Rates {
+    pub(super) node: String,
+    pub(super) sent_packages_s: f64,
+    pub(super) sent_bytes_s: f64,
+    pub(super) received_packages_s: f64,
+    pub(super) received_bytes_s: f64,
+}
+
+impl NodeReport {
+    /// Whether what it has of routers answers, all its peers are there, and so is the TCP router.
+    pub(super) fn is_well(&self) -> bool {
+        let all_alive = |links: &Links| links.peers.iter().all(|peer| peer.state == LinkState::Alive);
+        self.failure.is_none()
+            && self.links.as_ref().is_none_or(all_alive)
+            && self.beyond.as_ref().is_none_or(|link| link.state == BeyondState::Up)
+    }
+}
+
+/// What went by between two looks; nothing if the router was started anew in between, or has not told anything new.
+pub(super) fn rates(before: &NodeReport, now: &NodeReport) -> Vec<Rates> {
+    let (Some(old), Some(new)) = (&before.links, &now.links) else { return Vec::new() };
+    let elapsed_s = now.time_ns.saturating_sub(before.time_ns) as f64 * 1e-9;
+    if elapsed_s <= 0.0 || new.uptime_ms < old.uptime_ms {
+        return before.rates.clone();
+    }
+    let rate = |new: u64, old: u64| new.saturating_sub(old) as f64 / elapsed_s;
+    let peers = new.peers.iter().zip(&old.peers).map(|(new, old)| Rates {
+        node: new.node.clone(),
+        sent_packages_s: rate(new.sent.packages, old.sent.packages),
+        sent_bytes_s: rate(new.sent.bytes, old.sent.bytes),
+        received_packages_s: rate(new.received.packages, old.received.packages),
+        received_bytes_s: rate(new.received.bytes, old.received.bytes),
+    });
+    peers.collect()
+}

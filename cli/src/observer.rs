@@ -1,0 +1,92 @@
+//! A tool's observer of other nodes: its place among those that call, and why a node cannot be seen.
+
+use super::units::short;
+use crate::terminal::Failure;
+use rohrpost::launcher::launcher_of;
+use rohrpost::output::{iso, plain};
+use rohrpost::survey::LookFailure;
+use rohrpost::{CallError, Fault, ToolLink};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{SendError, realtime_ns};
+use serde::Serialize;
+use std::cell::RefCell;
+use std::time::Duration;
+
+/// Another node shows itself, or a module describes itself, within this time, or is silent.
+pub(super) const PATIENCE: Duration = Duration::from_secs(1);
+
+/// A tool's place among those that call, taken when it first looks beyond its own node; given back with this.
+#[derive(Default)]
+pub(super) struct Observer(RefCell<Option<ToolLink>>);
+
+impl Observer {
+    /// Asks from this place, which `join` takes if it is not taken yet.
+    pub(super) fn with<T>(
+        &self,
+        join: impl FnOnce() -> Result<ToolLink, Failure>,
+        ask: impl FnOnce(&mut ToolLink) -> T,
+    ) -> Result<T, Failure> {
+        let mut tool = self.0.borrow_mut();
+        let link = match tool.take() {
+            Some(link) => link,
+            None => join()?,
+        };
+        Ok(ask(tool.insert(link)))
+    }
+}
+
+impl Drop for Observer {
+    fn drop(&mut self) {
+        if let Some(tool) = self.0.take() {
+            tool.close();
+        }
+    }
+}
+
+/// A node that does not show itself.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Silence {
+    pub(super) node: String,
+    /// Why, in words.
+    pub(super) why: String,
+    /// For how long, as far as it is known.
+    pub(super) silent_s: Option<f64>,
+}
+
+impl Silence {
+    pub(super) fn new(node: &str, why: impl Into<String>) -> Self {
+        Self { node: node.into(), why: why.into(), silent_s: None }
+    }
+
+    /// Silent, and since when: a moment of today, or of the day that it was.
+    pub(super) fn since(&self) -> String {
+        self.silent_s.map_or("silent".into(), |silent_s| {
+            let now_ns = realtime_ns();
+            let since = iso(now_ns.saturating_sub((silent_s * 1e9) as u64));
+            format!("silent since {} ({})", since.split('.').next().unwrap_or_default(), short(silent_s))
+        })
+    }
+
+    pub(super) fn text(&self) -> String {
+        format!("node {} is {}: {}", self.node, self.since(), plain::line(&self.why))
+    }
+}
+
+/// Why a node does not show itself, without the number of its launch.
+pub(super) fn silence(installation: &Installation, node: &str, failure: &LookFailure) -> Silence {
+    let launch = launcher_of(installation, node).map(|name| name.to_string()).unwrap_or_default();
+    let why = match failure {
+        // A router has found out.
+        LookFailure::Call(CallError::Fault(_, Fault::NodeSilent { .. })) => {
+            "nothing comes from it; is it on, does its router run, and is it reached at its address? (`rohrpost net`)"
+                .into()
+        }
+        LookFailure::Call(CallError::Fault(_, Fault::NoMailbox)) => "it has no launch; is it launched?".into(),
+        LookFailure::Call(CallError::Fault(_, fault)) => fault.to_string(),
+        LookFailure::Call(CallError::NotSent(SendError::NoMailbox(_) | SendError::NoRouter { .. })) => {
+            "the router of this node does not run (`rohrpost list`)".into()
+        }
+        other => other.to_string().replace(&launch, "its launch"),
+    };
+    Silence::new(node, why)
+}

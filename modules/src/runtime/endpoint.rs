@@ -1,0 +1,76 @@
+//! One name under which a module's process is reached: its command mailbox, and its interface.
+
+use super::server::CommandServer;
+use crate::call::Fault;
+use crate::interface::{ServeFunction, Served};
+use rohrpost_config::Principal;
+use rohrpost_mailbox::{Name, Receiver};
+use rohrpost_schema::Description;
+
+/// One endpoint. A module without further endpoints has this one.
+pub(crate) struct Endpoint<M> {
+    pub(crate) name: Name,
+    pub(crate) command_server: CommandServer,
+    pub(crate) offer: Offer<M>,
+}
+
+/// What a endpoint offers.
+pub(crate) struct Offer<M> {
+    /// Numbers of functions that may be run twice.
+    pub(crate) idempotent: Vec<u16>,
+    /// Numbers of its data.
+    pub(crate) data: Vec<u16>,
+    /// None: the module serves no interface under this name, only the common functions.
+    pub(crate) serve: Option<ServeFunction<M>>,
+    pub(crate) hash: u32,
+    /// Numbers of its functions, and what they are called.
+    pub(crate) functions: Vec<(u16, String)>,
+    /// Postcard of the description.
+    pub(crate) description: Vec<u8>,
+}
+
+impl<M> Endpoint<M> {
+    /// `named`: who always finds a place as its caller.
+    pub(crate) fn new(
+        name: Name,
+        class: &str,
+        commands: Receiver,
+        named: &[Principal],
+        served: Option<Served<M>>,
+    ) -> Self {
+        let (serve, description) = match served {
+            Some(Served { description, serve, .. }) => (Some(serve), description),
+            None => (None, bare(class)),
+        };
+        let hash = description.hash();
+        let idempotent = description.functions.iter().filter(|f| f.idempotent).map(|f| f.number).collect();
+        let functions = description.functions.iter().map(|f| (f.number, f.name.clone())).collect();
+        let data = description.data.iter().map(|item| item.number).collect();
+        // Writing to a growing vector does not fail.
+        let description = description.to_bytes();
+        // For tools that must not ask: a question would be one more package.
+        if let Err(error) = commands.set_about(&description) {
+            // On a full /dev/shm, say: a module that could take its mailboxes over goes on all the same.
+            tracing::warn!("{name}: tools cannot describe it: {error}");
+        }
+        let offer = Offer { idempotent, data, serve, hash, functions, description };
+        Self { name, command_server: CommandServer::new(commands, named), offer }
+    }
+}
+
+impl<M> Offer<M> {
+    pub(crate) fn require_data(&self, number: u16) -> Result<(), Fault> {
+        if self.data.contains(&number) { Ok(()) } else { Err(Fault::Unknown(number)) }
+    }
+}
+
+/// The description of a module without interface.
+fn bare(class: &str) -> Description {
+    Description {
+        name: String::new(),
+        class: class.into(),
+        text: "A module without functions or data of its own.".into(),
+        functions: Vec::new(),
+        data: Vec::new(),
+    }
+}

@@ -1,0 +1,128 @@
+//! A module and the state it is in.
+
+use super::context::Context;
+use crate::call::Fault;
+use crate::common::Status;
+use crate::module::{Module, ModuleError};
+use crate::output;
+use crate::survey::in_words;
+use rohrpost_mailbox::{ModuleState, Participant, Work};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The module and the state it is in.
+pub(crate) struct Incarnation<M> {
+    pub(crate) module: M,
+    /// Times that parameters were set.
+    pub(crate) changes: u32,
+    pub(super) participant: Arc<Participant>,
+    pub(super) state: ModuleState,
+    error: String,
+    started: Instant,
+    /// A part of the module's code that took so long is told.
+    busy_after: Duration,
+}
+
+impl<M: Module> Incarnation<M> {
+    pub(crate) fn new(module: M, participant: Arc<Participant>, busy_after: Duration) -> Self {
+        let (state, started) = (ModuleState::Starting, Instant::now());
+        let mut life = Self { module, changes: 0, participant, state, error: String::new(), started, busy_after };
+        life.enter(ModuleState::Off);
+        life
+    }
+
+    /// Runs a part of the module's own code. Whoever looks sees which, and since when; what took long is told.
+    pub(crate) fn work<T>(
+        &mut self,
+        work: Work,
+        context: &mut Context,
+        part: impl FnOnce(&mut M, &mut Context) -> T,
+    ) -> T {
+        self.participant.begin_work(work);
+        let result = part(&mut self.module, context);
+        let lasted = self.participant.end_work();
+        if lasted >= self.busy_after {
+            tracing::warn!("was in {} for {:.1} s", in_words(work, &context.functions), lasted.as_secs_f64());
+        }
+        result
+    }
+
+    /// What a handler left half done is not to be trusted; but what it drives must be made safe.
+    pub(super) fn panicked(&mut self, text: &str, context: &mut Context) {
+        self.error = format!("panicked: {text}");
+        self.enter(ModuleState::Error);
+        // Whatever its state: it may have panicked half way on.
+        if catch_unwind(AssertUnwindSafe(|| self.work(Work::Off, context, M::off))).is_err() {
+            tracing::error!("panicked again on the way to its safe state");
+        }
+    }
+
+    pub(super) fn enter(&mut self, state: ModuleState) {
+        self.state = state;
+        self.participant.set_state(state);
+    }
+
+    pub(crate) fn require_on(&self) -> Result<(), Fault> {
+        match self.state {
+            ModuleState::On => Ok(()),
+            ModuleState::Error => Err(Fault::ModuleError(self.error.clone())),
+            _ => Err(Fault::ModuleOff),
+        }
+    }
+
+    pub(crate) fn turn_on(&mut self, context: &mut Context) -> Result<(), Fault> {
+        if self.state == ModuleState::On {
+            return Ok(());
+        }
+        self.error.clear();
+        if let Err(error) = self.work(Work::On, context, M::on) {
+            self.fail(&error, context);
+            return Err(Fault::ModuleError(self.error.clone()));
+        }
+        self.enter(ModuleState::On);
+        tracing::info!("is on");
+        context.next_tick = context.period.map(|_| Instant::now());
+        // Asked for before the answer goes out: who switches modules on one after the other knows who listens to whom.
+        context.followings.renew(&mut context.link.borrow_mut(), Instant::now());
+        Ok(())
+    }
+
+    pub(crate) fn turn_off(&mut self, context: &mut Context) {
+        if self.state == ModuleState::On {
+            self.work(Work::Off, context, M::off);
+            tracing::info!("is off");
+        }
+        self.error.clear();
+        self.enter(ModuleState::Off);
+    }
+
+    pub(super) fn fail(&mut self, error: &ModuleError, context: &mut Context) {
+        self.work(Work::Off, context, M::off);
+        self.error = error.to_string();
+        tracing::error!("{error}");
+        self.enter(ModuleState::Error);
+    }
+
+    pub(super) fn check(&mut self, result: Result<(), ModuleError>, context: &mut Context) {
+        if let Err(error) = result {
+            self.fail(&error, context);
+        }
+    }
+
+    pub(crate) fn status(&self, context: &Context) -> Status {
+        Status {
+            state: self.state.into(),
+            error: self.error.clone(),
+            incarnation: self.participant.incarnation(),
+            uptime_ms: self.started.elapsed().as_millis() as u64,
+            subscribers: context.subscriptions.len() as u32,
+            missed: context.subscriptions.missed(),
+            lost: context.followings.lost(),
+            output_lost: output::lost(),
+            output_suppressed: output::suppressed(),
+            output_level: output::level(),
+            refused: context.refusals.counts,
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Who lives is found out by challenge and answer; no state is kept for who has not answered.
+
+use super::hello::Hello;
+use super::opening::Greeting;
+use super::peer_sessions::{PeerIncarnation, PeerSessions};
+use crate::broken::broken;
+use crate::frame::{FrameHead, NodeIndex};
+use rand_chacha::ChaCha20Rng;
+use rand_chacha::rand_core::{RngCore, SeedableRng};
+use std::sync::Arc;
+
+/// Questions of one peer that are answered in [`PER_NS`], at most: recorded ones that are sent again must not cost more than they are worth.
+/// Of more than half as many, a random share is.
+pub const ANSWERS_MAX: u32 = 10;
+/// See [`ANSWERS_MAX`].
+pub const PER_NS: u64 = 100_000_000;
+/// A challenge is drawn anew so often, ns.
+const DRAW_EVERY_NS: u64 = 1_000_000_000;
+/// So long after it was drawn it can be answered: an answer that is kept back says nothing of who lives when it comes.
+pub const CHALLENGE_MAX_NS: u64 = 2 * DRAW_EVERY_NS;
+
+/// Takes hellos, in the thread that receives packages.
+pub struct Handshake {
+    all: Arc<PeerSessions>,
+    random: ChaCha20Rng,
+    peers: Box<[Peer]>,
+    /// An incarnation that has shown that it lives, and has not begun.
+    begins: Option<(NodeIndex, PeerIncarnation)>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Peer {
+    /// When the present challenge was drawn, ns.
+    drawn_ns: u64,
+    /// The challenge before it, and when that was drawn; 0: none.
+    before: (u64, u64),
+    questions: Questions,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Questions {
+    since_ns: u64,
+    came: u32,
+    answered: u32,
+    /// How many came in the time before.
+    came_before: u32,
+}
+
+/// What a hello brought about.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Greeted {
+    /// The peer has shown that it lives.
+    pub proves: bool,
+    /// An incarnation of the peer begins, with [`Handshake::begin`].
+    pub begins: bool,
+    /// Bytes of the hello to send back, in the buffer.
+    pub reply_bytes: Option<usize>,
+}
+
+impl Handshake {
+    /// There is one. `seed` comes from a source of random numbers that is fit for keys; each incarnation has another.
+    pub fn new(all: &Arc<PeerSessions>, seed: [u8; 32]) -> Self {
+        let peers = vec![Peer::default(); all.who.nodes.into()].into();
+        let mut handshake = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), peers, begins: None };
+        (0..all.who.nodes).for_each(|peer| handshake.draw(0, peer));
+        handshake
+    }
+
+    /// Takes a hello that was opened, if all else in its head is as it must be. `datagram` has room for a hello of
+    /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If an incarnation begins by it, [`Self::begin`] when the reply has left.
+    pub fn greet(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
+        self.take(now_ns, head, greeting, true, datagram)
+    }
+
+    /// The same of one whose digest is another: no incarnation begins by it. A question is answered, so that its sender knows that this node lives, and by
+    /// which configuration.
+    pub fn greet_other(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
+        self.take(now_ns, head, greeting, false, datagram)
+    }
+
+    fn take(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        greeting: &Greeting,
+        may_begin: bool,
+        datagram: &mut [u8],
+    ) -> Greeted {
+        self.begin();
+        let (peer, Greeting { hello, key }) = (head.from, *greeting);
+        self.refresh(now_ns, peer);
+        let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);
+        let begins = may_begin && proves && self.all.incarnation(peer) != Some(head.incarnation);
+        if proves {
+            // Each challenge serves once: what else was answered to it, or will be, proves nothing any more.
+            self.draw(now_ns, peer);
+            self.peers[usize::from(peer)].before = (0, 0);
+        }
+        if begins {
+            self.begins = Some((peer, PeerIncarnation { incarnation: head.incarnation, key, next: hello.next }));
+        }
+        let is_question = hello.answer == 0;
+        // Nobody but who lives can answer, and once: that need not be counted.
+        let may = hello.challenge != 0 && (proves || is_question && self.may_answer(now_ns, peer));
+        // Who has shown that it lives is told that we do, and that is the last word; who has not must show it first.
+        let challenge = if is_question { self.all.challenge(peer) } else { 0 };
+        let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
+        Greeted { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
+    }
+
+    /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the network before: it says from
+    /// which sequence on we are to be heard, and what left before it would not be taken.
+    pub fn begin(&mut self) -> Option<NodeIndex> {
+        let (peer, life) = self.begins.take()?;
+        self.all.begin(peer, life);
+        Some(peer)
+    }
+
+    /// Draws a peer's challenge anew if it is old. To be done before it is asked, or it has less time to answer.
+    pub fn refresh(&mut self, now_ns: u64, peer: NodeIndex) {
+        let drawn_ns = self.peers[usize::from(peer)].drawn_ns;
+        if now_ns.saturating_sub(drawn_ns) >= DRAW_EVERY_NS {
+            self.peers[usize::from(peer)].before = (self.all.challenge(peer), drawn_ns);
+            self.draw(now_ns, peer);
+        }
+    }
+
+    fn draw(&mut self, now_ns: u64, peer: NodeIndex) {
+        self.peers[usize::from(peer)].drawn_ns = now_ns;
+        self.all.set_challenge(peer, self.random.next_u64().max(1));
+    }
+
+    /// Whether this answers a challenge of ours that may still be answered.
+    fn is_answer(&self, now_ns: u64, peer: NodeIndex, answer: u64) -> bool {
+        let (before, drawn_ns) = self.peers[usize::from(peer)].before;
+        let is_before = before != 0 && answer == before && now_ns.saturating_sub(drawn_ns) < CHALLENGE_MAX_NS;
+        answer == self.all.challenge(peer) || is_before
+    }
+
+    /// Of a flood each question has the same chance, not the first ones alone: among them may be one of who lives.
+    fn may_answer(&mut self, now_ns: u64, peer: NodeIndex) -> bool {
+        let questions = &mut self.peers[usize::from(peer)].questions;
+        let passed_ns = now_ns.saturating_sub(questions.since_ns);
+        if passed_ns >= PER_NS {
+            let came_before = if passed_ns < 2 * PER_NS { questions.came } else { 0 };
+            *questions = Questions { since_ns: now_ns, came_before, ..Questions::default() };
+        }
+        questions.came = questions.came.saturating_add(1);
+        let share = ANSWERS_MAX / 2;
+        let is_drawn = questions.came_before <= share || self.random.next_u32() % questions.came_before < share;
+        let may = is_drawn && questions.answered < ANSWERS_MAX;
+        questions.answered += u32::from(may);
+        may
+    }
+}

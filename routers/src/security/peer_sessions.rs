@@ -1,0 +1,353 @@
+//! Which incarnation of each peer this router knows to live: one thread finds out, those that send and the clock go by it.
+
+use super::hello::Hello;
+use super::keys::{Binding, End, KeyRing, Purpose};
+use super::seal::{self, Seal};
+use super::tally::Rejections;
+use super::{HELLO_BYTES, HELLO_DATAGRAM_BYTES};
+use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use crate::settings::Settings;
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+
+/// Which of a router's ports: each has keys and sequences of its own.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(usize)]
+pub enum Port {
+    /// Packages.
+    Packages = 0,
+    /// Time.
+    Time = 1,
+    /// Packages that are not real time.
+    Rest = 2,
+}
+
+impl Port {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Packages, Self::Time, Self::Rest];
+
+    pub(super) fn purpose(self) -> Purpose {
+        match self {
+            Self::Packages => Purpose::Packages,
+            Self::Time => Purpose::Time,
+            Self::Rest => Purpose::Rest,
+        }
+    }
+}
+
+/// A router, as far as keys depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Who {
+    /// Its system.
+    pub system: u8,
+    /// Its node.
+    pub own: NodeIndex,
+    /// Nodes that there are.
+    pub nodes: NodeIndex,
+    /// Of its configuration.
+    pub digest: u64,
+    /// Its incarnation, from a source of random numbers that is fit for keys: if two incarnations had one, they would use a nonce twice. Not 0.
+    pub incarnation: u64,
+}
+
+impl Who {
+    /// The router of these settings.
+    pub fn of(settings: &Settings) -> Self {
+        let Settings { system, own, digest, incarnation, .. } = *settings;
+        Self { system, own, nodes: settings.nodes.len() as NodeIndex, digest, incarnation }
+    }
+}
+
+/// An incarnation of a peer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct PeerIncarnation {
+    pub(super) incarnation: u64,
+    /// Place of the key that it is sent to with.
+    pub(super) key: usize,
+    /// Of packages and of time, as [`Port`] counts them: what it sent before is not taken.
+    pub(super) next: [u64; 2],
+}
+
+/// What the threads of one router know of its peers' lives.
+pub struct PeerSessions {
+    pub(super) who: Who,
+    pub(super) keys: KeyRing,
+    peers: Box<[Peer]>,
+    /// Peers of which an incarnation is known, one bit each.
+    known: AtomicU64,
+    /// Peers of whose incarnation datagrams said something else, one bit each.
+    doubts: AtomicU64,
+    /// Peers for which a reply waits for a slot, one bit each: nothing is sealed to them before it has left.
+    unsaid: AtomicU64,
+    /// By [`Port`].
+    rejections: [Arc<Rejections>; Port::ALL.len()],
+}
+
+impl fmt::Debug for PeerSessions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PeerSessions").field("who", &self.who).finish_non_exhaustive()
+    }
+}
+
+/// A peer.
+struct Peer {
+    /// By the place of the key.
+    hello_to: Vec<Seal>,
+    hello_from: Vec<Seal>,
+    life: Published,
+    /// What it must answer for an incarnation of it to begin.
+    challenge: AtomicU64,
+    /// Questions to it.
+    asked: AtomicU32,
+    /// Hellos of this incarnation to it.
+    hellos: AtomicU64,
+    /// By [`Port`]: the next sequence that may be sealed.
+    sealed: [AtomicU64; Port::ALL.len()],
+}
+
+impl PeerSessions {
+    /// Nobody is known yet.
+    ///
+    /// # Panics
+    /// If the incarnation is 0.
+    pub fn new(who: Who, keys: KeyRing) -> Arc<Self> {
+        assert_ne!(who.incarnation, 0, "an incarnation has an incarnation");
+        let seals = |from, to| {
+            let (from, to) = (End::any(from), End::any(to));
+            keys.derive_all(&Binding { purpose: Purpose::Hello, system: who.system, from, to })
+        };
+        let peer = |node| Peer {
+            hello_to: seals(who.own, node),
+            hello_from: seals(node, who.own),
+            life: Published::default(),
+            challenge: AtomicU64::new(0),
+            asked: AtomicU32::new(0),
+            hellos: AtomicU64::new(0),
+            sealed: Default::default(),
+        };
+        let peers = (0..who.nodes).map(peer).collect();
+        let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(who.nodes)));
+        let none = || AtomicU64::new(0);
+        Arc::new(Self { peers, who, keys, known: none(), doubts: none(), unsaid: none(), rejections })
+    }
+
+    /// What was not taken at a port.
+    pub fn rejections(&self, port: Port) -> &Arc<Rejections> {
+        &self.rejections[port as usize]
+    }
+
+    /// The peers that something can be sealed to, one bit each.
+    pub fn known(&self) -> u64 {
+        // ORDERING (F): who finds a peer here finds its incarnation, and so can seal to it. Pairs with (E).
+        self.known.load(Ordering::Acquire)
+    }
+
+    /// The peers of [`Self::known`] that can open what is sealed to them.
+    pub fn reached(&self) -> u64 {
+        // ORDERING (H): who finds that a reply has left finds so after it has. Pairs with (G).
+        self.known() & !self.unsaid.load(Ordering::Acquire)
+    }
+
+    /// A reply to a peer is to leave in a slot: until then it may not be able to open what is sealed to it. Whether none
+    /// waited before.
+    pub fn reply_waits(&self, peer: NodeIndex) -> bool {
+        self.unsaid.fetch_or(1 << peer, Ordering::Relaxed) & 1 << peer == 0
+    }
+
+    /// It has left, or is lost: then the peer asks again.
+    pub fn reply_left(&self, peer: NodeIndex) {
+        // ORDERING (G): the reply was handed over before. Pairs with (H).
+        self.unsaid.fetch_and(!(1 << peer), Ordering::Release);
+    }
+
+    /// The incarnation of a peer that is known to live, if there is one.
+    pub fn incarnation(&self, peer: NodeIndex) -> Option<u64> {
+        self.life(peer)?.1.map(|life| life.incarnation)
+    }
+
+    /// Whether a node of that number is a peer.
+    pub(super) fn is_peer(&self, node: NodeIndex) -> bool {
+        node < self.who.nodes && node != self.who.own
+    }
+
+    /// Grows with each incarnation that begins.
+    pub(super) fn version(&self, peer: NodeIndex) -> u32 {
+        self.peer(peer).life.version.load(Ordering::Relaxed)
+    }
+
+    /// None while it is being written: then it is to be looked at again.
+    pub(super) fn life(&self, peer: NodeIndex) -> Option<(u32, Option<PeerIncarnation>)> {
+        self.peer(peer).life.read()
+    }
+
+    pub(super) fn begin(&self, peer: NodeIndex, life: PeerIncarnation) {
+        self.peer(peer).life.write(life);
+        // ORDERING (E): the incarnation was written before. Pairs with (F).
+        self.known.fetch_or(1 << peer, Ordering::Release);
+        self.doubts.fetch_and(!(1 << peer), Ordering::Relaxed);
+    }
+
+    /// Something came of another incarnation of a peer, or to another of ours: perhaps it has another by now. It is to be asked soon.
+    pub(super) fn doubt(&self, peer: NodeIndex) {
+        if !self.doubts(peer) {
+            self.doubts.fetch_or(1 << peer, Ordering::Relaxed);
+        }
+    }
+
+    pub(super) fn doubts(&self, peer: NodeIndex) -> bool {
+        self.doubts.load(Ordering::Relaxed) & 1 << peer != 0
+    }
+
+    pub(super) fn doubted(&self, peer: NodeIndex) {
+        self.doubts.fetch_and(!(1 << peer), Ordering::Relaxed);
+    }
+
+    pub(super) fn challenge(&self, peer: NodeIndex) -> u64 {
+        self.peer(peer).challenge.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn set_challenge(&self, peer: NodeIndex, challenge: u64) {
+        self.peer(peer).challenge.store(challenge, Ordering::Relaxed);
+    }
+
+    /// Uses up a sequence. Each is used once: a second datagram with the nonce of a first would give away what is in both.
+    ///
+    /// # Panics
+    /// If it was used before.
+    pub(super) fn use_up(&self, port: Port, peer: NodeIndex, sequence: u64) {
+        let next = &self.peer(peer).sealed[port as usize];
+        assert!(sequence >= next.load(Ordering::Relaxed), "sequence {sequence} is sealed a second time");
+        next.store(sequence + 1, Ordering::Relaxed);
+    }
+
+    /// Key of what one end's incarnation seals to the other's. Time it seals to the node: who begins in time slots must hear it before anybody knows that it
+    /// lives, and takes nothing for proven that was said before the hello by which the other's incarnation began.
+    pub(super) fn binding(&self, port: Port, from: End, to: End) -> Binding {
+        let to = if port == Port::Time { End::any(to.node) } else { to };
+        Binding { purpose: port.purpose(), system: self.who.system, from, to }
+    }
+
+    pub(super) fn own(&self) -> End {
+        End { node: self.who.own, incarnation: self.who.incarnation }
+    }
+
+    pub(super) fn hello_from(&self, peer: NodeIndex, key: usize) -> &Seal {
+        &self.peer(peer).hello_from[key]
+    }
+
+    /// A question to a peer, with one of its keys after the other: which of them the peer has is not known. None
+    /// as long as there is nobody who would take an answer.
+    pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
+        let question = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
+        if question.challenge == 0 {
+            return None;
+        }
+        let asked = self.peer(peer).asked.fetch_add(1, Ordering::Relaxed) as usize;
+        Some(self.hello(peer, asked % self.keys.len(), question, datagram))
+    }
+
+    /// The sequences that come next: of packages, and of time.
+    pub(super) fn next(&self, peer: NodeIndex) -> [u64; 2] {
+        [Port::Packages, Port::Time].map(|port| self.peer(peer).sealed[port as usize].load(Ordering::Relaxed))
+    }
+
+    /// Writes a hello; how long its datagram is.
+    ///
+    /// # Panics
+    /// If this incarnation has said to a peer as many as it may. Only another incarnation, which has other nonces, can go on. Whoever says a peer's recorded
+    /// questions again without end, and forges what makes us ask and say last words, 200 a second in all, brings that about in 248 days; a peer
+    /// that is away, in 136 years.
+    pub(super) fn hello(&self, peer: NodeIndex, key: usize, hello: Hello, datagram: &mut [u8]) -> usize {
+        let number = u32::try_from(self.peer(peer).hellos.fetch_add(1, Ordering::Relaxed));
+        let number = number.expect("an incarnation says 2^32 hellos to a peer at most; the router begins another");
+        let datagram = &mut datagram[..HELLO_DATAGRAM_BYTES];
+        let Who { system, own, digest, incarnation, .. } = self.who;
+        let sequence = number.into();
+        let head = FrameHead { kind: Kind::Hello, system, from: own, to: peer, digest, incarnation, sequence };
+        head.write(self.keys.id(key), datagram);
+        datagram[HEAD_BYTES..HEAD_BYTES + HELLO_BYTES].copy_from_slice(&hello.to_bytes());
+        self.peer(peer).hello_to[key].close(seal::of_hello(incarnation, number), datagram);
+        HELLO_DATAGRAM_BYTES
+    }
+
+    /// As if so many hellos had been said to a peer.
+    #[cfg(test)]
+    pub(super) fn has_said(&self, peer: NodeIndex, hellos: u64) {
+        self.peer(peer).hellos.store(hellos, Ordering::Relaxed);
+    }
+
+    fn peer(&self, peer: NodeIndex) -> &Peer {
+        &self.peers[usize::from(peer)]
+    }
+}
+
+const _: () = {
+    assert!(rohrpost_network::NODES_MAX <= 64, "peers are the bits of a word");
+};
+
+/// An incarnation that one thread writes and others read, whole. Who reads while it is written gets nothing, and goes on with what it had.
+#[derive(Default)]
+struct Published {
+    /// Odd while it is written; 0: nothing was.
+    version: AtomicU32,
+    incarnation: AtomicU64,
+    key: AtomicU64,
+    next: [AtomicU64; 2],
+}
+
+impl Published {
+    fn write(&self, life: PeerIncarnation) {
+        let version = self.version.load(Ordering::Relaxed);
+        self.version.store(version | 1, Ordering::Relaxed);
+        // ORDERING (A): who reads a new word sees the odd version. Pairs with (B).
+        fence(Ordering::Release);
+        self.incarnation.store(life.incarnation, Ordering::Relaxed);
+        self.key.store(life.key as u64, Ordering::Relaxed);
+        self.next.iter().zip(life.next).for_each(|(place, next)| place.store(next, Ordering::Relaxed));
+        // ORDERING (C): publishes the words. Pairs with (D).
+        self.version.store((version | 1).wrapping_add(1), Ordering::Release);
+    }
+
+    fn read(&self) -> Option<(u32, Option<PeerIncarnation>)> {
+        // ORDERING (D)
+        let version = self.version.load(Ordering::Acquire);
+        let incarnation = self.incarnation.load(Ordering::Relaxed);
+        let key = self.key.load(Ordering::Relaxed) as usize;
+        let next = self.next.each_ref().map(|next| next.load(Ordering::Relaxed));
+        // ORDERING (B)
+        fence(Ordering::Acquire);
+        let is_whole = version.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == version;
+        is_whole.then_some((version, (incarnation != 0).then_some(PeerIncarnation { incarnation, key, next })))
+    }
+}
+
+/// What a thread has made of a peer's incarnation, until another begins.
+pub(super) struct Known<K> {
+    version: u32,
+    pub(super) made: Option<K>,
+}
+
+impl<K> Default for Known<K> {
+    fn default() -> Self {
+        Self { version: 0, made: None }
+    }
+}
+
+impl<K> Known<K> {
+    /// What belongs to the present incarnation. A new one costs the derivation of its keys; else it is one load.
+    pub(super) fn of(
+        &mut self,
+        all: &PeerSessions,
+        peer: NodeIndex,
+        make: impl FnOnce(&PeerIncarnation) -> K,
+    ) -> Option<&mut K> {
+        if all.version(peer) != self.version
+            && let Some((version, life)) = all.life(peer)
+        {
+            self.version = version;
+            self.made = life.as_ref().map(make);
+        }
+        self.made.as_mut()
+    }
+}

@@ -1,0 +1,93 @@
+//! What a client does for its session: it delivers, answers, and says what happens.
+
+use crate::report::NotDelivered;
+use crate::session::client::{Event, Host};
+use crate::session::frame::Carried;
+use crate::session::{Answers, Cause};
+use crate::shell::sender_cache::SenderCache;
+use crate::tcp::fault_writer::FaultWriter;
+use crate::tcp::snapshots::Outage;
+use rohrpost_mailbox::{SendError, monotonic_ns};
+use std::net::SocketAddr;
+
+/// Delivers, answers, and says what happens.
+pub(super) struct EventReporter {
+    server: SocketAddr,
+    pub(super) sender_cache: SenderCache,
+    fault_writer: FaultWriter,
+    /// Why it takes no part, as it was last told; empty if it does.
+    pub(super) why: String,
+    /// The server has said that, or what it said is why.
+    by_server: bool,
+    pub(super) outage: Outage,
+}
+
+impl EventReporter {
+    pub(super) fn new(server: SocketAddr, sender_cache: SenderCache, fault_writer: FaultWriter) -> Self {
+        Self { server, sender_cache, fault_writer, why: String::new(), by_server: false, outage: Outage::default() }
+    }
+
+    /// Says once why the server is not there. `was_made`: the connection was.
+    pub(super) fn unreached(&mut self, why: &str, was_made: bool) {
+        let server = self.server;
+        let why = if was_made {
+            format!("takes no part at the TCP router at {server}: {why}")
+        } else {
+            format!("the TCP router at {server} is not reached: {why}; does it run, and is it reached from here?")
+        };
+        // What it said itself is better than that its connection then ended.
+        if !(self.by_server && was_made) && self.why != why {
+            self.says(why, false);
+        }
+    }
+
+    fn says(&mut self, why: String, by_server: bool) {
+        tracing::warn!("{why}");
+        (self.why, self.by_server) = (why, by_server);
+    }
+}
+
+impl Answers for EventReporter {
+    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
+        self.fault_writer.answer(call, why, holder, answer)
+    }
+}
+
+impl Host for EventReporter {
+    fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
+        self.sender_cache.send(&carried.head, carried.body).map_err(|error| {
+            if let SendError::TooLarge { max, .. } = error {
+                self.fault_writer.takes_bytes = Some(max);
+            }
+            error.into()
+        })
+    }
+
+    fn not_allowed(&mut self, line: Option<usize>) {
+        self.fault_writer.rule = line;
+    }
+
+    fn event(&mut self, event: Event<'_>) {
+        let server = self.server;
+        match event {
+            Event::Up => {
+                self.why.clear();
+                self.outage.ends(monotonic_ns());
+                tracing::info!("takes part at the TCP router at {server}");
+            }
+            Event::Down => {
+                self.outage.begins(monotonic_ns());
+                self.says(format!("takes part at the TCP router at {server} no more; it tries again"), false)
+            }
+            Event::Refused(refusal) => {
+                self.says(format!("may not take part at the TCP router at {server}: {refusal}"), true);
+            }
+            Event::Objected(verdict) => {
+                self.says(format!("may not host its names at the TCP router at {server}: {verdict}"), true);
+            }
+            Event::Damaged(bad) => {
+                self.says(format!("cannot read what came from the TCP router at {server}: {bad}"), true);
+            }
+        }
+    }
+}

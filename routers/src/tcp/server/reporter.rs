@@ -1,0 +1,99 @@
+//! What the TCP router has to say: to those whose commands go no further, and to people.
+
+use crate::session::frame::Reason;
+use crate::session::server::{Event, Host};
+use crate::session::{Answers, Cause};
+use crate::tcp::fault_writer::FaultWriter;
+use crate::tcp::hush::{Hush, Topic};
+use rohrpost_mailbox::monotonic_ns;
+
+/// Says what happens, and answers for who is not reached.
+pub(super) struct ServerReporter {
+    fault_writer: FaultWriter,
+    hush: Hush,
+    /// Clients that took part and do not any more.
+    pub(super) left: u64,
+    /// Connections that might not take part.
+    pub(super) refused: u64,
+    /// The last of them, in words.
+    pub(super) refusal: String,
+}
+
+impl ServerReporter {
+    pub(super) fn new(fault_writer: FaultWriter) -> Self {
+        Self { fault_writer, hush: Hush::default(), left: 0, refused: 0, refusal: String::new() }
+    }
+
+    /// Says and keeps why one may not take part.
+    pub(super) fn refuses(&mut self, topic: Topic, refusal: String) {
+        self.says(topic, &refusal);
+        self.refused += 1;
+        self.refusal = refusal;
+    }
+
+    /// Says it, unless there was such a line a moment ago.
+    pub(super) fn says(&mut self, topic: Topic, line: &str) {
+        if let Some(line) = self.hush.line(monotonic_ns(), topic, line) {
+            tell(topic, &line);
+        }
+    }
+
+    /// Says what was held back, as far as it is time.
+    pub(super) fn says_held(&mut self, now_ns: u64) {
+        while let Some((topic, line)) = self.hush.next_held(now_ns) {
+            tell(topic, &line);
+        }
+    }
+
+    /// Lines held back so far.
+    pub(super) fn held(&self) -> u64 {
+        self.hush.held
+    }
+}
+
+fn tell(topic: Topic, line: &str) {
+    match topic {
+        Topic::Joined | Topic::Left(None) => tracing::info!("{line}"),
+        Topic::Left(Some(Reason::Ending)) => tracing::debug!("{line}"),
+        _ => tracing::warn!("{line}"),
+    }
+}
+
+impl Answers for ServerReporter {
+    fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
+        self.fault_writer.answer(call, why, holder, answer)
+    }
+}
+
+impl Host for ServerReporter {
+    fn event(&mut self, event: Event<'_>) {
+        match event {
+            Event::Joined { name } => self.says(Topic::Joined, &format!("{name} takes part")),
+            Event::Left { name, why } => {
+                self.left += 1;
+                let line = match why {
+                    None => format!("{name} takes part no more: its connection is closed"),
+                    Some(Reason::Ending) => format!("{name} is told that the TCP router ends"),
+                    Some(why) => format!("{name} takes part no more: {}", why.word()),
+                };
+                self.says(Topic::Left(why), &line);
+            }
+            Event::Refused { reason: Reason::Ending, .. } => {}
+            Event::Refused { name, reason, digests: (theirs, ours), text } => {
+                let refusal = match reason {
+                    Reason::Common | Reason::System => format!(
+                        "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
+                         (`rohrpost check`, on both)",
+                        reason.word()
+                    ),
+                    _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),
+                    _ => format!("{name} may not take part: {}: {text}", reason.word()),
+                };
+                self.refuses(Topic::Refused(reason), refusal);
+            }
+            Event::Objected { name, verdict } => {
+                self.says(Topic::Objected, &format!("{name} may not host what it says: {verdict}"));
+            }
+        }
+    }
+}

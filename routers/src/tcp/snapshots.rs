@@ -1,0 +1,172 @@
+//! How a client and the server are, as their threads last said: for whoever publishes it.
+
+use crate::session::server::Crowded;
+use crate::session::{Cause, Counts};
+use rohrpost_mailbox::{Name, Priority, TimeRecord};
+use std::sync::{Mutex, PoisonError};
+
+/// So often it is said anew.
+pub(super) const SAY_EVERY_NS: u64 = 200_000_000;
+
+/// Members that are said one by one: with what else is said they must fit into a package.
+pub const MEMBERS_MAX: usize = 300;
+/// Ranges of a client that are told by name.
+pub(super) const HOSTS_MAX: usize = 64;
+
+/// What a class did at one end.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Class {
+    /// The class's priority.
+    pub priority: Priority,
+    /// Packages that came.
+    pub packages: u64,
+    /// Of these, handed on.
+    pub passed: u64,
+    /// Of these, replaced by newer ones while they waited.
+    pub replaced: u64,
+    /// Of these, lost, and why.
+    pub lost: Vec<(Cause, u64)>,
+}
+
+impl Class {
+    /// All classes that did something.
+    pub(super) fn all(counts: &Counts) -> Vec<Self> {
+        let class = |(priority, counts): (Priority, &crate::session::ClassCounts)| {
+            let lost = Cause::ALL.into_iter().map(|cause| (cause, counts.lost(cause))).filter(|(_, count)| *count > 0);
+            Self {
+                priority,
+                packages: counts.packages.get(),
+                passed: counts.passed.get(),
+                replaced: counts.replaced.get(),
+                lost: lost.collect(),
+            }
+        };
+        counts.classes().map(class).collect()
+    }
+}
+
+/// Whether a client takes part.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub enum LinkState {
+    /// It has no connection.
+    #[default]
+    Away,
+    /// It has one, and is not registered.
+    Joining,
+    /// Packages go both sender_cache.
+    Up,
+}
+
+/// When a client that took part did not.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Outage {
+    /// How often that was.
+    pub count: u64,
+    /// When the last one began, and when it ended if it is over, monotonic ns.
+    pub last: Option<(u64, Option<u64>)>,
+}
+
+impl Outage {
+    /// It takes part.
+    pub(super) fn ends(&mut self, now_ns: u64) {
+        if let Some((_, ended @ None)) = &mut self.last {
+            *ended = Some(now_ns);
+        }
+    }
+
+    /// It takes no part any more.
+    pub(super) fn begins(&mut self, now_ns: u64) {
+        if self.last.is_none_or(|(_, ended)| ended.is_some()) {
+            (self.last, self.count) = (Some((now_ns, None)), self.count + 1);
+        }
+    }
+}
+
+/// A client, as it sees itself.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Link {
+    /// Whether it takes part.
+    pub state: LinkState,
+    /// Why not, as it was last told; empty if it does.
+    pub why: String,
+    /// Connections so far.
+    pub connections: u64,
+    /// Shortest way there and back of late, ns.
+    pub round_trip_ns: Option<u64>,
+    /// How far off system time by the server is at most, ns; none if the server does not know it.
+    pub time_error_ns: Option<u64>,
+    /// Times that it took no part any more.
+    pub outage: Outage,
+    /// The node's system time, if the server tells it.
+    pub time: Option<TimeRecord>,
+    /// Bytes of memory that what waits takes up.
+    pub waiting_bytes: u64,
+    /// What went to the server.
+    pub out: Vec<Class>,
+    /// What came from it.
+    pub inn: Vec<Class>,
+}
+
+/// A client, as the server sees it.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Member {
+    /// Its name; before its hello, where it comes from.
+    pub name: String,
+    /// Where it comes from.
+    pub peer: String,
+    /// First byte of the names that it hosts; 0 before its hello.
+    pub system: u8,
+    /// Whether it takes part.
+    pub is_member: bool,
+    /// Ranges of names that it hosts.
+    pub ranges: u64,
+    /// The first of them, each from the first to the last name in it.
+    pub hosts: Vec<(Name, Name)>,
+    /// Time since its connection was made, ns.
+    pub age_ns: u64,
+    /// Time since something came from it, ns.
+    pub heard_ns: u64,
+    /// Packages lost in queues since it, or who connects as the same, sent more than its part of them.
+    pub lost: u64,
+    /// Bytes of memory that it takes up, with what waits for it.
+    pub bytes: u64,
+}
+
+/// All that the server has to say.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Members {
+    /// Connections that are there; of many the first.
+    pub members: Vec<Member>,
+    /// Connections besides these.
+    pub more: u64,
+    /// Clients that took part and do not any more.
+    pub left: u64,
+    /// Connections that were told why they may not take part, or not any more.
+    pub refused: u64,
+    /// Who was the last of them, and why; empty without one.
+    pub refusal: String,
+    /// What went beyond the part of one certificate, or one address.
+    pub crowded: Crowded,
+    /// Packages of those that were lost.
+    pub crowded_packages: u64,
+    /// Registrations that a later one of the same client took the place of before they were looked at.
+    pub overtaken: u64,
+    /// Lines that were not said one by one, since there were too many of their cause.
+    pub held: u64,
+    /// What went through.
+    pub classes: Vec<Class>,
+}
+
+/// What one thread says, and others read: a few times a second.
+#[derive(Debug, Default)]
+pub(super) struct LatestValue<T>(Mutex<T>);
+
+impl<T: Clone> LatestValue<T> {
+    pub(super) fn say(&self, value: T) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = value;
+    }
+
+    pub(super) fn get(&self) -> T {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}

@@ -1,0 +1,143 @@
+//! One window being used: what still fits in it.
+
+use super::LATE_NS;
+use super::table::{Kind, Window};
+use super::wire::Wire;
+use crate::broken::broken;
+use crate::time::Allowed;
+use rohrpost_network::HAND_OVER;
+
+/// What a window may be used for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Carries {
+    /// A hello alone: the node knows the time by those only who have not shown that they live.
+    Hello,
+    /// Datagrams of time, and a hello in a slot: it is a synchronisation window, or the node knows the time by others' Syncs only.
+    Time,
+    /// All that waits, time first.
+    All,
+}
+
+/// The wire is this node's, from `begin_ns` to `end_ns`.
+#[derive(Clone, Debug)]
+pub struct TransmitWindow {
+    /// Which window, in system time.
+    pub window: Window,
+    /// From when on, local ns.
+    pub begin_ns: u64,
+    /// Until when, local ns: here the guard begins.
+    pub end_ns: u64,
+    /// For what.
+    pub carries: Carries,
+    /// From the call to the wire, ns.
+    pub(super) lead_ns: u64,
+    pub(super) wire: Wire,
+    /// When the wire has carried what was handed over, local ns.
+    free_ns: u64,
+    /// So long what was handed over may have kept the window busy, ns.
+    planned_ns: u64,
+    datagrams: u64,
+    wire_bytes: u64,
+}
+
+impl TransmitWindow {
+    pub(super) fn new(window: Window, begin_ns: u64, end_ns: u64, carries: Carries, lead_ns: u64, wire: Wire) -> Self {
+        Self {
+            window,
+            begin_ns,
+            end_ns,
+            carries,
+            lead_ns,
+            wire,
+            free_ns: begin_ns,
+            planned_ns: 0,
+            datagrams: 0,
+            wire_bytes: 0,
+        }
+    }
+
+    /// The largest datagram that would be off the wire before the guard if it were handed over now, in bytes. None: nothing fits.
+    pub fn room_bytes(&self, now_ns: u64) -> Option<usize> {
+        let starts_ns = self.starts_ns(now_ns);
+        self.wire.datagram_bytes_in(self.end_ns.checked_sub(starts_ns)?)
+    }
+
+    /// Whether a datagram of this size would be off the wire before the guard.
+    pub fn fits(&self, now_ns: u64, datagram_bytes: usize) -> bool {
+        self.room_bytes(now_ns).is_some_and(|room_bytes| datagram_bytes <= room_bytes)
+    }
+
+    /// A datagram is being handed over now.
+    pub fn takes(&mut self, now_ns: u64, datagram_bytes: usize) {
+        let wire_ns = self.wire.ns(datagram_bytes);
+        self.free_ns = self.starts_ns(now_ns).saturating_add(wire_ns);
+        self.planned_ns += reckoned_ns(wire_ns);
+        self.datagrams += 1;
+        self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
+    }
+
+    /// From handing over a datagram now until its last bit is at the other computer, behind a switch that passes it on when it has all of it,
+    /// ns. `to_wire_ns`: how long it takes to the wire, unless that is busy for longer.
+    pub fn arrives_after_ns(&self, now_ns: u64, datagram_bytes: usize, to_wire_ns: u64) -> u64 {
+        self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
+    }
+
+    /// For so long the wire is still busy with what was handed over, ns: what is handed over meanwhile leaves no sooner.
+    pub fn busy_ns(&self, now_ns: u64) -> u64 {
+        self.free_ns.saturating_sub(now_ns.saturating_add(self.lead_ns))
+    }
+
+    /// Whether a datagram that is handed over now would be off the wire later than bounds reckon with, after what the window has carried: the
+    /// window began too late, or the thread stood still.
+    pub fn is_late(&self, now_ns: u64, datagram_bytes: usize) -> bool {
+        let wire_ns = self.wire.ns(datagram_bytes);
+        self.starts_ns(now_ns).saturating_add(wire_ns) > self.reckoned_ns().saturating_add(reckoned_ns(wire_ns))
+    }
+
+    /// Whether the window has less room left now than bounds reckon with, after what it has carried.
+    pub fn is_behind(&self, now_ns: u64) -> bool {
+        self.starts_ns(now_ns) > self.reckoned_ns()
+    }
+
+    /// When bounds have the wire free for the next datagram, at the latest, local ns.
+    fn reckoned_ns(&self) -> u64 {
+        self.begin_ns.saturating_add(LATE_NS + self.planned_ns)
+    }
+
+    /// When a datagram is on the wire that is handed over now: not before those that were.
+    fn starts_ns(&self, now_ns: u64) -> u64 {
+        let at_once_ns = now_ns.saturating_add(self.lead_ns);
+        if broken!(ForgetsHandedOver) { at_once_ns } else { self.free_ns.max(at_once_ns) }
+    }
+
+    /// Datagrams so far.
+    pub fn datagrams(&self) -> u64 {
+        self.datagrams
+    }
+
+    /// Bytes on the wire so far, all heads counted.
+    pub fn wire_bytes(&self) -> u64 {
+        self.wire_bytes
+    }
+
+    /// Whether a hello may leave in it.
+    pub fn carries_hello(&self) -> bool {
+        matches!(self.window.kind, Kind::Slot { .. })
+    }
+
+    /// What the clock may send in it.
+    pub fn allowed(&self) -> Allowed {
+        match self.window.kind {
+            _ if self.carries == Carries::Hello && !broken!(TellsUnproven) => Allowed::Nothing,
+            Kind::Synchronisation { .. } => {
+                Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns }
+            }
+            Kind::Slot { .. } => Allowed::Slot,
+        }
+    }
+}
+
+/// So long bounds have a datagram keep a window busy that takes the wire so long, ns: what is shorter waits for the thread.
+fn reckoned_ns(wire_ns: u64) -> u64 {
+    wire_ns.max(HAND_OVER.as_nanos() as u64)
+}
