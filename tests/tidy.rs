@@ -81,8 +81,11 @@ const PAIRS: &[(&str, &str, &str)] = &[
 const KNOTS: &[(&str, usize)] = &[("gui-bridge/src/views.rs", 4), ("gui-bridge/src/scene.rs", 10)];
 
 /// Type names that several files of a crate use, each for a type of its own, and why that is right.
-const SHARED_NAMES: &[(&str, &str, &str)] =
-    &[("cli/src", "Arguments", "each subcommand has its own, in a file of its name")];
+const SHARED_NAMES: &[(&str, &str, &str)] = &[
+    ("cli/src", "Arguments", "each subcommand has its own, in a file of its name"),
+    ("modules/src", "Settings", "each module has its own, as those of an author have"),
+    ("tests/fuzz/src", "World", "each target is a program of its own, and has one"),
+];
 
 /// Lines that a file may have.
 const LINES_MAX: usize = 400;
