@@ -65,7 +65,7 @@ pub(crate) enum Delivery {
     /// Accepted.
     Sent,
     /// The subscriber's mailbox was full.
-    OverflowPolicy,
+    Full,
     /// The subscriber's mailbox takes no value of this size, and this was said.
     TooLarge,
     /// The subscriber is gone.
@@ -202,7 +202,7 @@ impl SubscriptionEntry {
     fn settle(&mut self, delivery: Delivery) -> bool {
         match delivery {
             Delivery::Sent => self.sequence = self.sequence.wrapping_add(1),
-            Delivery::OverflowPolicy | Delivery::TooLarge => {
+            Delivery::Full | Delivery::TooLarge => {
                 self.told |= matches!(delivery, Delivery::TooLarge);
                 // The number is used up, so that the subscriber sees the gap.
                 self.sequence = self.sequence.wrapping_add(1);
@@ -345,7 +345,7 @@ mod tests {
     fn a_subscriber_that_was_started_again_has_none_of_its_earlier_subscriptions() {
         let mut all = subscribed(0);
         assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
-        publish(&mut all, || Delivery::OverflowPolicy);
+        publish(&mut all, || Delivery::Full);
         let later = RequestOrigin { incarnation: 6, ..asked(2) };
         assert!(all.subscribe(0, later, Subscribe { number: 2, ..wish(0) }, 2));
         let left: Vec<_> = all.list.iter().map(|s| (s.wish.number, s.asked.incarnation, s.sequence)).collect();
@@ -398,7 +398,7 @@ mod tests {
     #[test]
     fn full_is_a_gap_and_a_miss_and_gone_is_gone() {
         let mut all = subscribed(0);
-        publish(&mut all, || Delivery::OverflowPolicy);
+        publish(&mut all, || Delivery::Full);
         assert_eq!((all.list[0].sequence, all.missed()), (1, 1));
         publish(&mut all, || Delivery::Gone);
         assert_eq!((all.len(), all.missed()), (0, 1), "what was missed stays counted");

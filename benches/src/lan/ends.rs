@@ -105,7 +105,7 @@ impl LanSource {
     pub fn offer(&mut self, message: &[u8]) -> Result<bool, Failure> {
         match self.sender.send(&self.label, &[message]) {
             Ok(()) => Ok(true),
-            Err(SendError::OverflowPolicy(_)) => Ok(false),
+            Err(SendError::Full(_)) => Ok(false),
             Err(error) => Err(Failure::of("send", error)),
         }
     }

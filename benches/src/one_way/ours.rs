@@ -108,7 +108,7 @@ impl Sink for OurSink {
         loop {
             match self.sender.send(&self.label, &[message]) {
                 Ok(()) => return Ok(()),
-                Err(SendError::OverflowPolicy(_)) if self.retry != Retry::Never => self.pause(),
+                Err(SendError::Full(_)) if self.retry != Retry::Never => self.pause(),
                 Err(error) => return Err(Failure::of("send", error)),
             }
         }

@@ -228,7 +228,7 @@ impl Link {
             Err(error) => {
                 self.spare.push(call.body);
                 // One whose server is not there is none of the calls that should have had an answer.
-                if matches!(error, SendError::OverflowPolicy(_)) {
+                if matches!(error, SendError::Full(_)) {
                     self.tallies.ended(sequence, to, CallOutcome::Refused);
                 }
                 Err(error.into())

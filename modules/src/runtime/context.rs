@@ -415,6 +415,6 @@ fn deliver(
             }
             Delivery::TooLarge
         }
-        Err(_) => Delivery::OverflowPolicy,
+        Err(_) => Delivery::Full,
     }
 }

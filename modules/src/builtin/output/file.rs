@@ -189,7 +189,7 @@ mod tests {
         assert!(file.write("third", start + 2 * LOOK).is_none());
         assert_eq!(read(&path), "third\n");
 
-        // OverflowPolicy before it is noticed: what was put aside stays where it is.
+        // Full before it is noticed: what was put aside stays where it is.
         fs::remove_file(&path).unwrap();
         assert!(file.write("a line that fills the file", start + 2 * LOOK).is_none());
         assert_eq!(read(&path), "a line that fills the file\n");
