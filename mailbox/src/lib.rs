@@ -51,7 +51,7 @@
 //! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes on with (H)
-//! and (I); `traffic` and `system_time` have letters of their own.
+//! and (I); `cell` has letters of its own.
 //!
 //! ```
 //! use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Shape, Type};
@@ -71,6 +71,7 @@
 
 mod about;
 mod bell;
+mod cell;
 mod clock;
 mod counters;
 mod doorbell;
@@ -109,6 +110,7 @@ mod watch;
 mod word;
 mod work;
 
+pub use cell::SeqCount;
 pub use clock::{monotonic_ns, realtime_ns, slept_ns, unslewed_ns};
 pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss, saturating_sum};
 pub use entry::{ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
