@@ -86,10 +86,10 @@ const LINES_MAX: usize = 400;
 const LONG: &[(&str, usize)] = &[
     ("config/src/reader.rs", 403),
     ("gui-bridge/src/store.rs", 453),
-    ("mailbox/proof/loom/src/broken.rs", 906),
+    ("mailbox/proof/loom/src/broken.rs", 901),
     ("mailbox/proof/loom/src/models.rs", 665),
     ("mailbox/src/node.rs", 420),
-    ("mailbox/src/sender.rs", 423),
+    ("mailbox/src/sender.rs", 420),
     ("mailbox/src/slots.rs", 423),
     ("mailbox/src/system_time.rs", 449),
     ("modules/src/call/link.rs", 428),

@@ -30,7 +30,7 @@ struct Proof {
 const PROOFS: [Proof; 2] = [
     Proof {
         real: "real",
-        parts: &["word", "hot", "slots", "queue", "bell", "rig", "models"],
+        parts: &["word", "full", "hot", "slots", "queue", "bell", "rig", "models"],
         models: broken::MODELS,
         broken: broken::BROKEN,
     },

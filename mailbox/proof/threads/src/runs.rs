@@ -2,7 +2,7 @@
 
 use super::cell::{SeqCount, SeqLatch};
 use super::rig::{Mailbox, Receiver, Sender, Sent};
-use super::slots::Full;
+use super::full::Full;
 use crate::scaled;
 use crate::step::{reached, shake};
 use std::sync::atomic::{AtomicU64, Ordering};
