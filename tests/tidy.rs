@@ -91,7 +91,7 @@ const LONG: &[(&str, usize)] = &[
     ("mailbox/src/node.rs", 420),
     ("mailbox/src/sender.rs", 420),
     ("mailbox/src/slots.rs", 423),
-    ("mailbox/src/system_time.rs", 449),
+    ("mailbox/src/system_time.rs", 416),
     ("modules/src/call/link.rs", 428),
     ("modules/src/call/once_simulation.rs", 418),
     ("modules/src/output/way.rs", 434),

@@ -1,5 +1,5 @@
-//! The models. Each is one small program, run by loom in every order of its threads' steps and with every stale value
-//! that a load may read. This file is compiled beside the real slot core and beside each broken one.
+//! The models. Loom runs each small program in every order of its threads' steps and with every stale value. This file is
+//! compiled beside the real slot core and beside each broken one.
 
 use crate::full::Full;
 use crate::name::Priority;
