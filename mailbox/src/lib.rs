@@ -71,6 +71,7 @@
 
 mod about;
 mod bell;
+mod causes;
 mod clock;
 mod counters;
 mod doorbell;

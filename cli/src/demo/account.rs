@@ -1,9 +1,9 @@
 //! What went between the nodes of the demo, and whether nothing was forgotten.
 
 use crate::summary::class_name;
-use crate::table::{table, time};
+use crate::table::{counted, table, time};
 use rohrpost::Class;
-use rohrpost::interfaces::{Carried, ClassCarried, Links, PeerLink};
+use rohrpost::interfaces::{ClassCarried, Links, PeerLink};
 use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -128,7 +128,7 @@ fn lost_of(class: &ClassCarried) -> u64 {
 
 /// Datagrams from a peer that did not come whole.
 fn gone(peer: &PeerLink) -> u64 {
-    peer.lost + peer.damaged
+    peer.counters.lost + peer.counters.damaged
 }
 
 /// A row for each class and node.
@@ -160,26 +160,16 @@ pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
 pub(super) fn by_link(links: &[Links]) -> String {
     let pairs = links.iter().flat_map(|to| to.peers.iter().map(move |from| (from, to)));
     let rows = pairs.map(|(from, to)| {
-        let Carried { packages, datagrams, bytes, parts } = from.received;
-        [
-            format!("{} → {}", from.node, to.node),
-            packages.to_string(),
-            datagrams.to_string(),
-            format!("{} KiB", bytes.div_ceil(1 << 10)),
-            parts.to_string(),
-            from.lost.to_string(),
-            from.damaged.to_string(),
-            from.copies.to_string(),
-            from.overtaken.to_string(),
-        ]
+        let [packages, datagrams] = [from.received.packages, from.received.datagrams].map(|count| count.to_string());
+        [format!("{} → {}", from.node, to.node), packages, datagrams, counted(&from.counters)]
     });
-    table(["link", ">packages", ">datagrams", ">bytes", ">parts", ">lost", ">damaged", ">copies", ">overtaken"], rows)
+    table(["link", ">packages", ">datagrams", "counted"], rows)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost::interfaces::{CarriedLoss, LinkState};
+    use rohrpost::interfaces::{Carried, CarriedLoss, LinkCounters, LinkState};
 
     const TOOL: u8 = 16;
 
@@ -198,14 +188,7 @@ mod tests {
             heard_ms: Some(1),
             sent: carried(sent),
             received: carried(received),
-            unsent: 0,
-            lost,
-            missed: 0,
-            copies: 0,
-            damaged: 0,
-            overtaken: 0,
-            refused: 0,
-            restarts: 0,
+            counters: LinkCounters { lost, ..LinkCounters::default() },
         }
     }
 

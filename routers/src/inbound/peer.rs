@@ -206,12 +206,12 @@ impl Peer {
         way.peer.link.next.set(self.window.next());
         match arrival {
             Arrival::Newest => return true,
-            Arrival::Overtaken => received.overtaken.add(1),
+            Arrival::Overtaken => received.reordered.add(1),
             Arrival::Returned => {
-                received.overtaken.add(1);
+                received.reordered.add(1);
                 received.returned.add(1);
             }
-            Arrival::Copy => received.copies.add(1),
+            Arrival::Copy => received.duplicates.add(1),
         }
         arrival != Arrival::Copy
     }
