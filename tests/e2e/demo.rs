@@ -48,13 +48,13 @@ fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_f
     judged(Watched::Ordinary, || {
         let place = Place::new();
         let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
-        let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "--impair", bad]);
+        let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "-v", "--impair", bad]);
         if lacks_namespaces(&said.err) {
             return;
         }
         assert_eq!(said.code, Some(0), "{said:?}");
         let said = said.out;
-        assert!(said.contains("the accounts balance\n"), "{said}");
+        assert!(said.contains("The demo went well.\n") && said.contains("the accounts balance\n"), "{said}");
         assert!(number(&said, " scans mapped (") > 5, "{said}");
         assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
         let link = said.lines().find(|line| line.starts_with("base → brain")).unwrap();
@@ -68,7 +68,7 @@ fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_f
 fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
     judged(Watched::Ordinary, || {
         let place = Place::new();
-        let said = place.say(&["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet"]);
+        let said = place.say(&["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet", "-v"]);
         if lacks_namespaces(&said.err) {
             return;
         }

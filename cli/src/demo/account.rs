@@ -105,7 +105,7 @@ impl fmt::Display for Balance {
         let Self { taken, delivered, lost, on_wire, datagrams, died, wrong } = self;
         writeln!(
             f,
-            "packages to other nodes: {taken}; delivered: {delivered}; lost in routers, for the causes above: {lost}\n\
+            "packages to other nodes: {taken}; delivered: {delivered}; lost in routers, for the causes below: {lost}\n\
              lost on the wire: {on_wire}; datagrams that did not come whole: {datagrams}"
         )?;
         if !died.is_empty() {
@@ -133,25 +133,22 @@ fn gone(peer: &PeerLink) -> u64 {
 
 /// A row for each class and node.
 pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
-    let mut rows: Vec<(u8, [String; 10])> = Vec::new();
+    let mut rows: Vec<(u8, [String; 8])> = Vec::new();
     for node in links {
         for class in &node.classes {
-            let ages = class.age.map_or(["-".into(), "-".into(), "-".into()], |age| {
-                [age.p50_ns, age.p99_ns, age.max_ns].map(|ns| time(Duration::from_nanos(ns)))
-            });
-            let [p50, p99, max] = ages;
+            let age = class.age.map_or("-".into(), |age| time(Duration::from_nanos(age.p99_ns)));
             let lost = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause));
             let lost: Vec<String> = lost.collect();
             let counts = [class.taken, class.sent, class.came, class.delivered].map(|count| count.to_string());
             let [taken, sent, came, delivered] = counts;
             let name = class_name(installation, Some(Class(class.class)));
             let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
-            rows.push((class.class, [name, node.node.clone(), taken, sent, came, delivered, lost, p50, p99, max]));
+            rows.push((class.class, [name, node.node.clone(), taken, sent, came, delivered, age, lost]));
         }
     }
     rows.sort_by_key(|(class, _)| std::cmp::Reverse(*class));
     table(
-        ["class", "node", ">taken", ">sent", ">came", ">delivered", "lost", ">age p50", ">p99", ">max"],
+        ["class", "node", ">taken", ">sent", ">came", ">delivered", ">age p99", "lost"],
         rows.into_iter().map(|(_, row)| row),
     )
 }
