@@ -71,6 +71,7 @@
 
 mod about;
 mod bell;
+mod causes;
 mod cell;
 mod clock;
 mod counters;
@@ -104,6 +105,7 @@ pub mod step;
 mod sync;
 pub mod sys;
 mod system_time;
+mod throttle;
 mod traffic;
 mod unlink;
 mod waiting;
@@ -129,6 +131,7 @@ pub use routes::ROUTES_MAX;
 pub use sender::{Label, Loan, SendError, Sender};
 pub use slots::SLOTS_MAX;
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
+pub use throttle::Throttle;
 pub use waiting::{Waiting, wait_above, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};
 pub use work::{InHand, Work};
