@@ -4,9 +4,9 @@
 //! no fences: what a body's hand-over rested on a fence for would be reported here, though it were right. None does.
 
 use super::bell::Bell;
+use super::full::{Full, NoSlot};
 use super::hot::Hot;
 use super::queue::Queue;
-use super::full::{Full, NoSlot};
 use super::slots::{Bodies, Posted, Published, Slots};
 use super::word::{Claimant, FREE, State, Victim};
 use crate::name::Priority;

@@ -1,8 +1,8 @@
 //! The runs: each lets threads do one thing many times, and judges the accounts at the end.
 
 use super::cell::{SeqCount, SeqLatch};
-use super::rig::{Mailbox, Receiver, Sender, Sent};
 use super::full::Full;
+use super::rig::{Mailbox, Receiver, Sender, Sent};
 use crate::scaled;
 use crate::step::{reached, shake};
 use std::sync::atomic::{AtomicU64, Ordering};
