@@ -1,18 +1,21 @@
 //! Calls: a command with an envelope, its reply, and what may go wrong between.
 //!
-//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side, `tally` counts what came of its calls.
+//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side,
+//! `tally` counts what came of its calls.
 
 mod absent;
 mod envelope;
 mod error;
 mod link;
 mod once;
+mod pending;
 mod tally;
 
 pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope, append};
 pub use error::{CallError, Fault};
 pub(crate) use link::is_to;
-pub use link::{CALLS_MAX, Caller, Link, Pending};
+pub use link::{CALLS_MAX, Caller, Link};
 pub use once::{CALLERS_MAX, Once, REPLIES_KEPT, Request, TRANSIT_MAX, VALIDITY_MAX, Verdict, WINDOW};
+pub use pending::Pending;
 pub use tally::Tally;
