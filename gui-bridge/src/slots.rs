@@ -229,7 +229,7 @@ mod tests {
     }
 
     /// Draws what the router of a node tells.
-    fn draw<T: serde::Serialize>(drawing: &mut Drawing, view: &mut dyn View, data: &str, told: &T) {
+    fn draw<T: serde::Serialize>(drawing: &mut TestScene, view: &mut dyn View, data: &str, told: &T) {
         let installation = demo();
         let (mut bytes, description) = (Vec::new(), RouterInterface::description());
         append(&mut bytes, told).unwrap();

@@ -126,7 +126,7 @@ mod tests {
     }
 
     /// Draws what the client of the desk tells.
-    fn draw(drawing: &mut Drawing, view: &mut TcpLinks, told: &BeyondLink) {
+    fn draw(drawing: &mut TestScene, view: &mut TcpLinks, told: &BeyondLink) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tcp.toml");
         let installation = Installation::load(&path).unwrap();
         let (mut bytes, description) = (Vec::new(), TcpInterface::description());
