@@ -1,18 +1,18 @@
 //! Nodes, the links between them, and their clocks: what routers tell, drawn as a graph and as charts.
 //!
 //! ```text
-//!   network/graph            nodes on a circle; on each link, in each direction, how it is: state, packages a second, lost
+//!   network/graph            nodes on a circle; on each link, in each direction: state, packages a second, lost
 //!   network/packages/A → B   packages a second        network/counters/…    what each node counts of its peers
 //!   network/clock/NODE       error bound, µs          network/offset/NODE   offset at the last exchange, µs
 //!   network/latency/…        by class and hop, µs: until the router has it, until it is delivered, until it is taken
 //! ```
 
 use crate::blueprint::Tab;
-use crate::nodes::APART;
+use crate::error::DrawError;
+use crate::nodes::RATE_INTERVAL_MIN;
 use crate::palette;
-use crate::scene::{DrawError, Scene, entity};
-use crate::view::{Datum, View};
-use crate::views::is;
+use crate::scene::{Scene, entity};
+use crate::view::{Datum, View, is};
 use rerun::blueprint::{ContainerLike, GraphView, Horizontal, TimeSeriesView, Vertical};
 use rerun::{AsComponents, GraphEdges, GraphNodes, Scalars, SerializedComponentBatch};
 use rohrpost::Class;
@@ -98,8 +98,8 @@ impl View for Network {
     }
 }
 
-/// When the graph is drawn that this word of a router changes. Several routers tell of it, and what one tells is overtaken by what another
-/// told later; an entity's rows go on in time, unless time itself went back.
+/// When the graph is drawn that this report of a router changes. Several routers report it, and one report is overtaken
+/// by what another told later; an entity's rows go on in time, unless time itself went back.
 fn onward(drawn_ns: u64, told_ns: u64) -> u64 {
     let went_back = u128::from(drawn_ns.saturating_sub(told_ns)) > OLD.as_nanos();
     if went_back { told_ns } else { told_ns.max(drawn_ns) }
@@ -107,7 +107,7 @@ fn onward(drawn_ns: u64, told_ns: u64) -> u64 {
 
 /// None when the router began anew in between, or told both at nearly the same time.
 fn sent_per_s(before: &Links, now: &Links, peer: &PeerLink) -> Option<f64> {
-    let apart_ms = APART.as_millis() as u64;
+    let apart_ms = RATE_INTERVAL_MIN.as_millis() as u64;
     let seconds = now.uptime_ms.checked_sub(before.uptime_ms).filter(|ms| *ms >= apart_ms)? as f64 / 1e3;
     let known = before.peers.iter().find(|known| known.node == peer.node)?;
     Some(peer.sent.packages.checked_sub(known.sent.packages)? as f64 / seconds)
@@ -240,7 +240,8 @@ impl Scene {
         self.log(entity(parts), &Scalars::single(number));
     }
 
-    /// How long packages of a class waited until their router took them, and until those took them that they were for, µs: 99 of 100.
+    /// How long packages of a class waited, µs, 99th percentile: until their router took them, and until their
+    /// receivers took them.
     pub(crate) fn hops(&mut self, class: &str, transit_us: Option<f64>, end_us: Option<f64>) {
         for (hop, us) in [("to router", transit_us), ("at its end", end_us)] {
             if let Some(us) = us {

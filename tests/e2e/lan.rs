@@ -5,7 +5,7 @@ use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait}
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Head, monotonic_ns};

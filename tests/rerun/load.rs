@@ -1,8 +1,8 @@
 //! One processor for a robot that is measured, which is never idle.
 //!
-//! Where the kernel puts which process, and how deep a processor sleeps, changes latencies more than any bridge does; a robot is even
-//! faster the more others do, because it then finds processors awake. So the modules that are measured share one
-//! processor, and that has work all the time, which gives way to whoever wants it.
+//! Where the kernel puts which process, and how deep a processor sleeps, changes latencies more than any bridge does; a
+//! robot is even faster the more others do, because it then finds processors awake. So the modules that are measured
+//! share one processor, and that has work all the time, which yields to all other threads.
 
 use nix::libc;
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};

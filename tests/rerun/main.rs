@@ -1,12 +1,15 @@
-//! The GUI bridge with Rerun's own command line: what is in a drawing, and what a viewer that misbehaves does to a robot.
+//! The GUI bridge with Rerun's own command line: what is in a drawing, and what a viewer that misbehaves does to a
+//! robot.
 //!
-//! Behind the feature `rerun-tests`, since they need two programs that nobody else does; `cargo xtask test` brings both.
+//! Behind the feature `rerun-tests`, since they need two programs that no other test needs; `cargo xtask test` brings
+//! both.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod drawings;
 mod launched;
 mod load;
+mod modules;
 mod own_view;
 mod picture;
 mod programs;

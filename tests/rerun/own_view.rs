@@ -7,7 +7,7 @@ use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError};
 use std::time::Duration;
 
-/// What the example draws: the type counts, not who declares it.
+/// What the example draws: the type counts, not the module that declares it.
 #[rohrpost::data]
 struct Fires {
     places_m: Vec<[f32; 2]>,

@@ -12,7 +12,8 @@ const SCAN: &str = "/world/scan/source.0";
 const NEWEST: u8 = 3;
 /// Patches of the source's map.
 const PATCHES: usize = 64;
-/// Patches that come while the bridge stands still: a second, which is less than a subscription lives without being renewed.
+/// Patches that come while the bridge stands still: a second, which is less than a subscription lives without being
+/// renewed.
 const WAITING: u32 = 10;
 
 fn is_stopped(pid: u32) -> bool {
@@ -32,7 +33,8 @@ fn a_bridge_that_stood_still_goes_on_with_the_newest() {
         signal(Signal::SIGSTOP);
         wait("the bridge stands still", || is_stopped(pid).then_some(()));
         let stopped_ns = robot.newest_scan_ns();
-        // Of what was published, that which was followed by something sent has been sent itself, however slow the computer is.
+        // Of what was published, that which was followed by something sent has been sent itself, however slow the
+        // computer is.
         let (mut continued_ns, mut last) = (stopped_ns, (stopped_ns, u64::MAX));
         wait("patches wait", || {
             let sent = robot.bridge_mailbox(NEWEST).sent;

@@ -15,7 +15,7 @@ use std::time::Duration;
 #[serde(crate = "rohrpost::serde", deny_unknown_fields)]
 struct Settings {}
 
-/// Its map never changes: it publishes it to those who ask, and else says nothing.
+/// Its map never changes: it publishes the map on request only.
 struct Quiet {
     asked: bool,
 }
@@ -104,7 +104,8 @@ fn a_drawing_that_is_switched_on_again_is_whole_and_the_last_one_is_kept() {
     let (file, old) = (folder.path().join("map.rrd"), folder.path().join("map.old.rrd"));
     std::fs::write(folder.path().join("map.toml"), configuration(r#"file = "map.rrd""#)).unwrap();
     let launch = Launched::start(folder.path(), "map.toml");
-    // States and charts come each half second, some twenty rows; after several times the map, which is asked for at once, has come, too.
+    // States and charts come each half second, some twenty rows; after several times the map, which is asked for at
+    // once, has come, too.
     let enough = |launch: &Launched| wait("something is drawn", || (launch.count("drawn")? > 100).then_some(()));
     enough(&launch);
     ok("off", &launch.tool(&["call", "gui.0", "off"]));

@@ -2,18 +2,19 @@
 //!
 //! The robot has one processor, which is never idle ([`Load`]); bridge and viewer run wherever the kernel puts them.
 //!
-//! What is compared is how late beats came in short windows, and of all windows the lower quartile: what else the computer does only adds,
-//! and comes and goes; what a fault does stays. Faults are interleaved with two kinds of peace: a viewer that is `well`, which costs
-//! the computer more than one that does nothing; and none at all, `absent`, which costs it less. With a fault the robot must be no
-//! slower than with either. How many windows there are does not depend on what they say: only when peace itself is noisy
-//! are they as many again, once, and all count.
+//! What is compared is how late beats came in short windows, and of all windows the lower quartile: what else the
+//! computer does only adds, and comes and goes; what a fault does stays. Faults are interleaved with two kinds of quiet
+//! phases: a viewer that is `well`, which costs the computer more than one that does nothing; and none at all,
+//! `absent`, which costs it less. With a fault the robot must be no slower than with either. How many windows there are
+//! does not depend on what they say: only when peace itself is noisy are they as many again, once, and all count.
 //!
-//! A few rounds on a computer that others use as well tell a robot that waits for its viewer from one that does not, and no
-//! tenth: they are held to a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` makes each fault come that often, and
-//! holds them to the narrow one.
+//! A few rounds on a computer that others use as well tell a robot that waits for its viewer from one that does not,
+//! and no tenth: they are held to a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` makes each fault come
+//! that often, and holds them to the narrow one.
 
 use super::load::{Load, on_one_processor};
-use super::robot::{Mark, Robot};
+use super::modules::Mark;
+use super::robot::Robot;
 use super::viewer::{Viewer, free_port};
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};
@@ -266,8 +267,8 @@ fn a_robot_that_waits_for_its_viewer_is_found_out() {
     });
 }
 
-/// Rerun makes threads of its own; they inherit what the bridge has. Class 40 has nice 8; the thread that waits for signals is
-/// older than that, and does nothing.
+/// Rerun makes threads of its own; they inherit what the bridge has. Class 40 has nice 8; the thread that waits for
+/// signals is older than that, and does nothing.
 fn threads_are_nice(robot: &Robot) -> bool {
     let threads = std::fs::read_dir(format!("/proc/{}/task", robot.bridge_pid())).unwrap();
     let mut all = threads.map(|thread| {

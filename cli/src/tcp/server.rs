@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::tcp::ends::NAME_BYTES_MAX;
     use rohrpost::interfaces::{CarriedLoss, ClassPassed};
-    use rohrpost::macro_support::append;
+    use rohrpost::wire::append;
     use rohrpost_routers::session::Cause;
     use rohrpost_routers::tcp::MEMBERS_MAX;
 

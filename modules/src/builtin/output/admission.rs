@@ -1,5 +1,5 @@
-//! Which lines are taken: those said in the sender's own name, as many as its share, and of what they say of time and losses what can be.
-//! Knows no clock and no mailbox.
+//! Which lines are taken: those said in the sender's own name, as many as its share, and of what they say of time and
+//! losses what can be. Knows no clock and no mailbox.
 
 use crate::interfaces::RefusedLines;
 use crate::output::{Bucket, LANES, OutputLine, WAITING_LINES, cut, iso};
@@ -7,7 +7,8 @@ use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{Name, Throttle};
 
 const SECOND_NS: u64 = 1_000_000_000;
-/// How far ahead of the collector's a line's time may be: clocks of nodes differ by less, as long as they have one time.
+/// How far ahead of the collector's a line's time may be: clocks of nodes differ by less, as long as they have one
+/// time.
 const AHEAD_MAX_NS: u64 = SECOND_NS;
 /// Each refusal is told at most so often.
 const TELL_NS: u64 = 5 * SECOND_NS;
@@ -33,8 +34,8 @@ pub(super) struct Admission {
     unreadable: Throttle,
 }
 
-/// Who says lines: a principal, by itself or through launch, which passes on what it prints. Each of both ways has an allowance where the
-/// lines come from, and so it has here.
+/// Who says lines: a principal, by itself or through launch, which passes on what it prints. Each of both ways has an
+/// allowance where the lines come from, and so it has here.
 struct Writer {
     principal: Principal,
     by_launch: bool,
@@ -122,8 +123,8 @@ impl Admission {
         &mut self.writers[at]
     }
 
-    /// A line cannot be later than now, nor tell of more lines than its module can have said since the last one; of the first in this incarnation
-    /// of the collector, since the computer started. What it said stands in its text.
+    /// A line cannot be later than now, nor tell of more lines than its module can have said since the last one; of the
+    /// first in this incarnation of the collector, since the computer started. What it said stands in its text.
     fn bound(&mut self, line: &mut OutputLine, now_ns: u64, lost_max: u64, quiet_ns: u64) {
         let mut marks = String::new();
         if line.time_ns > now_ns.saturating_add(AHEAD_MAX_NS) {

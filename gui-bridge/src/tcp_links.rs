@@ -1,4 +1,5 @@
-//! The ways of nodes to the TCP router: what their clients tell, drawn beside the modules, so that an outage is seen as one.
+//! Links of nodes to the TCP router. Their clients report them; they are drawn beside the modules, so outages are
+//! visible.
 //!
 //! ```text
 //!   modules/TCP router, from NODE                a lane: on, or unreachable while packages cannot go there
@@ -6,14 +7,15 @@
 //!   network/clock/NODE                           error bound of a node that has its time from there, µs
 //! ```
 //!
-//! While such a way is away nothing new comes by it. What tells how things are right now, scans and speeds, is cleared from then on until the
-//! next comes, so that nobody takes the last of it for the present. Maps, poses and ways stay: they are what was.
+//! While such a link is down, it brings nothing new. What tells how things are right now, scans and speeds, is cleared
+//! from then on until the next comes, so that nobody takes the last of it for the present. Maps, poses and ways stay:
+//! they are what was.
 
 use crate::blueprint::Tab;
-use crate::scene::{DrawError, Scene, entity};
+use crate::error::DrawError;
+use crate::scene::{Scene, entity};
 use crate::states::Level;
-use crate::view::{Datum, View};
-use crate::views::is;
+use crate::view::{Datum, View, is};
 use rerun::Clear;
 use rohrpost::interfaces::{BeyondLink, BeyondState};
 use rohrpost::schema::{DataItem, Description};
@@ -25,10 +27,11 @@ const PRESENT: [&[&str]; 2] = [&["world", "scan"], &["motion"]];
 
 /// Ways to the TCP router, as all clients see theirs.
 #[derive(Default)]
-pub(crate) struct Beyond {
+pub(crate) struct TcpLinks {
     /// By node.
     drawn: HashMap<String, Drawn>,
-    /// When what is of its moment was cleared last, system time, ns. Several clients tell of one outage, one after the other.
+    /// When what is of its moment was cleared last, system time, ns. Several clients tell of one outage, one after the
+    /// other.
     cleared_ns: u64,
 }
 
@@ -40,7 +43,7 @@ struct Drawn {
     is_up: bool,
 }
 
-impl View for Beyond {
+impl View for TcpLinks {
     fn wants(&self, _: &Description, item: &DataItem) -> bool {
         is::<BeyondLink>(item)
     }
@@ -93,10 +96,10 @@ fn standing(is_up: bool) -> Standing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Drawing;
+    use crate::testing::TestScene;
     use rohrpost::interface::Interface;
     use rohrpost::interfaces::{BeyondOutage, TcpInterface};
-    use rohrpost::macro_support::append;
+    use rohrpost::wire::append;
     use rohrpost_config::Installation;
     use std::path::Path;
 
@@ -123,7 +126,7 @@ mod tests {
     }
 
     /// Draws what the client of the desk tells.
-    fn draw(drawing: &mut Drawing, view: &mut Beyond, told: &BeyondLink) {
+    fn draw(drawing: &mut TestScene, view: &mut TcpLinks, told: &BeyondLink) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tcp.toml");
         let installation = Installation::load(&path).unwrap();
         let (mut bytes, description) = (Vec::new(), TcpInterface::description());
@@ -149,7 +152,7 @@ mod tests {
             ),
             (vec![link(1, Some((S, Some(2 * S)))), link(1, Some((S, Some(2 * S))))], 1, 0, "it was before"),
         ] {
-            let (mut drawing, mut view) = (Drawing::new(), Beyond::default());
+            let (mut drawing, mut view) = (TestScene::new(), TcpLinks::default());
             drawing.rows();
             for link in &told {
                 draw(&mut drawing, &mut view, link);

@@ -77,7 +77,7 @@ fn slow_file(folder: &tempfile::TempDir) -> std::path::PathBuf {
     path
 }
 
-/// Takes all that is written to a slow file, whoever opens and closes it meanwhile.
+/// Reads all that is written to a slow file, across openings and closings by the writer.
 struct Reader {
     path: std::path::PathBuf,
     bytes: Arc<AtomicU64>,
@@ -121,12 +121,12 @@ impl Drop for Reader {
 fn a_disk_that_stands_still_is_waited_for_and_keeps_nobody_waiting() {
     let folder = tempfile::tempdir().unwrap();
     let path = slow_file(&folder);
-    let turn = crate::pen::Turn::default();
+    let turn = crate::supervisor::Turn::default();
     let open = || Scene::open_in_turn("lab", Sink::file(&path), RATE_HZ, 0, turn.clone()).unwrap();
     let mut first = open();
     until(&mut first, "it is noticed", |scene| scene.counts().stuck == 1);
     assert_eq!(first.failure(), None, "it is no failure");
-    // Until somebody reads it, who waited would wait for ever.
+    // Without a reader, a call that waited would wait for ever.
     let start = Instant::now();
     let first = first.leave().unwrap();
     // Switched off and on, and off again: they wait for the first, and the second has nothing to say any more.
@@ -151,8 +151,8 @@ fn who_closes_a_drawing_waits_no_longer_than_it_says() {
     let folder = tempfile::tempdir().unwrap();
     let path = slow_file(&folder);
     let scene = Scene::open("lab", Sink::file(&path), RATE_HZ, 0).unwrap();
-    let pen = scene.leave().unwrap();
-    let ended = pen.close_by(Instant::now() + Duration::from_millis(50));
+    let supervisor = scene.leave().unwrap();
+    let ended = supervisor.close_by(Instant::now() + Duration::from_millis(50));
     assert!(matches!(ended, Err(crate::CloseError::Stuck)), "{ended:?}");
     drop(Reader::new(&path));
 }
@@ -184,7 +184,7 @@ fn on_a_small_disk(test: &str) -> Option<std::path::PathBuf> {
 
 #[test]
 fn a_disk_that_is_full_is_tried_again_and_the_drawing_goes_on_when_there_is_room() {
-    let test = "pen::tests::a_disk_that_is_full_is_tried_again_and_the_drawing_goes_on_when_there_is_room";
+    let test = "supervisor::tests::a_disk_that_is_full_is_tried_again_and_the_drawing_goes_on_when_there_is_room";
     let Some(folder) = on_a_small_disk(test) else { return };
     let (path, ballast) = (folder.join("scene.rrd"), folder.join("ballast"));
     std::fs::write(&path, "what was recorded before").unwrap();

@@ -1,8 +1,8 @@
 //! Asks a module of another node what it offers, part by part, and waits for nothing.
 
 use rohrpost::common::{DESCRIBE, DescriptionPart, HASH};
-use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::schema::Description;
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Context, Name};
 use std::time::Duration;
 
@@ -13,13 +13,13 @@ const BYTES_MAX: u32 = 1 << 20;
 
 /// A description that is being asked for.
 #[derive(Default)]
-pub(crate) struct Asking {
+pub(crate) struct DescriptionRequest {
     bytes: Vec<u8>,
     /// The call that is under way.
     call: Option<u32>,
 }
 
-impl Asking {
+impl DescriptionRequest {
     /// The description, when it is there. Asks for what is missing; after a failure, for all of it.
     pub(crate) fn poll(&mut self, context: &Context, module: Name) -> Option<Description> {
         let mut link = context.link().borrow_mut();

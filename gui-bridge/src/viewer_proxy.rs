@@ -1,13 +1,13 @@
-//! The way to a viewer: Rerun speaks to a socket of ours, and we to the viewer.
+//! Stands for the viewer: Rerun's client connects to a local socket, and the proxy connects to the viewer.
 //!
 //! ```text
-//!   Rerun's gRPC client ──▶ 127.0.0.1:some port ──▶ [Line] ──▶ viewer
+//!   Rerun's gRPC client ──▶ 127.0.0.1:some port ──▶ [ViewerProxy] ──▶ viewer
 //! ```
 //!
-//! Rerun's client never gives up: without a viewer it tries for ever, and with one that stands still it waits for as long as
-//! that lives, and whoever draws waits with it. It has no way to be told otherwise. A line has one: when it is cut, all that
-//! Rerun waits for fails at once, its threads end, and its memory is free. It also tells whether the viewer has answered:
-//! the kernel connects to one that stands still, too.
+//! Rerun's client never gives up: without a viewer it tries for ever, and with one that stands still it waits for as
+//! long as it lives, and so does its caller. It has no way to be stopped. A proxy has one: when it is cut, all that
+//! Rerun waits for fails at once, its threads end, and its memory is free. It also tells whether the viewer has
+//! answered: the kernel connects to one that stands still, too.
 
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream, ToSocketAddrs};
@@ -16,11 +16,11 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// Bytes handed over at once.
-const PIECE: usize = 64 * 1024;
+const BUFFER_BYTES: usize = 64 * 1024;
 /// How often a thread that waits for Rerun's client looks whether it is still wanted.
-const GLANCE: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-struct Shared {
+struct ProxyState {
     viewer: TcpStream,
     client: OnceLock<TcpStream>,
     answered: AtomicBool,
@@ -28,12 +28,12 @@ struct Shared {
 }
 
 /// A connection to a viewer that can be cut.
-pub(crate) struct Line {
-    shared: Arc<Shared>,
+pub(crate) struct ViewerProxy {
+    shared: Arc<ProxyState>,
     port: u16,
 }
 
-impl Line {
+impl ViewerProxy {
     /// Connects to a viewer, at one of its addresses.
     pub(crate) fn open(host: &str, port: u16, patience: Duration) -> io::Result<Self> {
         let mut failure = io::Error::new(io::ErrorKind::NotFound, "its name has no address");
@@ -53,7 +53,7 @@ impl Line {
         let port = listener.local_addr()?.port();
         listener.set_nonblocking(true)?;
         let (answered, broken) = (AtomicBool::new(false), AtomicBool::new(false));
-        let shared = Arc::new(Shared { viewer, client: OnceLock::new(), answered, broken });
+        let shared = Arc::new(ProxyState { viewer, client: OnceLock::new(), answered, broken });
         let outward = shared.clone();
         std::thread::Builder::new().name("to viewer".into()).spawn(move || outward.run(&listener))?;
         Ok(Self { shared, port })
@@ -80,19 +80,19 @@ impl Line {
     }
 }
 
-/// Where nobody listens on a port of this computer from which connections are made, too, the system now and then connects a
-/// socket to itself. It would take that port from the viewer, and hear its own words as an answer.
+/// A connection to an unused local port in the range of source ports sometimes connects a socket to itself. It would
+/// occupy the viewer's port, and read its own bytes as an answer.
 fn is_itself(viewer: &TcpStream) -> bool {
     matches!((viewer.local_addr(), viewer.peer_addr()), (Ok(here), Ok(there)) if here == there)
 }
 
-impl Drop for Line {
+impl Drop for ViewerProxy {
     fn drop(&mut self) {
         self.cut();
     }
 }
 
-impl Shared {
+impl ProxyState {
     fn cut(&self) {
         self.broken.store(true, Ordering::Relaxed);
         // What is closed already cannot be closed; that is as good.
@@ -108,7 +108,7 @@ impl Shared {
             match listener.accept() {
                 Ok((client, _)) => break client,
                 Err(_) if self.broken.load(Ordering::Relaxed) => return,
-                Err(_) => std::thread::sleep(GLANCE),
+                Err(_) => std::thread::sleep(POLL_INTERVAL),
             }
         };
         // A socket inherits that its listener does not block on some systems.
@@ -123,20 +123,20 @@ impl Shared {
     }
 
     fn pass_on(&self, mut client: &TcpStream) {
-        let mut piece = vec![0; PIECE];
-        while let Ok(bytes @ 1..) = client.read(&mut piece) {
-            if (&self.viewer).write_all(&piece[..bytes]).is_err() {
+        let mut buffer = vec![0; BUFFER_BYTES];
+        while let Ok(bytes @ 1..) = client.read(&mut buffer) {
+            if (&self.viewer).write_all(&buffer[..bytes]).is_err() {
                 break;
             }
         }
     }
 
     fn answer(&self) {
-        let mut piece = vec![0; PIECE];
+        let mut buffer = vec![0; BUFFER_BYTES];
         let Some(mut client) = self.client.get() else { return };
-        while let Ok(bytes @ 1..) = (&self.viewer).read(&mut piece) {
+        while let Ok(bytes @ 1..) = (&self.viewer).read(&mut buffer) {
             self.answered.store(true, Ordering::Relaxed);
-            if client.write_all(&piece[..bytes]).is_err() {
+            if client.write_all(&buffer[..bytes]).is_err() {
                 break;
             }
         }
@@ -154,7 +154,8 @@ mod tests {
     fn who_is_connected_to_itself_has_no_viewer() {
         let range = std::fs::read_to_string("/proc/sys/net/ipv4/ip_local_port_range").unwrap();
         let ports: Vec<u16> = range.split_whitespace().map(|port| port.parse().unwrap()).collect();
-        // Linux chooses from every second one of these for who connects, so after a while the one that is asked for.
+        // Linux picks the source port from every second of these, so at some time it picks the port that is connected
+        // to.
         let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port();
         let port = free - (free - ports[0]) % 2;
         let tries = 4 * u32::from(ports[1] - ports[0]);
@@ -167,7 +168,7 @@ mod tests {
         assert!(is_itself(&itself));
         drop(itself);
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        let line = Line::open("127.0.0.1", listener.local_addr().unwrap().port(), PATIENCE).unwrap();
-        assert!(!is_itself(&line.shared.viewer));
+        let proxy = ViewerProxy::open("127.0.0.1", listener.local_addr().unwrap().port(), PATIENCE).unwrap();
+        assert!(!is_itself(&proxy.shared.viewer));
     }
 }

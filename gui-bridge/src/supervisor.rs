@@ -1,25 +1,25 @@
-//! Who sees to it that there is a stream, and that a stuck one stays alone with it.
+//! Supervises the drawing stream: starts it, detects that it is stuck, and replaces it.
 //!
 //! ```text
 //!   away ──connected──▶ asked ──answered──▶ draws ──gone, or stands still: cut──▶ away, after a while
 //! ```
 //!
-//! A thread of its own connects, or opens the file, starts the [`Feeder`], and looks at it every [`LOOK`]. There is never more
-//! than one feeder: before the next begins, the last one's line is cut and it has ended, however long that takes. So at any
-//! time the bridge holds one stream, with [`crate::sink`]'s bound on what waits in it. A pen that is told to end does so by
-//! itself, and nobody need wait for it; the next one waits for its [`Turn`].
+//! A thread of its own connects, or opens the file, starts the [`Feeder`], and checks it every [`CHECK_INTERVAL`].
+//! There is never more than one feeder: before the next begins, the last one's proxy is cut and it has ended, however
+//! long that takes. So at any time the bridge holds one stream, with [`crate::sink`]'s bound on what waits in it. A
+//! supervisor that is told to end does so by itself; the next one waits for its [`Turn`].
 //!
-//! What a disk does is no failure either: one that stands still is waited for, and one that is full is tried again, with a
-//! file that is new. Only what a person has to put right is one: a file that cannot be made.
+//! A disk is no failure either: the supervisor waits for a stalled disk, and retries a full one with a new file. A
+//! failure is only what a person has to fix: a file that cannot be created.
 //!
-//! Nothing is counted by the clock but by looks: on a computer that has no time for the bridge, nobody looks either, and what
-//! is merely late is not taken for stuck.
+//! Timeouts count checks, not clock time: an overloaded computer also checks less often, so a late stream is not taken
+//! for a stuck one.
 
 use crate::feeder::{FeedError, Feeder};
 use crate::files::{self, Room};
-use crate::line::Line;
-use crate::sink::{self, Address, Canvas, CloseError, Sink, Surface};
+use crate::sink::{self, Address, CloseError, Sink, StreamConfig, StreamTarget};
 use crate::store::Store;
+use crate::viewer_proxy::ViewerProxy;
 use rerun::ApplicationId;
 use rerun::external::re_log_types::RecordingId;
 use std::path::Path;
@@ -29,15 +29,15 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// How often the feeder is looked at.
-const LOOK: Duration = Duration::from_millis(50);
-/// Looks at a call that does not come back: 0.5 s.
-const LOOKS_AT_CALL: u32 = 10;
-/// After a stream that stood still soon, the next is given twice the looks, up to so many times: a computer that is merely
-/// overloaded would else begin anew without end.
+const CHECK_INTERVAL: Duration = Duration::from_millis(50);
+/// Checks of a call that does not return: 0.5 s.
+const CHECKS_OF_CALL: u32 = 10;
+/// After a stream that stood still soon, the next is given twice the checks, up to so many times: a computer that is
+/// merely overloaded would else begin anew without end.
 const LENIENCE_MAX: u32 = 16;
-/// Looks at threads of the stream that do not move (a pulse may have to wait behind much work), and at a viewer that was
-/// connected to and says nothing: 3 s.
-const LOOKS_AT_PULSE: u32 = 60;
+/// Checks of threads of the stream that do not move (a pulse may have to wait behind much work), and at a viewer that
+/// was connected to and says nothing: 3 s.
+const CHECKS_OF_PULSE: u32 = 60;
 /// A viewer that is there takes a connection within this time.
 const CONNECT: Duration = Duration::from_secs(1);
 /// Waits between attempts to connect.
@@ -46,19 +46,19 @@ const BACKOFF: std::ops::RangeInclusive<Duration> = Duration::from_millis(200)..
 const BACKOFF_FILE: Duration = Duration::from_secs(10);
 /// A stream that drew for so long was a good one: the next attempt need not wait long.
 const GOOD: Duration = Duration::from_secs(5);
-/// Looks at a stream that has to end before it is told that something waits for it: 3 s.
-const LOOKS_AT_END: u32 = 60;
+/// Checks of a stream that has to end before a warning is given: 3 s.
+const CHECKS_OF_END: u32 = 60;
 /// What a viewer has not taken by then when drawing ends, it does not get.
 const LAST_TO_VIEWER: Duration = Duration::from_secs(1);
 /// The same for a file, the time in which it is flushed included.
 const LAST_TO_FILE: Duration = Duration::from_secs(6);
-/// Who waits for the end of a drawing waits no longer.
+/// Longest wait for the end of a drawing.
 pub(crate) const LAST: Duration = LAST_TO_FILE.saturating_add(LAST_TO_VIEWER);
 
-/// Pens that share one draw one after the other: two that write to one file would spoil it.
+/// Supervisors that share one draw one after the other: two that write to one file would spoil it.
 pub(crate) type Turn = Arc<Mutex<()>>;
 
-struct Shared {
+struct SupervisorState {
     store: Arc<Store>,
     closing: AtomicBool,
     /// Why nothing is drawn any more, and never will be.
@@ -66,13 +66,13 @@ struct Shared {
 }
 
 /// See the module's text.
-pub(crate) struct Pen {
-    shared: Arc<Shared>,
+pub(crate) struct StreamSupervisor {
+    shared: Arc<SupervisorState>,
     thread: JoinHandle<Result<(), CloseError>>,
 }
 
 /// How a stream ended.
-enum End {
+enum StreamEnd {
     /// All was written, or its feeder failed.
     Ended,
     /// The file is as large as it may be.
@@ -83,7 +83,7 @@ enum End {
     Still,
 }
 
-impl Pen {
+impl StreamSupervisor {
     /// Begins to draw what comes to the store, when it is its turn.
     pub(crate) fn begin(
         sink: Sink,
@@ -97,9 +97,10 @@ impl Pen {
             Sink::File { .. } => None,
         };
         let recording = RecordingId::random();
-        let shared = Arc::new(Shared { store, closing: AtomicBool::new(false), failure: Mutex::new(None) });
-        let canvas = move |surface| Canvas { application: application.clone(), recording: recording.clone(), surface };
-        let mut work = Work { shared: shared.clone(), canvas: Box::new(canvas), streams: 0, lenience: 1 };
+        let shared = Arc::new(SupervisorState { store, closing: AtomicBool::new(false), failure: Mutex::new(None) });
+        let config =
+            move |target| StreamConfig { application: application.clone(), recording: recording.clone(), target };
+        let mut work = SupervisorThread { shared: shared.clone(), config: Box::new(config), streams: 0, lenience: 1 };
         let run = move || {
             let Some(_turn) = work.turn(&turn) else { return Err(CloseError::Stuck) };
             let ended = match (sink, address) {
@@ -116,7 +117,7 @@ impl Pen {
             }
             ended
         };
-        let thread = std::thread::Builder::new().name("pen".into()).spawn(run)?;
+        let thread = std::thread::Builder::new().name("drawing".into()).spawn(run)?;
         Ok(Self { shared, thread })
     }
 
@@ -136,8 +137,8 @@ impl Pen {
         self.thread.is_finished()
     }
 
-    /// Draws what waits, and ends. Waits until `deadline` for that, whatever the sink does: what it has not taken by then it may
-    /// still take as long as the process incarnations.
+    /// Draws what waits, and ends. Waits until `deadline` for that, whatever the sink does: what it has not taken by
+    /// then it may still take as long as the process incarnations.
     pub(crate) fn close_by(self, deadline: Instant) -> Result<(), CloseError> {
         self.leave();
         while !self.has_ended() {
@@ -151,27 +152,27 @@ impl Pen {
 }
 
 /// What the thread has.
-struct Work {
-    shared: Arc<Shared>,
-    canvas: Box<dyn Fn(Surface) -> Canvas + Send>,
+struct SupervisorThread {
+    shared: Arc<SupervisorState>,
+    config: Box<dyn Fn(StreamTarget) -> StreamConfig + Send>,
     streams: u64,
     lenience: u32,
 }
 
-impl Work {
-    /// Waits until the pen before this one has ended; none if this one has to end first.
+impl SupervisorThread {
+    /// Waits until the supervisor before this one has ended; none if this one has to end first.
     fn turn<'a>(&self, turn: &'a Mutex<()>) -> Option<MutexGuard<'a, ()>> {
-        for looks in 0u32.. {
+        for checks in 0u32.. {
             match turn.try_lock() {
                 Ok(guard) => return Some(guard),
                 Err(TryLockError::Poisoned(guard)) => return Some(guard.into_inner()),
                 Err(TryLockError::WouldBlock) if self.is_closing() => return None,
                 Err(TryLockError::WouldBlock) => {}
             }
-            if looks == LOOKS_AT_END {
+            if checks == CHECKS_OF_END {
                 tracing::warn!("the last drawing has not ended yet; this one begins when it has");
             }
-            std::thread::park_timeout(LOOK);
+            std::thread::park_timeout(CHECK_INTERVAL);
         }
         None
     }
@@ -184,8 +185,8 @@ impl Work {
         let mut aside_from = 1;
         loop {
             let began = Instant::now();
-            let surface = Surface::File { path: path.into(), aside_from };
-            let feeder = match self.feeder(surface, || true, true) {
+            let target = StreamTarget::File { path: path.into(), aside_from };
+            let feeder = match self.feeder(target, || true, true) {
                 Ok(feeder) => feeder,
                 Err(error) => return self.fail(&error),
             };
@@ -210,7 +211,7 @@ impl Work {
                     aside_from = files::WORTH.min(bytes_max);
                     self.rest(&mut backoff, BACKOFF_FILE);
                 }
-                (End::Full, None) => aside_from = 1,
+                (StreamEnd::Full, None) => aside_from = 1,
                 (_, None) => return if files::is_whole(path) { Ok(()) } else { Err(CloseError::Torn) },
             }
         }
@@ -232,8 +233,8 @@ impl Work {
         let url = &address.url;
         while !self.is_closing() {
             let began = Instant::now();
-            let line = match Line::open(&address.host, address.port, CONNECT) {
-                Ok(line) => Arc::new(line),
+            let proxy = match ViewerProxy::open(&address.host, address.port, CONNECT) {
+                Ok(proxy) => Arc::new(proxy),
                 Err(error) => {
                     lines = true;
                     if told.is_empty() {
@@ -244,25 +245,25 @@ impl Work {
                     continue;
                 }
             };
-            let (watched, store) = (line.clone(), self.shared.store.clone());
-            let feeder = match self.feeder(Surface::Line(line.url()), move || watched.has_answered(), lines) {
+            let (watched, store) = (proxy.clone(), self.shared.store.clone());
+            let feeder = match self.feeder(StreamTarget::Viewer(proxy.url()), move || watched.has_answered(), lines) {
                 Ok(feeder) => feeder,
                 Err(error) => return self.fail(&error),
             };
-            if self.answers(&feeder, &line) && told != "draws" {
+            if self.answers(&feeder, &proxy) && told != "draws" {
                 tracing::info!("draws to the viewer at {url}");
                 told = "draws";
             }
-            let end = self.watch(&feeder, Some(&line), &|| false);
-            let (was_broken, had_answered) = (line.is_broken(), line.has_answered());
+            let end = self.watch(&feeder, Some(&proxy), &|| false);
+            let (was_broken, had_answered) = (proxy.is_broken(), proxy.has_answered());
             feeder.give_up();
-            line.cut();
+            proxy.cut();
             self.until_ended(&feeder, "Rerun has not come back from a call yet; drawing goes on when it has");
             match (end, feeder.failure()) {
                 (_, Some(error @ (FeedError::Layout(_) | FeedError::Open(_)))) if !was_broken => {
                     return self.fail(&error);
                 }
-                (End::Still, _) => {
+                (StreamEnd::Still, _) => {
                     store.count(|counts| counts.stuck += 1);
                     lines = false;
                     if told != "still" {
@@ -270,7 +271,7 @@ impl Work {
                         told = "still";
                     }
                 }
-                (End::Gone, _) => {
+                (StreamEnd::Gone, _) => {
                     lines = true;
                     if told != "gone" {
                         tracing::warn!("the viewer at {url} has gone; drawing goes on when it is back");
@@ -292,7 +293,7 @@ impl Work {
     /// A stream, which is given all that is known.
     fn feeder(
         &mut self,
-        surface: Surface,
+        target: StreamTarget,
         may_begin: impl Fn() -> bool + Send + 'static,
         lines: bool,
     ) -> std::io::Result<Feeder> {
@@ -302,51 +303,52 @@ impl Work {
             store.count(|counts| counts.rebuilt += 1);
         }
         self.streams += 1;
-        Feeder::begin((self.canvas)(surface), store.clone(), may_begin)
+        Feeder::begin((self.config)(target), store.clone(), may_begin)
     }
 
     /// Waits for the viewer's first word.
-    fn answers(&self, feeder: &Feeder, line: &Line) -> bool {
-        for _ in 0..LOOKS_AT_PULSE {
-            if line.has_answered() || line.is_broken() || feeder.has_ended() || self.is_closing() {
+    fn answers(&self, feeder: &Feeder, proxy: &ViewerProxy) -> bool {
+        for _ in 0..CHECKS_OF_PULSE {
+            if proxy.has_answered() || proxy.is_broken() || feeder.has_ended() || self.is_closing() {
                 break;
             }
-            std::thread::park_timeout(LOOK);
+            std::thread::park_timeout(CHECK_INTERVAL);
         }
-        line.has_answered()
+        proxy.has_answered()
     }
 
     /// Until the stream has to end.
-    fn watch(&self, feeder: &Feeder, line: Option<&Line>, is_full: &dyn Fn() -> bool) -> End {
+    fn watch(&self, feeder: &Feeder, proxy: Option<&ViewerProxy>, is_full: &dyn Fn() -> bool) -> StreamEnd {
         let mut seen = [(None, 0u32); 2];
         let mut last = None;
         let mut told = false;
         loop {
-            if line.is_some_and(Line::is_broken) {
-                return End::Gone;
+            if proxy.is_some_and(ViewerProxy::is_broken) {
+                return StreamEnd::Gone;
             }
             if feeder.has_ended() {
-                return End::Ended;
+                return StreamEnd::Ended;
             }
-            if line.is_some_and(|line| !line.has_answered()) {
-                return if self.is_closing() { End::Ended } else { End::Still };
+            if proxy.is_some_and(|proxy| !proxy.has_answered()) {
+                return if self.is_closing() { StreamEnd::Ended } else { StreamEnd::Still };
             }
             if self.is_closing() {
-                let until = last
-                    .get_or_insert_with(|| Instant::now() + if line.is_some() { LAST_TO_VIEWER } else { LAST_TO_FILE });
+                let until = last.get_or_insert_with(|| {
+                    Instant::now() + if proxy.is_some() { LAST_TO_VIEWER } else { LAST_TO_FILE }
+                });
                 if Instant::now() >= *until {
-                    return End::Ended;
+                    return StreamEnd::Ended;
                 }
             } else if is_full() {
-                return End::Full;
+                return StreamEnd::Full;
             }
-            for ((before, looks), now) in seen.iter_mut().zip(feeder.waits_for()) {
-                *looks = if now.is_some() && now == *before { *looks + 1 } else { 0 };
+            for ((before, checks), now) in seen.iter_mut().zip(feeder.waits_for()) {
+                *checks = if now.is_some() && now == *before { *checks + 1 } else { 0 };
                 *before = now;
             }
-            let still = seen[0].1 >= LOOKS_AT_CALL * self.lenience || seen[1].1 >= LOOKS_AT_PULSE * self.lenience;
-            if still && line.is_some() {
-                return End::Still;
+            let still = seen[0].1 >= CHECKS_OF_CALL * self.lenience || seen[1].1 >= CHECKS_OF_PULSE * self.lenience;
+            if still && proxy.is_some() {
+                return StreamEnd::Still;
             }
             // A disk cannot be cut off; it is waited for, and what comes meanwhile replaces what waits.
             if still && !told {
@@ -354,20 +356,20 @@ impl Work {
                 tracing::warn!("the disk stands still; drawing goes on when it moves again");
             }
             told = still;
-            std::thread::park_timeout(LOOK);
+            std::thread::park_timeout(CHECK_INTERVAL);
         }
     }
 
     /// However long it takes: what comes meanwhile replaces what waits.
     fn until_ended(&self, feeder: &Feeder, why: &str) {
-        let mut looks = 0;
+        let mut checks = 0;
         while !feeder.has_ended() {
-            looks += 1;
-            if looks == LOOKS_AT_END {
+            checks += 1;
+            if checks == CHECKS_OF_END {
                 self.shared.store.count(|counts| counts.stuck += 1);
                 tracing::warn!("{why}");
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(CHECK_INTERVAL);
         }
     }
 
