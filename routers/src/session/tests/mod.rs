@@ -2,6 +2,9 @@
 
 mod admitted;
 mod book;
+#[allow(unreachable_pub, dead_code, reason = "public in the testbed, and more of it is used there")]
+#[path = "../../../../tests/testbed/src/sim/chance.rs"]
+mod chance;
 mod ends;
 mod ground;
 mod newest;
