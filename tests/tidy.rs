@@ -63,7 +63,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "routers/src/time/clock/slots.rs",
         "what a clock remembers in time slots, and does there",
     ),
-    ("routers/src/sim/plan/draw.rs", "routers/src/sim/plan/mod.rs", "a plan, and how its parts are drawn"),
+    ("tests/testbed/src/sim/plan/draw.rs", "tests/testbed/src/sim/plan/mod.rs", "a plan, and how its parts are drawn"),
     (
         "modules/src/runtime/runner.rs",
         "modules/src/runtime/start.rs",
@@ -112,7 +112,7 @@ const LONG: &[(&str, usize)] = &[
     ("routers/src/time/clock/slots.rs", 436),
     ("routers/src/time/election.rs", 408),
     ("routers/tests/shell.rs", 415),
-    ("routers/tests/simulation.rs", 528),
+    ("tests/testbed/tests/simulation.rs", 528),
     ("routers/tests/slots_common/mod.rs", 447),
     ("tests/e2e/probe.rs", 413),
 ];

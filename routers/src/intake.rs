@@ -27,11 +27,11 @@ pub(crate) const FEW: usize = 4;
 /// Nothing more is taken between slots with less than this until the thread has to wake up: to take one lasts for some ten microseconds.
 pub(crate) const LEFT_NS_MIN: u64 = 50_000;
 /// To take a package lasts about so long, ns.
-pub(crate) const TAKING_NS: u64 = 10_000;
+pub const TAKING_NS: u64 = 10_000;
 /// A datagram is made so long before it is handed over, at most, unless the thread stands still, ns.
-pub(crate) const MAKING_NS: u64 = 10_000;
+pub const MAKING_NS: u64 = 10_000;
 /// In the last moments before the call nothing is begun that might last until then, ns.
-pub(crate) const QUIET_NS: u64 = 20_000;
+pub const QUIET_NS: u64 = 20_000;
 const _: () = assert!(TAKING_NS + MAKING_NS <= HAND_OVER.as_nanos() as u64, "bounds have room for both");
 
 /// A router's mailbox, and the queue behind it.
@@ -149,6 +149,6 @@ fn is_full(transit: &mut impl Transit) -> bool {
 }
 
 /// Whether a package stands further ahead in the mailbox than it may in the queue, see [`Outbound::accept`](crate::outbound::Outbound::accept).
-pub(crate) fn hurries(head: &Head) -> bool {
+pub fn hurries(head: &Head) -> bool {
     head.priority.outranks(capped(head).priority)
 }

@@ -9,7 +9,7 @@
 //! In time slots (`tdma`) a node sends all of this in its own windows only.
 //!
 //! All protocol logic is without sockets, threads and clocks: time comes as an argument, datagrams as bytes. The same code runs under
-//! real sockets (`shell`) and in a simulation of whole networks (`sim`).
+//! real sockets (`shell`) and in a simulation of whole networks (`tests/testbed`).
 
 #![forbid(unsafe_code)]
 
@@ -35,7 +35,6 @@ pub mod security;
 pub mod session;
 pub mod settings;
 pub mod shell;
-pub mod sim;
 pub mod stats;
 pub mod tcp;
 pub mod tdma;

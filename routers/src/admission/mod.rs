@@ -25,9 +25,9 @@ use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
 
 /// Of a router of the LAN: takes IP packets from the same mailbox of other nodes.
-pub(crate) const TUNNEL: u8 = 4;
+pub const TUNNEL: u8 = 4;
 /// Type of an IP packet.
-pub(crate) const PACKET: Type = Type::data(1);
+pub const PACKET: Type = Type::data(1);
 /// An IP packet goes behind all packages of modules.
 pub(crate) const PACKET_PRIORITY: Priority = Priority(0);
 

@@ -136,7 +136,7 @@ impl FrameHead {
     }
 
     /// Reads the head, and which key what follows it is sealed with; 0: none.
-    pub(crate) fn read(datagram: &[u8]) -> Result<(Self, u8), BadFrame> {
+    pub fn read(datagram: &[u8]) -> Result<(Self, u8), BadFrame> {
         let (b, rest) = datagram.split_first_chunk::<HEAD_BYTES>().ok_or(BadFrame::Foreign)?;
         if b[0..2] != MAGIC {
             return Err(BadFrame::Foreign);
@@ -185,7 +185,7 @@ pub(crate) fn beginning(kind: Kind) -> [u8; 4] {
 }
 
 /// Says in a head what the datagram is sealed with.
-pub(crate) fn write_key(key: u8, datagram: &mut [u8]) {
+pub fn write_key(key: u8, datagram: &mut [u8]) {
     datagram[7] = key;
 }
 
@@ -195,7 +195,7 @@ pub(crate) fn before_check(head: &[u8]) -> &[u8] {
 }
 
 /// Writes the check of a datagram that is whole but for it.
-pub(crate) fn write_check(datagram: &mut [u8]) {
+pub fn write_check(datagram: &mut [u8]) {
     if let Some((head, rest)) = datagram.split_first_chunk_mut::<HEAD_BYTES>() {
         let check = check(head, &[rest]);
         head[CHECK].copy_from_slice(&check.to_le_bytes());

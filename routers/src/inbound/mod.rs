@@ -35,7 +35,7 @@ const SWEEP_EVERY_NS: u64 = 100_000_000;
 /// A sweep that comes so late says that this router stood still itself: that nothing was heard says nothing then.
 const STOOD_STILL_NS: u64 = 400_000_000;
 /// Missing datagrams are given up after two to three of these, if not before.
-pub(crate) const TICK_EVERY_NS: u64 = 500_000_000;
+pub const TICK_EVERY_NS: u64 = 500_000_000;
 
 /// A datagram as it came.
 #[derive(Clone, Copy, Debug)]

@@ -239,12 +239,12 @@ impl Outbound {
     }
 
     /// The level on which packages of a priority wait.
-    pub(crate) fn level(&self, priority: Priority) -> u8 {
+    pub fn level(&self, priority: Priority) -> u8 {
         self.levels[usize::from(priority.0)]
     }
 
     /// The first level on which something waits that may leave.
-    pub(crate) fn first_level(&self) -> Option<u8> {
+    pub fn first_level(&self) -> Option<u8> {
         self.queue.first_among(self.open()).map(|place| self.queue.at(place).level)
     }
 

@@ -3,8 +3,8 @@
 use super::plan::ROUTER;
 use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
+use crate::session::tests::chance::Chance;
 use crate::session::{AGE_MAX_NS, Answers, Cause, client, server};
-use crate::sim::chance::Chance;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options, local};
 use std::collections::BTreeMap;
 

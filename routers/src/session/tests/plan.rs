@@ -4,7 +4,7 @@ use crate::admission::Admission;
 use crate::session::client::ClientSettings;
 use crate::session::frame::Range;
 use crate::session::server::{OwnNodes, ServerSettings};
-use crate::sim::chance::Chance;
+use crate::session::tests::chance::Chance;
 use rohrpost_mailbox::{Class, Name};
 use std::net::SocketAddr;
 

@@ -9,7 +9,7 @@ use crate::admission::capped;
 use crate::session::LOOK_EVERY_NS;
 use crate::session::client::{self, Client, Package};
 use crate::session::server::{self, Server};
-use crate::sim::chance::Chance;
+use crate::session::tests::chance::Chance;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Options, Priority, TimeRecord, TimeSource, Type};
 use streams::Connection;
 
