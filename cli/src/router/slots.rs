@@ -2,7 +2,8 @@
 
 use rohrpost::interfaces::{SlotState, SlotUse, TunnelState};
 use rohrpost_routers::shell::Shell;
-use rohrpost_routers::shell::slots::{State, Used};
+use rohrpost_routers::driver::Used;
+use rohrpost_routers::shell::slots::State;
 use rohrpost_routers::shell::tunnel::Passed;
 use rohrpost_routers::tdma::Kind;
 

@@ -16,6 +16,8 @@ pub const AROUND_BYTES: usize = 8 + 14 + 4 + 12 + 20 + 8;
 pub(super) const LATE_PPM: u32 = 2000;
 /// A thread wakes so late at most, unless it is frozen.
 const LATE_NS_MAX: u64 = 5 * MS;
+/// A thread stands still so long at most before it hands over what it made.
+const STILL_NS_MAX: u64 = 5 * MS;
 
 /// What a network with time slots has besides.
 #[derive(Clone, Debug)]
@@ -74,6 +76,11 @@ impl Slots {
             }
         }
         if chance.percent(5) { chance.below(45 * US) } else { chance.below(3 * US) }
+    }
+
+    /// For how long it stands still with a datagram in its hand, while something may go wrong: as seldom as it wakes too late.
+    pub fn still_ns(&self, mended: bool, chance: &mut Chance) -> u64 {
+        if !mended && chance.per_million(self.late_ppm) { chance.scale(50 * US, STILL_NS_MAX) } else { 0 }
     }
 
     /// A thread that woke too late does so again no sooner than after this, when the faults are over: a master then misses one Sync of four.

@@ -24,6 +24,8 @@ pub const SOCKET_BYTES_MAX: usize = 256 * 1024;
 pub struct Io<'a> {
     /// Its clocks.
     pub now: Now,
+    /// Which says what they show later.
+    pub clock: &'a Clock,
     /// The node's index.
     pub node: usize,
     /// What was planned.
@@ -47,10 +49,9 @@ pub struct Io<'a> {
 impl Io<'_> {
     /// The thread was busy for so long: what it does next is later.
     pub fn works(&mut self, for_ns: u64) {
-        let now = &mut self.now;
-        now.true_ns += for_ns;
-        now.monotonic_ns += for_ns;
-        now.realtime_ns += for_ns;
+        if for_ns > 0 {
+            self.now = self.clock.at(self.now.true_ns + for_ns);
+        }
     }
 
     /// Writes a line.

@@ -19,6 +19,7 @@ impl World<'_> {
             plan: &self.plan,
             lives: &self.living,
             now,
+            clock: &station.clock,
             node,
             life,
             host: &mut station.host,
