@@ -77,16 +77,19 @@ const SEEN_IN_A_HUNDRED_SEALED: [(&str, u64); 8] = [
     ("time: taken", 300_000),
 ];
 /// The same with time slots.
-const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 6] = [
+const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 9] = [
     ("delivered", 20_000),
     ("time: taken", 500_000),
     ("window used", 200_000),
     ("router killed", 20),
     ("frozen", 20),
     ("split", 8),
+    ("missed its slot, held", 100),
+    ("held for too long", 15),
+    ("slot left out", 50000),
 ];
 /// The same with sealed datagrams.
-const SEEN_IN_A_HUNDRED_SEALED_SLOTTED: [(&str, u64); 8] = [
+const SEEN_IN_A_HUNDRED_SEALED_SLOTTED: [(&str, u64); 11] = [
     ("delivered", 20_000),
     ("time: taken", 400_000),
     ("time: overheard", 2_000),
@@ -95,15 +98,22 @@ const SEEN_IN_A_HUNDRED_SEALED_SLOTTED: [(&str, u64); 8] = [
     ("rejected", 100),
     ("router killed", 20),
     ("split", 8),
+    ("missed its slot, held", 80),
+    ("held for too long", 15),
+    ("slot left out", 50000),
 ];
 /// The same where all goes wrong.
-const SEEN_IN_A_HUNDRED_ROUGH_SLOTTED: [(&str, u64); 6] = [
+const SEEN_IN_A_HUNDRED_ROUGH_SLOTTED: [(&str, u64); 10] = [
     ("delivered", 5_000),
     ("window late", 5_000),
     ("router killed", 200),
     ("frozen", 400),
     ("cut", 200),
     ("lost on the wire", 2_000),
+    ("missed its slot, held", 400),
+    ("missed its slot, lost", 40),
+    ("held for too long", 60),
+    ("slot left out", 100000),
 ];
 /// The same with edited files.
 const SEEN_IN_A_HUNDRED_EDITED: [(&str, u64); 4] =

@@ -41,6 +41,8 @@ struct Watch {
     asked_ns: Option<u64>,
     /// When it began, true ns; none as soon as it has joined.
     joins_since_ns: Option<u64>,
+    /// Whether the thread stood still when it ran last.
+    stood_still: bool,
 }
 
 /// What the driver has of the simulated computer.
@@ -238,6 +240,7 @@ impl Slotted {
             window: (Says::default(), 0),
             asked_ns: None,
             joins_since_ns: Some(now.true_ns),
+            stood_still: false,
         };
         let (discipline, network) = (Discipline::new(table, spin_ns), settings.network);
         let datagram = vec![0; network.datagram_bytes_max + network.security.tag_bytes()].into();
@@ -248,8 +251,13 @@ impl Slotted {
     /// The thread runs until it sleeps, or spins for what only time brings.
     fn run(&mut self, io: &mut Io<'_>) {
         let Self { packages, time, driver, watch, .. } = self;
+        if std::mem::take(&mut watch.stood_still) {
+            // What came of that is seen now.
+            time.look(io);
+        }
         let step = driver.poll(&mut Ground { packages, time, watch, io });
         let now_ns = io.now.monotonic_ns;
+        self.watch.stood_still = io.stood_still();
         (self.wake_ns, self.due_ns) = match step {
             SlotStep::Sleep { for_ns } => (now_ns + for_ns, now_ns + for_ns),
             // Packages that come meanwhile are taken.

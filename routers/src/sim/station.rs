@@ -17,6 +17,8 @@ use std::rc::Rc;
 pub type Port = usize;
 /// Sockets of a router.
 pub const PORTS: usize = 2;
+/// A thread that is busy works for less at a time.
+const STILL_NS: u64 = 2 * super::spans::MS;
 /// Bytes that a socket holds for a router that does not read.
 pub const SOCKET_BYTES_MAX: usize = 256 * 1024;
 
@@ -26,6 +28,8 @@ pub struct Io<'a> {
     pub now: Now,
     /// Which says what they show later.
     pub clock: &'a Clock,
+    /// When it began what it does, true ns.
+    pub began_ns: u64,
     /// The node's index.
     pub node: usize,
     /// What was planned.
@@ -52,6 +56,11 @@ impl Io<'_> {
         if for_ns > 0 {
             self.now = self.clock.at(self.now.true_ns + for_ns);
         }
+    }
+
+    /// Whether it stood still meanwhile: what it does after that happens only if its router lives so long.
+    pub fn stood_still(&self) -> bool {
+        self.now.true_ns > self.began_ns + STILL_NS
     }
 
     /// Writes a line.

@@ -270,6 +270,9 @@ impl Ticking {
     }
 
     pub(super) fn look(&mut self, io: &mut Io<'_>) {
+        if io.stood_still() {
+            return;
+        }
         let is_master = self.clock.role() == Role::Master;
         if is_master && !std::mem::replace(&mut self.was_master, is_master) && io.now.true_ns > STARTED_NS {
             io.book.saw("took over");

@@ -20,6 +20,7 @@ impl World<'_> {
             lives: &self.living,
             now,
             clock: &station.clock,
+            began_ns: self.now_ns,
             node,
             life,
             host: &mut station.host,
