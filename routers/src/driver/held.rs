@@ -1,6 +1,7 @@
 //! A datagram that was made for a slot and missed it.
 
-use crate::frame::{Fragment, FrameHead, Kind, NodeIndex};
+use crate::frame::{Fragment, Kind, NodeIndex};
+use crate::outbound::kind_of_own;
 use rohrpost_mailbox::Head;
 use rohrpost_network::{LEVEL_NOT_REAL_TIME, Network};
 
@@ -24,7 +25,7 @@ impl Held {
 /// Whether a datagram of this router carries more than what is not real time. What is most important stands first in it. Where it is to be
 /// sealed, it has no check yet.
 pub(super) fn is_real_time(datagram: &[u8], network: &Network) -> bool {
-    let Some((kind, _, rest)) = FrameHead::of_own(datagram) else { return false };
+    let Some((kind, _, rest)) = kind_of_own(datagram) else { return false };
     let head = match kind {
         Kind::Packages => Head::from_bytes(rest).ok(),
         Kind::Fragment => Fragment::parse(rest).ok().map(|part| part.head),
@@ -37,7 +38,7 @@ pub(super) fn is_real_time(datagram: &[u8], network: &Network) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{ALIVE_BYTES, HEAD_BYTES};
+    use crate::frame::{ALIVE_BYTES, FrameHead, HEAD_BYTES};
     use crate::harness::{ENVELOPE, End, START, head, module};
 
     #[test]

@@ -12,7 +12,9 @@ mod held;
 mod log;
 mod platform;
 mod slots;
+mod timing;
 
 pub use log::{Used, WINDOWS, WindowLog};
 pub use platform::{NotSent, Platform, SlotEvent};
-pub use slots::{SPIN_NS_MAX, SlotDriver, SlotStep, spin_ns};
+pub use slots::{SlotDriver, SlotStep};
+pub use timing::spin_ns;

@@ -11,38 +11,13 @@
 use super::held::{self, Held};
 use super::log::WindowLog;
 use super::platform::{NotSent, Platform, SlotEvent};
+use super::timing::{LAST_LOOK_NS, LOOK_BURST, NAP_NS, SLEEP_NS_MAX, TIDY_NS};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::intake::{Intake, MAKING_NS, QUIET_NS, Transit};
 use crate::outbound::Outbound;
 use crate::tdma::{Carries, Discipline, Kind, Next, Permit, Planned, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
-use rohrpost_network::{Network, TRANSIT_LOOK};
-
-/// The thread wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it
-/// wakes up 50 µs late on average, and to read takes 30 µs.
-pub const SPIN_NS_MAX: u64 = 150_000;
-/// Of the cycle, at most this part for each window: short cycles leave less time for it.
-const SPIN_CYCLES: u64 = 20;
-/// Syncs that came since it woke up are looked for so long before the call: to read one takes some microseconds.
-const LAST_LOOK_NS: u64 = 50_000;
-/// Whether the mailbox is full is looked at this often: half of it has room for a burst of 32 packages.
-const NAP_NS: u64 = 1_000_000;
-/// With less than this until it has to wake up it sleeps on: each look at the mailbox keeps a processor from another thread, perhaps one that
-/// is about to send.
-const SLEEP_NS_MAX: u64 = NAP_NS + NAP_NS / 4;
-const _: () = assert!(
-    (SLEEP_NS_MAX + SPIN_NS_MAX) as u128 <= TRANSIT_LOOK.as_nanos(),
-    "who declares flows counts on it, that what waits does not overflow meanwhile"
-);
-/// So many datagrams of time, and one for each node, are read at a look: to read one takes some microseconds.
-const LOOK_BURST: usize = 16;
-/// To see to what waits takes less than this, unless much does.
-const TIDY_NS: u64 = 250_000;
-
-/// How long before the call the thread that sends in time slots is to wake up, ns; then it spins.
-pub fn spin_ns(cycle_ns: u64) -> u64 {
-    SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)
-}
+use rohrpost_network::Network;
 
 /// Sends in the windows of its node. Nothing but this sends, and this only with a [`Permit`].
 pub struct SlotDriver {

@@ -55,7 +55,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Packages,
         Self::Fragment,
         Self::Alive,
@@ -133,13 +133,6 @@ impl FrameHead {
             return Err(BadFrame::Sealed);
         }
         Ok((head, &datagram[HEAD_BYTES..]))
-    }
-
-    /// Kind and receiver of a datagram that this router made, and what follows its head; where it is to be sealed it has no check yet.
-    pub(crate) fn of_own(datagram: &[u8]) -> Option<(Kind, NodeIndex, &[u8])> {
-        let (head, rest) = datagram.split_first_chunk::<HEAD_BYTES>()?;
-        let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == head[3])?;
-        Some((kind, head[6], rest))
     }
 
     /// Reads the head, and which key what follows it is sealed with; 0: none.

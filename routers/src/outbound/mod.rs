@@ -10,7 +10,7 @@
 use crate::admission::capped;
 use crate::broken::broken;
 use crate::counts::Cause;
-use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
+use crate::frame::{self, Fragment, Kind, NodeIndex};
 use crate::link::State;
 use crate::queue::{Place, Queue, Waiting};
 use crate::report::Report;
@@ -26,6 +26,7 @@ mod flows;
 mod pace;
 mod slot;
 
+pub(crate) use datagram::kind_of_own;
 use flows::Aboard;
 use pace::Pace;
 
@@ -295,7 +296,7 @@ impl Outbound {
 
     /// Says that the socket did not take what was to be sent last: the datagram, and the body besides if it was [`Accepted::Send`].
     pub fn unsent(&mut self, datagram: &[u8], body: &[u8], report: &mut impl Report) {
-        let Some((kind, peer, mut rest)) = FrameHead::of_own(datagram) else { return };
+        let Some((kind, peer, mut rest)) = kind_of_own(datagram) else { return };
         self.stats.peer(peer).sent.unsent.add(1);
         if kind == Kind::Packages {
             while let Ok(head) = Head::from_bytes(rest) {
