@@ -9,7 +9,7 @@
 //! The mailbox outlives a router that is killed, the queue does not: so what waits for a slot waits in the mailbox. A flood is taken out of it,
 //! since quotas hold in the queue. So is all, if no slot came for long: what cannot leave must be told so to its sender.
 //!
-//! No mailbox and no clock here: the thread of the time slots has them (`shell::slots`), and the simulation.
+//! No mailbox and no clock here: the platform of a [driver](crate::driver) has them.
 
 use crate::admission::capped;
 use crate::outbound::Accepted;
@@ -44,8 +44,8 @@ pub trait Transit {
     fn queued(&self) -> Option<u8>;
     /// The level on which such packages wait there.
     fn level(&self, priority: Priority) -> u8;
-    /// For so long the wire is still busy with what the slot has carried, ns.
-    fn busy_ns(&self) -> u64;
+    /// Local time, ns.
+    fn local_ns(&self) -> u64;
     /// Takes the most important package into the queue: its head, and what became of it. None if there is none.
     fn take(&mut self) -> Option<(Head, Accepted)>;
 }
@@ -83,8 +83,9 @@ impl Intake {
     }
 
     /// In the slot, before each datagram: takes what is to leave next and a few that may go with it; what is less important only while the wire
-    /// is busy. Bounds give each package of its level time to be taken and handed over, but none for those below.
-    pub fn take_on(&mut self, transit: &mut impl Transit) {
+    /// is busy. Bounds give each package of its level time to be taken and handed over, but none for those below. `busy_ns`: for how long, at
+    /// a local time, ns.
+    pub fn take_on(&mut self, transit: &mut impl Transit, busy_ns: impl Fn(u64) -> u64) {
         let (mut hurried, mut beside) = (0, 0);
         for _ in 0..BURST {
             let queued = transit.queued();
@@ -96,7 +97,7 @@ impl Intake {
             beside += usize::from(transit.queued() == Some(transit.level(head.priority)));
         }
         for _ in 0..BURST {
-            let has_time = transit.busy_ns() > TAKING_NS + MAKING_NS;
+            let has_time = busy_ns(transit.local_ns()) > TAKING_NS + MAKING_NS;
             let wants = has_time && (self.room_bytes > 0 || self.is_outranked(transit) || is_full(transit));
             if !wants || self.take(transit).is_none() {
                 return;
@@ -104,12 +105,16 @@ impl Intake {
         }
     }
 
-    /// Between slots: takes all if it is much, or if there was no slot for long. `left_ns` says how long it may last.
-    pub fn relieve(&mut self, now_ns: u64, transit: &mut impl Transit, mut left_ns: impl FnMut() -> u64) {
+    /// Between slots: takes all if it is much, or if there was no slot for long. It lasts until `wake_ns`, local
+    /// time, at most.
+    pub fn relieve(&mut self, now_ns: u64, transit: &mut impl Transit, wake_ns: u64) {
         if is_full(transit) || now_ns.saturating_sub(self.taken_ns) > UNTAKEN_NS_MAX {
             self.taken_ns = now_ns;
             let mut taken = 0;
-            while taken < BURST && left_ns() > LEFT_NS_MIN && self.take(transit).is_some() {
+            while taken < BURST
+                && wake_ns.saturating_sub(transit.local_ns()) > LEFT_NS_MIN
+                && self.take(transit).is_some()
+            {
                 taken += 1;
             }
         }

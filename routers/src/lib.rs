@@ -9,13 +9,15 @@
 //! In time slots (`tdma`) a node sends all of this in its own windows only.
 //!
 //! All protocol logic is without sockets, threads and clocks: time comes as an argument, datagrams as bytes. The same code runs under
-//! real sockets (`shell`) and in a simulation of whole networks (`tests/testbed`).
+//! real sockets (`shell`) and in a simulation of whole networks (`tests/testbed`), with time slots up to the thread's own loop
+//! (`driver`).
 
 #![forbid(unsafe_code)]
 
 pub mod admission;
 pub mod broken;
 pub mod counts;
+pub mod driver;
 pub mod flows;
 pub mod fragment;
 pub mod frame;

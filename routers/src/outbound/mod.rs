@@ -26,6 +26,7 @@ mod flows;
 mod pace;
 mod slot;
 
+pub(crate) use datagram::kind_of_own;
 use flows::Aboard;
 use pace::Pace;
 
@@ -295,10 +296,9 @@ impl Outbound {
 
     /// Says that the socket did not take what was to be sent last: the datagram, and the body besides if it was [`Accepted::Send`].
     pub fn unsent(&mut self, datagram: &[u8], body: &[u8], report: &mut impl Report) {
-        let Some((head, mut rest)) = datagram.split_first_chunk::<{ frame::HEAD_BYTES }>() else { return };
-        let (kind, peer) = (head[3], head[6]);
+        let Some((kind, peer, mut rest)) = kind_of_own(datagram) else { return };
         self.stats.peer(peer).sent.unsent.add(1);
-        if kind == Kind::Packages as u8 {
+        if kind == Kind::Packages {
             while let Ok(head) = Head::from_bytes(rest) {
                 rest = &rest[PACKAGE_HEAD_BYTES..];
                 let (inside, behind) = rest.split_at_checked(head.len.into()).unwrap_or((body, &[]));
@@ -306,7 +306,7 @@ impl Outbound {
                 rest = behind;
             }
         }
-        if kind == Kind::Fragment as u8
+        if kind == Kind::Fragment
             && let Ok(part) = Fragment::parse(rest)
         {
             // Without this part the others are worth nothing.

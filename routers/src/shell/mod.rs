@@ -40,9 +40,9 @@ pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
 pub use news::difference;
-pub use slots::spin_ns;
 pub use socket::{SocketError, listen};
 
+use crate::driver::spin_ns;
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
@@ -280,7 +280,7 @@ impl Shell {
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
         let works = Works::new(clock)?.sealed_in_slots(self.peer_sessions.as_ref()).in_slots(table.for_clock());
-        let spin_ns = slots::spin_ns(table.cycle_ns());
+        let spin_ns = spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(slots::ANSWERS);
         let hellos = self.peer_sessions.as_ref().map(Waiting::new);
         let line = slots::AnswerQueue::new(waiting, hellos, self.sockets[0].clone(), settings.clone());

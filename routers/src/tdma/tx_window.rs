@@ -125,6 +125,11 @@ impl TransmitWindow {
         matches!(self.window.kind, Kind::Slot { .. })
     }
 
+    /// Whether a refusal may leave in it: who is not sure of the time sends nothing but questions.
+    pub fn carries_refusal(&self) -> bool {
+        self.carries_hello() && self.carries == Carries::All
+    }
+
     /// What the clock may send in it.
     pub fn allowed(&self) -> Allowed {
         match self.window.kind {

@@ -3,6 +3,8 @@
 
 #[path = "simulated/rare.rs"]
 mod rare;
+#[path = "simulated/seen.rs"]
+mod seen;
 mod simulated;
 
 use rohrpost_config::Principal;
@@ -13,6 +15,10 @@ use rohrpost_testbed::sim::calls::{Attempt, Guard, Ruling};
 use rohrpost_testbed::sim::plan::Plan;
 use rohrpost_testbed::sim::promise::{Problem, Promise};
 use rohrpost_testbed::sim::run::{Mistake, run, run_broken};
+use seen::{
+    SEEN_IN_A_HUNDRED, SEEN_IN_A_HUNDRED_EDITED, SEEN_IN_A_HUNDRED_ROUGH_SLOTTED, SEEN_IN_A_HUNDRED_SEALED,
+    SEEN_IN_A_HUNDRED_SEALED_SLOTTED, SEEN_IN_A_HUNDRED_SLOTTED, SEEN_IN_A_HUNDRED_UNSTEADY,
+};
 use simulated::{for_all, number};
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -37,80 +43,6 @@ const SLOTTED: &str = "networks_with_time_slots";
 const SEALED_SLOTTED: &str = "sealed_networks_with_time_slots";
 /// Those in which all goes wrong: a tenth as many.
 const ROUGH_SLOTTED: &str = "rough_slotted_networks";
-/// What must have been seen so often in each hundred networks.
-const SEEN_IN_A_HUNDRED: [(&str, u64); 25] = [
-    ("intruder", 1000),
-    ("routers-own", 100),
-    ("bad-packet", 50),
-    ("delivered", 100_000),
-    ("answered", 10_000),
-    ("run before", 200),
-    ("interrupted", 200),
-    ("told that it was not run", 300),
-    ("quota", 20_000),
-    ("silent", 3000),
-    ("unheard", 10),
-    ("refused", 300),
-    ("late", 100),
-    ("incomplete", 200),
-    ("stale", 500),
-    ("no-mailbox", 300),
-    ("mailbox-full", 300),
-    ("socket", 200),
-    ("dropped as a copy", 200),
-    ("dropped as wrong or old", 300),
-    ("lost on the wire", 5000),
-    ("frozen", 40),
-    ("router killed", 50),
-    ("split", 15),
-    ("time: taken", 300_000),
-];
-/// The same where datagrams are sealed.
-const SEEN_IN_A_HUNDRED_SEALED: [(&str, u64); 8] = [
-    ("intruder", 1000),
-    ("foreign-name", 50),
-    ("delivered", 100_000),
-    ("answered", 10_000),
-    ("asked", 1000),
-    ("rejected", 400),
-    ("router killed", 50),
-    ("time: taken", 300_000),
-];
-/// The same with time slots.
-const SEEN_IN_A_HUNDRED_SLOTTED: [(&str, u64); 6] = [
-    ("delivered", 20_000),
-    ("time: taken", 500_000),
-    ("window used", 200_000),
-    ("router killed", 20),
-    ("frozen", 20),
-    ("split", 8),
-];
-/// The same with sealed datagrams.
-const SEEN_IN_A_HUNDRED_SEALED_SLOTTED: [(&str, u64); 8] = [
-    ("delivered", 20_000),
-    ("time: taken", 400_000),
-    ("time: overheard", 2_000),
-    ("asked by what was overheard", 200),
-    ("asked by an echo", 10),
-    ("rejected", 100),
-    ("router killed", 20),
-    ("split", 8),
-];
-/// The same where all goes wrong.
-const SEEN_IN_A_HUNDRED_ROUGH_SLOTTED: [(&str, u64); 6] = [
-    ("delivered", 5_000),
-    ("window late", 5_000),
-    ("router killed", 200),
-    ("frozen", 400),
-    ("cut", 200),
-    ("lost on the wire", 2_000),
-];
-/// The same with edited files.
-const SEEN_IN_A_HUNDRED_EDITED: [(&str, u64); 4] =
-    [("edited", 150), ("time: of another configuration", 5_000), ("refused", 200), ("window used", 200_000)];
-/// The same of unsteady clocks.
-const SEEN_IN_A_HUNDRED_UNSTEADY: [(&str, u64); 4] =
-    [("asleep", 30), ("slewed", 30), ("time: unsteady", 60), ("delivered", 20_000)];
 /// Mistakes that cannot show here, since each has something else before it; the tests of `fragment` see them. Heads in this simulation are
 /// never the same twice, and copies of a part are dropped as datagrams. Who waits for the pace though it is urgent breaks no promise but that
 /// of speed.

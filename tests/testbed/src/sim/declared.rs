@@ -47,7 +47,7 @@ impl Plan {
         (plan.fixed_ns, plan.timed_ns, plan.stepped_ns) = (plan.traffic_end_ns, BEGIN_NS, BEGIN_NS);
         plan.end_ns = plan.traffic_end_ns + DRAIN_NS;
         if let Some(slots) = &mut plan.slots {
-            (slots.late_ppm, slots.divisions) = (0, Divisions::default());
+            (slots.late_ppm, slots.still_ppm, slots.divisions) = (0, 0, Divisions::default());
             slots.oversleeps_percent = chance.pick(&[0, 20, 100]);
         }
         plan

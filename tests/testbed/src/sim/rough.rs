@@ -100,7 +100,7 @@ impl Plan {
         plan.quality = Quality { delay_ns, jitter_ns, reorder_ppm: 20_000, ..QUALITY };
         plan.checksum = false;
         if let Some(slots) = &mut plan.slots {
-            slots.late_ppm = LATE_PPM;
+            (slots.late_ppm, slots.still_ppm) = (LATE_PPM, LATE_PPM);
         }
         plan.rough_slotted_faults(&mut chance);
         plan.divide();

@@ -77,7 +77,7 @@ fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayer
         if let Some(slots) = plan.slots_of(edition) {
             let (own, nodes) = (settings.own, plan.nodes.len() as u8);
             let table = Table::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());
-            return vec![Box::new(Slotted::new(packages, ticking, table, now))];
+            return vec![Box::new(Slotted::new(packages, ticking, &settings, table, now))];
         }
         vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]
     })

@@ -205,6 +205,36 @@ impl Oracle {
         }
     }
 
+    /// A datagram that left the queue and no router is lost: what was complete in it waits as before, for as long as it takes to lose it.
+    pub fn comes_back(&mut self, life: u32, datagram: &[u8]) {
+        let number = |body: &[u8]| super::oracle::number_of(body);
+        match Frame::parse(datagram) {
+            Ok((_, Frame::Packages(packages))) => {
+                packages.filter_map(|(_, body)| number(body)).for_each(|number| self.waits_again(life, number));
+            }
+            Ok((head, Frame::Fragment(part))) if part.index + 1 == part.count => {
+                let whole = self.by_part.get(&(head.incarnation, head.to, part.first)).copied();
+                whole.into_iter().for_each(|number| self.waits_again(life, number));
+            }
+            _ => {}
+        }
+    }
+
+    fn waits_again(&mut self, life: u32, number: u32) {
+        let level = self.level(self.packages[number as usize].head.priority.0);
+        let package = &mut self.packages[number as usize];
+        if package.life != life || package.way != SendStage::Left {
+            return;
+        }
+        package.way = SendStage::Accepted;
+        let sending = self.sending.entry(life).or_default();
+        sending.account.left -= 1;
+        if let Some(waiting) = sending.waiting.get_mut(&package.head.from.module()) {
+            waiting.packages.insert((level, package.ticket, number));
+            waiting.bytes += usize::from(package.head.len);
+        }
+    }
+
     /// The first part has left: it would be a waste to lose the others.
     fn gives_way_no_more(&mut self, life: u32, number: u32) {
         let package = &self.packages[number as usize];

@@ -16,6 +16,8 @@ pub const AROUND_BYTES: usize = 8 + 14 + 4 + 12 + 20 + 8;
 pub(super) const LATE_PPM: u32 = 2000;
 /// A thread wakes so late at most, unless it is frozen.
 const LATE_NS_MAX: u64 = 5 * MS;
+/// A thread stands still so long at most before it hands over what it made: longer than a datagram waits for a slot.
+const STILL_NS_MAX: u64 = 200 * MS;
 
 /// What a network with time slots has besides.
 #[derive(Clone, Debug)]
@@ -26,6 +28,8 @@ pub struct Slots {
     pub masters: Vec<NodeIndex>,
     /// Wake-ups beyond what the late gate lets through, of a million.
     pub late_ppm: u32,
+    /// Datagrams that the thread makes, and then stands still before it hands them over, of a million.
+    pub still_ppm: u32,
     /// Windows for which the thread wakes up so late that it takes nothing before the call, of a hundred.
     pub oversleeps_percent: u64,
     /// The faults that divide the network.
@@ -74,6 +78,11 @@ impl Slots {
             }
         }
         if chance.percent(5) { chance.below(45 * US) } else { chance.below(3 * US) }
+    }
+
+    /// For how long it stands still with a datagram in its hand, while something may go wrong.
+    pub fn still_ns(&self, fixed: bool, chance: &mut Chance) -> u64 {
+        if !fixed && chance.per_million(self.still_ppm) { chance.scale(50 * US, STILL_NS_MAX) } else { 0 }
     }
 
     /// A thread that woke too late does so again no sooner than after this, when the faults are over: a master then misses one Sync of four.

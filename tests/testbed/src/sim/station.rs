@@ -17,6 +17,8 @@ use std::rc::Rc;
 pub type Port = usize;
 /// Sockets of a router.
 pub const PORTS: usize = 2;
+/// A thread that is busy works for less at a time.
+const STILL_NS: u64 = 2 * super::spans::MS;
 /// Bytes that a socket holds for a router that does not read.
 pub const SOCKET_BYTES_MAX: usize = 256 * 1024;
 
@@ -24,6 +26,10 @@ pub const SOCKET_BYTES_MAX: usize = 256 * 1024;
 pub struct Io<'a> {
     /// Its clocks.
     pub now: Now,
+    /// Which says what they show later.
+    pub clock: &'a Clock,
+    /// When it began what it does, true ns.
+    pub began_ns: u64,
     /// The node's index.
     pub node: usize,
     /// What was planned.
@@ -47,10 +53,14 @@ pub struct Io<'a> {
 impl Io<'_> {
     /// The thread was busy for so long: what it does next is later.
     pub fn works(&mut self, for_ns: u64) {
-        let now = &mut self.now;
-        now.true_ns += for_ns;
-        now.monotonic_ns += for_ns;
-        now.realtime_ns += for_ns;
+        if for_ns > 0 {
+            self.now = self.clock.at(self.now.true_ns + for_ns);
+        }
+    }
+
+    /// Whether it stood still meanwhile: what it does after that happens only if its router lives so long.
+    pub fn stood_still(&self) -> bool {
+        self.now.true_ns > self.began_ns + STILL_NS
     }
 
     /// Writes a line.

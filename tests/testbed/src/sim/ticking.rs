@@ -9,11 +9,10 @@ use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::times::Left;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::security::PeerSessions;
-use rohrpost_routers::tdma::{Table, TransmitWindow};
+use rohrpost_routers::tdma::Table;
 use rohrpost_routers::time::message::Message;
 use rohrpost_routers::time::{
-    Allowed, Clock, JOINING_SYNCS, Looked, RATE_MAX_PPB, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeEstimate,
-    TimeSettings,
+    Clock, JOINING_SYNCS, Looked, RATE_MAX_PPB, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeEstimate, TimeSettings,
 };
 use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
@@ -61,7 +60,6 @@ struct TimeFrame {
 
 /// Whom a node hears of which it does not know whether it lives.
 pub(super) struct UnverifiedPeer {
-    pub(super) from: NodeIndex,
     pub(super) estimate: TimeEstimate,
     pub(super) term: Term,
     pub(super) is_misled: bool,
@@ -109,6 +107,9 @@ pub struct Ticking {
     awaited: VecDeque<(u64, SentId)>,
     sent: u64,
     seals: Option<TimeSeals>,
+    /// With time slots: stamps and datagrams that the thread has not read yet.
+    stamps: VecDeque<(SentId, Stamp)>,
+    came: VecDeque<Arrived>,
 }
 
 impl Ticking {
@@ -127,6 +128,8 @@ impl Ticking {
             awaited: VecDeque::new(),
             sent: 0,
             seals: None,
+            stamps: VecDeque::new(),
+            came: VecDeque::new(),
         }
     }
 
@@ -145,26 +148,34 @@ impl Ticking {
         &mut self.clock
     }
 
-    /// With time slots: sends what a window is for, as long as it fits; without one does what passing time does. When to ask again.
-    pub(super) fn poll_in(&mut self, io: &mut Io<'_>, mut tx_window: Option<&mut TransmitWindow>) -> u64 {
+    /// The same, to be read.
+    pub(super) fn core(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// With time slots: what came waits until the thread reads its socket.
+    pub(super) fn keep(&mut self, arrived: &Arrived) {
+        self.came.push_back(arrived.clone());
+    }
+
+    /// The thread reads stamps of what `left`, then at most so many datagrams.
+    pub(super) fn take(&mut self, io: &mut Io<'_>, most: usize, mut left: impl FnMut(SentId, Stamp)) {
         self.look_at_clocks(io);
-        let (mut datagram, now_ns) = ([0; TIME_BYTES], io.now.monotonic_ns);
-        loop {
-            let fits = tx_window.as_ref().filter(|tx_window| tx_window.fits(now_ns, TIME_BYTES));
-            let allowed = fits.map_or(Allowed::Nothing, |tx_window| tx_window.allowed());
-            let step = self.clock.poll_in(now_ns, allowed, &mut datagram);
-            self.look(io);
-            match (step, &mut tx_window) {
-                (Step::Send { to, stamp }, Some(tx_window)) => {
-                    tx_window.takes(now_ns, TIME_BYTES);
-                    self.send(io, to, stamp, &datagram);
-                }
-                (Step::Send { .. }, None) => {
-                    io.oracle.broken(io.now, Promise::Exclusive, "a clock sends outside of its windows".into());
-                }
-                (Step::Wait { until_ns }, _) => return until_ns,
-            }
+        for (id, stamp) in std::mem::take(&mut self.stamps) {
+            self.clock.sent(id, stamp);
+            left(id, stamp);
         }
+        for _ in 0..most {
+            let Some(arrived) = self.came.pop_front() else { break };
+            self.handle(io, &arrived);
+        }
+    }
+
+    /// With time slots: sends a datagram in a window.
+    pub(super) fn send_in(&mut self, io: &mut Io<'_>, to: NodeIndex, datagram: &[u8; TIME_BYTES]) {
+        self.look(io);
+        let id = FrameHead::parse(datagram).ok().map(|(head, _)| SentId { to, sequence: head.sequence });
+        self.send(io, to, id, datagram);
     }
 
     /// Whether a datagram is a Sync in the place of a master whose own of this cycle has come.
@@ -195,12 +206,7 @@ impl Ticking {
         let is_other = |told: &VecDeque<TimeFrame>| told.iter().any(|told| told.is_other);
         let is_misled = lives.clone().any(|told| are_late(told, now, way_ns) || is_other(told));
         let latest = lives.filter_map(|told| told.back()).max_by_key(|told| told.came_ns);
-        Some(UnverifiedPeer { from, estimate, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
-    }
-
-    /// A hello left by it.
-    pub(super) fn asked_overheard(&mut self, now: Now) {
-        self.clock.asked_overheard(now.monotonic_ns);
+        Some(UnverifiedPeer { estimate, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
     }
 
     fn is_told(&mut self, io: &Io<'_>, arrived: &Arrived, head: &FrameHead, message: &Message) {
@@ -248,7 +254,7 @@ impl Ticking {
         io.sent.push(Sent { port: PORT, to: to.into(), bytes, handed: io.now });
     }
 
-    pub(super) fn stamp(&self, io: &mut Io<'_>, at: Now) -> Stamp {
+    fn stamp(&self, io: &mut Io<'_>, at: Now) -> Stamp {
         if !self.has_stamps {
             return Stamp::by_us(io.now.monotonic_ns);
         }
@@ -263,7 +269,10 @@ impl Ticking {
         }
     }
 
-    fn look(&mut self, io: &mut Io<'_>) {
+    pub(super) fn look(&mut self, io: &mut Io<'_>) {
+        if io.stood_still() {
+            return;
+        }
         let is_master = self.clock.role() == Role::Master;
         if is_master && !std::mem::replace(&mut self.was_master, is_master) && io.now.true_ns > STARTED_NS {
             io.oracle.saw("took over");
@@ -327,6 +336,9 @@ impl Layer for Ticking {
             && !io.chance.percent(2)
         {
             let stamp = self.stamp(io, at);
+            if io.plan.slots.is_some() {
+                return self.stamps.push_back((id, stamp));
+            }
             self.clock.sent(id, stamp);
             self.look(io);
         }

@@ -124,6 +124,10 @@ impl Times {
     pub fn read(&mut self, now: Now, node: usize, problems: &mut Vec<Problem>) {
         let Some(record) = self.page(now, node) else { return };
         let page = &mut self.pages[node];
+        // What the page said before a thread that is busy wrote it, nobody knows any more.
+        if now.true_ns < page.looked_ns {
+            return;
+        }
         let time = record.at(now.monotonic_ns);
         let broken = |promise, text| Problem { promise, at_ns: now.true_ns, text };
         if let Some((epoch, ns)) = page.last.replace((time.epoch, time.ns))

@@ -22,6 +22,8 @@ pub struct Wire {
     free_ns: Vec<u64>,
     /// By what each sends.
     says: Vec<Says>,
+    /// When each began the window in which it sends, on its clock, ns.
+    called_ns: Vec<u64>,
     /// When somebody first sent by a term, true ns.
     first_ns: BTreeMap<(u64, Term), u64>,
     recent: VecDeque<Transmission>,
@@ -33,6 +35,7 @@ impl Wire {
         Self {
             free_ns: vec![0; nodes],
             says: vec![Says::default(); nodes],
+            called_ns: vec![0; nodes],
             first_ns: BTreeMap::new(),
             recent: VecDeque::with_capacity(RECENT_MAX),
         }
@@ -41,17 +44,19 @@ impl Wire {
     /// From now on a node sends by this. It may have begun a time before.
     pub fn goes_by(&mut self, now: Now, node: usize, says: Says) {
         self.first_ns.entry((says.digest, says.term)).or_insert(now.true_ns);
+        self.called_ns[node] = now.monotonic_ns;
         let before = self.says[node].basis;
         let goes_on = matches!((before, says.basis), (Basis::Begins { .. }, Basis::Begins { .. }));
         self.says[node] = Says { basis: if goes_on { before } else { says.basis }, ..says };
     }
 
     /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its node.
-    pub fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 3]) -> Option<String> {
+    pub fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 2]) -> Option<String> {
         let Some(estimate) = self.says[node].estimate else {
             return Some(format!("node {node}, {bytes} bytes, by no time"));
         };
-        let [called_ns, begin_ns, end_ns] = local_ns.map(|local_ns| estimate.system_ns(local_ns));
+        let [begin_ns, end_ns] = local_ns.map(|local_ns| estimate.system_ns(local_ns));
+        let called_ns = estimate.system_ns(self.called_ns[node]);
         let window = slots.window(node, called_ns + LEAD_NS.1);
         let is_well = window.as_ref().is_some_and(|(window, late_ns)| {
             // Who does not know its lead yet may end later by as much, who does by what it varies.

@@ -19,6 +19,7 @@ use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use crate::harm::harmful;
 use rohrpost_mailbox::{Head, Options, Type};
+use rohrpost_routers::driver::NotSent;
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
 use rohrpost_routers::intake::hurries;
@@ -66,6 +67,8 @@ pub struct Packages {
     /// What the receiving half wants to be sent.
     refusals: VecDeque<Sent>,
     seals: Option<PackageSeals>,
+    /// A datagram waits for the next slot that has left the queue.
+    holds: bool,
     /// Commands that could not be delivered here; their callers are to be told.
     undelivered: Vec<Head>,
 }
@@ -89,6 +92,7 @@ impl Packages {
             refusals: VecDeque::new(),
             seals: None,
             undelivered: Vec::new(),
+            holds: false,
             steady_since_ns: now_ns,
             polled_ns: now_ns,
             heard_ns: vec![now_ns; settings.nodes.len()],
@@ -147,32 +151,42 @@ impl Packages {
     }
 
     fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
-        if io.host.unsendable > 0 && io.chance.percent(50) {
+        if self.hand_over(io, to, &bytes).is_err() {
             let mut watch = Watch::out(io, &mut self.undelivered);
-            return self.outbound.unsent(&bytes, &[], &mut watch);
+            self.outbound.unsent(&bytes, &[], &mut watch);
         }
-        let sealed = match &mut self.seals {
-            None => Some(bytes.clone()),
-            Some(seals) => sealed(&mut seals.sealing, &bytes),
+    }
+
+    /// Hands a datagram to the kernel, sealed if it is to be.
+    fn hand_over(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: &[u8]) -> Result<(), NotSent> {
+        if io.host.unsendable > 0 && io.chance.percent(50) {
+            return Err(NotSent);
+        }
+        let (sealed, bytes) = match &mut self.seals {
+            None => (Rc::from(bytes), Rc::from(bytes)),
+            Some(seals) => (sealed(&mut seals.sealing, bytes).ok_or(NotSent)?, checked(bytes)),
         };
-        let bytes = if self.seals.is_some() { checked(&bytes) } else { bytes };
-        let Some(sealed) = sealed else {
-            let mut watch = Watch::out(io, &mut self.undelivered);
-            return self.outbound.unsent(&bytes, &[], &mut watch);
-        };
-        io.oracle.leaves(io.now, io.life, &bytes);
+        if !std::mem::take(&mut self.holds) {
+            self.leaves(io, &bytes);
+        }
+        io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
+        io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed, handed: io.now });
+        Ok(())
+    }
+
+    /// A datagram leaves the queue.
+    fn leaves(&self, io: &mut Io<'_>, bytes: &[u8]) {
+        io.oracle.leaves(io.now, io.life, bytes);
         if io.plan.slots.is_some() {
             let reaches = |to| self.seals.as_ref().is_none_or(|seals| seals.knows(to));
             // Of those that hurry more than they may, only a few are taken before a datagram.
             let first = io.host.transit.first().filter(|first| !hurries(&first.head));
             let first = first.filter(|first| self.settings.node_of(first.head.to).is_some_and(reaches));
             let behind = first.map(|first| first.number);
-            io.oracle.is_strict(io.now, io.life, &bytes, behind, reaches);
+            io.oracle.is_strict(io.now, io.life, bytes, behind, reaches);
         } else {
-            io.oracle.paces(io.now, io.life, &bytes, &io.plan.shape, self.settings.overhead_bytes());
+            io.oracle.paces(io.now, io.life, bytes, &io.plan.shape, self.settings.overhead_bytes());
         }
-        io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
-        io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed, handed: io.now });
     }
 
     /// Asks whoever is not known.
@@ -207,7 +221,7 @@ impl Packages {
     }
 
     /// Tells callers on other nodes of commands that were not delivered here.
-    fn answer(&mut self, io: &mut Io<'_>) {
+    fn answer_callers(&mut self, io: &mut Io<'_>) {
         for command in std::mem::take(&mut self.undelivered) {
             let Some(number) = io.oracle.number(&command) else { continue };
             let package = &io.oracle.packages[number as usize];
@@ -296,7 +310,7 @@ impl Layer for Packages {
         } else {
             io.oracle.saw("dropped as wrong or old");
         }
-        self.answer(io);
+        self.answer_callers(io);
     }
 
     fn left(&mut self, _: &mut Io<'_>, _: Port, _: u64, _: Now) {}
@@ -305,7 +319,7 @@ impl Layer for Packages {
         self.take_in(io);
         let until_ns = self.poll_inbound(io);
         io.sent.extend(self.refusals.drain(..));
-        self.answer(io);
+        self.answer_callers(io);
         loop {
             let mut watch = Watch::out(io, &mut self.undelivered);
             match self.outbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {

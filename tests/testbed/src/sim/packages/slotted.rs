@@ -1,15 +1,17 @@
-//! Packages where there are time slots: sent in a slot as far as it has room, and tidied between slots.
+//! Packages where there are time slots: what the driver has of them.
 //!
 //! `sim/slotted` calls this; without slots, `poll` sends as packages come.
 
 use super::watch::Watch;
-use super::{PORT, Packages};
+use super::{PORT, Packages, checked};
 use crate::sim::host::TRANSIT_SLOTS;
 use crate::sim::station::{Io, Sent};
 use rohrpost_mailbox::{Head, Priority};
+use rohrpost_routers::driver::NotSent;
 use rohrpost_routers::frame::NodeIndex;
-use rohrpost_routers::intake::{Intake, MAKING_NS, TAKING_NS, Transit};
-use rohrpost_routers::outbound::Accepted;
+use rohrpost_routers::intake::{TAKING_NS, Transit};
+use rohrpost_routers::outbound::{Accepted, Outbound};
+use rohrpost_routers::report::Report;
 use rohrpost_routers::security::HELLO_SLOT_BYTES;
 use rohrpost_routers::tdma::TransmitWindow;
 use std::rc::Rc;
@@ -18,8 +20,6 @@ use std::rc::Rc;
 pub(in crate::sim) struct Hands<'a, 'b> {
     pub(in crate::sim) packages: &'a mut Packages,
     pub(in crate::sim) io: &'a mut Io<'b>,
-    /// The slot, where each package that is taken keeps the thread from sending.
-    pub(in crate::sim) tx_window: Option<&'a TransmitWindow>,
 }
 
 impl Transit for Hands<'_, '_> {
@@ -39,62 +39,71 @@ impl Transit for Hands<'_, '_> {
         self.packages.outbound.level(priority)
     }
 
-    fn busy_ns(&self) -> u64 {
-        self.tx_window.map_or(0, |tx_window| tx_window.busy_ns(self.io.now.monotonic_ns))
+    fn local_ns(&self) -> u64 {
+        self.io.now.monotonic_ns
     }
 
     fn take(&mut self) -> Option<(Head, Accepted)> {
-        self.io.works(if self.tx_window.is_some() { TAKING_NS } else { 0 });
+        if !self.io.host.transit.is_empty() {
+            self.io.works(TAKING_NS);
+        }
         self.packages.take_one(self.io)
     }
 }
 
 impl Packages {
-    /// With time slots, where all is sealed: sends a hello in one, to this node before others; whether there was any.
-    pub(in crate::sim) fn say_in(
+    /// The queue; and who is told of what it loses.
+    pub(in crate::sim) fn queue<'a, 'b>(&'a mut self, io: &'a mut Io<'b>) -> (&'a mut Outbound, impl Report) {
+        (&mut self.outbound, Watch::out(io, &mut self.undelivered))
+    }
+
+    /// With time slots: sends a datagram in one.
+    pub(in crate::sim) fn send_in(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: &[u8]) -> Result<(), NotSent> {
+        let sent = self.hand_over(io, to, bytes);
+        if sent.is_err() && self.holds {
+            self.drops_held(io, bytes);
+        }
+        sent
+    }
+
+    /// A datagram that was made waits for the next slot: it has left the queue.
+    pub(in crate::sim) fn holds(&mut self, io: &mut Io<'_>, datagram: &[u8]) {
+        self.leaves(io, &checked(datagram));
+        self.holds = true;
+    }
+
+    /// It is lost: what is in it is as if it had never left.
+    pub(in crate::sim) fn drops_held(&mut self, io: &mut Io<'_>, datagram: &[u8]) {
+        self.holds = false;
+        io.oracle.comes_back(io.life, &checked(datagram));
+    }
+
+    /// With time slots: sends in one what must be said besides packages, where all is sealed a hello, to this node before others; its bytes.
+    pub(in crate::sim) fn answer(
         &mut self,
         io: &mut Io<'_>,
         first: Option<NodeIndex>,
-        tx_window: &mut TransmitWindow,
-    ) -> bool {
-        let (Some(seals), now_ns) = (&mut self.seals, io.now.monotonic_ns) else { return false };
-        let fits = tx_window.carries_hello() && tx_window.fits(now_ns, HELLO_SLOT_BYTES);
-        let Some((said, datagram)) = fits.then(|| seals.waiting.take(now_ns, first)).flatten() else { return false };
-        tx_window.takes(now_ns, HELLO_SLOT_BYTES);
+        tx_window: &TransmitWindow,
+    ) -> Option<usize> {
+        let now_ns = io.now.monotonic_ns;
+        let Some(seals) = &mut self.seals else {
+            let fits = |bytes| tx_window.carries_refusal() && tx_window.fits(now_ns, bytes);
+            let refusal = self.refusals.pop_front_if(|refusal| fits(refusal.bytes.len()))?;
+            let bytes = refusal.bytes.len();
+            io.sent.push(Sent { handed: io.now, ..refusal });
+            return Some(bytes);
+        };
+        let fits = tx_window.fits(now_ns, HELLO_SLOT_BYTES);
+        let (said, datagram) = fits.then(|| seals.waiting.take(now_ns, first)).flatten()?;
         io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram), handed: io.now });
         seals.waiting.left(said);
-        true
+        Some(HELLO_SLOT_BYTES)
     }
 
-    /// With time slots: sends in one what must be said, and then what is most important, as long as it fits.
-    pub(in crate::sim) fn poll_in(&mut self, io: &mut Io<'_>, intake: &mut Intake, tx_window: &mut TransmitWindow) {
-        let now_ns = io.now.monotonic_ns;
-        while let Some(refusal) = self.refusals.pop_front_if(|refusal| tx_window.fits(now_ns, refusal.bytes.len())) {
-            tx_window.takes(now_ns, refusal.bytes.len());
-            io.sent.push(refusal);
-        }
-        loop {
-            let mut watch = Watch::out(io, &mut self.undelivered);
-            self.outbound.drop_first(watch.io.now.monotonic_ns, &mut watch);
-            intake.take_on(&mut Hands { packages: self, io, tx_window: Some(tx_window) });
-            let Some(room_bytes) = tx_window.room_bytes(io.now.monotonic_ns + MAKING_NS) else { break };
-            let (made_ns, mut watch) = (io.now.monotonic_ns, Watch::out(io, &mut self.undelivered));
-            let (_, behind) = watch.io.host.transit.waits();
-            let datagram = (room_bytes, &mut self.buffer[..]);
-            let Some((to, bytes)) = self.outbound.poll_slot(made_ns, datagram, behind, &mut watch) else { break };
-            io.works(MAKING_NS);
-            tx_window.takes(io.now.monotonic_ns, bytes);
-            let bytes = Rc::from(&self.buffer[..bytes]);
-            self.send(io, to, bytes);
-        }
-    }
-
-    /// With time slots: does between them what passing time does; when to ask again.
-    pub(in crate::sim) fn tidy(&mut self, io: &mut Io<'_>) -> u64 {
+    /// The thread that receives: does what passing time does; when to ask again.
+    pub(in crate::sim) fn receive(&mut self, io: &mut Io<'_>) -> u64 {
         let until_ns = self.poll_inbound(io);
-        self.answer(io);
-        let mut watch = Watch::out(io, &mut self.undelivered);
-        self.outbound.tidy(watch.io.now.monotonic_ns, &mut watch);
+        self.answer_callers(io);
         until_ns
     }
 }

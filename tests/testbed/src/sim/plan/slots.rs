@@ -51,6 +51,7 @@ impl Plan {
             table,
             masters: plan.masters.clone(),
             late_ppm: LATE_PPM,
+            still_ppm: LATE_PPM,
             oversleeps_percent: 0,
             divisions: Divisions::default(),
             joins_ns: None,
@@ -70,6 +71,7 @@ impl Plan {
         plan.calls.clear();
         plan.divide();
         plan.fixed_ns = S + cycles * plan.shape.interval_ns;
+        plan.slots.iter_mut().for_each(|slots| slots.still_ppm = 0);
         plan.time_slots();
         plan
     }

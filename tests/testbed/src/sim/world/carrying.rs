@@ -19,6 +19,8 @@ impl World<'_> {
             plan: &self.plan,
             lives: &self.living,
             now,
+            clock: &station.clock,
+            began_ns: self.now_ns,
             node,
             life,
             host: &mut station.host,
@@ -56,7 +58,7 @@ impl World<'_> {
         let at_ns = handed_ns + self.chance.between(LEAD_NS.0, LEAD_NS.1);
         let sent = oracle.wire.transmit(node, at_ns, bytes, slots, &mut oracle.problems);
         let clock = &self.stations[node].clock;
-        let local_ns = [self.now_ns, sent.begin_ns, sent.end_ns].map(|true_ns| clock.at(true_ns).monotonic_ns);
+        let local_ns = [sent.begin_ns, sent.end_ns].map(|true_ns| clock.at(true_ns).monotonic_ns);
         if let Some(text) = oracle.wire.window(node, bytes, slots, local_ns) {
             oracle.problems.push(Problem { promise: Promise::InWindow, at_ns: sent.begin_ns, text });
         }
