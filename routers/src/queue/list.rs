@@ -1,4 +1,4 @@
-//! Lists through an array: places are linked by their numbers, so that one can be taken out of the middle, and nothing is allocated.
+//! Linked lists in an array: places are linked by number. One can be removed from the middle, and nothing is allocated.
 
 const NONE: u32 = u32::MAX;
 
@@ -70,7 +70,7 @@ impl Lists {
         }
     }
 
-    /// What stands behind a place of a list.
+    /// The place behind a place of a list.
     pub(super) fn after(&self, place: u32) -> Option<u32> {
         Some(self.0[place as usize].after).filter(|after| *after != NONE)
     }

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_just_begun_says_nothing_of_what_came() {
+    fn a_router_that_has_just_begun_answers_nothing_that_came() {
         let (came, left) = (arrived(Options::default()), command(Options::default()));
         let mut ground = Ground::new(None);
         for cause in [Cause::NoMailbox, Cause::MailboxFull, Cause::TooLarge, Cause::Stale] {

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn who_takes_nothing_is_given_so_much_and_no_more() {
+    fn a_full_handover_takes_no_more() {
         let (_folder, mut giver, mut taker) = ends();
         let mut given = 0;
         while giver.takes() {

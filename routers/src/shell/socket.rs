@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn who_never_waits_has_room_for_what_it_asked_for() {
+    fn a_socket_that_never_waits_has_the_room_it_asked_for() {
         let at = SocketAddr::new(ONE, free_port(ONE));
         let there = InSocket::open(at, &[ONE], REST_BYTES).unwrap();
         let usual = OutSocket::new(ONE, at, 0).socket.unwrap();

@@ -1,4 +1,4 @@
-//! Two routers and a wire that loses, copies and reorders.
+//! Two routers and a wire that loses, duplicates and reorders.
 
 use super::*;
 use crate::counts::Cause;
@@ -13,7 +13,7 @@ enum Wire {
     Passes,
     Loses,
     Copies,
-    /// It is overtaken by so many.
+    /// This many others overtake it.
     Holds(usize),
 }
 
@@ -71,7 +71,7 @@ proptest! {
             if step.is_some() || !on_wire.is_empty() {
                 busy_ns = now_ns;
             }
-            // Long after the last, so that all that is missing was given up, and every part.
+            // Long after the last, so that all that is missing was given up, and every fragment.
             if now_ns > busy_ns + 3 * S {
                 break;
             }
@@ -80,7 +80,7 @@ proptest! {
         base.assert_balanced();
         prop_assert_eq!((arm.stats.waiting_in_all(), base.inbound.partial()), (0, 0));
         prop_assert_eq!(arm.log.lost.len(), 0);
-        // The very first was said to nobody.
+        // No peer took the very first one.
         let received = &base.stats.peer(1).received;
         prop_assert_eq!(received.missing(), lost_on_wire + 1);
         prop_assert_eq!(received.datagrams.get() + received.missing(), arm.stats.peer(0).sent.datagrams.get());
