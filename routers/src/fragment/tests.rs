@@ -33,7 +33,7 @@ impl Cut {
     }
 }
 
-/// Takes a part; first of the package that is whole now, and what became of others.
+/// Takes a fragment; returns `first` of a complete package, and the events of others.
 fn take(parts: &mut Reassembly, now_ns: u64, part: &Fragment<'_>) -> (Option<u64>, Vec<(u64, Change)>) {
     let mut changes = Vec::new();
     let whole = parts.take(now_ns, part, || false, |head, _, change| changes.push((head.priority.0.into(), change)));

@@ -1,22 +1,22 @@
-//! Why a datagram could not be sent, as far as it makes a difference, and how often that happened.
+//! Kinds of failures to send a datagram, as far as they make a difference, and their counters.
 
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What the kernel says instead of sending a datagram.
+/// Why the kernel did not send a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Failure {
-    /// The computer is there, but nobody listens at the port. Told of an earlier datagram; this one was sent.
+    /// The computer is there, but nothing listens at the port. Reported for an earlier datagram; this one was sent.
     NobodyThere,
-    /// No way to the address: the network is down, the way is missing, or a firewall forbids it.
+    /// No route to the address: the network is down, the route is missing, or a firewall forbids it.
     NoWay,
-    /// Longer than what is between can carry.
+    /// Longer than the path can carry.
     TooLong,
     /// The kernel or the network card had no room.
     NoRoom,
-    /// So much waits already for its device that the kernel takes no more; nobody waits for that.
+    /// The device's queue is full: the kernel takes no more without waiting.
     OverflowPolicy,
-    /// Nobody is known there that it could be sealed to.
+    /// The peer has no session to seal with.
     Unacquainted,
     /// Anything else.
     Other,
@@ -92,7 +92,7 @@ impl Failure {
     }
 }
 
-/// How often each of them happened.
+/// Counters of each of them.
 #[derive(Default, Debug)]
 pub struct Failures([AtomicU64; Failure::ALL.len()]);
 
@@ -101,7 +101,7 @@ impl Failures {
         self.0[failure as usize].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often this one did.
+    /// The counter of this one.
     pub fn of(&self, failure: Failure) -> u64 {
         self.0[failure as usize].load(Ordering::Relaxed)
     }

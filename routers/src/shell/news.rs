@@ -1,4 +1,4 @@
-//! What a router says of its peers, in words: each once, until it is over.
+//! Messages of a router about its peers: each once, until it is over.
 
 use super::failure::Failure;
 use crate::frame::{self, NodeIndex, Reason};
@@ -6,7 +6,7 @@ use crate::report::{Event, Mismatch};
 use crate::settings::Settings;
 use std::sync::Arc;
 
-/// What is the matter between two nodes that refuse each other, and what would be right. `digest` is this node's.
+/// The difference between two nodes that refuse each other, and the remedy. `digest` is this node's.
 pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
     match (mismatch.reason, mismatch.digest) {
         (Reason::Version, _) => format!(
@@ -37,10 +37,10 @@ pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
     }
 }
 
-/// Speaks of peers by their names.
+/// Reports about peers by their names.
 pub(super) struct News {
     settings: Arc<Settings>,
-    /// Of each peer: why nothing could be sent there.
+    /// For each peer: why nothing could be sent there.
     failing: Box<[Option<Failure>]>,
 }
 
@@ -49,7 +49,7 @@ impl News {
         Self { settings: settings.clone(), failing: settings.nodes.iter().map(|_| None).collect() }
     }
 
-    /// Something happened that the receiving half has noticed.
+    /// An event of the receiving half.
     pub(super) fn event(&self, event: Event) {
         let digest = self.settings.digest;
         match event {
@@ -86,13 +86,13 @@ impl News {
     /// A datagram could not be sent.
     #[cold]
     pub(super) fn fails(&mut self, to: NodeIndex, failure: Failure) {
-        // That nobody listens is no news: a peer that does not run is silent, and that is told.
+        // That nothing listens is not reported: a peer that does not run is silent, and that is reported.
         if failure.is_loss() && self.failing[usize::from(to)].replace(failure) != Some(failure) {
             tracing::warn!("cannot send to {}: {}", self.node(to), failure.words());
         }
     }
 
-    /// One could.
+    /// A datagram could be sent.
     pub(super) fn works(&mut self, to: NodeIndex) {
         if self.failing[usize::from(to)].take().is_some() {
             tracing::info!("sends to {} again", self.node(to));

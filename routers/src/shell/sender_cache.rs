@@ -1,19 +1,20 @@
-//! The mailboxes that a thread of the router sends to, kept open: finding one again takes a search of a small table, no system call.
+//! Open mailboxes that a thread of the router sends to: a search in a small table replaces a system call.
 
 use super::hosted::Hosted;
 use rohrpost_mailbox::{Head, Label, Name, Participant, SendError, Sender};
 use std::sync::Arc;
 
-/// Mailboxes kept open; the one not used for longest gives way.
+/// Mailboxes kept open; the least recently used is closed first.
 const WAYS_MAX: usize = 512;
-/// Names of others known to lead nowhere; those beyond are looked for each time.
+/// Remembered names without a mailbox; others are looked up each time.
 const ABSENT_MAX: usize = 64;
 
 /// Where packages may go.
 enum Reach {
-    /// To mailboxes that configuration gives this node: what came from other nodes must not go back.
+    /// To mailboxes that configuration gives this node: packages from other nodes must not go back.
     Here(Hosted),
-    /// Also through this node's own router. Programs of this node choose the names. These lead nowhere while the registry has this epoch.
+    /// Also through this node's own router. Programs of this node choose the names. The absent ones hold while the
+    /// registry has this epoch.
     Everywhere { absent: Vec<Name>, epoch: u32 },
 }
 
@@ -23,15 +24,15 @@ struct CachedSender {
     used: u64,
 }
 
-/// SenderCache to mailboxes.
+/// Cache of senders to mailboxes.
 pub(crate) struct SenderCache {
     participant: Arc<Participant>,
     reach: Reach,
     /// By name.
     sender_cache: Vec<CachedSender>,
-    /// Counts packages, to tell which way was not used for longest.
+    /// Counts packages, to find the least recently used sender.
     packages: u64,
-    /// Looks for mailboxes so far.
+    /// Lookups of mailboxes so far.
     #[cfg(test)]
     looks: u64,
 }
@@ -58,12 +59,12 @@ impl SenderCache {
         }
     }
 
-    /// Sends a package on, as it is, to the mailbox that its head names.
+    /// Sends a package on, unchanged, to the mailbox in its head.
     pub(crate) fn send(&mut self, head: &Head, body: &[u8]) -> Result<(), SendError> {
         self.send_by(head.to, head, body)
     }
 
-    /// The same by a mailbox of which it is known that it leads there: nothing is looked for but that one.
+    /// The same through a mailbox that is known to lead there: only that one is looked up.
     pub(crate) fn send_by(&mut self, router: Name, head: &Head, body: &[u8]) -> Result<(), SendError> {
         let Head { to, from, kind, id, priority, options, .. } = *head;
         let at = match self.sender_cache.binary_search_by_key(&router, |way| way.to) {
@@ -75,7 +76,7 @@ impl SenderCache {
         self.sender_cache[at].sender.readdress(to);
         let sent = self.sender_cache[at].sender.send(&Label { from, kind, id, priority, options }, &[body]);
         if let Err(SendError::NoMailbox(_) | SendError::NoRouter { .. } | SendError::Bad(..)) = sent {
-            // Its memory is nobody's any more.
+            // Its memory has no owner any more.
             self.sender_cache.remove(at);
         }
         sent
@@ -83,7 +84,7 @@ impl SenderCache {
 
     #[cold]
     fn open(&mut self, to: Name, at: usize) -> Result<usize, SendError> {
-        // Before it is looked for: what comes in between makes this number an old one.
+        // Read before the lookup: a change meanwhile makes this epoch an old one.
         let now = self.participant.node().registry_epoch();
         let may_be_there = match &mut self.reach {
             Reach::Here(hosted) => hosted.may_be_there(to, now),
@@ -120,7 +121,7 @@ impl SenderCache {
         Ok(at)
     }
 
-    /// Gives up the way not used for longest; where that of `to` belongs now.
+    /// Closes the least recently used sender; returns where that of `to` belongs now.
     fn make_room(&mut self, to: Name) -> usize {
         if let Some((oldest, _)) = self.sender_cache.iter().enumerate().min_by_key(|(_, way)| way.used) {
             self.sender_cache.remove(oldest);
@@ -224,7 +225,7 @@ mod tests {
         let count = WAYS_MAX as u16 + 20;
         let mut receivers: Vec<_> = (0..count).map(|number| me.receiver(name(number), shape).unwrap()).collect();
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
-        // The first is in use all the time, so it never gives way.
+        // The first is in use all the time, so it is never closed.
         for number in 0..count {
             sender_cache.send(&head(name(number)), b"body").unwrap();
             assert!(receivers[usize::from(number)].try_receive().is_some());

@@ -69,7 +69,7 @@ pub enum Silent {
         heard: u8,
     },
     /// It has no system time, and hears unverified peers only.
-    #[error("joining: hears the time, and asks whether who says it lives")]
+    #[error("joining: hears the time from unverified routers, and asks whether they live")]
     Asking,
     /// It is master, with a time that others may not follow yet.
     #[error(
