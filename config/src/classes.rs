@@ -6,10 +6,10 @@ use rohrpost_mailbox::{Class, Name, local};
 /// Class of programs run by hand; every installation has it.
 pub const TOOL: &str = "tool";
 
-/// Class of the routers, which are there by themselves when there are several nodes.
+/// Class of the routers, which are implicit when there are several nodes.
 pub const ROUTER: &str = "router";
 
-/// Class of the TCP router and of its clients, which are there by themselves with `[tcp]`.
+/// Class of the TCP router and of its clients, which are implicit with `[tcp]`.
 pub const TCP: &str = "tcp";
 
 /// One class of an installation.
@@ -56,7 +56,7 @@ pub enum NameTextError {
     /// A part is no number from 0 to 255.
     #[error("`{0}`: {1} `{2}` is not a number from 0 to 255")]
     Byte(String, &'static str, String),
-    /// System or class zero means "none" or "own" and is nobody's name.
+    /// System or class zero means "none" or "own", and no name has it.
     #[error("`{0}`: {1} 0 is reserved; write 1 to 255")]
     Reserved(String, &'static str),
 }

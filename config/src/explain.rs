@@ -1,4 +1,4 @@
-//! Says in words what an installation means: the page that `rohrpost check` prints, readable at 100 columns.
+//! Explains an installation in words: the page that `rohrpost check` prints, readable at 100 columns.
 
 mod slots;
 mod timeline;
@@ -54,7 +54,7 @@ impl Page<'_> {
         self.text.push('\n');
     }
 
-    /// A line of a label and words, which go on below each other.
+    /// A label and words, with wrapped lines below each other.
     fn entry(&mut self, label: &str, words: &str) {
         let mut line = format!("  {label:<width$}", width = INDENT - 2);
         let mut first = true;
@@ -104,7 +104,7 @@ impl Page<'_> {
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
-    /// Whose clock counts.
+    /// The nodes that may be master of time.
     fn masters(&self, masters: &[u8], interval: Duration) -> String {
         let mut names = masters.iter().filter_map(|index| self.installation.nodes.get(usize::from(*index)));
         let first = names.next().map_or("", |node| &node.name);
@@ -337,7 +337,7 @@ fn starts(module: &Module) -> String {
     };
     let (ready, stop) = (duration_text(module.ready_within), duration_text(module.stop_within));
     let mut words = format!("{state}; must be ready within {ready}, has {stop} to stop");
-    // Those that are there by themselves have no such key.
+    // Implicit modules have no such key.
     if module.required && module.is_in_file() {
         words.push_str("; without it the node does not start");
     }

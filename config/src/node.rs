@@ -1,4 +1,4 @@
-//! The system and its nodes: which computers there are, and which tool instances each may hand out.
+//! The system and its nodes: its computers, and the tool instances of each.
 
 use crate::reader::{Item, Section, is_word};
 use std::net::IpAddr;
@@ -24,7 +24,8 @@ pub struct Node {
     pub address: Option<IpAddr>,
     /// Permission bits of its shared-memory directory.
     pub mode: u32,
-    /// Instances of class `tool` on this node, at least two: the first is launch's, programs run by hand take the others.
+    /// Instances of class `tool` on this node, at least two: the first is launch's, programs run by hand take the
+    /// others.
     pub tools: RangeInclusive<u8>,
     /// Line in the file.
     pub line: usize,
@@ -39,7 +40,7 @@ pub enum Reach {
     Tcp,
 }
 
-/// How the key `network` of a node says it.
+/// Value of the key `network` of a node.
 const LAN: &str = "lan";
 const TCP: &str = "tcp";
 
@@ -136,7 +137,7 @@ impl Node {
     }
 }
 
-/// What a node needs not say, since nobody asks.
+/// Keys that a node may leave out, since nothing uses them.
 #[derive(Clone, Copy)]
 struct Alone {
     /// No other node is on its LAN.
@@ -156,7 +157,7 @@ fn read_mode(item: &Item<'_>) -> Option<u32> {
     mode
 }
 
-/// An address that the others reach: of one computer alone, of the same kind as theirs.
+/// An address that the others reach: of one computer alone, of the same family as theirs.
 fn read_address(item: &Item<'_>, earlier: &[Node]) -> Option<IpAddr> {
     let text = item.text("192.168.0.1")?;
     let Ok(address) = text.parse::<IpAddr>() else {

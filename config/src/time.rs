@@ -15,11 +15,11 @@ pub enum TimeSource {
     /// The computer's own clock.
     #[default]
     Local,
-    /// The clock of one node, which the routers bring to all: the only source that several nodes can share.
+    /// The clock of one node, which the routers distribute: the only source that several nodes can share.
     Master {
         /// Nodes that may be master, by their place in the file; the first that runs is. At least one.
         masters: Vec<u8>,
-        /// Time from one synchronisation to the next; where nodes send in time slots, the cycle.
+        /// Interval of synchronisation; with time slots, the cycle.
         interval: Duration,
     },
     /// The simulation; `speed` 2.0 lets time pass twice as fast.
@@ -32,7 +32,7 @@ pub enum TimeSource {
 }
 
 impl TimeSource {
-    /// Nodes that may be master, by their place in the file; the first that runs is. None if time is no node's.
+    /// Nodes that may be master, by their place in the file; the first that runs is. None if time is not from a node.
     pub fn masters(&self) -> &[u8] {
         match self {
             Self::Master { masters, .. } => masters,
@@ -40,7 +40,8 @@ impl TimeSource {
         }
     }
 
-    /// `file` is asked for the line of what is missing; `nodes` are all of them; `cycle` is that of the time slots, if there are any.
+    /// `file` gives the line of a missing key; `nodes` are all of them; `cycle` is that of the time slots, if there are
+    /// any.
     pub(crate) fn read(
         section: Option<Section<'_>>,
         file: &Section<'_>,
@@ -120,7 +121,7 @@ impl TimeSource {
         source
     }
 
-    /// What must be equal at both ends of the wire.
+    /// The part that must be equal at both ends of the wire.
     pub(crate) fn lan_text(&self) -> String {
         match self {
             Self::Master { masters, interval } => format!("masters {masters:?} every {} ns", interval.as_nanos()),

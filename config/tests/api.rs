@@ -175,8 +175,8 @@ fn one_node_is_explained_alone() {
     assert!(explain(&full, Some("roof")).contains("There is no node `roof`; the nodes are base, desk."));
 }
 
-/// Half a file, a file without one of its lines, and a file with two lines in one: errors perhaps, but no panic, and each
-/// error in a line that exists.
+/// Half a file, a file without one of its lines, and a file with two lines in one: errors perhaps, but no panic, and
+/// each error in an existing line.
 #[test]
 fn damaged_files_give_errors_and_nothing_worse() {
     let lines: Vec<&str> = FULL.lines().collect();

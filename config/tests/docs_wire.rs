@@ -1,4 +1,4 @@
-//! The digests of `docs/src/wire.md` are what the code makes of the texts there.
+//! The digests of `docs/src/wire.md` match the code's digests of the texts there.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

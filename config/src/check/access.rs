@@ -6,8 +6,8 @@ use crate::module::{Lines, Module};
 use crate::reader::Reader;
 use rohrpost_mailbox::Name;
 
-/// Nobody is listed as a caller of whom it may not command, and no alias lets in whom its module keeps out: a router goes by the class of the
-/// name that is commanded.
+/// No module is listed as a caller of one that it may not command, and no alias admits a caller that its module
+/// refuses: a router checks the class of the commanded name.
 pub(crate) fn validate(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
     for (to, line) in module.calls.iter().zip(&lines.calls) {
         let refuses = |access: &&Access| access.refuses(module.name.class(), to.class());
