@@ -157,7 +157,8 @@ impl ClassTable {
                 let free = (1..=255u8).rev().filter(|free| table.entry(Class(*free)).is_none());
                 let free = free.min_by_key(|free| free.abs_diff(id)).unwrap_or(1);
                 item.report(format!(
-                    "class `{name}` has id {id}, which is class `{other}`'s; ids are priorities and unique, {free} is free"
+                    "class `{name}` has id {id}, which is class `{other}`'s; ids are priorities and unique, {free} is \
+                     free"
                 ));
             }
             table.entries.push(ClassEntry { class: Class(id), name, text: text.into() });
@@ -233,7 +234,8 @@ mod tests {
         for (text, message) in [
             (
                 "laser",
-                "`laser` is no mailbox name; write class.instance (`laser.0`), with a local id `laser.0.2`, or `1.laser.0.2`",
+                "`laser` is no mailbox name; write class.instance (`laser.0`), with a local id `laser.0.2`, or \
+                 `1.laser.0.2`",
             ),
             ("lasr.0", "`lasr.0`: there is no class `lasr`; did you mean `laser`?"),
             ("pump.0", "`pump.0`: there is no class `pump`; the classes are motor, laser, tool"),

@@ -28,7 +28,8 @@ pub enum ContentsError {
     Kind(String),
     /// A number that no package of the kind has.
     #[error(
-        "`{number}` is no number of a {kind}; write {first} to {last}, such as \"{kind} {first}\", or \"{kind}\" for all of them"
+        "`{number}` is no number of a {kind}; write {first} to {last}, such as \"{kind} {first}\", or \"{kind}\" for \
+         all of them"
     )]
     Number {
         /// What stands in its place.

@@ -70,14 +70,14 @@ impl<'d> Directory<'d> {
                 ),
             );
         }
-        let whose = match class_of(text) {
+        let owner = match class_of(text) {
             ROUTER => "for the routers, which are there by themselves when there are several nodes",
             _ => "for the TCP router and its clients, which are there by themselves with [tcp]",
         };
         if self.reserved.contains(&class_of(text)) {
             module.reader.report(
                 line,
-                format!("module `{text}`: class `{}` is {whose}; give the module a class of its own", class_of(text)),
+                format!("module `{text}`: class `{}` is {owner}; give the module a class of its own", class_of(text)),
             );
         }
         self.owners.insert(text.into(), name.unwrap_or_default());

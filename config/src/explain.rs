@@ -130,8 +130,8 @@ impl Page<'_> {
         self.entry(
             "network",
             &format!(
-                "UDP ports {ports}; IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps {} \
-                 of each sender waiting",
+                "UDP ports {ports}; IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps \
+                 {} of each sender waiting",
                 network.mtu,
                 network.datagram_bytes_max,
                 sends,
@@ -152,7 +152,8 @@ impl Page<'_> {
             None => "another installation runs it".into(),
         };
         let words = format!(
-            "TCP router at {}: what neither a node nor its LAN has goes there; {runs}; {} wait for a connection at most",
+            "TCP router at {}: what neither a node nor its LAN has goes there; {runs}; {} wait for a connection at \
+             most",
             tcp.address,
             size_text(tcp.quota_bytes as u64)
         );

@@ -60,10 +60,12 @@ pub struct Keys {
 #[derive(Debug, thiserror::Error)]
 pub enum KeysError {
     /// The file itself.
-    #[error("{path}: keys cannot be read ({1}); copy this folder from the first computer of the installation. On that one, and there alone, `rohrpost keys new {folder}` makes it", path = .0.display(), folder = folder_of(.0))]
+    #[error("{path}: keys cannot be read ({1}); copy this folder from the first computer of the installation. On that \
+             one, and there alone, `rohrpost keys new {folder}` makes it", path = .0.display(), folder = folder_of(.0))]
     Read(PathBuf, io::Error),
     /// Others may read it.
-    #[error("{path}: others than its owner may read these keys (mode {1:o}); run `chmod 600 {path}`, and if others could log in here, change the keys", path = .0.display())]
+    #[error("{path}: others than its owner may read these keys (mode {1:o}); run `chmod 600 {path}`, and if others \
+             could log in here, change the keys", path = .0.display())]
     Open(PathBuf, u32),
     /// What is in it.
     #[error("{}:{line}: {why}", path.display())]
@@ -79,7 +81,8 @@ pub enum KeysError {
     #[error("{path}: keys cannot be written ({1})", path = .0.display())]
     Write(PathBuf, io::Error),
     /// A temporary file from an earlier write exists.
-    #[error("{path}: this was left when keys were written and the computer stopped, or they are being written now; if not, remove it", path = .0.display())]
+    #[error("{path}: this was left when keys were written and the computer stopped, or they are being written now; if \
+             not, remove it", path = .0.display())]
     Left(PathBuf),
     /// There is one already.
     #[error("{path}: there are keys already; `rohrpost keys rotate` changes them", path = .0.display())]

@@ -114,7 +114,8 @@ impl MailboxSpec {
         let full = section.get("full").and_then(|item| {
             if !latest && item.is(OverflowPolicy::Latest.name()) {
                 item.report(
-                    "`full` is \"latest\"; write \"displace\" or \"reject\": each command has an id of its own, so none replaces another",
+                    "`full` is \"latest\"; write \"displace\" or \"reject\": each command has an id of its own, so \
+                     none replaces another",
                 );
                 return None;
             }

@@ -297,7 +297,8 @@ fn command(item: &Item<'_>) -> Option<Vec<String>> {
         // No shell parses it, so quotes need no escapes.
         if text.trim().is_empty() || text.contains(char::is_whitespace) {
             item.report(format!(
-                "`program` \"{text}\" is no single program; write program and arguments as a list, `program = {example}`"
+                "`program` \"{text}\" is no single program; write program and arguments as a list, `program = \
+                 {example}`"
             ));
             return None;
         }
@@ -317,8 +318,8 @@ fn required(section: &Section<'_>, optional: bool) -> bool {
     let required = item.flag().unwrap_or(false);
     if required && optional {
         item.report(
-            "`required` and `optional` are both true; a module without which the node does not start cannot be left out, \
-             drop one of them",
+            "`required` and `optional` are both true; a module without which the node does not start cannot be left \
+             out, drop one of them",
         );
     }
     required
@@ -331,7 +332,8 @@ fn spin(item: &Item<'_>) -> Option<Duration> {
     }
     let (spin, most) = (duration_text(spin), duration_text(SPIN_MAX));
     item.report(format!(
-        "`spin` is \"{spin}\"; write at most \"{most}\", such as `spin = \"20 us\"`: it keeps a processor busy all that time"
+        "`spin` is \"{spin}\"; write at most \"{most}\", such as `spin = \"20 us\"`: it keeps a processor busy all \
+         that time"
     ));
     None
 }

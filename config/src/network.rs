@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Required choice of a file with several nodes.
-const CHOICES: &str = "write `security = \"keys\"` (what passes between nodes is sealed; `rohrpost keys new` makes what it takes), or \
-                       `security = \"none\"` (it is neither sealed nor signed, and anyone on the network may read and send)";
+const CHOICES: &str = "write `security = \"keys\"` (what passes between nodes is sealed; `rohrpost keys new` makes \
+                       what it takes), or `security = \"none\"` (it is neither sealed nor signed, and anyone on the \
+                       network may read and send)";
 const PORT: u16 = 21_117;
 const MTU: i64 = 1500;
 const MTUS: RangeInclusive<i64> = 576..=65_535;

@@ -50,7 +50,8 @@ pub struct Tcp {
 
 impl Tcp {
     /// Security note that `check` and each start of a client or the server print.
-    pub const UNPROTECTED: &str = "security = \"none\": packages to and from the TCP router are neither sealed nor signed, and whoever reaches its port may take part; use a \
+    pub const UNPROTECTED: &str = "security = \"none\": packages to and from the TCP router are neither sealed nor \
+                                   signed, and any computer that reaches its port may take part; use a \
          network that nobody else reaches";
 
     /// Security note of `check`.
@@ -78,11 +79,12 @@ impl Tcp {
         let certificates = certificates(&section, is_sealed);
         let address = section.required("address", "address = \"192.168.0.1\"").and_then(|item| {
             let text = item.text("192.168.0.1")?;
-            let address = text.parse::<IpAddr>().ok().filter(|address| !address.is_unspecified() && !address.is_multicast());
+            let address =
+                text.parse::<IpAddr>().ok().filter(|address| !address.is_unspecified() && !address.is_multicast());
             if address.is_none() {
                 item.report(format!(
-                    "`address` \"{text}\" is not the IP address of one computer; write numbers, such as `address = \"192.168.0.1\"`: a robot \
-                     must not wait for a name server"
+                    "`address` \"{text}\" is not the IP address of one computer; write numbers, such as `address = \
+                     \"192.168.0.1\"`: a robot must not wait for a name server"
                 ));
             }
             if let Some((address, tdma)) = address.zip(tdma).filter(|(address, _)| is_on_lan(*address, nodes)) {
@@ -97,8 +99,8 @@ impl Tcp {
             let known: Vec<String> = nodes.iter().map(|node| format!("`{}`", node.name)).collect();
             if !nodes.iter().any(|node| node.name == name) {
                 item.report(format!(
-                    "`server` is \"{name}\", and there is no such node; write one of {}, or drop `server` if another installation runs \
-                     the TCP router",
+                    "`server` is \"{name}\", and there is no such node; write one of {}, or drop `server` if another \
+                     installation runs the TCP router",
                     known.join(", ")
                 ));
             }
@@ -160,7 +162,8 @@ fn is_on_lan(address: IpAddr, nodes: &[Node]) -> bool {
 fn beside_slots(tdma: &Tdma) -> String {
     let right = match &tdma.tunnel {
         Some(tunnel) => format!(
-            "write that of the TCP router's node in the tunnel of [tdma], {} for the first node of the file, or one on another network",
+            "write that of the TCP router's node in the tunnel of [tdma], {} for the first node of the file, or one on \
+             another network",
             tunnel.address(0)
         ),
         None => "give [tdma] a `tunnel` and write an address in it, or one on another network".into(),
@@ -180,8 +183,8 @@ pub(crate) fn validate(file: &Section<'_>, classes: &ClassTable, scheduling: Sch
         Some(class) if matches!(scheduling.of(class), Scheduling::Fifo { .. }) => file.reader.report(
             line,
             format!(
-                "[classes]: class `tcp` has id {}, which is real time, and what goes beyond the LAN must not keep the LAN waiting; \
-                 give it an id below {}",
+                "[classes]: class `tcp` has id {}, which is real time, and what goes beyond the LAN must not keep the \
+                 LAN waiting; give it an id below {}",
                 class.0, scheduling.real_time_from
             ),
         ),
@@ -196,8 +199,8 @@ pub(crate) fn validate_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Nod
     let Some(node) = nodes.iter().find(is_beyond) else { return };
     let Some(tcp) = tcp else {
         let what = format!(
-            "node `{}`: `network = \"tcp\"`: the others are reached through the TCP router, and there is none; add `[tcp]`, or drop \
-             `network` and write an `address`",
+            "node `{}`: `network = \"tcp\"`: the others are reached through the TCP router, and there is none; add \
+             `[tcp]`, or drop `network` and write an `address`",
             node.name
         );
         return file.reader.report(node.line, what);
@@ -217,8 +220,8 @@ pub(crate) fn validate_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Nod
     file.reader.report(
         line,
         format!(
-            "[tcp]: `server` names no node that is there without the TCP router, and node `{}`, with `network = \"tcp\"`, has the time of \
-             that node; {right}",
+            "[tcp]: `server` names no node that is there without the TCP router, and node `{}`, with `network = \
+             \"tcp\"`, has the time of that node; {right}",
             node.name
         ),
     );
@@ -231,8 +234,8 @@ fn validate_names(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
     }
     for node in nodes.iter().filter(|node| node.name.len() > LABEL_MAX || node.name.ends_with('-')) {
         let what = format!(
-            "[nodes]: `{}` fits in no certificate, of which `security = \"tls\"` in [tcp] makes use; take a name of {LABEL_MAX} letters at most \
-             that does not end in `-`",
+            "[nodes]: `{}` fits in no certificate, of which `security = \"tls\"` in [tcp] makes use; take a name of \
+             {LABEL_MAX} letters at most that does not end in `-`",
             node.name
         );
         file.reader.report(node.line, what);

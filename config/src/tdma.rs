@@ -57,10 +57,10 @@ fn read_tunnel(item: &Item<'_>, nodes: &[Node]) -> Option<Tunnel> {
     };
     if let Some(node) = nodes.iter().find(is_inside) {
         item.report(format!(
-                "`tunnel` \"{text}\" holds the address of node `{}`, where the slots themselves go; write a network of its own, \
-                 such as \"10.78.0.0/24\"",
-                node.name
-            ));
+            "`tunnel` \"{text}\" holds the address of node `{}`, where the slots themselves go; write a network of \
+                 its own, such as \"10.78.0.0/24\"",
+            node.name
+        ));
     }
     Some(Tunnel { network: begin, prefix })
 }
@@ -87,9 +87,9 @@ pub(crate) fn read(file: &Section<'_>, slots: Vec<Section<'_>>, nodes: &[Node]) 
     }
     let Some(section) = section else {
         file.report(
-                "section `[tdma]` is missing; with `mode = \"tdma\"` add `[tdma]` with `cycle = \"5 ms\"` and `link = \"100 Mbit/s\"`, \
-                 and a `[[slot]]` for each node",
-            );
+            "section `[tdma]` is missing; with `mode = \"tdma\"` add `[tdma]` with `cycle = \"5 ms\"` and `link = \
+                 \"100 Mbit/s\"`, and a `[[slot]]` for each node",
+        );
         return None;
     };
     let cycle = section.required("cycle", "cycle = \"5 ms\"").and_then(|item| read_cycle(&item));
@@ -150,10 +150,19 @@ fn read_slot(section: Section<'_>, nodes: &[Node]) -> Option<(TimeSlot, usize)> 
         && *read >= period
     {
         item.report(if period == 1 {
-                format!("`phase` {read} says in which of several cycles the slot is, but it is in each; write `period = {}` or more, or drop `phase`", read + 1)
-            } else {
-                format!("`phase` is {read}, but of {period} cycles the last is {}; write 0 to {}, or a longer `period`", period - 1, period - 1)
-            });
+            format!(
+                "`phase` {read} says in which of several cycles the slot is, but it is in each; write `period \
+                         = {}` or more, or drop `phase`",
+                read + 1
+            )
+        } else {
+            format!(
+                "`phase` is {read}, but of {period} cycles the last is {}; write 0 to {}, or a longer \
+                         `period`",
+                period - 1,
+                period - 1
+            )
+        });
     }
     let line = section.line;
     section.finish();

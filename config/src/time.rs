@@ -54,8 +54,8 @@ impl TimeSource {
         let Some(section) = section else {
             if several {
                 file.report(
-                    "section `[time]` is missing; with several nodes one of them is the master of time: add `[time]` with \
-                     `source = \"master\"`",
+                    "section `[time]` is missing; with several nodes one of them is the master of time: add `[time]` \
+                     with `source = \"master\"`",
                 );
             }
             return Self::default();
@@ -72,17 +72,21 @@ impl TimeSource {
         let is_master = matches!(source, Self::Master { .. });
         match &item {
             Some(item) if is_master && nodes.len() == 1 => {
-                item.report("`source` is \"master\", and there is one node on the LAN; write \"local\", or add the other nodes");
+                item.report(
+                    "`source` is \"master\", and there is one node on the LAN; write \"local\", or add the \
+                             other nodes",
+                );
             }
             Some(item) if several && !is_master => item.report(
-                "`source`: with several nodes one of them is the master of time, and no other source reaches all of them; write \
-                 `source = \"master\"`",
+                "`source`: with several nodes one of them is the master of time, and no other source reaches all of \
+                 them; write `source = \"master\"`",
             ),
             None if several => section.report("`source` is missing; with several nodes write `source = \"master\"`"),
             Some(item) if matches!(source, Self::Simulation { .. } | Self::Log) => {
                 if let Some(node) = beyond {
                     item.report(format!(
-                        "`source`: the time of node `{}` comes by TCP, in which only clocks of computers can be told; write \"local\"",
+                        "`source`: the time of node `{}` comes by TCP, in which only clocks of computers can be told; \
+                         write \"local\"",
                         node.name
                     ));
                 }
@@ -103,7 +107,8 @@ impl TimeSource {
                 (Some(cycle), None) => cycle,
                 (Some(cycle), Some(own)) => {
                     own.report(format!(
-                        "`interval`: with time slots the master synchronises once a cycle, {}, as `cycle` of [tdma] says; drop `interval`",
+                        "`interval`: with time slots the master synchronises once a cycle, {}, as `cycle` of [tdma] \
+                         says; drop `interval`",
                         duration_text(cycle)
                     ));
                     cycle

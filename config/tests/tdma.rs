@@ -37,7 +37,7 @@ fn what_leaves_in_slots_may_be_sealed_and_takes_longer() {
     let worst =
         |text: &str| -> Duration { bounds(&parse(text)).into_iter().map(|bound| bound.latency.unwrap().latency).sum() };
     assert!(sealed != open && worst(&sealed) > worst(open));
-    assert_ne!(parse(&sealed).digest(), parse(open).digest(), "who seals has nothing to do with who does not");
+    assert_ne!(parse(&sealed).digest(), parse(open).digest(), "a node that seals does not talk to one that does not");
 }
 
 #[test]
@@ -189,7 +189,8 @@ fn no_more_flows_of_a_node_are_declared_than_its_router_has_room_for() {
         };
         let flow = |n| {
             format!(
-                "[[flow]]\nfrom = \"laser.0\"\nto = \"pilot.{n}\"\nsize = \"8 B\"\nperiod = \"400 ms\"\ndeadline = \"400 ms\"\n"
+                "[[flow]]\nfrom = \"laser.0\"\nto = \"pilot.{n}\"\nsize = \"8 B\"\nperiod = \"400 ms\"\ndeadline = \
+                 \"400 ms\"\n"
             )
         };
         let subscribers: String = (1..=count).map(subscriber).collect();

@@ -1,7 +1,7 @@
 //! Declared flows that leave a node, and the measured delays of their packages.
 //!
 //! ```text
-//!  published ──▶ transit mailbox ─▶ queue ─▶ slot ─▶ handed over ──▶ wire ──▶ switch ──▶ last bit at the other computer
+//!  published ──▶ transit mailbox ─▶ queue ─▶ slot ─▶ handed over ──▶ wire ──▶ switch ──▶ last bit at the receiver
 //!     └───────────── by the sender's clock ─────────────┘ └──── lead, bytes of the link ───┘
 //! ```
 //!

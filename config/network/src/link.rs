@@ -1,4 +1,4 @@
-//! What packages and the routers' own datagrams take of a link.
+//! Transmission times of packages and of the routers' own datagrams on a link.
 
 use crate::setup::{Network, Security};
 use crate::sizes::{
@@ -8,14 +8,13 @@ use crate::sizes::{
 use crate::table::{LATE, Tdma};
 use rohrpost_mailbox::HEAD_BYTES as PACKAGE_HEAD_BYTES;
 
-/// What of time goes in the windows of a system with time slots: the rule by which clocks send, and bounds are
-/// computed.
+/// Frames of time in the windows of a system with time slots: the rule for clocks, and for bounds.
 ///
 /// In each of its synchronisation windows the master sends a Sync to every other node. If the window has room for twice
-/// as many frames, a warm-up goes before each of them; if it has room for a reply to each besides, replies go there
-/// too, and nowhere else; otherwise in slots of the master, before all else. A slave sends a warm-up and a request in a
-/// slot, before all else, at most once in a cycle; who hears no master a request to each master. A window has room for
-/// what is through before its guard also when it is begun [`LATE`].
+/// as many frames, a warm-up goes before each of them. If it has room for a reply to each besides, replies go there
+/// only, else in slots of the master, before all else. A slave sends a warm-up and a request in a slot, before all
+/// else, at most once in a cycle. A node that hears no master sends a request to each master. A window has room for
+/// frames that end before its guard even if it begins [`LATE`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TimeShare {
     /// A warm-up goes before each Sync.

@@ -95,9 +95,10 @@ impl Page<'_> {
         self.entry(
             "",
             &format!(
-                "slots: of its node that begin while it waits; waits: until the last of them; others: what goes before it meanwhile; \
-                 itself: its own datagrams. In \"at worst\" besides: {said} said by routers in a slot, {} by which it may be begun late, what \
-                 else is in the last datagram, and that once more through a switch.",
+                "slots: of its node that begin while it waits; waits: until the last of them; others: what goes before \
+                 it meanwhile; itself: its own datagrams. In \"at worst\" besides: {said} said by routers in a slot, \
+                 {} by which it may be begun late, what else is in the last datagram, and that once more through a \
+                 switch.",
                 duration_text(LATE)
             ),
         );

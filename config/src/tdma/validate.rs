@@ -70,7 +70,7 @@ impl<'a> Validator<'a> {
         self.reader.report(self.lines.table, format!("[tdma]: {message}"));
     }
 
-    fn whose(&self, slot: usize) -> String {
+    fn described(&self, slot: usize) -> String {
         let (TimeSlot { node, offset, .. }, line) = (self.tdma.slots[slot], self.lines.slots[slot]);
         format!("that of `{}` at {} (line {line})", self.node_name(node), duration_decimal(offset))
     }
@@ -92,7 +92,8 @@ impl<'a> Validator<'a> {
         if self.fixed.cycle > SLOT_WITHIN {
             let (cycle, most) = (duration_decimal(self.fixed.cycle), duration_decimal(SLOT_WITHIN));
             self.report_table(format!(
-                "`cycle` {cycle} is so long that nodes would take each other for silent in between; write `cycle = \"{most}\"` or less"
+                "`cycle` {cycle} is so long that nodes would take each other for silent in between; write `cycle = \
+                 \"{most}\"` or less"
             ));
             self.fixed.cycle = SLOT_WITHIN;
         }
@@ -112,8 +113,8 @@ impl<'a> Validator<'a> {
         } else {
             let way = duration_decimal(round_up(way));
             format!(
-                "is too short for such a link: who joins takes it that a frame of time passes two links within a quarter of it, and that takes \
-                 {way}"
+                "is too short for such a link: a joining node assumes that a frame of time passes two links within a \
+                 quarter of it, and that takes {way}"
             )
         };
         self.fixed.guard = least;
@@ -133,10 +134,10 @@ impl<'a> Validator<'a> {
         let right = guard.checked_sub(round_up(lacking.unwrap_or_default()));
         let Some(right) = right.filter(|right| *right >= least.max(GUARD)) else { return };
         self.report_table(format!(
-            "`guard` {} is too long for such slots: {} has no room for what routers say to each other and one largest datagram, and none to \
-             grow; write `guard = \"{}\"`",
+            "`guard` {} is too long for such slots: {} has no room for what routers say to each other and one largest \
+             datagram, and none to grow; write `guard = \"{}\"`",
             duration_decimal(guard),
-            self.whose(cramped),
+            self.described(cramped),
             duration_decimal(right)
         ));
         self.fixed.guard = right;
@@ -151,8 +152,8 @@ impl<'a> Validator<'a> {
         let needed = self.synchronisation_min();
         if self.fixed.synchronisation < needed {
             self.report_table(format!(
-                "`synchronisation` {} has no room for a warm-up and a Sync to each of {} other nodes before its guard; write \
-                 `synchronisation = \"{}\"` or more",
+                "`synchronisation` {} has no room for a warm-up and a Sync to each of {} other nodes before its guard; \
+                 write `synchronisation = \"{}\"` or more",
                 duration_decimal(self.fixed.synchronisation),
                 self.plan.link.others(),
                 duration_decimal(needed)
@@ -198,8 +199,9 @@ impl<'a> Validator<'a> {
             let or_earlier = self.moved(index).map_or_else(String::new, |place| format!("{place}, or "));
             let (end, once) = (duration_decimal(end), self.once_longer(index));
             self.report(index, format!(
-                "ends {end} after the cycle begins{once}, and until then a node that joins knows the time to {known} only, which is more than half of \
-                 the guard: it could never send; write {or_earlier}`guard = \"{least}\"` or more in [tdma]"
+                "ends {end} after the cycle begins{once}, and until then a node that joins knows the time to {known} \
+                 only, which is more than half of the guard: it could never send; write {or_earlier}`guard = \
+                 \"{least}\"` or more in [tdma]"
             ));
         }
     }

@@ -2,9 +2,9 @@
 //!
 //! ```text
 //!  0     2    3    4       5     6     7  8        16            24         32      36
-//! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬───────┬──────────────────────────────────┐
-//! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ check │ content by kind                  │
-//! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴───────┴──────────────────────────────────┘
+//! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬───────┬─────────────────────────────┐
+//! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ check │ content by kind             │
+//! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴───────┴─────────────────────────────┘
 //!  packages: (package head 16, body) over and over
 //!  fragment: first u64, index u16, count u16, offset u32, package head, bytes
 //!  alive: incarnation u64 and next sequence u64 of the peer as heard here, datagrams of it that were missed u64

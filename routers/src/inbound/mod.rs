@@ -1,8 +1,8 @@
 //! Datagrams from other nodes: checks of sender, loss and duplicates, and delivery.
 //!
 //! ```text
-//!  datagram ─▶ ours? ─▶ our digest? ─▶ this incarnation? ─▶ not seen yet? ─┬─ packages ──────────────┬─▶ in order? ─▶ deliver
-//!              foreign  refused, told so   old               duplicate      └─ fragment ─▶ Reassembly ┘   late
+//!  datagram ─▶ ours? ─▶ our digest? ─▶ this incarnation? ─▶ not seen yet? ─┬─ packages ──────────┬─▶ in order? ─▶ deliver
+//!              foreign  refused, told so   old               duplicate      └ fragment ▶ Reassembly ┘   late
 //! ```
 
 mod doubt;

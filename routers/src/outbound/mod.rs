@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  accept: route ─ age ─ peer there? ─┬─ nothing waits, may leave now ──▶ at once, without a copy
-//!                                     └─ Queue ──▶ poll: first level first, with all for that peer that fits; fragments
+//!                                     └─ Queue ──▶ poll: first level first, and all that fits for that peer
 //! ```
 //!
 //! Each accepted package is sent or lost with a cause; see [`Stats`].

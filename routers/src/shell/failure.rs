@@ -76,15 +76,18 @@ impl Failure {
         match self {
             Self::NobodyThere => "nobody listens at its port; does its router run?",
             Self::NoWay => {
-                "there is no way to its address; is the network up, and does a firewall forbid it? (`ip route get ADDRESS`)"
+                "there is no way to its address; is the network up, and does a firewall forbid it? (`ip route get \
+                 ADDRESS`)"
             }
             Self::TooLong => "the datagram was too long for the network; lower `mtu` in [network], on all nodes",
             Self::NoRoom => {
-                "the kernel had no room; lower `rate` in [network], or with time slots `link` in [tdma], to what the network can carry"
+                "the kernel had no room; lower `rate` in [network], or with time slots `link` in [tdma], to what the \
+                 network can carry"
             }
             Self::OverflowPolicy => {
-                "its device has not sent what it was given before; does it stand still, or carry less than `rate` in [network], or with time slots \
-                 `link` in [tdma], says (`ethtool DEVICE`), and is net.core.wmem_max enough for a slot (`sysctl`)?"
+                "its device has not sent what it was given before; does it stand still, or carry less than `rate` in \
+                 [network], or with time slots `link` in [tdma], says (`ethtool DEVICE`), and is net.core.wmem_max \
+                 enough for a slot (`sysctl`)?"
             }
             Self::Unacquainted => "its router has not shown yet that it has the same key",
             Self::Other => "the kernel refused it",

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  datagram ─▶ source address among the nodes'? ─┬─ yes ─▶ the socket's queue ─▶ its reader wakes
-//!                                                └─ no: dropped in the kernel, before any thread runs, and counted there
+//!                                                └─ no: dropped and counted in the kernel, no thread runs
 //! ```
 //!
 //! A program of the classic packet filter: it needs no rights, and costs some nanoseconds a datagram. It checks the

@@ -89,7 +89,8 @@ pub enum ShellError {
     NoTime,
     /// The configuration demands sealed datagrams and there is no key, or the other way round.
     #[error(
-        "configuration says `security = \"keys\"`, and the router was given no keys; or it says `none`, and there are some"
+        "configuration says `security = \"keys\"`, and the router was given no keys; or it says `none`, and there are \
+         some"
     )]
     Keys,
     /// No unused incarnation number was found.
@@ -253,8 +254,8 @@ impl Shell {
             shell.begin("tx_thread", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                     tracing::warn!(
-                        "the router's threads run as modules do, and not before them: {error}; allow it with a limit `rtprio` of {} \
-                         for this user (limits.conf) or CAP_SYS_NICE",
+                        "the router's threads run as modules do, and not before them: {error}; allow it with a limit \
+                         `rtprio` of {} for this user (limits.conf) or CAP_SYS_NICE",
                         threads::ARRIVALS_FIFO
                     );
                 }

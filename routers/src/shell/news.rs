@@ -15,19 +15,20 @@ pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
             frame::VERSION
         ),
         (Reason::Digest, Some(theirs)) => format!(
-            "its configuration has the digest {theirs:016x}, this node's {digest:016x}; launch all nodes from the same file \
-             (`rohrpost check`, on both)"
+            "its configuration has the digest {theirs:016x}, this node's {digest:016x}; launch all nodes from the same \
+             file (`rohrpost check`, on both)"
         ),
         (Reason::Digest, None) => {
             format!("its configuration is another than this node's, {digest:016x}; launch all nodes from the same file")
         }
         (Reason::Sealed, _) => {
-            "one of both seals what it sends (`security = \"keys\"`), the other does not (`security = \"none\"`); launch all nodes from the \
-             same file"
+            "one of both seals what it sends (`security = \"keys\"`), the other does not (`security = \"none\"`); \
+             launch all nodes from the same file"
                 .into()
         }
-        (Reason::Key, _) => "what comes from its address is sealed with another key than this node's; copy the folder of keys from the first \
-                             computer of the installation to this one or to that (`rohrpost keys show`, on both, tells which differ)"
+        (Reason::Key, _) => "what comes from its address is sealed with another key than this node's; copy the folder \
+                             of keys from the first computer of the installation to this one or to that (`rohrpost \
+                             keys show`, on both, tells which differ)"
             .into(),
         (Reason::Stranger, _) => {
             "its packages come from another address than the configuration has for it, or are for another \
@@ -56,7 +57,8 @@ impl News {
             Event::Heard { peer } => tracing::info!("{} is heard", self.node(peer)),
             Event::Restarted { peer } => tracing::info!("the router of {} was started anew", self.node(peer)),
             Event::Silent { peer } => tracing::warn!(
-                "{} is silent: nothing came for a second; is it on, does its router run, and does the network reach it?",
+                "{} is silent: nothing came for a second; is it on, does its router run, and does the network reach \
+                 it?",
                 self.node(peer)
             ),
             Event::Unheard { peer } => tracing::warn!(
@@ -77,7 +79,8 @@ impl News {
                 tracing::warn!("takes nothing from {from}: {why} (datagrams: {datagrams})");
             }
             Event::Twice { peer } => tracing::error!(
-                "two routers send as {}: its address is used twice, or an old router there did not end; end one of them",
+                "two routers send as {}: its address is used twice, or an old router there did not end; end one of \
+                 them",
                 self.node(peer)
             ),
         }

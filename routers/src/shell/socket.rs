@@ -40,14 +40,14 @@ const PAUSE: Duration = Duration::from_millis(1);
 pub enum SocketError {
     /// Another process uses it.
     #[error(
-        "{0} is in use: does the router of this node run already, its launch (which keeps this for it), or another program? Stop it, or choose another `port` in \
-         [network], the same on all nodes"
+        "{0} is in use: does the router of this node run already, its launch (which keeps this for it), or another \
+         program? Stop it, or choose another `port` in [network], the same on all nodes"
     )]
     InUse(SocketAddr),
     /// It is another computer's address.
     #[error(
-        "{0} is no address of this computer: launch this node on the computer that has it, or correct its `address` in the \
-         configuration (`ip addr` shows which there are)"
+        "{0} is no address of this computer: launch this node on the computer that has it, or correct its `address` in \
+         the configuration (`ip addr` shows which there are)"
     )]
     NotHere(SocketAddr),
     /// The inherited socket is not bound to the router's address.

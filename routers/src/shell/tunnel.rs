@@ -112,7 +112,8 @@ pub(super) struct In {
 #[derive(Debug, thiserror::Error)]
 pub(super) enum TunnelError {
     #[error(
-        "{0}; it needs CAP_NET_ADMIN, and /dev/net/tun (`modprobe tun`; in a container `--cap-add=NET_ADMIN --device /dev/net/tun`)"
+        "{0}; it needs CAP_NET_ADMIN, and /dev/net/tun (`modprobe tun`; in a container `--cap-add=NET_ADMIN --device \
+         /dev/net/tun`)"
     )]
     Device(#[from] io::Error),
     #[error(transparent)]

@@ -3,8 +3,8 @@
 //!
 //! ```text
 //!  transit mailbox ─┬▶ accept ─┬─ at once: head of the frame + body without a copy ─▶ one sendmsg
-//!                   │          └─ queue ─▶ poll ─▶ datagram ─▶ socket of the peer      between any two, the mailbox is checked
-//!                   └▶ not real time: a batch, as long as there is an empty one; else it stays in the mailbox, and rings nothing.
+//!                   │          └─ queue ─▶ poll ─▶ datagram ─▶ socket of the peer      mailbox checked between any two
+//!                   └▶ not real time: a batch, if there is an empty one; else it stays in the mailbox, without a ring.
 //!                      With a claimed priority above the permitted one it is lost to its quota
 //! ```
 

@@ -27,8 +27,9 @@
 //!    heard.
 //!    Spin until [`Planned::call_ns`].
 //! 3. [`SlotScheduler::validate`]. With a [`TransmitWindow`]: as long as a datagram of time fits,
-//!    [`Clock::poll_in`](crate::time::Clock::poll_in) with [`TransmitWindow::allowed`], until it waits. Then keep-alives,
-//!    then packages. Ask [`TransmitWindow::room_bytes`] before each datagram, and call [`TransmitWindow::takes`] for it.
+//!    [`Clock::poll_in`](crate::time::Clock::poll_in) with [`TransmitWindow::allowed`], until it waits. Then
+//!    keep-alives, then packages. Ask [`TransmitWindow::room_bytes`] before each datagram, and call
+//!    [`TransmitWindow::takes`] for it.
 //!    At last [`SlotScheduler::close`].
 //! 4. The kernel's stamp of the first datagram of a window goes to [`SlotScheduler::left`].
 

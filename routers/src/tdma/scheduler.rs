@@ -44,8 +44,8 @@ pub struct Planned {
 pub enum Silent {
     /// There are nodes of another configuration, so with another table; which, see [`Clock::parted_by`].
     #[error(
-        "{} goes by another configuration, of digest {digest:016x} (this node's: {own:016x}); launch all nodes from the \
-         same file",
+        "{} goes by another configuration, of digest {digest:016x} (this node's: {own:016x}); launch all nodes from \
+         the same file",
         named(*node)
     )]
     OtherTable {

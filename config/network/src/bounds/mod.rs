@@ -74,7 +74,8 @@ pub enum Unbounded {
     TooShort,
     /// The demand exceeds the capacity.
     #[error(
-        "with all that goes before it, it asks for {asked_permille} thousandths of the time, and the slots carry {carried_permille}"
+        "with all that goes before it, it asks for {asked_permille} thousandths of the time, and the slots carry \
+         {carried_permille}"
     )]
     TooMuch {
         /// Demand of this flow and all before it, in thousandths of the link's time.

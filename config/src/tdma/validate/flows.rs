@@ -20,8 +20,8 @@ impl Validator<'_> {
             );
             let text = |name| self.installation.classes.format(name);
             let message = format!(
-                "[[flow]] from `{}` to `{}`: `period` {} is less than the {} that a package must be there before its slot, and a cycle is {}; put \
-                 what comes meanwhile into one package, and write {right}",
+                "[[flow]] from `{}` to `{}`: `period` {} is less than the {} that a package must be there before its \
+                 slot, and a cycle is {}; put what comes meanwhile into one package, and write {right}",
                 text(flow.from),
                 text(flow.to),
                 duration_decimal(flow.period),
@@ -62,12 +62,12 @@ impl Validator<'_> {
         match self.plan.remedy(self.tdma, flow) {
             Remedy::Longer(slot, longer) => {
                 let by = duration_decimal(longer.length - self.tdma.slots[slot].length);
-                let (whose, length) = (self.whose(slot), duration_decimal(longer.length));
-                format!("lengthen {whose} by {by}: `length = \"{length}\"`")
+                let (described, length) = (self.described(slot), duration_decimal(longer.length));
+                format!("lengthen {described} by {by}: `length = \"{length}\"`")
             }
             Remedy::Oftener(slot, oftener) => {
                 let period = period_text(&oftener, &self.tdma.slots[slot]);
-                format!("let {} come oftener: {period}", self.whose(slot))
+                format!("let {} come oftener: {period}", self.described(slot))
             }
             Remedy::Another(slot) => {
                 let (offset, length) = (duration_decimal(slot.offset), duration_decimal(slot.length));
@@ -98,8 +98,8 @@ impl Validator<'_> {
             let bytes: u64 = own().map(|flow| kept_bytes(flow.size)).sum();
             if let Some(flow) = own().next().filter(|_| bytes > quota) {
                 let message = format!(
-                    "[[flow]]s of `{}`: {} of them may wait at once, and its router keeps {} of a sender; write `quota = \"{}\"` in \
-                     [network]",
+                    "[[flow]]s of `{}`: {} of them may wait at once, and its router keeps {} of a sender; write `quota \
+                     = \"{}\"` in [network]",
                     self.installation.classes.format(module.name),
                     size_text(bytes.next_multiple_of(1 << 10)),
                     size_text(quota),
@@ -132,7 +132,9 @@ impl Validator<'_> {
             let most = under_way.min(behind_half + u128::from(TRANSIT.slots / 2));
             if let Some((flow, _)) = own().next().filter(|_| most > TRANSIT.slots.into()) {
                 let message = format!(
-                    "[[flow]]s from `{}`: {most} of their packages may wait for its slots at once, and the mailbox of its router holds {}; declare fewer, with one package for what goes to one module, or let slots of `{}` come oftener",
+                    "[[flow]]s from `{}`: {most} of their packages may wait for its slots at once, and the mailbox of \
+                     its router holds {}; declare fewer, with one package for what goes to one module, or let slots of \
+                     `{}` come oftener",
                     node.name, TRANSIT.slots, node.name
                 );
                 self.reader.report(self.installation.flows[flow].line, message);

@@ -20,7 +20,8 @@ impl Validator<'_> {
                 format!("is {length} long, all of it guard: nobody ever sends in the last {guard} of a slot")
             } else {
                 format!(
-                    "is {length} long, {guard} of it guard, which leaves no room for what routers say to each other and one largest datagram"
+                    "is {length} long, {guard} of it guard, which leaves no room for what routers say to each other \
+                     and one largest datagram"
                 )
             };
             let lacking = duration_decimal(needed - slot.length);
@@ -77,8 +78,8 @@ impl Validator<'_> {
                 format!("write {shorter_text}")
             };
             let (over, when) = (duration_decimal(a.end() - b.offset), when.unwrap_or_default());
-            let (whose, once) = (self.whose(first), self.once_longer(first));
-            self.report(second, format!("begins {over} before {whose} ends{once}{when}; {right}"));
+            let (first_text, once) = (self.described(first), self.once_longer(first));
+            self.report(second, format!("begins {over} before {first_text} ends{once}{when}; {right}"));
         }
     }
 

@@ -34,7 +34,8 @@ proptest! {
         wire in prop::collection::vec(wire(), 64),
     ) {
         let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
-        let (mut now_ns, mut busy_ns, mut on_wire, mut left, mut lost_on_wire) = (START, START, Vec::new(), 0usize, 0u64);
+        let (mut now_ns, mut busy_ns) = (START, START);
+        let (mut on_wire, mut left, mut lost_on_wire) = (Vec::new(), 0usize, 0u64);
         let mut bodies = HashMap::new();
         let mut steps = packages.into_iter();
         loop {
