@@ -1,8 +1,6 @@
 //! Walks the parsed TOML with its places in the file, and collects every problem instead of stopping at the first.
 //!
-//! A [`Section`] is asked for its keys one by one; keys that were asked for are known, so that [`Section::finish`]
-//! reports all others. A wrong value is reported and read as missing. The defaults in its place never leave this crate,
-//! since a file with problems gives no installation.
+//! Keys that a [`Section`] was asked for are known: [`Section::finish`] reports others. Wrong ones read as missing.
 
 use crate::errors::Problem;
 use crate::units;

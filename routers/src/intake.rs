@@ -3,7 +3,7 @@
 //! ```text
 //!  between slots                             shortly before the call              in the slot, before each datagram
 //!  all stays in the mailbox; if that has     as much as the slot has room for,    a few that leave next; others while
-//!  more than half of its slots full: ─▶      the most important first: ─▶         the wire is busy, if it fits: ─▶  queue
+//!  more than half of its slots full: ─▶      the most important first: ─▶         the wire is busy: ─▶             queue
 //! ```
 //!
 //! The mailbox outlives a killed router, the queue does not: so packages wait for a slot in the mailbox. A flood is

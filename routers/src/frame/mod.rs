@@ -5,22 +5,19 @@
 //! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬───────┬─────────────────────────────┐
 //! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ check │ content by kind             │
 //! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴───────┴─────────────────────────────┘
-//!  packages: (package head 16, body) over and over
-//!  fragment: first u64, index u16, count u16, offset u32, package head, bytes
+//!  packages: (head 16, body) repeated     fragment: first u64, index u16, count u16, offset u32, package head, bytes
 //!  alive: incarnation u64 and next sequence u64 of the peer as heard here, datagrams of it that were missed u64
 //!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
 //!  byte 7: key of the seal over the content, 0: none, see `security`; hello: always sealed
 //! ```
 //!
-//! All fields of frames are little-endian; the head of a package has the order that its options state. The check is the
-//! CRC-32 of zlib over all other bytes: a flipped bit that the 16 bits of UDP let pass must not look like a restarted
-//! router.
+//! Little-endian; a package head has the order of its options. The check is the CRC-32 of zlib over all other bytes.
 
 use crate::broken::broken;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 pub use rohrpost_network::{ALIVE_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES as HEAD_BYTES, REFUSAL_BYTES};
 
-/// Version of this format. The first four bytes, the check and a refusal mean the same in all versions.
+/// Version of this format. The first four bytes, the check and a refusal are the same in all.
 pub const VERSION: u8 = 1;
 /// Fragments of a package, at most: one of 64 KiB in the smallest datagrams has fewer.
 pub const PARTS_MAX: u16 = 256;
@@ -250,7 +247,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Packages of a datagram; an iterator over them. Checked as a whole: at least one, none cut short, nothing behind.
+/// Iterator over the packages of a datagram. Checked as a whole: at least one, none cut short, nothing behind.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Packages<'a> {
     rest: &'a [u8],
@@ -288,7 +285,7 @@ fn split_package(bytes: &[u8]) -> Option<(Head, &[u8], &[u8])> {
 /// A fragment of a package that does not fit in a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Fragment<'a> {
-    /// Sequence of the datagram with the first fragment: it identifies the package, and is its place in the order.
+    /// Sequence of the datagram with the first fragment: identifies the package, and its place in the order.
     pub first: u64,
     /// Index of the fragment, from 0.
     pub index: u16,
@@ -349,7 +346,7 @@ impl<'a> Fragment<'a> {
     }
 }
 
-/// Keep-alive, and what was heard of the receiver. It reveals one-way links, and losses at the end of a burst.
+/// Keep-alive with a report on the receiver: reveals one-way links, and losses at the end of a burst.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Alive {
     /// The receiver's incarnation that is heard; 0: none.

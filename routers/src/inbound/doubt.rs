@@ -16,12 +16,12 @@ const WITHIN_NS: u64 = 2_000_000_000;
 /// Doubted claims of one peer.
 #[derive(Debug, Default)]
 pub(super) struct Doubt {
-    said: [Said; KEPT],
+    claims: [Claim; KEPT],
     next: usize,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Said {
+struct Claim {
     /// 0: nothing.
     incarnation: u64,
     sequence: u64,
@@ -33,15 +33,16 @@ impl Doubt {
     /// reordered. If none has, this one is remembered.
     pub(super) fn is_confirmed(&mut self, now_ns: u64, head: &FrameHead) -> bool {
         let says_so =
-            |said: &Said| said.incarnation == head.incarnation && said.sequence.abs_diff(head.sequence) < WINDOW;
-        let known = self.said.iter().position(|said| says_so(said) && now_ns.saturating_sub(said.at_ns) <= WITHIN_NS);
-        if let Some(place) = known.filter(|place| self.said[*place].sequence != head.sequence) {
-            self.said[place] = Said::default();
+            |claims: &Claim| claims.incarnation == head.incarnation && claims.sequence.abs_diff(head.sequence) < WINDOW;
+        let known =
+            self.claims.iter().position(|claims| says_so(claims) && now_ns.saturating_sub(claims.at_ns) <= WITHIN_NS);
+        if let Some(place) = known.filter(|place| self.claims[*place].sequence != head.sequence) {
+            self.claims[place] = Claim::default();
             return true;
         }
         let place = known.unwrap_or(self.next);
         self.next = if known.is_none() { (self.next + 1) % KEPT } else { self.next };
-        self.said[place] = Said { incarnation: head.incarnation, sequence: head.sequence, at_ns: now_ns };
+        self.claims[place] = Claim { incarnation: head.incarnation, sequence: head.sequence, at_ns: now_ns };
         false
     }
 }

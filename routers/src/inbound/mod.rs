@@ -1,8 +1,8 @@
 //! Datagrams from other nodes: checks of sender, loss and duplicates, and delivery.
 //!
 //! ```text
-//!  datagram ─▶ ours? ─▶ our digest? ─▶ this incarnation? ─▶ not seen yet? ─┬─ packages ──────────┬─▶ in order? ─▶ deliver
-//!              foreign  refused, told so   old               duplicate      └ fragment ▶ Reassembly ┘   late
+//!  datagram ─▶ ours? ─▶ our digest? ─▶ this incarnation? ─▶ not seen yet? ─┬─ packages ───────┬─▶ in order? ─▶ deliver
+//!              foreign  refused, told so   old               duplicate      └ fragment ▶ whole ┘   late
 //! ```
 
 mod doubt;
@@ -22,7 +22,7 @@ use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use order::position;
-use peer::{Peer, PeerContext, Refusing};
+use peer::{PeerContext, PeerReceiver, Refusing};
 use rohrpost_mailbox::Head;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -81,7 +81,7 @@ pub enum Output {
 pub struct Inbound {
     settings: Settings,
     stats: Arc<Stats>,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerReceiver]>,
     strangers: Refusing,
     /// A refusal is due.
     must_refuse: bool,
@@ -93,7 +93,7 @@ impl Inbound {
     /// For the router of `settings.own`.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         Self {
-            peers: settings.nodes.iter().map(|_| Peer::default()).collect(),
+            peers: settings.nodes.iter().map(|_| PeerReceiver::default()).collect(),
             strangers: Refusing::default(),
             must_refuse: false,
             sweep_ns: 0,
@@ -215,7 +215,7 @@ impl Inbound {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    /// `first`: see [`Peer::lives`].
+    /// `first`: see [`PeerReceiver::lives`].
     fn take(
         &mut self,
         now_ns: u64,
@@ -256,7 +256,7 @@ impl Inbound {
             Frame::Fragment(part) => {
                 way.peer.received.fragments.add(1);
                 let part = Fragment { head: admitted(&part.head), ..part };
-                let Peer { order, reassembly, .. } = peer;
+                let PeerReceiver { order, reassembly, .. } = peer;
                 let is_late = || order.is_late(&part.head, position(part.first, 0));
                 let tell = |head: &Head, body: &[u8], change| way.partial(head, body, change, deliver);
                 if let Some(whole) = reassembly.take(now_ns, &part, is_late, tell) {

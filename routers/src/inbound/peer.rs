@@ -22,7 +22,7 @@ const OLD_GONE_NS: u64 = 2_000_000_000;
 
 /// State of a peer.
 #[derive(Debug, Default)]
-pub(super) struct Peer {
+pub(super) struct PeerReceiver {
     /// The incarnation that is heard; 0: none yet.
     incarnation: u64,
     began_ns: u64,
@@ -31,7 +31,7 @@ pub(super) struct Peer {
     doubt: Doubt,
     /// When the last restart was reported, ns; 0: never.
     restart_told_ns: u64,
-    old: [Old; OLD_KEPT],
+    old: [PastIncarnation; OLD_KEPT],
     old_next: usize,
     pub(super) window: Window,
     pub(super) order: Order,
@@ -54,7 +54,7 @@ pub(super) struct Refusing {
 
 /// An incarnation that is over.
 #[derive(Clone, Copy, Debug, Default)]
-struct Old {
+struct PastIncarnation {
     /// 0: none.
     incarnation: u64,
     /// Its next expected sequence: earlier ones may have been delivered.
@@ -72,7 +72,7 @@ struct PeerNotices {
     refuses: Option<(Mismatch, u64)>,
 }
 
-impl Peer {
+impl PeerReceiver {
     /// Whether a datagram is of the present incarnation. An unknown incarnation begins. An incarnation that is over is
     /// ignored, unless it sends more while its supposed successor is silent: then the order was the other way round.
     /// What it sent before it was over says nothing: that may be a duplicate from the wire or a replay. Unauthenticated
@@ -111,7 +111,7 @@ impl Peer {
             self.end_incarnation(way, deliver);
             let place = was.unwrap_or(self.old_next % OLD_KEPT);
             self.old_next += usize::from(was.is_none());
-            self.old[place] = Old { incarnation: self.incarnation, next };
+            self.old[place] = PastIncarnation { incarnation: self.incarnation, next };
             self.told = PeerNotices { heard: true, twice: self.told.twice, ..PeerNotices::default() };
             if self.restart_told_ns == 0 || now_ns >= self.restart_told_ns + RESTARTS_TOLD_NS {
                 self.restart_told_ns = now_ns;

@@ -1,6 +1,6 @@
 //! Makes datagrams: of one package without a copy, of many that wait, of one fragment, or a keep-alive.
 
-use super::{DIRECT_HEAD_BYTES, Outbound, Package, Peer, is_stale};
+use super::{DIRECT_HEAD_BYTES, KeepAlive, Outbound, Package, is_stale};
 use crate::broken::broken;
 use crate::counts::Cause;
 use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
@@ -145,7 +145,7 @@ impl Outbound {
 
     /// A peer that needs a keep-alive. If none does, notes when one will.
     pub(super) fn due(&mut self, now_ns: u64) -> Option<NodeIndex> {
-        let when = |peer: &Peer| peer.quiet_until_ns.min(peer.tell_ns);
+        let when = |peer: &KeepAlive| peer.quiet_until_ns.min(peer.tell_ns);
         let reached = self.settings.peers().filter(|node| self.open() & 1 << node != 0);
         let peers = reached.map(|node| (when(&self.peers[usize::from(node)]), node));
         match peers.min() {

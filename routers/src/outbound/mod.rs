@@ -95,7 +95,7 @@ pub struct Outbound {
     senders: Box<[(u32, u16)]>,
     /// The quota of all other senders.
     others: u16,
-    peers: Box<[Peer]>,
+    peers: Box<[KeepAlive]>,
     /// Most bytes of a datagram.
     datagram_bytes: usize,
     aboard: Aboard,
@@ -105,11 +105,9 @@ pub struct Outbound {
     reached: u64,
     /// Peers with no socket room at present, one bit each: they are passed over.
     full: u64,
-    /// Peers that have said that they hear this incarnation, one bit each: packages may go there. All peers where that
-    /// does not matter.
+    /// Peers that hear this incarnation by their word, one bit each; all peers where that does not matter.
     hearing: u64,
-    /// Counters of the real-time half, if this is the other one, and how many of its bytes were counted: both share one
-    /// rate.
+    /// Counters of the real-time half, if this is the other one, and its counted bytes: both share one rate.
     shares_with: Option<(Arc<Stats>, u64)>,
     /// It sends in time slots only.
     in_slots: bool,
@@ -119,7 +117,7 @@ pub struct Outbound {
 }
 
 #[derive(Clone, Debug, Default)]
-struct Peer {
+struct KeepAlive {
     /// When the next keep-alive is due: without other traffic, and in any case, ns.
     quiet_until_ns: u64,
     tell_ns: u64,
@@ -141,7 +139,7 @@ impl Outbound {
             levels: std::array::from_fn(|priority| settings.network.level(Priority(priority as u8))),
             senders: senders.into(),
             others: others as u16,
-            peers: vec![Peer::default(); settings.nodes.len()].into(),
+            peers: vec![KeepAlive::default(); settings.nodes.len()].into(),
             datagram_bytes: settings.datagram_bytes(),
             aboard: Aboard::new(settings.datagram_bytes()),
             peer_sessions: None,
@@ -171,8 +169,7 @@ impl Outbound {
         Self { hearing: 0, shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
     }
 
-    /// The sockets of these peers, one bit each, have no room at present: packages to them wait, and do not hold up
-    /// others.
+    /// The sockets of these peers, one bit each, have no room: packages to them wait, without delay of others.
     pub fn pass_over(&mut self, full: u64) {
         if full != self.full {
             (self.full, self.alive_ns) = (full, 0);
@@ -229,8 +226,7 @@ impl Outbound {
         !self.queue.is_empty()
     }
 
-    /// Whether so much waits that only more important packages are of use: it fills datagrams, and half of one sender's
-    /// quota. False where all of it waits for peers that are closed: others must not wait for these.
+    /// Whether only more important packages are of use. False if all waits for closed peers.
     pub fn has_plenty(&self) -> bool {
         let enough = (2 * self.datagram_bytes).max(self.settings.network.quota_bytes / 2);
         self.queue.used_bytes() >= enough as u64 && self.first_level().is_some()
@@ -366,7 +362,7 @@ impl Outbound {
         if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full & self.hearing }
     }
 
-    /// Accounts for the rate that real time uses, and takes over which peers hear this node.
+    /// Accounts for the rate that real time uses, and copies which peers hear this node.
     fn look_at_what_is_real_time(&mut self, now_ns: u64) {
         let Some((real_time, counted)) = &mut self.shares_with else { return };
         let bytes = real_time.on_wire_bytes.get();
@@ -414,7 +410,7 @@ impl Outbound {
             && self.pace.may_leave(now_ns, level).is_ok()
     }
 
-    /// Two of this size do not fit in a datagram. A copy through the queue would not make it leave sooner.
+    /// Two of this size do not fit in a datagram: the queue has no gain.
     fn fills_a_datagram(&self, body_bytes: usize) -> bool {
         frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.datagram_bytes
     }

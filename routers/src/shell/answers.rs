@@ -144,14 +144,14 @@ mod tests {
     }
 
     /// A router that began this long ago, ns, the mailbox of a caller on its node, and its own, for callers on others.
-    struct Ground {
+    struct Fixture {
         answers: Answers,
         replies: Receiver,
         transit: Receiver,
         _folder: tempfile::TempDir,
     }
 
-    impl Ground {
+    impl Fixture {
         fn new(age_ns: Option<u64>) -> Self {
             let folder = tempfile::tempdir().unwrap();
             let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn of_a_command_that_is_handed_out_again_nothing_is_said() {
-        let mut ground = Ground::new(Some(YOUNG_NS));
+        let mut ground = Fixture::new(Some(YOUNG_NS));
         for cause in Cause::ALL {
             let again = command(Options::default().with(Options::REDELIVERED));
             ground.answers.answer(Some(1), &again, b"call", cause, None);
@@ -208,14 +208,14 @@ mod tests {
     #[test]
     fn a_router_that_has_just_begun_answers_nothing_that_came() {
         let (came, left) = (arrived(Options::default()), command(Options::default()));
-        let mut ground = Ground::new(None);
+        let mut ground = Fixture::new(None);
         for cause in [Cause::NoMailbox, Cause::MailboxFull, Cause::TooLarge, Cause::Stale] {
             ground.answers.answer_arrived(Some(1), &came, b"call", cause, None);
             assert_eq!(ground.answered(), None, "{cause:?}: it may be a copy of what the incarnation before delivered");
         }
         ground.answers.answer(Some(1), &left, b"call", Cause::Stale, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::Stale.word()), "what is to leave is no copy");
-        let mut ground = Ground::new(Some(YOUNG_NS));
+        let mut ground = Fixture::new(Some(YOUNG_NS));
         ground.answers.answer_arrived(Some(1), &came, b"call", Cause::MailboxFull, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::MailboxFull.word()));
         for from in [caller(), Name::new(2, 50, 1, 1), Name::NONE] {

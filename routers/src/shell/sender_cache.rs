@@ -135,12 +135,12 @@ mod tests {
     use super::*;
     use rohrpost_mailbox::{Node, Priority, Receiver, Shape, Type};
 
-    struct Ground {
+    struct Fixture {
         _folder: tempfile::TempDir,
         node: Arc<Node>,
     }
 
-    impl Ground {
+    impl Fixture {
         fn new() -> Self {
             let folder = tempfile::tempdir().unwrap();
             let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_package_is_sent_on_as_it_is() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let mut receiver = ground.mailbox(name(0));
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
         sender_cache.send(&head(name(0)), b"body").unwrap();
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn what_is_absent_is_found_when_it_comes_and_forgotten_when_it_goes() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
         for _ in 0..2 {
             assert!(matches!(sender_cache.send(&head(name(0)), b"body"), Err(SendError::NoMailbox(_))));
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn whatever_names_others_write_each_is_looked_for_once_and_those_of_nobody_never() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let (first, last) = (name(0), name(999));
         let mut sender_cache = SenderCache::here(&ground.join(), &[(first, last)]);
         for _ in 0..3 {
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn names_that_a_router_leads_to_are_not_looked_for() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let router = Name::new(1, 250, 0, 3);
         let mut transit = ground.mailbox(router);
         let mut sender_cache = SenderCache::everywhere(&ground.join());
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn more_mailboxes_than_are_kept_open_are_all_reached() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let me = ground.join();
         let shape = Shape { slots: 2, body_bytes_max: 8, ..Shape::default() };
         let count = WAYS_MAX as u16 + 20;

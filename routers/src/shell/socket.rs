@@ -1,7 +1,6 @@
 //! Sockets of a node's router: one for datagrams to the node's address and port, and one to each peer.
 //!
-//! Those to peers are connected: the kernel keeps the route, and reports when nothing listens. Their own port is
-//! arbitrary; the address identifies a node.
+//! Those to peers are connected: the kernel reports when nothing listens. The address, not the port, identifies a node.
 
 use super::failure::Failure;
 use super::filter;
@@ -27,8 +26,7 @@ pub(super) const REST_BYTES: usize = 2 << 20;
 /// own queues that needs no rights.
 const TRAFFIC_CLASS: u32 = 46 << 2;
 const PRIORITY: u32 = 6;
-/// Reading ends after this long without a datagram. The kernel counts it in ticks of its slow timers, which costs less
-/// than a sleep.
+/// Reading ends after this long without a datagram. A timeout in the kernel costs less than a sleep.
 pub(super) const LISTEN: Duration = Duration::from_millis(100);
 /// Room for a stamp and a count, and the kernel's heads of them.
 const CONTROL_BYTES: usize = 64;
@@ -104,8 +102,7 @@ impl InSocket {
     /// Wanted receive buffer.
     pub(super) const WANTED_BYTES: usize = RECEIVE_BYTES;
 
-    /// Binds the node's own address and port, exclusively: two routers of one node would each get some datagrams. It
-    /// takes only datagrams from `peers`.
+    /// Binds the node's own address and port, exclusively. It takes only datagrams from `peers`.
     pub(super) fn open(own: SocketAddr, peers: &[IpAddr], bytes: usize) -> Result<Self, SocketError> {
         let socket = new_socket(own).map_err(|error| SocketError::Io(own, "making a socket", error))?;
         bind(&socket, own)?;

@@ -51,7 +51,7 @@ struct Left {
 
 /// A Sync that came, and the Request that answers it.
 #[derive(Clone, Copy, Debug, Default)]
-struct Asked {
+struct PendingExchange {
     exchange: Exchange,
     sequence: u64,
 }
@@ -87,7 +87,7 @@ pub struct Clock {
     far: bool,
     epoch_began_ns: u64,
     slaves: Vec<Slave>,
-    asked: [Asked; PENDING],
+    asked: [PendingExchange; PENDING],
     asked_ns: u64,
     hello_ns: u64,
     drafts: VecDeque<(NodeIndex, Draft)>,
@@ -137,7 +137,7 @@ impl Clock {
             far: false,
             epoch_began_ns: 0,
             slaves: vec![Slave::default(); nodes],
-            asked: [Asked::default(); PENDING],
+            asked: [PendingExchange::default(); PENDING],
             asked_ns: 0,
             hello_ns: now_ns,
             drafts: VecDeque::with_capacity(2 * nodes + 2 * PENDING),
@@ -203,8 +203,7 @@ impl Clock {
         }
     }
 
-    /// The next step. Call it after each datagram sent or received, and at the deadline. `now_ns` goes into the
-    /// datagram: read it just before. In time slots it sends nothing: see [`Self::poll_in`].
+    /// The next step, after each datagram and at the deadline. `now_ns` is sent: read it just before.
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8; TIME_BYTES]) -> Step {
         if self.slots.is_some() {
             return self.poll_in(now_ns, Allowed::Nothing, datagram);
@@ -312,7 +311,7 @@ impl Clock {
         if self.slots.is_some() {
             self.history.fades(2.0 * RATE_MAX);
         }
-        self.asked = [Asked::default(); PENDING];
+        self.asked = [PendingExchange::default(); PENDING];
         self.asked_ns = 0;
         self.far = false;
     }

@@ -11,7 +11,7 @@ const SYNCS: usize = JOINING_SYNCS as usize;
 
 /// When a frame came, and its time.
 #[derive(Clone, Copy, Debug, Default)]
-struct Came {
+struct TimeSample {
     local_ns: u64,
     system_ns: u64,
     /// The sender's largest distance from the time of the others.
@@ -21,7 +21,7 @@ struct Came {
 /// The last frames that stated the time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coarse {
-    syncs: [Came; SYNCS],
+    syncs: [TimeSample; SYNCS],
     epoch: u64,
     count: u8,
     next: usize,
@@ -42,7 +42,7 @@ impl Coarse {
         if epoch != self.epoch {
             *self = Self { epoch, ..Self::default() };
         }
-        self.syncs[self.next] = Came { local_ns, system_ns, error_ns };
+        self.syncs[self.next] = TimeSample { local_ns, system_ns, error_ns };
         self.next = (self.next + 1) % SYNCS;
         self.count = (self.count + 1).min(JOINING_SYNCS);
     }
@@ -54,7 +54,7 @@ impl Coarse {
         heard_ns.map_or(0, |heard_ns| heard_ns.abs_diff(system_ns))
     }
 
-    fn best(&self, now_ns: u64) -> Option<&Came> {
+    fn best(&self, now_ns: u64) -> Option<&TimeSample> {
         self.syncs[..usize::from(self.count)].iter().max_by_key(|came| came.score(now_ns))
     }
 
@@ -78,7 +78,7 @@ impl Coarse {
     }
 }
 
-impl Came {
+impl TimeSample {
     /// A slow frame states a time that is too early; an old one may have drifted, and its sender may be off.
     fn score(&self, now_ns: u64) -> i128 {
         let age_ns = i128::from(now_ns.saturating_sub(self.local_ns));

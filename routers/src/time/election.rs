@@ -10,8 +10,7 @@ use crate::frame::NodeIndex;
 const DEAF_NS_MIN: u64 = 200_000_000;
 /// The same in time slots, in slots of the node that asks and of the master.
 const DEAF_SLOTS: u64 = 4;
-/// In time slots: how long a node waits after the last frame was due before it may begin a new time. Unheard nodes may
-/// still send by theirs.
+/// In time slots: wait after the last frame was due before a new time. Unheard nodes may still send by theirs.
 const BEGINS_AFTER_NS: u64 = 100_000_000;
 /// In time slots a master that misses three Syncs has a successor in the third cycle; after two it may still be heard.
 const SUCCEEDED_HALF_INTERVALS: u64 = 5;
@@ -201,8 +200,7 @@ impl Election {
             State::Listening => Heard::Turned,
             State::Master(own) if theirs.claim() > (followed, own) => Heard::Turned,
             State::Master(own) => {
-                // The other one will yield. This node raises its own term, so that no node that heard the other takes
-                // this one for older.
+                // The other will yield. A higher own term: no node that heard the other takes this one for older.
                 if let (true, Some(rank)) = (theirs.term > own, self.rank()) {
                     self.state = State::Master(self.next_term(rank));
                 }
@@ -259,8 +257,7 @@ impl Election {
         }
     }
 
-    /// A node asks and names the term that it follows. A master with an older term begins another, so that its term is
-    /// the latest for all.
+    /// A node asks and names its term. A master with an older term begins another, so that its term is the latest.
     pub(super) fn is_told(&mut self, request: &Request) {
         self.speaks_of(request.term, request.epoch);
         if let (State::Master(own), Some(rank)) = (self.state, self.rank())
@@ -270,8 +267,7 @@ impl Election {
         }
     }
 
-    /// This node was stalled until now. Its silence says nothing of the others: their frames may still be in the
-    /// socket. Any wait before a new time is extended by the stall.
+    /// After a stall frames of others may still be in the socket. A wait before a new time is extended by the stall.
     pub(super) fn awakes(&mut self, stood_since_ns: u64, now_ns: u64) {
         self.awake_since_ns = now_ns;
         let stood_ns = now_ns.saturating_sub(stood_since_ns);

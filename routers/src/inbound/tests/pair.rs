@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 /// What the wire does with the datagram that leaves next.
 #[derive(Clone, Copy, Debug)]
-enum Wire {
+enum WireFate {
     Passes,
     Loses,
     Copies,
@@ -17,12 +17,12 @@ enum Wire {
     Holds(usize),
 }
 
-fn wire() -> impl Strategy<Value = Wire> {
+fn wire() -> impl Strategy<Value = WireFate> {
     prop_oneof![
-        6 => Just(Wire::Passes),
-        1 => Just(Wire::Loses),
-        1 => Just(Wire::Copies),
-        2 => (1usize..100).prop_map(Wire::Holds),
+        6 => Just(WireFate::Passes),
+        1 => Just(WireFate::Loses),
+        1 => Just(WireFate::Copies),
+        2 => (1usize..100).prop_map(WireFate::Holds),
     ]
 }
 
@@ -57,11 +57,11 @@ proptest! {
                 if to != 0 {
                     continue;
                 }
-                match if step.is_some() { wire[left % wire.len()] } else { Wire::Passes } {
-                    Wire::Passes => on_wire.push((left, datagram)),
-                    Wire::Loses => lost_on_wire += 1,
-                    Wire::Copies => on_wire.extend([(left, datagram.clone()), (left + 7, datagram)]),
-                    Wire::Holds(by) => on_wire.push((left + by, datagram)),
+                match if step.is_some() { wire[left % wire.len()] } else { WireFate::Passes } {
+                    WireFate::Passes => on_wire.push((left, datagram)),
+                    WireFate::Loses => lost_on_wire += 1,
+                    WireFate::Copies => on_wire.extend([(left, datagram.clone()), (left + 7, datagram)]),
+                    WireFate::Holds(by) => on_wire.push((left + by, datagram)),
                 }
             }
             on_wire.sort_by_key(|(at, _)| *at);

@@ -1,6 +1,6 @@
 //! A clock as a slave: it asks the master after each Sync, and slews its page's line to the result.
 
-use super::{Asked, Clock, Draft, EXCHANGE_NS_MIN, rate_of};
+use super::{Clock, Draft, EXCHANGE_NS_MIN, PendingExchange, rate_of};
 use crate::frame::FrameHead;
 use crate::time::broken::Broken;
 use crate::time::clock_model::{EVEN_PPB, wander_ns_s};
@@ -56,7 +56,7 @@ impl Clock {
         self.asked_ns = received.ns;
         let exchange = Exchange { id: sync.id, sync_sent_ns: sync.sent_ns, sync_came: received, ..Exchange::default() };
         self.asked.rotate_right(1);
-        self.asked[0] = Asked { exchange, ..Asked::default() };
+        self.asked[0] = PendingExchange { exchange, ..PendingExchange::default() };
         // The newest question is enough when several Syncs came at once.
         self.drafts.clear();
         self.drafts.push_back((head.from, Draft::WarmUp));

@@ -16,8 +16,7 @@ use crate::time::unverified::UnverifiedPeers;
 use crate::time::{Ignored, InSlots, JOINING_SYNCS, Stamp, Step, SyncCounts, TIME_BYTES, Term, TimeEstimate};
 use rohrpost_mailbox::TimeRecord;
 
-/// Cycles in which a master with a new or heard time sends only Syncs: nodes that follow another time hear of it
-/// meanwhile.
+/// Cycles in which a master with a new or heard time sends only Syncs, so that nodes with another time hear of it.
 const BEGINNING_CYCLES: u8 = JOINING_SYNCS;
 
 /// Syncs in a row that a master misses before another node takes its place.
@@ -215,8 +214,7 @@ impl Clock {
         Some((to, if is_master { Draft::Sync { nominal_ns } } else { Draft::Replacement { nominal_ns } }))
     }
 
-    /// A stand-in becomes master when enough Syncs are missing. A node that is not the next in order does so only if no
-    /// other node stood in.
+    /// A stand-in becomes master when enough Syncs are missing; the next in order before others.
     fn succeed(&mut self, now_ns: u64, cycle: u64) {
         let (State::Slave(master), Some(slots)) = (self.election.state(), &self.slots) else { return };
         let is_next = self.election.before(Some(master.node)) == 0;
@@ -260,8 +258,7 @@ impl Clock {
 
 /// Received frames, as far as slots are concerned.
 impl Clock {
-    /// A Sync came from the present or a later master: whether the present master is still alive, so that there are two
-    /// masters and perhaps two times.
+    /// A Sync of this or a later master came: whether the present one lives, so that there are two.
     pub(super) fn is_contested(&self, received_ns: u64) -> bool {
         match self.election.state() {
             State::Listening => false,
@@ -304,8 +301,7 @@ impl Clock {
         }
     }
 
-    /// The same for packages, from their counters. `now_ns`: now by the monotonic clock of these counters; `local_ns`:
-    /// now by the clock of time.
+    /// The same for packages, from their counters, with now by their monotonic clock and by the clock of time.
     pub fn hears_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
         self.refused_by(packages, now_ns, local_ns);
         let State::Slave(Followed { node, .. }) = self.election.state() else { return };
@@ -369,8 +365,7 @@ impl Clock {
         }
     }
 
-    /// The page takes over the time that was heard. A small difference needs no step. Else the time steps, but not back
-    /// within an epoch.
+    /// The page takes over the time that was heard. A large difference is a step, but not back within an epoch.
     pub(super) fn take_up_heard(&mut self, now_ns: u64) {
         let Some((heard, slots)) = self.coarse(now_ns).zip(self.slots.as_ref()) else { return };
         let (epoch, system_ns) = (self.line.record().epoch, heard.system_ns(now_ns));
