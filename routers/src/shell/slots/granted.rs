@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn who_gets_less_than_it_needs_is_told_what_to_change() {
+    fn a_short_reservation_is_reported_with_what_to_change() {
         let warning = wanted(5000, &[(3000, 1)]).warning().unwrap();
         assert_eq!(
             warning,
