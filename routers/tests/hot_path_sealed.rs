@@ -1,4 +1,5 @@
-//! Sealing and opening take nothing from the heap: neither what is taken, nor what is rejected, nor a hello that brings about nothing new.
+//! Sealing and opening take nothing from the heap: neither what is taken, nor what is rejected, nor a hello that brings
+//! about nothing new.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

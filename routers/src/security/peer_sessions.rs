@@ -1,4 +1,4 @@
-//! Which incarnation of each peer this router knows to live: one thread finds out, those that send and the clock go by it.
+//! Tracks each peer's authenticated incarnation. One thread writes; senders and the clock read.
 
 use super::hello::Hello;
 use super::keys::{Binding, End, KeyRing, Purpose};
@@ -47,7 +47,8 @@ pub struct Who {
     pub nodes: NodeIndex,
     /// Of its configuration.
     pub digest: u64,
-    /// Its incarnation, from a source of random numbers that is fit for keys: if two incarnations had one, they would use a nonce twice. Not 0.
+    /// Its incarnation, from a source of random numbers that is fit for keys: if two incarnations had one, they would
+    /// use a nonce twice. Not 0.
     pub incarnation: u64,
 }
 
@@ -76,7 +77,7 @@ pub struct PeerSessions {
     peers: Box<[Peer]>,
     /// Peers of which an incarnation is known, one bit each.
     known: AtomicU64,
-    /// Peers of whose incarnation datagrams said something else, one bit each.
+    /// One bit for each peer with datagrams of another incarnation than the known one.
     doubts: AtomicU64,
     /// Peers for which a reply waits for a slot, one bit each: nothing is sealed to them before it has left.
     unsaid: AtomicU64,
@@ -112,7 +113,7 @@ impl PeerSessions {
     /// # Panics
     /// If the incarnation is 0.
     pub fn new(who: Who, keys: KeyRing) -> Arc<Self> {
-        assert_ne!(who.incarnation, 0, "an incarnation has an incarnation");
+        assert_ne!(who.incarnation, 0, "an incarnation is not 0");
         let seals = |from, to| {
             let (from, to) = (End::any(from), End::any(to));
             keys.derive_all(&Binding { purpose: Purpose::Hello, system: who.system, from, to })
@@ -139,18 +140,18 @@ impl PeerSessions {
 
     /// The peers that something can be sealed to, one bit each.
     pub fn known(&self) -> u64 {
-        // ORDERING (F): who finds a peer here finds its incarnation, and so can seal to it. Pairs with (E).
+        // ORDERING (F): a reader that finds a peer here finds its incarnation, and so can seal to it. Pairs with (E).
         self.known.load(Ordering::Acquire)
     }
 
     /// The peers of [`Self::known`] that can open what is sealed to them.
     pub fn reached(&self) -> u64 {
-        // ORDERING (H): who finds that a reply has left finds so after it has. Pairs with (G).
+        // ORDERING (H): a reader that finds that a reply has left finds so after it has. Pairs with (G).
         self.known() & !self.unsaid.load(Ordering::Acquire)
     }
 
-    /// A reply to a peer is to leave in a slot: until then it may not be able to open what is sealed to it. Whether none
-    /// waited before.
+    /// A reply to a peer is to leave in a slot: until then it may not be able to open what is sealed to it. Whether
+    /// none waited before.
     pub fn reply_waits(&self, peer: NodeIndex) -> bool {
         self.unsaid.fetch_or(1 << peer, Ordering::Relaxed) & 1 << peer == 0
     }
@@ -188,7 +189,8 @@ impl PeerSessions {
         self.doubts.fetch_and(!(1 << peer), Ordering::Relaxed);
     }
 
-    /// Something came of another incarnation of a peer, or to another of ours: perhaps it has another by now. It is to be asked soon.
+    /// Something came of another incarnation of a peer, or to another of ours: perhaps it has another by now. It is to
+    /// be asked soon.
     pub(super) fn doubt(&self, peer: NodeIndex) {
         if !self.doubts(peer) {
             self.doubts.fetch_or(1 << peer, Ordering::Relaxed);
@@ -211,7 +213,8 @@ impl PeerSessions {
         self.peer(peer).challenge.store(challenge, Ordering::Relaxed);
     }
 
-    /// Uses up a sequence. Each is used once: a second datagram with the nonce of a first would give away what is in both.
+    /// Uses up a sequence. Each is used once: a second datagram with the nonce of a first would give away what is in
+    /// both.
     ///
     /// # Panics
     /// If it was used before.
@@ -221,8 +224,9 @@ impl PeerSessions {
         next.store(sequence + 1, Ordering::Relaxed);
     }
 
-    /// Key of what one end's incarnation seals to the other's. Time it seals to the node: who begins in time slots must hear it before anybody knows that it
-    /// lives, and takes nothing for proven that was said before the hello by which the other's incarnation began.
+    /// Key between two incarnations. Time is sealed to the node instead: a node that joins time slots must hear it
+    /// before anybody knows that it lives, and takes nothing for proven that was said before the hello by which the
+    /// other's incarnation began.
     pub(super) fn binding(&self, port: Port, from: End, to: End) -> Binding {
         let to = if port == Port::Time { End::any(to.node) } else { to };
         Binding { purpose: port.purpose(), system: self.who.system, from, to }
@@ -236,8 +240,8 @@ impl PeerSessions {
         &self.peer(peer).hello_from[key]
     }
 
-    /// A question to a peer, with one of its keys after the other: which of them the peer has is not known. None
-    /// as long as there is nobody who would take an answer.
+    /// A challenge to a peer, with one of its keys after the other: which of them the peer has is not known. None
+    /// as long as no incarnation of it could take an answer.
     pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
         let question = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
         if question.challenge == 0 {
@@ -255,9 +259,9 @@ impl PeerSessions {
     /// Writes a hello; how long its datagram is.
     ///
     /// # Panics
-    /// If this incarnation has said to a peer as many as it may. Only another incarnation, which has other nonces, can go on. Whoever says a peer's recorded
-    /// questions again without end, and forges what makes us ask and say last words, 200 a second in all, brings that about in 248 days; a peer
-    /// that is away, in 136 years.
+    /// Whether this incarnation has sent a peer all the hellos that it may. Only another incarnation, with other
+    /// nonces, can go on. An attacker that replays a peer's challenges without end, and forges datagrams that make this
+    /// node challenge and answer, 200 a second in all, gets there in 248 days; a peer that is away, in 136 years.
     pub(super) fn hello(&self, peer: NodeIndex, key: usize, hello: Hello, datagram: &mut [u8]) -> usize {
         let number = u32::try_from(self.peer(peer).hellos.fetch_add(1, Ordering::Relaxed));
         let number = number.expect("an incarnation says 2^32 hellos to a peer at most; the router begins another");
@@ -286,7 +290,8 @@ const _: () = {
     assert!(rohrpost_network::NODES_MAX <= 64, "peers are the bits of a word");
 };
 
-/// An incarnation that one thread writes and others read, whole. Who reads while it is written gets nothing, and goes on with what it had.
+/// An incarnation that one thread writes and others read, whole. A read during a write gets nothing, and the reader
+/// keeps what it had.
 #[derive(Default)]
 struct Published {
     /// Odd while it is written; 0: nothing was.
@@ -300,7 +305,7 @@ impl Published {
     fn write(&self, life: PeerIncarnation) {
         let version = self.version.load(Ordering::Relaxed);
         self.version.store(version | 1, Ordering::Relaxed);
-        // ORDERING (A): who reads a new word sees the odd version. Pairs with (B).
+        // ORDERING (A): a reader of a new word sees the odd version. Pairs with (B).
         fence(Ordering::Release);
         self.incarnation.store(life.incarnation, Ordering::Relaxed);
         self.key.store(life.key as u64, Ordering::Relaxed);

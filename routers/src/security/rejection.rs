@@ -49,7 +49,8 @@ impl Rejection {
         Self::Version,
     ];
 
-    /// What it tells of a peer from which nothing else comes, if it is of that: anybody can write a peer's address on a datagram.
+    /// What it tells of a peer from which nothing else comes, if it is of that: anybody can write a peer's address on a
+    /// datagram.
     pub const fn reason(self) -> Option<Reason> {
         match self {
             Self::Unsealed => Some(Reason::Sealed),

@@ -1,9 +1,9 @@
-//! Lives of a peer that are not known to live, as their datagrams of time are overheard.
+//! Incarnations of a peer that have not proved that they live, but send datagrams of time that this node opens.
 
 use super::seal::{self, Seal};
 use crate::frame::FrameHead;
 
-/// Lives of one peer that are remembered at a time; of more the one that was overheard longest ago is forgotten.
+/// Number of incarnations of a peer that are remembered; a further one replaces the one that was heard longest ago.
 const INCARNATIONS: usize = 2;
 
 struct UnverifiedIncarnation {
@@ -20,7 +20,8 @@ struct UnverifiedIncarnation {
 pub(super) struct UnverifiedIncarnations([Option<UnverifiedIncarnation>; INCARNATIONS]);
 
 impl UnverifiedIncarnations {
-    /// Opens a datagram that is sealed with the key at a place. Without its seal, which is derived, none takes the place of another.
+    /// Opens a datagram that is sealed with the key at a place. Without its seal, which is derived, none takes the
+    /// place of another.
     pub(super) fn open<'a>(
         &mut self,
         (head, key): (&FrameHead, usize),

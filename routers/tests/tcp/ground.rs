@@ -42,8 +42,8 @@ impl Faults for Words {
     }
 }
 
-/// An address that nobody has: of this process and this call alone. Not a port that the kernel chose and has back: until it is used, it
-/// may be another's, or still open in a child that another test starts.
+/// An address that nobody has: of this process and this call alone. Not a port that the kernel chose and has back:
+/// until it is used, it may be another's, or still open in a child that another test starts.
 pub(crate) fn address() -> SocketAddr {
     static COUNT: AtomicU8 = AtomicU8::new(1);
     let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));

@@ -67,7 +67,7 @@ fn until_the_new_life_has_answered_the_old_one_is_heard() {
 }
 
 /// All hellos that ever were, said again to a router that lives, begin nothing and end nothing.
-pub(super) fn check_only_who_lives_begins() {
+pub(super) fn check_only_a_living_incarnation_begins() {
     let mut kept = Vec::new();
     let mut b = Router::new(1, 200);
     for life in 0..40 {
@@ -89,12 +89,12 @@ pub(super) fn check_only_who_lives_begins() {
 }
 
 #[test]
-fn only_who_lives_begins() {
-    check_only_who_lives_begins();
+fn only_a_living_incarnation_begins() {
+    check_only_a_living_incarnation_begins();
 }
 
 #[test]
-fn an_answer_serves_once_and_only_to_whom_it_was_given() {
+fn a_response_serves_once_and_only_its_receiver() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
     let answer = b.greet(&a.ask(1)).unwrap().1.unwrap();
     let mut other = Router::new(0, 101);
@@ -250,7 +250,7 @@ fn a_life_that_has_said_all_its_hellos_ends() {
 }
 
 #[test]
-fn recorded_questions_do_not_keep_from_answering_who_lives() {
+fn replayed_challenges_do_not_keep_a_living_peer_from_its_response() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
     let recorded = Router::new(0, 99).ask(1);
     for _ in 0..1000 {

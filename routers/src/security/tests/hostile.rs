@@ -1,4 +1,4 @@
-//! Someone who has recorded all that ever passed, and sends what he likes: replays, alterations, mixtures. Nothing of it is taken.
+//! An attacker that has recorded all datagrams, and sends replays, alterations and mixtures. None of it is taken.
 
 use super::*;
 use crate::frame::SEQUENCE_MAX;

@@ -102,7 +102,7 @@ impl Client {
 
     fn validate(&self, carried: &Carried<'_>, host: &mut impl Host) -> Result<(), Cause> {
         let (head, admission) = (&carried.head, &self.settings.admission);
-        // The server knows who hosts a name, and brings nothing back to who sent it.
+        // The server knows which client hosts a name, and brings nothing back to the sender.
         let is_our_name = self.ranges.iter().any(|range| range.has(head.from));
         admission.validate(ArrivalPath::Beyond { is_our_name }, head, carried.body).map_err(|why| {
             if why == Refused::NotAllowed {

@@ -30,7 +30,7 @@ use rohrpost_mailbox::{Head, TimeRecord};
 const CONNECT_MAX_NS: u64 = 5_000_000_000;
 /// A connection that holds for so long is no failure.
 const LASTING_NS: u64 = 5_000_000_000;
-/// What the server objected to is registered again after so long: who had it may have gone.
+/// Interval after which a refused range is registered again: the client that had it may have gone.
 const REGISTER_AGAIN_NS: u64 = 500_000_000;
 /// A look that comes so late says that this client stood still itself.
 const STOOD_STILL_NS: u64 = 4 * LOOK_EVERY_NS;
@@ -67,7 +67,7 @@ pub struct Package<'a> {
     pub body: &'a [u8],
     /// When its sender published it, ns of the monotonic clock.
     pub published_ns: u64,
-    /// How often it was handed on before: 0, but for who hands on what came from a server.
+    /// How often it was forwarded before: 0, except for a package that came from a server.
     pub hops: u8,
 }
 
@@ -102,9 +102,10 @@ pub enum Event<'a> {
     Damaged(super::frame::BadFrame),
 }
 
-/// What a client asks of who runs it.
+/// What a client needs from the code that runs it.
 pub trait Host: Answers {
-    /// Puts a package that came into its mailbox. Its `published_ns` is by the monotonic clock here, as far as that can be told.
+    /// Puts a package that came into its mailbox. Its `published_ns` is by the monotonic clock here, as far as that can
+    /// be told.
     ///
     /// # Errors
     /// [`NotDelivered`]
@@ -157,7 +158,7 @@ pub struct Client {
     is_blocked: bool,
     is_slow: bool,
     estimate: ServerClockEstimate,
-    /// Whose clocks that is about.
+    /// The end with these clocks.
     server_incarnation: u64,
     out: Counts,
     inn: Counts,
@@ -347,8 +348,8 @@ impl Client {
         self.is_blocked = false;
     }
 
-    /// What is known of how fast the stream takes bytes: whether so slowly that an answer may be long on its way, and how many are made ready
-    /// for it at a time.
+    /// What is known of how fast the stream takes bytes: whether so slowly that an answer may be long on its way, and
+    /// how many are made ready for it at a time.
     pub fn set_pace(&mut self, is_slow: bool, batch_bytes: usize) {
         self.is_slow = is_slow;
         self.outgoing.set_batch(batch_bytes);

@@ -7,7 +7,7 @@ const MAGIC: [u8; 4] = *b"RpTc";
 /// Bytes of a name that people read, at most.
 pub const NAME_BYTES_MAX: usize = 64;
 
-/// Who a client is.
+/// Identity of a client.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hello<'a> {
     /// First byte of the names that it may host.
@@ -158,7 +158,7 @@ impl Reason {
 /// "I take nothing from you, since …"
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Refusal<'a> {
-    /// Version of who refuses.
+    /// Version of the refusing end.
     pub version: u8,
     /// Why.
     pub reason: Reason,
@@ -166,7 +166,7 @@ pub struct Refusal<'a> {
     pub yours: u64,
     /// The one that it should be, else 0.
     pub ours: u64,
-    /// Who has that digest; else what was wrong.
+    /// The end that has that digest; else what was wrong.
     pub text: &'a str,
 }
 

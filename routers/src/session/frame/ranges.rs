@@ -121,7 +121,7 @@ pub struct Verdict<'a> {
     pub objection: Option<Objection>,
     /// Of which range.
     pub range: Range,
-    /// Who hosts what is in its way.
+    /// The host of the range in conflict.
     pub holder: &'a str,
 }
 

@@ -72,11 +72,11 @@ pub(super) struct Member {
     pub(super) rights: Rights,
     /// Where it comes from.
     pub(super) address: Principal,
-    /// Whose it is: that, or its certificate's.
+    /// The owner: that, or its certificate's.
     pub(super) principal: Principal,
     /// The same by its number, as long as it takes part.
     pub(super) principal_id: PrincipalId,
-    /// With whom it takes turns on lines: the nodes of a system, which trust each other, are one party, and anybody
+    /// The party that it takes turns as: the nodes of a system, which trust each other, are one party, and anybody
     /// else is one by itself.
     pub(super) party: u32,
     pub(super) system_digest: u64,

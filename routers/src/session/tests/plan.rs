@@ -1,4 +1,4 @@
-//! What a seed decides: who takes part, with which clocks and lines, and what goes wrong.
+//! What a seed decides: the clients, their clocks and rates, and the faults.
 
 use crate::admission::Admission;
 use crate::session::client::ClientSettings;
@@ -60,7 +60,7 @@ impl Plan {
         Self { calm: true, lines: vec![100_000; 7], per_s: 500, ..Self::rough(seed) }
     }
 
-    /// One client floods all others, whose lines take some hundred kB a second.
+    /// One client floods all others, at rates of some hundred kB a second.
     pub(super) fn flooded(seed: u64) -> Self {
         let mut chance = Chance::new(seed ^ 0xf10);
         let plan = Self::calm(seed);

@@ -288,11 +288,11 @@ impl World {
     }
 }
 
-fn check_counts(who: &str, counts: &crate::session::Counts, waits_none: bool) -> Vec<String> {
+fn check_counts(end: &str, counts: &crate::session::Counts, waits_none: bool) -> Vec<String> {
     let wrong = counts.classes().filter_map(|(priority, class)| {
         let (came, went) = (class.packages.get(), class.settled());
         let holds = if waits_none { came == went } else { came >= went };
-        (!holds).then(|| format!("{who}: of class {} came {came}, and {went} are accounted for", priority.0))
+        (!holds).then(|| format!("{end}: of class {} came {came}, and {went} are accounted for", priority.0))
     });
     wrong.collect()
 }
