@@ -55,10 +55,12 @@ const LATE_ALONE_PERCENT_MAX: usize = 5;
 /// What a file would say of the segment, and of the flows.
 fn installation() -> Installation {
     let mut text = String::from(
-        "installation = \"segment\"\n[system]\nname = \"robot\"\nid = 1\n[network]\nsecurity = \"none\"\nmode = \"tdma\"\n\
+        "installation = \"segment\"\n[system]\nname = \"robot\"\nid = 1\n[network]\nsecurity = \"none\"\n\
+         mode = \"tdma\"\n\
          [classes]\nrouter = { id = 250, text = \"Carries packages\" }\nit = { id = 100, text = \"Some module\" }\n\
          tool = { id = 16, text = \"Programs run by hand\" }\n[time]\nsource = \"master\"\nmasters = [\"n0\", \"n1\"]\n\
-         [tdma]\ncycle = \"10 ms\"\nsynchronisation = \"1 ms\"\nguard = \"400 us\"\nlink = \"1 Gbit/s\"\ntunnel = \"10.78.0.0/24\"\n",
+         [tdma]\ncycle = \"10 ms\"\nsynchronisation = \"1 ms\"\nguard = \"400 us\"\nlink = \"1 Gbit/s\"\n\
+         tunnel = \"10.78.0.0/24\"\n",
     );
     for node in 0..NODES {
         let (address, tools, offset) = (node + 1, 16 * node, 3 + 2 * node);
@@ -170,8 +172,8 @@ fn late_percent(segment: &Segment, what: &str, mut is_done: impl FnMut() -> bool
         let mut latencies: Vec<_> = seen.iter().map(|(latency_ns, _)| *latency_ns as f64 / 1e6).collect();
         latencies.sort_by(f64::total_cmp);
         println!(
-            "{what}, flow {flow}: {} packages, p50 {:.2} ms, at most {:.2} ms; bound {:.2} ms, later {}, of these {late_in_kept} in slots \
-             that were kept",
+            "{what}, flow {flow}: {} packages, p50 {:.2} ms, at most {:.2} ms; bound {:.2} ms, later {}, of these {late_in_kept} \
+             in slots that were kept",
             seen.len(),
             latencies[seen.len() / 2],
             latencies[seen.len() - 1],

@@ -144,7 +144,7 @@ impl Admission {
         Addresses::of(body) == Some(expected)
     }
 
-    /// The node whose mailbox for IP packets this is.
+    /// The node that this mailbox for IP packets belongs to.
     pub(crate) fn tunnel_end(&self, name: Name) -> Option<NodeIndex> {
         (Some(name.class()) == self.router && name.local() == TUNNEL).then_some(name.instance())
     }

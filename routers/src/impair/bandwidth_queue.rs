@@ -1,7 +1,7 @@
 //! One way of a stream through a bad network: all bytes arrive, in their order, but late.
 //!
 //! ```text
-//!  push ──▶ segments ──▶ line of `rate` ──▶ delay ± jitter ──▶ lost? sent again, later each time ──▶ none before those in front ──▶ arrived
+//!  push ──▶ segments ──▶ line of `rate` ──▶ delay ± jitter ──▶ lost? sent again, later each time ──▶ in order ──▶ arrived
 //! ```
 //!
 //! A segment that is lost, or changed, is sent again after a retransmission time, and what is behind it waits with it.

@@ -12,7 +12,7 @@ use crate::frame::{FrameHead, Kind, NodeIndex};
 use crate::inbound::window::{Arrival, Window};
 use std::sync::Arc;
 
-/// A datagram whose seal was right.
+/// A datagram with a valid seal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Opened<'a> {
     /// Of the peer's present incarnation to our present one, and not opened before: its head and what was sealed.

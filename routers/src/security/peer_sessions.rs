@@ -70,7 +70,7 @@ pub(super) struct PeerIncarnation {
     pub(super) next: [u64; 2],
 }
 
-/// What the threads of one router know of its peers' lives.
+/// What the threads of one router know of its peers' incarnations.
 pub struct PeerSessions {
     pub(super) who: Who,
     pub(super) keys: KeyRing,

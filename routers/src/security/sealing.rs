@@ -59,7 +59,7 @@ impl Sealing {
         self.close(datagram)
     }
 
-    /// The same of a datagram whose head was written, with a check or without.
+    /// The same for a datagram with a written head, with a check or without.
     ///
     /// # Errors
     /// [`Unacquainted`]: ask first.

@@ -4,7 +4,7 @@
 //! ```text
 //!  a node, a laptop, a foreign program                the server                            another client
 //!  packages ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ Table: which host? ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ mailboxes
-//!               └── Client: reconnects, registers, asks the time          └── of each client, bounded, most important first
+//!               └── Client: reconnects, registers, asks the time          └── of each client, bounded, by priority
 //! ```
 //!
 //! Neither end knows a socket, a thread or a clock: time comes as an argument, and what the stream brings as bytes,
@@ -59,7 +59,7 @@ pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
 /// Writes the answers to commands that go no further: what a fault looks like is not the routers' business.
 pub trait Answers {
-    /// Appends the answer to a command whose body begins with these bytes. `holder`: the client that it was for. False:
+    /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for. False:
     /// it gets none.
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
 }

@@ -2,7 +2,7 @@
 //! no other. Each sender has an equal share of memory and rate, if others want some too.
 //!
 //! ```text
-//!  package ─┬─ nothing waits ──────────────────────▶ ready: bytes for the stream, a batch at most, in their final order
+//!  package ─┬─ nothing waits ──────────────────────▶ ready: bytes for the stream, a batch at most, in final order
 //!           └─ Queue: the least important gives way ──▲ most important first, whenever the stream has taken all
 //! ```
 //!
@@ -54,7 +54,7 @@ pub(super) struct Outgoing {
     ready: Vec<u8>,
     /// Of `ready`, bytes that the stream has taken.
     taken: usize,
-    /// Of `ready`, bytes of a frame whose beginning was taken before.
+    /// Of `ready`, bytes of a frame that was taken in part before.
     begun: usize,
     /// Of `ready`, bytes up to the end of the last frame that was put before packages.
     hurried: usize,

@@ -2,7 +2,7 @@
 //! overtaken by nothing.
 //!
 //! ```text
-//!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if it was wanted all the time
+//!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if always wanted
 //! ```
 //!
 //! As long as nothing is known little is held at a time; a connection that takes much more than that and is never full

@@ -321,7 +321,8 @@ fn words(error: &Error) -> String {
             format!("its certificate has expired; {NEW}")
         }
         Error::InvalidCertificate(CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. }) => {
-            "its certificate is not valid yet; is the date right at both ends?".into()
+            "its certificate is not valid yet; \
+                     is the date right at both ends?".into()
         }
         Error::InvalidCertificate(CertificateError::UnknownIssuer | CertificateError::BadSignature) => {
             format!("its certificate is foreign: {FOREIGN}")
@@ -338,7 +339,8 @@ fn words(error: &Error) -> String {
             // It says the same of one that does not hold yet.
             AlertDescription::CertificateExpired => {
                 format!(
-                    "it refuses this end's certificate as expired, or not valid yet; is the date right at both ends? If so, {NEW}"
+                    "it refuses this end's certificate as expired, or not valid yet; \
+                     is the date right at both ends? If so, {NEW}"
                 )
             }
             AlertDescription::UnknownCA | AlertDescription::DecryptError => {

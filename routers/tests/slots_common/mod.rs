@@ -425,7 +425,8 @@ fn tell(what: &str, repeated_on_stall: &Judged) {
             .map_or(f64::NAN, |ns| *ns as f64 / 1e3)
     };
     println!(
-        "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us after their nominal time",
+        "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us \
+         after their nominal time",
         repeated_on_stall.frames,
         repeated_on_stall.outside.len(),
         at(10),

@@ -92,7 +92,7 @@ fn body() -> Vec<u8> {
     [WORDS[0].as_bytes(), &RECURRING, WORDS[1].as_bytes()].concat()
 }
 
-/// Two nodes whose routers exchange datagrams, and the TCP router on one of them with a client on each. None where
+/// Two nodes with routers that exchange datagrams, and the TCP router on one of them with a client on each. None where
 /// namespaces cannot be made.
 fn recorded(authority: Option<&Authority>) -> Option<Read> {
     let spec = |name: &str, address| NodeSpec { name: name.into(), address };
@@ -203,7 +203,7 @@ fn wireshark_reads_all_without_security_and_of_what_is_sealed_nothing() {
     for secret in secrets() {
         assert_eq!(sealed.frames(&secret), 0, "with security {secret} finds frames");
     }
-    // All datagrams are data of nothing that Wireshark knows, and all that a session sends is TLS 1.3, whose handshake
+    // All datagrams are data of nothing that Wireshark knows, and all that a session sends is TLS 1.3; its handshake
     // shows no certificate.
     let (datagrams, data) = (sealed.frames(&lan("udp.length > 8")), sealed.frames(&lan("data")));
     assert!(datagrams > PACKAGES / 20 && datagrams == data, "{data} of {datagrams} datagrams are data");

@@ -69,7 +69,7 @@ pub(crate) fn start_sealed(
     start_for(address, node, life, seal, None)
 }
 
-/// Whose own system is 1, if it is said what the nodes of that host.
+/// Starts one for system 1, if the names that its nodes host are given.
 pub(crate) fn start_for(
     address: SocketAddr,
     node: &Arc<Node>,

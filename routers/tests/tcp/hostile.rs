@@ -293,7 +293,8 @@ fn others_are_served(authority: Option<&Authority>) {
     });
     let [connections, bytes, refused] = *target.most.lock().unwrap();
     eprintln!(
-        "{served} served beside; RSS {before} to {most} B; most: {connections} connections, {bytes} B; {refused} refused"
+        "{served} served beside; RSS {before} to {most} B; most: {connections} connections, {bytes} B; \
+         {refused} refused"
     );
     assert!(served > 0 && refused > attacks() / 10, "{served} served, {refused} refused");
     assert!(connections <= PLACES, "{connections} connections");

@@ -197,7 +197,8 @@ fn files_that_are_not_there_are_named() {
     let authority = Authority::new();
     let error = ClientSeal::load(authority.path(), &holder(4)).unwrap_err();
     assert!(
-        matches!(&error, SealError::File(path, _) if path.ends_with("base.system-4.pem") || path.ends_with("base.system-4.key")),
+        matches!(&error, SealError::File(path, _)
+            if path.ends_with("base.system-4.pem") || path.ends_with("base.system-4.key")),
         "{error}"
     );
     assert!(error.to_string().contains("`rohrpost keys "), "{error}");

@@ -197,18 +197,18 @@ impl std::fmt::Display for Refusal<'_> {
         match self.reason {
             Reason::Version => write!(
                 f,
-                "the TCP router speaks session format {version}, this end {VERSION}; run the same version of Rohrpost at both ends \
-                 (`rohrpost version`)"
+                "the TCP router speaks session format {version}, this end {VERSION}; \
+                 run the same version of Rohrpost at both ends (`rohrpost version`)"
             ),
             Reason::Common => write!(
                 f,
-                "the common digest here is {yours:016x}, that of {text} {ours:016x}; give both configurations the same classes \
-                 (`rohrpost check`, on both)"
+                "the common digest here is {yours:016x}, that of {text} {ours:016x}; \
+                 give both configurations the same classes (`rohrpost check`, on both)"
             ),
             Reason::System => write!(
                 f,
-                "the system's digest here is {yours:016x}, that of {text} {ours:016x}; start all of a system from the same file \
-                 (`rohrpost check`, on both)"
+                "the system's digest here is {yours:016x}, that of {text} {ours:016x}; \
+                 start all of a system from the same file (`rohrpost check`, on both)"
             ),
             Reason::OverflowPolicy if text.is_empty() => {
                 write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some")

@@ -25,7 +25,7 @@ const STRANGERS: u32 = 256;
 pub struct Crowded {
     /// Connections before their hello that gave way, since their address had most.
     pub greetings: u64,
-    /// Clients that gave way to others who had fewer, or were not let in while they had most.
+    /// Clients that gave way to others with fewer, or were not let in while they had most.
     pub clients: u64,
     /// Registrations with more ranges than a principal may have.
     pub ranges: u64,

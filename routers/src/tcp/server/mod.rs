@@ -44,8 +44,8 @@ pub enum ServerError {
     InUse(SocketAddr),
     /// It is another computer's address.
     #[error(
-        "{0} is no address of this computer: let `server` of [tcp] name the node that has it, or correct `address` (`ip addr` shows which \
-         there are)"
+        "{0} is no address of this computer: let `server` of [tcp] name the node that has it, or correct `address` \
+         (`ip addr` shows which there are)"
     )]
     NotHere(SocketAddr),
     /// The system says no for another reason.

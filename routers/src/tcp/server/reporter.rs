@@ -82,8 +82,8 @@ impl Host for ServerReporter {
             Event::Refused { name, reason, digests: (theirs, ours), text } => {
                 let refusal = match reason {
                     Reason::Common | Reason::System => format!(
-                        "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
-                         (`rohrpost check`, on both)",
+                        "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; \
+                         give both the same configuration (`rohrpost check`, on both)",
                         reason.word()
                     ),
                     _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),

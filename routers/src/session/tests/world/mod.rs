@@ -141,7 +141,7 @@ impl World {
         }
     }
 
-    /// Whether the server that a client knows is the one that lives.
+    /// Whether a client knows the server's present incarnation.
     fn is_reached(&self, client: usize) -> bool {
         let is_whole = |connection: &Connection| connection.is_client_open && connection.index.is_some();
         self.connections.iter().any(|connection| connection.client == client && is_whole(connection))
