@@ -174,7 +174,7 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
 }
 
 #[test]
-fn each_sealed_life_has_an_incarnation_of_its_own_whatever_its_settings_say() {
+fn each_sealed_router_has_an_incarnation_of_its_own_whatever_its_settings_say() {
     let mut pair = Pair::new();
     let lives: Vec<_> = (0..3).map(|_| sealed_incarnation(&mut pair)).collect();
     assert!(lives[0] != lives[1] && lives[1] != lives[2] && lives[0] != lives[2], "{lives:?}");

@@ -76,7 +76,7 @@ impl Gate {
             opening: Opening::new(all, port),
             handshake,
             tally: Tally::new(all.rejections(port)),
-            peers: vec![Asked::default(); all.who.nodes.into()].into(),
+            peers: vec![Asked::default(); all.router.nodes.into()].into(),
             all: all.clone(),
             look_ns: 0,
         }
@@ -171,7 +171,7 @@ impl Gate {
         if now_ns < self.look_ns || self.handshake.is_none() {
             return None;
         }
-        let mut peers = 0..self.all.who.nodes;
+        let mut peers = 0..self.all.router.nodes;
         let Some(to) = peers.find(|peer| self.is_to_be_asked(*peer, now_ns, stats)) else {
             self.look_ns = now_ns + LOOK_EVERY_NS;
             return None;

@@ -60,9 +60,9 @@ pub struct Greeted {
 impl Handshake {
     /// There is one. `seed` comes from a source of random numbers that is fit for keys; each incarnation has another.
     pub fn new(all: &Arc<PeerSessions>, seed: [u8; 32]) -> Self {
-        let peers = vec![Peer::default(); all.who.nodes.into()].into();
+        let peers = vec![Peer::default(); all.router.nodes.into()].into();
         let mut handshake = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), peers, begins: None };
-        (0..all.who.nodes).for_each(|peer| handshake.draw(0, peer));
+        (0..all.router.nodes).for_each(|peer| handshake.draw(0, peer));
         handshake
     }
 
@@ -112,8 +112,8 @@ impl Handshake {
     /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the
     /// network before: it says from which sequence on we are to be heard, and what left before it would not be taken.
     pub fn begin(&mut self) -> Option<NodeIndex> {
-        let (peer, life) = self.begins.take()?;
-        self.all.begin(peer, life);
+        let (peer, session) = self.begins.take()?;
+        self.all.begin(peer, session);
         Some(peer)
     }
 

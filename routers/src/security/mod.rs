@@ -44,7 +44,7 @@ pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Handshake, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 pub use opening::{Greeting, Opened, Opening};
-pub use peer_sessions::{PeerSessions, Port, Who};
+pub use peer_sessions::{PeerSessions, Port, RouterIdentity};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;

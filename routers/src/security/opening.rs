@@ -67,9 +67,9 @@ struct Heard {
 impl Opening {
     /// For a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
-        let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
-        let overheard = (0..all.who.nodes).map(|_| UnverifiedIncarnations::default()).collect();
-        let past = vec![<[Past; PAST]>::default(); all.who.nodes.into()].into();
+        let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
+        let overheard = (0..all.router.nodes).map(|_| UnverifiedIncarnations::default()).collect();
+        let past = vec![<[Past; PAST]>::default(); all.router.nodes.into()].into();
         Self { peers, overheard, past, all: all.clone(), port }
     }
 
@@ -180,7 +180,7 @@ impl Opening {
     /// Whether it says that it comes from another node of ours, to this one.
     fn is_ours(&self, head: &FrameHead) -> bool {
         let all = &self.all;
-        all.is_peer(head.from) && head.to == all.who.own && head.system == all.who.system
+        all.is_peer(head.from) && head.to == all.router.own && head.system == all.router.system
     }
 
     /// From which sequence on the incarnation of a peer is heard that was opened last; what is missing from there on is
@@ -210,18 +210,18 @@ impl Opening {
         port: Port,
         from: NodeIndex,
     ) -> Option<&'a mut Heard> {
-        peers[usize::from(from)].of(all, from, |life| {
-            let peer = End { node: from, incarnation: life.incarnation };
+        peers[usize::from(from)].of(all, from, |session| {
+            let peer = End { node: from, incarnation: session.incarnation };
             let from = match port {
                 // What is sealed there is sealed to this incarnation of ours: all of it may be opened, and once.
-                Port::Rest => remembered(past, life.incarnation),
+                Port::Rest => remembered(past, session.incarnation),
                 // What was overheard is not proven a second time.
                 Port::Packages | Port::Time => {
-                    life.next[port as usize].max(overheard[usize::from(from)].next(life.incarnation))
+                    session.next[port as usize].max(overheard[usize::from(from)].next(session.incarnation))
                 }
             };
             Heard {
-                incarnation: life.incarnation,
+                incarnation: session.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
                 first: (port != Port::Rest).then_some(from),
                 window: Window::going_on(from),

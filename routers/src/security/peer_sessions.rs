@@ -38,7 +38,7 @@ impl Port {
 
 /// A router, as far as keys depend on it.
 #[derive(Clone, Copy, Debug)]
-pub struct Who {
+pub struct RouterIdentity {
     /// Its system.
     pub system: u8,
     /// Its node.
@@ -52,7 +52,7 @@ pub struct Who {
     pub incarnation: u64,
 }
 
-impl Who {
+impl RouterIdentity {
     /// The router of these settings.
     pub fn of(settings: &Settings) -> Self {
         let Settings { system, own, digest, incarnation, .. } = *settings;
@@ -72,7 +72,7 @@ pub(super) struct PeerIncarnation {
 
 /// What the threads of one router know of its peers' incarnations.
 pub struct PeerSessions {
-    pub(super) who: Who,
+    pub(super) router: RouterIdentity,
     pub(super) keys: KeyRing,
     peers: Box<[Peer]>,
     /// Peers of which an incarnation is known, one bit each.
@@ -87,7 +87,7 @@ pub struct PeerSessions {
 
 impl fmt::Debug for PeerSessions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("PeerSessions").field("who", &self.who).finish_non_exhaustive()
+        f.debug_struct("PeerSessions").field("router", &self.router).finish_non_exhaustive()
     }
 }
 
@@ -96,7 +96,7 @@ struct Peer {
     /// By the place of the key.
     hello_to: Vec<Seal>,
     hello_from: Vec<Seal>,
-    life: Published,
+    session: Published,
     /// What it must answer for an incarnation of it to begin.
     challenge: AtomicU64,
     /// Questions to it.
@@ -112,25 +112,25 @@ impl PeerSessions {
     ///
     /// # Panics
     /// If the incarnation is 0.
-    pub fn new(who: Who, keys: KeyRing) -> Arc<Self> {
-        assert_ne!(who.incarnation, 0, "an incarnation is not 0");
+    pub fn new(router: RouterIdentity, keys: KeyRing) -> Arc<Self> {
+        assert_ne!(router.incarnation, 0, "an incarnation is not 0");
         let seals = |from, to| {
             let (from, to) = (End::any(from), End::any(to));
-            keys.derive_all(&Binding { purpose: Purpose::Hello, system: who.system, from, to })
+            keys.derive_all(&Binding { purpose: Purpose::Hello, system: router.system, from, to })
         };
         let peer = |node| Peer {
-            hello_to: seals(who.own, node),
-            hello_from: seals(node, who.own),
-            life: Published::default(),
+            hello_to: seals(router.own, node),
+            hello_from: seals(node, router.own),
+            session: Published::default(),
             challenge: AtomicU64::new(0),
             asked: AtomicU32::new(0),
             hellos: AtomicU64::new(0),
             sealed: Default::default(),
         };
-        let peers = (0..who.nodes).map(peer).collect();
-        let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(who.nodes)));
+        let peers = (0..router.nodes).map(peer).collect();
+        let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(router.nodes)));
         let none = || AtomicU64::new(0);
-        Arc::new(Self { peers, who, keys, known: none(), doubts: none(), unsaid: none(), rejections })
+        Arc::new(Self { peers, router, keys, known: none(), doubts: none(), unsaid: none(), rejections })
     }
 
     /// What was not taken at a port.
@@ -164,26 +164,26 @@ impl PeerSessions {
 
     /// The incarnation of a peer that is known to live, if there is one.
     pub fn incarnation(&self, peer: NodeIndex) -> Option<u64> {
-        self.life(peer)?.1.map(|life| life.incarnation)
+        self.session(peer)?.1.map(|session| session.incarnation)
     }
 
     /// Whether a node of that number is a peer.
     pub(super) fn is_peer(&self, node: NodeIndex) -> bool {
-        node < self.who.nodes && node != self.who.own
+        node < self.router.nodes && node != self.router.own
     }
 
     /// Grows with each incarnation that begins.
     pub(super) fn version(&self, peer: NodeIndex) -> u32 {
-        self.peer(peer).life.version.load(Ordering::Relaxed)
+        self.peer(peer).session.version.load(Ordering::Relaxed)
     }
 
     /// None while it is being written: then it is to be looked at again.
-    pub(super) fn life(&self, peer: NodeIndex) -> Option<(u32, Option<PeerIncarnation>)> {
-        self.peer(peer).life.read()
+    pub(super) fn session(&self, peer: NodeIndex) -> Option<(u32, Option<PeerIncarnation>)> {
+        self.peer(peer).session.read()
     }
 
-    pub(super) fn begin(&self, peer: NodeIndex, life: PeerIncarnation) {
-        self.peer(peer).life.write(life);
+    pub(super) fn begin(&self, peer: NodeIndex, session: PeerIncarnation) {
+        self.peer(peer).session.write(session);
         // ORDERING (E): the incarnation was written before. Pairs with (F).
         self.known.fetch_or(1 << peer, Ordering::Release);
         self.doubts.fetch_and(!(1 << peer), Ordering::Relaxed);
@@ -229,11 +229,11 @@ impl PeerSessions {
     /// other's incarnation began.
     pub(super) fn binding(&self, port: Port, from: End, to: End) -> Binding {
         let to = if port == Port::Time { End::any(to.node) } else { to };
-        Binding { purpose: port.purpose(), system: self.who.system, from, to }
+        Binding { purpose: port.purpose(), system: self.router.system, from, to }
     }
 
     pub(super) fn own(&self) -> End {
-        End { node: self.who.own, incarnation: self.who.incarnation }
+        End { node: self.router.own, incarnation: self.router.incarnation }
     }
 
     pub(super) fn hello_from(&self, peer: NodeIndex, key: usize) -> &Seal {
@@ -266,7 +266,7 @@ impl PeerSessions {
         let number = u32::try_from(self.peer(peer).hellos.fetch_add(1, Ordering::Relaxed));
         let number = number.expect("an incarnation says 2^32 hellos to a peer at most; the router begins another");
         let datagram = &mut datagram[..HELLO_DATAGRAM_BYTES];
-        let Who { system, own, digest, incarnation, .. } = self.who;
+        let RouterIdentity { system, own, digest, incarnation, .. } = self.router;
         let sequence = number.into();
         let head = FrameHead { kind: Kind::Hello, system, from: own, to: peer, digest, incarnation, sequence };
         head.write(self.keys.id(key), datagram);
@@ -302,14 +302,14 @@ struct Published {
 }
 
 impl Published {
-    fn write(&self, life: PeerIncarnation) {
+    fn write(&self, session: PeerIncarnation) {
         let version = self.version.load(Ordering::Relaxed);
         self.version.store(version | 1, Ordering::Relaxed);
         // ORDERING (A): a reader of a new word sees the odd version. Pairs with (B).
         fence(Ordering::Release);
-        self.incarnation.store(life.incarnation, Ordering::Relaxed);
-        self.key.store(life.key as u64, Ordering::Relaxed);
-        self.next.iter().zip(life.next).for_each(|(place, next)| place.store(next, Ordering::Relaxed));
+        self.incarnation.store(session.incarnation, Ordering::Relaxed);
+        self.key.store(session.key as u64, Ordering::Relaxed);
+        self.next.iter().zip(session.next).for_each(|(place, next)| place.store(next, Ordering::Relaxed));
         // ORDERING (C): publishes the words. Pairs with (D).
         self.version.store((version | 1).wrapping_add(1), Ordering::Release);
     }
@@ -348,10 +348,10 @@ impl<K> Known<K> {
         make: impl FnOnce(&PeerIncarnation) -> K,
     ) -> Option<&mut K> {
         if all.version(peer) != self.version
-            && let Some((version, life)) = all.life(peer)
+            && let Some((version, session)) = all.session(peer)
         {
             self.version = version;
-            self.made = life.as_ref().map(make);
+            self.made = session.as_ref().map(make);
         }
         self.made.as_mut()
     }

@@ -35,7 +35,7 @@ const OTHER_KEY_EVERY: u64 = 4;
 impl Sealing {
     /// For a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
-        let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
+        let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
         Self { peers, strangers: Box::default(), all: all.clone(), port }
     }
 
@@ -43,7 +43,7 @@ impl Sealing {
     /// it may send a challenge.
     pub fn of_slots(all: &Arc<PeerSessions>) -> Self {
         let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), End::any(node)));
-        Self { strangers: (0..all.who.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
+        Self { strangers: (0..all.router.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
     }
 
     /// Seals a datagram where it lies: 36 bytes for the head, what follows it, and [`TAG_BYTES`](super::TAG_BYTES) of
@@ -112,10 +112,10 @@ impl Sealing {
         port: Port,
         to: NodeIndex,
     ) -> Option<&'a mut PeerSeal> {
-        peers[usize::from(to)].of(all, to, |life| {
-            let peer = End { node: to, incarnation: life.incarnation };
-            let seal = all.keys.derive(life.key, &all.binding(port, all.own(), peer));
-            PeerSeal { key: life.key, seal }
+        peers[usize::from(to)].of(all, to, |session| {
+            let peer = End { node: to, incarnation: session.incarnation };
+            let seal = all.keys.derive(session.key, &all.binding(port, all.own(), peer));
+            PeerSeal { key: session.key, seal }
         })
     }
 

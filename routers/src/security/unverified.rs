@@ -28,19 +28,20 @@ impl UnverifiedIncarnations {
         datagram: &'a mut [u8],
         derive: impl FnOnce() -> Seal,
     ) -> Option<&'a [u8]> {
-        let at = self.0.iter().position(|life| life.as_ref().is_some_and(|life| life.incarnation == head.incarnation));
+        let at =
+            self.0.iter().position(|entry| entry.as_ref().is_some_and(|entry| entry.incarnation == head.incarnation));
         let known = at.and_then(|at| self.0[at].as_mut());
         let (nonce, after) = (seal::of_sequence(head.sequence), head.sequence.saturating_add(1));
         let text = match known {
-            Some(life) if life.key == key => {
-                let text = life.seal.open(nonce, datagram)?;
-                life.next = life.next.max(after);
+            Some(entry) if entry.key == key => {
+                let text = entry.seal.open(nonce, datagram)?;
+                entry.next = entry.next.max(after);
                 text
             }
             known => {
                 let seal = derive();
                 let text = seal.open(nonce, datagram)?;
-                let next = known.map_or(after, |life| life.next.max(after));
+                let next = known.map_or(after, |entry| entry.next.max(after));
                 self.0[at.unwrap_or(INCARNATIONS - 1)] =
                     Some(UnverifiedIncarnation { incarnation: head.incarnation, key, seal, next });
                 text
@@ -52,7 +53,7 @@ impl UnverifiedIncarnations {
 
     /// From which sequence on nothing of an incarnation was overheard.
     pub(super) fn next(&self, incarnation: u64) -> u64 {
-        let mut lives = self.0.iter().flatten();
-        lives.find(|life| life.incarnation == incarnation).map_or(0, |life| life.next)
+        let mut entries = self.0.iter().flatten();
+        entries.find(|entry| entry.incarnation == incarnation).map_or(0, |entry| entry.next)
     }
 }

@@ -36,7 +36,7 @@ struct Word {
 impl Waiting {
     /// Nothing waits.
     pub fn new(all: &Arc<PeerSessions>) -> Self {
-        Self { peers: vec![Peer::default(); all.who.nodes.into()].into(), all: all.clone(), next: 0 }
+        Self { peers: vec![Peer::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
     }
 
     /// A hello that is to leave. It takes the place of the one before; but a reply by which an incarnation begins gives

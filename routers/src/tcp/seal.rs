@@ -322,7 +322,8 @@ fn words(error: &Error) -> String {
         }
         Error::InvalidCertificate(CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. }) => {
             "its certificate is not valid yet; \
-                     is the date right at both ends?".into()
+                     is the date right at both ends?"
+                .into()
         }
         Error::InvalidCertificate(CertificateError::UnknownIssuer | CertificateError::BadSignature) => {
             format!("its certificate is foreign: {FOREIGN}")

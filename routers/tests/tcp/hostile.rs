@@ -119,10 +119,10 @@ impl Chance {
     }
 }
 
-fn hello(life: u64) -> Vec<u8> {
+fn hello(incarnation: u64) -> Vec<u8> {
     let (system, system_digest) = (9, 9);
     let (reaches_own, attempt, asked_ns, name) = (false, 1, 0, "hostile");
-    let hello = Hello { system, reaches_own, common: COMMON, system_digest, life, attempt, asked_ns, name };
+    let hello = Hello { system, reaches_own, common: COMMON, system_digest, incarnation, attempt, asked_ns, name };
     let mut bytes = Vec::new();
     Message::Hello(hello).write(&mut bytes);
     bytes

@@ -160,7 +160,7 @@ fn a_certificate_of_the_own_system_hosts_what_its_file_gives_that_node_and_no_mo
     drop(server);
     // That it went away is told, and when it is there again what it says.
     wait("away", || one.client.link().why.contains("is not reached").then_some(()));
-    let again = |life, ranges: Vec<Range>| start_for(address, &own, life, seal(), with(ranges)).ok();
+    let again = |incarnation, ranges: Vec<Range>| start_for(address, &own, incarnation, seal(), with(ranges)).ok();
     let server = wait("its port is free", || again(2, others.to_vec()));
     wait("why again", || one.client.link().why.contains("or of its node").then_some(()));
     drop(server);

@@ -17,7 +17,7 @@ pub(crate) fn hello(system: u8, common: u64) -> Hello<'static> {
         reaches_own: false,
         common,
         system_digest: system.into(),
-        life: 1000 + u64::from(system),
+        incarnation: 1000 + u64::from(system),
         attempt: 1,
         asked_ns: 0,
         name: "raw",
@@ -118,7 +118,7 @@ fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
     one.wait_up();
     two.wait_up();
     let (mut sender, mut number, mut last) = (one.sender(2), 0, None);
-    for life in 2..6 {
+    for incarnation in 2..6 {
         // Under load until some came, then without a server while the load goes on.
         let before = last;
         wait("packages that cross", || {
@@ -136,7 +136,7 @@ fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
             one.say(&mut sender, number);
             std::thread::sleep(Duration::from_millis(1));
         }
-        server = Some(wait("its port is free", || start(address, &own, life).ok()));
+        server = Some(wait("its port is free", || start(address, &own, incarnation).ok()));
         one.wait_up();
         two.wait_up();
     }

@@ -29,7 +29,7 @@ impl Router {
     }
 
     fn with_keys(end: End, keys: KeyRing, own: u8) -> Self {
-        let all = PeerSessions::new(Who::of(&end.settings), keys);
+        let all = PeerSessions::new(RouterIdentity::of(&end.settings), keys);
         Self { gate: Gate::new(&all, [own; 32]), all, end }
     }
 

@@ -48,8 +48,8 @@ impl Router {
     }
 
     pub(super) fn with_keys(own: NodeIndex, incarnation: u64, keys: KeyRing) -> Self {
-        let who = Who { system: SYSTEM, own, nodes: 3, digest: DIGEST, incarnation };
-        let all = PeerSessions::new(who, keys);
+        let router = RouterIdentity { system: SYSTEM, own, nodes: 3, digest: DIGEST, incarnation };
+        let all = PeerSessions::new(router, keys);
         let mut seed = [own; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
         Self {

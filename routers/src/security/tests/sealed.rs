@@ -57,7 +57,7 @@ fn each_opens_once_in_whatever_order_within_the_window() {
 }
 
 #[test]
-fn what_is_for_another_node_port_or_life_does_not_open() {
+fn what_is_for_another_node_port_or_incarnation_does_not_open() {
     let (mut a, mut b) = pair();
     let mut c = Router::new(2, 300);
     acquaint(&mut c, &mut a);
@@ -165,7 +165,7 @@ fn what_could_not_be_sent_can_be_read_again_in_any_later_incarnation() {
 /// At the port of what is not real time no hello says what comes first; still nothing is opened twice, also when an
 /// incarnation begins again, and when another was taken for its successor meanwhile.
 #[test]
-fn what_is_not_real_time_opens_once_however_often_its_life_begins() {
+fn what_is_not_real_time_opens_once_however_often_its_incarnation_begins() {
     let (mut a, mut b) = pair();
     let seal = |a: &mut Router| a.seal(Port::Rest, 1, b"text").unwrap();
     let early = seal(&mut a);

@@ -116,7 +116,7 @@ fn the_newest_hellos_wait_and_replies_go_first() {
 }
 
 #[test]
-fn nothing_is_sealed_to_a_life_while_the_reply_waits_by_which_it_can_be_opened() {
+fn nothing_is_sealed_to_an_incarnation_while_the_reply_waits_by_which_it_can_be_opened() {
     let [mut a, mut b, _] = three();
     acquaint(&mut b, &mut a);
     let waiting = Waiting::new(&a.all);

@@ -49,8 +49,8 @@ impl Client {
             let refusal = Refusal { version: VERSION, reason: Reason::Common, yours, ours, text };
             return self.refused(now_ns, &refusal, host);
         }
-        if welcome.life != self.server_incarnation {
-            self.server_incarnation = welcome.life;
+        if welcome.incarnation != self.server_incarnation {
+            self.server_incarnation = welcome.incarnation;
             self.estimate = ServerClockEstimate::default();
         }
         self.estimate.heard(now_ns, &welcome.time);

@@ -49,7 +49,7 @@ pub struct ClientSettings {
     /// Digest of what must be equal inside a system.
     pub system_digest: u64,
     /// Tells this incarnation from others; not 0. Also what its waits are drawn from.
-    pub life: u64,
+    pub incarnation: u64,
     /// Bytes of packages that wait.
     pub quota_bytes: usize,
     /// Level of each priority; 0 goes first.
@@ -191,7 +191,7 @@ impl Client {
             registration: Registration::Due(0),
             number: 0,
             attempt: 0,
-            backoff: Backoff::new(settings.life),
+            backoff: Backoff::new(settings.incarnation),
             splitter: Splitter::default(),
             outgoing: Outgoing::new(settings.quota_bytes),
             is_blocked: false,
@@ -288,13 +288,13 @@ impl Client {
         self.splitter = Splitter::default();
         self.outgoing.cut();
         (self.heard_ns, self.moved_ns) = (now_ns, now_ns);
-        let ClientSettings { name, system, reaches_own, common, system_digest, life, .. } = &self.settings;
+        let ClientSettings { name, system, reaches_own, common, system_digest, incarnation, .. } = &self.settings;
         self.outgoing.say(&Message::Hello(Hello {
             system: *system,
             reaches_own: *reaches_own,
             common: *common,
             system_digest: *system_digest,
-            life: *life,
+            incarnation: *incarnation,
             attempt: self.attempt,
             asked_ns: now_ns,
             name,

@@ -19,7 +19,7 @@ pub struct Hello<'a> {
     /// Digest of what must be equal inside a system.
     pub system_digest: u64,
     /// Tells this incarnation of the client from others; not 0.
-    pub life: u64,
+    pub incarnation: u64,
     /// Counts the connections of this incarnation, from 1: of two the later is the true one.
     pub attempt: u64,
     /// Its own time, ns: the first question for the time.
@@ -43,13 +43,13 @@ impl<'a> Hello<'a> {
             reaches_own: flags == 1,
             common: fields.long()?,
             system_digest: fields.long()?,
-            life: fields.long()?,
+            incarnation: fields.long()?,
             attempt: fields.long()?,
             asked_ns: fields.long()?,
             name: fields.text(NAME_BYTES_MAX)?,
         };
         let is_one = system != 0 && system != rohrpost_mailbox::ALL_SYSTEMS;
-        if !is_one || flags > 1 || hello.life == 0 || hello.attempt == 0 {
+        if !is_one || flags > 1 || hello.incarnation == 0 || hello.attempt == 0 {
             return Err(BadFrame::Damaged("a hello of nobody"));
         }
         Ok(hello)
@@ -58,7 +58,7 @@ impl<'a> Hello<'a> {
     pub(super) fn write(&self, into: &mut Vec<u8>) {
         into.extend(MAGIC);
         into.extend([VERSION, self.system, u8::from(self.reaches_own), 0]);
-        for long in [self.common, self.system_digest, self.life, self.attempt, self.asked_ns] {
+        for long in [self.common, self.system_digest, self.incarnation, self.attempt, self.asked_ns] {
             into.extend(long.to_le_bytes());
         }
         into.extend(self.name.as_bytes());
@@ -71,7 +71,7 @@ pub struct Welcome {
     /// Digest of what must be equal everywhere.
     pub common: u64,
     /// Tells this incarnation of the server from others: times of two incarnations have nothing to do with each other.
-    pub life: u64,
+    pub incarnation: u64,
     /// To the question of the hello.
     pub time: TimeAnswer,
 }
@@ -86,14 +86,14 @@ impl Welcome {
             return Err(BadFrame::Version(version));
         }
         fields.zeroes::<3>()?;
-        Ok(Self { common: fields.long()?, life: fields.long()?, time: TimeAnswer::parse(fields)? })
+        Ok(Self { common: fields.long()?, incarnation: fields.long()?, time: TimeAnswer::parse(fields)? })
     }
 
     pub(super) fn write(&self, into: &mut Vec<u8>) {
         into.extend(MAGIC);
         into.extend([VERSION, 0, 0, 0]);
         into.extend(self.common.to_le_bytes());
-        into.extend(self.life.to_le_bytes());
+        into.extend(self.incarnation.to_le_bytes());
         self.time.write(into);
     }
 }

@@ -105,11 +105,11 @@ impl Server {
 
     /// Makes ready what is to be written next.
     pub(super) fn refill(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
-        let (time, life, common) = (self.time, self.settings.life, self.settings.common);
+        let (time, incarnation, common) = (self.time, self.settings.incarnation, self.settings.common);
         let Some(member) = self.member_mut(client) else { return };
         if let Some(asked) = member.asked.take() {
             let time = time_answer(now_ns, &asked, time);
-            let welcome = Message::Welcome(Welcome { common, life, time });
+            let welcome = Message::Welcome(Welcome { common, incarnation, time });
             if asked.by_hello {
                 member.round_trip = RoundTrip::Since(now_ns);
             }

@@ -77,7 +77,7 @@ impl Server {
         if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
             return self.refuse(now_ns, client, reason, digests, &holder, host);
         }
-        let older = self.places.of_incarnation(hello.life);
+        let older = self.places.of_incarnation(hello.incarnation);
         if let Some((older, attempt)) = older.and_then(|older| Some((older, self.member(older)?.attempt))) {
             if attempt >= hello.attempt {
                 return self.refuse(now_ns, client, Reason::Replaced, (0, 0), "", host);

@@ -81,7 +81,7 @@ pub(super) struct Member {
     pub(super) party: u32,
     pub(super) system_digest: u64,
     pub(super) reaches_own: bool,
-    pub(super) life: u64,
+    pub(super) incarnation: u64,
     pub(super) attempt: u64,
     pub(super) splitter: Splitter,
     pub(super) outgoing: Outgoing,
@@ -117,7 +117,7 @@ impl Member {
             party: 0,
             system_digest: 0,
             reaches_own: false,
-            life: 0,
+            incarnation: 0,
             attempt: 0,
             splitter: Splitter::default(),
             outgoing: Outgoing::new(quota_bytes),
@@ -143,7 +143,7 @@ impl Member {
         self.system = hello.system;
         self.system_digest = hello.system_digest;
         self.reaches_own = hello.reaches_own;
-        self.life = hello.life;
+        self.incarnation = hello.incarnation;
         self.attempt = hello.attempt;
         self.asked = Some(Asked { asked_ns: hello.asked_ns, came_ns: now_ns, by_hello: true });
     }

@@ -47,7 +47,7 @@ pub struct ServerSettings {
     /// rights](Server::certify).
     pub own_nodes: OwnNodes,
     /// Tells this incarnation from others; not 0.
-    pub life: u64,
+    pub incarnation: u64,
     /// Clients that may take part at a time.
     pub clients_max: u16,
     /// Connections that have not said hello yet; of more the oldest gives way.

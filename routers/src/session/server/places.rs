@@ -41,7 +41,7 @@ pub(super) struct Places {
     /// Admitted clients.
     pub(super) principals: Principals,
     /// Admitted clients, by incarnation.
-    lives: BTreeMap<u64, ClientIndex>,
+    incarnations: BTreeMap<u64, ClientIndex>,
     /// Admitted clients, by system.
     systems: BTreeSet<(u8, ClientIndex)>,
     pub(super) crowded: Crowded,
@@ -55,16 +55,16 @@ impl Places {
     }
 
     /// The client with this incarnation.
-    pub(super) fn of_incarnation(&self, life: u64) -> Option<ClientIndex> {
-        self.lives.get(&life).copied()
+    pub(super) fn of_incarnation(&self, incarnation: u64) -> Option<ClientIndex> {
+        self.incarnations.get(&incarnation).copied()
     }
 
     /// It does not take part any more.
     pub(super) fn leaves(&mut self, now_ns: u64, client: ClientIndex, member: &Member) {
         self.principals.leaves(now_ns, member.principal_id, member.began_ns, client);
         self.systems.remove(&(member.system, client));
-        if self.lives.get(&member.life) == Some(&client) {
-            self.lives.remove(&member.life);
+        if self.incarnations.get(&member.incarnation) == Some(&client) {
+            self.incarnations.remove(&member.incarnation);
         }
     }
 
@@ -136,7 +136,7 @@ impl Server {
         }
         let is_node = member.certified.is_some() || is_own && self.settings.own_nodes.has(hello.name);
         member.party = if is_node { hello.system.into() } else { STRANGERS + member.principal_id };
-        self.places.lives.insert(member.life, client);
+        self.places.incarnations.insert(member.incarnation, client);
         self.places.systems.insert((member.system, client));
         true
     }

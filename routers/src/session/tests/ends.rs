@@ -315,7 +315,7 @@ fn names_of_others_are_sent_by_nobody() {
 }
 
 #[test]
-fn a_later_connection_of_the_same_life_takes_the_place_of_the_earlier() {
+fn a_later_connection_of_the_same_incarnation_takes_the_place_of_the_earlier() {
     let mut ground = Ground::clients(2);
     let old = ground.ends[0].1.unwrap();
     let place = ground.server.accept(ground.now_ns, address(0, 2), &mut ground.said).unwrap();
@@ -324,7 +324,7 @@ fn a_later_connection_of_the_same_life_takes_the_place_of_the_earlier() {
         reaches_own: true,
         common: COMMON,
         system_digest: 11,
-        life: 100,
+        incarnation: 100,
         attempt: 2,
         asked_ns: 1,
         name: "client 0",

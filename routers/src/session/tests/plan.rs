@@ -126,27 +126,27 @@ pub(super) fn levels() -> [u8; 256] {
     std::array::from_fn(|priority| if priority < 16 { 31 } else { (15 - (priority as u8 >> 4)) * 2 })
 }
 
-pub(super) fn client_settings(client: usize, life: u64) -> ClientSettings {
+pub(super) fn client_settings(client: usize, incarnation: u64) -> ClientSettings {
     ClientSettings {
         name: format!("client {client}"),
         system: system_of(client),
         reaches_own: client.is_multiple_of(2),
         common: COMMON,
         system_digest: u64::from(system_of(client)) * 11,
-        life,
+        incarnation,
         quota_bytes: QUOTA,
         levels: levels(),
         admission: Admission { router: Some(ROUTER), ..Admission::default() },
     }
 }
 
-pub(super) fn server_settings(life: u64) -> ServerSettings {
+pub(super) fn server_settings(incarnation: u64) -> ServerSettings {
     ServerSettings {
         name: "the server".into(),
         common: COMMON,
         system: Some((1, 11)),
         own_nodes: OwnNodes::default(),
-        life,
+        incarnation,
         clients_max: 16,
         greetings_max: 4,
         quota_bytes: QUOTA,

@@ -25,7 +25,7 @@ pub(super) struct Node {
     clock: Clock,
     frozen_until_ns: u64,
     wake_ns: u64,
-    life: u64,
+    incarnation: u64,
     pub(super) attempts: u64,
     chance: Chance,
 }
@@ -53,9 +53,9 @@ impl World {
     pub(super) fn new(plan: Plan) -> Self {
         let mut chance = Chance::new(plan.seed);
         let node = |index: usize, chance: &mut Chance| {
-            let (clock, life) = (Clock::new(chance), chance.bits() | 1);
-            let client = Client::new(client_settings(index, life), ranges(index), clock.at(0));
-            Node { client, clock, frozen_until_ns: 0, wake_ns: 0, life, attempts: 0, chance: chance.fork() }
+            let (clock, incarnation) = (Clock::new(chance), chance.bits() | 1);
+            let client = Client::new(client_settings(index, incarnation), ranges(index), clock.at(0));
+            Node { client, clock, frozen_until_ns: 0, wake_ns: 0, incarnation, attempts: 0, chance: chance.fork() }
         };
         let nodes: Vec<Node> = (0..plan.clients).map(|index| node(index, &mut chance)).collect();
         let known = |index| Known {
