@@ -365,8 +365,7 @@ fn packages_above_their_class_are_not_carried_as_such() {
     assert_eq!(packages, [0, 1]);
 }
 
-/// Neither do those of which there is more than can leave: they are lost, and counted, before they take the way of what
-/// may.
+/// Neither do those of which there is more than can leave: they are lost, and counted, before they delay what may.
 #[test]
 fn a_flood_that_may_not_hurry_is_lost_rather_than_carried_as_if_it_might() {
     let mut pair = Pair::new();

@@ -104,8 +104,7 @@ pub enum Event<'a> {
 
 /// What a client needs from the code that runs it.
 pub trait Host: Answers {
-    /// Puts a package that came into its mailbox. Its `published_ns` is by the monotonic clock here, as far as that can
-    /// be told.
+    /// Puts a package that came into its mailbox. Its `published_ns` is an estimate by the monotonic clock here.
     ///
     /// # Errors
     /// [`NotDelivered`]
