@@ -45,7 +45,7 @@ impl Module for ServerModule {
             common: digest.common,
             system: Some((installation.system.id, digest.system)),
             own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
-            life: realtime_ns().max(1),
+            incarnation: realtime_ns().max(1),
             clients_max: tcp.clients,
             greetings_max: tcp.clients.max(GREETINGS_MIN),
             quota_bytes: tcp.quota_bytes,

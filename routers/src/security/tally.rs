@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Of each node something is told so often at most, ns; of all addresses that no node has together, too.
 pub const TELL_EVERY_NS: u64 = 1_000_000_000;
 
-/// Counts of one port: by the node whose address it came from, which anybody can write on a datagram.
+/// Counts of one port: by the node with the source address, which any sender can forge.
 #[derive(Debug)]
 pub struct Rejections {
     /// By node, then those of addresses that no node has.

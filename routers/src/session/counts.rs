@@ -1,4 +1,4 @@
-//! What one end of sessions counts: every package comes, and passes, is replaced by a newer one, or is lost with a cause.
+//! Counts of one end of sessions: each package comes, and passes, is replaced by a newer one, or is lost with a cause.
 
 use crate::counts::{self, Count};
 use crate::report::NotDelivered;
@@ -21,7 +21,7 @@ rohrpost_mailbox::causes! {
         Offline = "offline",
         /// It was handed on too often: it goes round.
         Hops = "hops",
-        /// Its sender's name is not hosted by who sent it.
+        /// Its sending client does not host its sender's name.
         Foreign = "foreign",
         /// Nobody has its mailbox open.
         NoMailbox = "no-mailbox",
@@ -29,7 +29,7 @@ rohrpost_mailbox::causes! {
         MailboxFull = "mailbox-full",
         /// Its mailbox has smaller slots.
         TooLarge = "too-large",
-        /// Who sent it may not command it.
+        /// Its sender may not command it.
         NotAllowed = "not-allowed",
         /// It is from or for a mailbox by which routers carry packages, or for a router of another system.
         RoutersOwn = "routers-own",
@@ -37,7 +37,8 @@ rohrpost_mailbox::causes! {
 }
 
 impl Cause {
-    /// What the sender of a command is told, in the words of a router on the LAN. None: nothing, since who is told may not be who sent it.
+    /// The refusal that the sender of a command gets, as from a router on the LAN. None: no refusal, since the name may
+    /// not be the true sender's.
     pub const fn told(self) -> Option<counts::Cause> {
         Some(match self {
             Self::NoRoute | Self::Hops => counts::Cause::NoRoute,

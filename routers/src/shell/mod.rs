@@ -47,7 +47,9 @@ use crate::driver::spin_ns;
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
-use crate::security::{self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, Sealing, Waiting, Who};
+use crate::security::{
+    self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing, Waiting,
+};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{SlotScheduler, Table};
@@ -187,7 +189,7 @@ impl Shell {
         }
         let settings = Arc::new(settings);
         let stats = Stats::new(&settings, monotonic_ns());
-        let all = keys.map(|keys| PeerSessions::new(Who::of(&settings), keys));
+        let all = keys.map(|keys| PeerSessions::new(RouterIdentity::of(&settings), keys));
         let mut outbound = Outbound::new(&settings, stats.clone());
         if let Some(all) = &all {
             outbound = outbound.sealed(all.clone());

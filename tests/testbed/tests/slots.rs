@@ -170,7 +170,8 @@ fn no_declared_flow_is_later_than_its_bound() {
     assert!(many > 2.0 / 3.0, "bounds that are never nearly reached say little");
 }
 
-/// A router that makes datagrams without a look at its mailbox fills them with what is less important than what waits there.
+/// A router that makes datagrams without a look at its mailbox fills them with what is less important than what waits
+/// there.
 #[test]
 fn what_waits_in_the_mailbox_is_not_forgotten() {
     let mistake = Mistake::Packages(Mistaken::ForgetsMailbox);

@@ -3,8 +3,8 @@
 use super::chance::Chance;
 use rohrpost_routers::frame::{self, FrameHead};
 use rohrpost_routers::security::{
-    Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection, Sealing,
-    TAG_BYTES, Waiting, Who,
+    Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection, RouterIdentity,
+    Sealing, TAG_BYTES, Waiting,
 };
 use rohrpost_routers::settings::Settings;
 use std::num::NonZeroU8;
@@ -16,7 +16,10 @@ const KEY: [u8; KEY_BYTES] = [0x5a; KEY_BYTES];
 
 /// Whom an incarnation of a router knows; nobody yet.
 pub(super) fn peer_sessions(settings: &Settings) -> Arc<PeerSessions> {
-    PeerSessions::new(Who::of(settings), KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &KEY), None))
+    PeerSessions::new(
+        RouterIdentity::of(settings),
+        KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &KEY), None),
+    )
 }
 
 /// What the layer of packages has.
