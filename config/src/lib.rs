@@ -28,6 +28,9 @@
 //! );
 //! ```
 //!
+//! Each section has a file that reads and checks it and words its mistakes (`module`, `classes`, `flow`, `tdma` …);
+//! `errors` prints them, `reader` words wrong types and unknown keys. `config/tests/broken` has an example of each.
+//!
 //! Every key of the file is described in [`manual`].
 #![forbid(unsafe_code)]
 

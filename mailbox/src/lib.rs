@@ -42,6 +42,16 @@
 //! on with the next. A process may be killed between any two steps; `slots` begins with a table of what that leaves and who fixes
 //! it, and the tests in `mailbox/proof` visit each step by its name.
 //!
+//! # Decisions
+//!
+//! - A receiver looks at the hints once per level, not once per package: else their cache line moves each time.
+//! - SeqCst accesses order "publish, then read what the receiver says" on both sides. Loom knows that order of fences
+//!   alone, so `sync` has one there.
+//! - A receiver reads the ticket counter only if hints came while it looked: looking until none comes has no bound.
+//! - A sender goes round in four slots while they are free again: their cache lines are still near.
+//! - Each ringer that sees `polling` writes a byte into the pipe. One that cleared the mark for the others and died would
+//!   lose their wake-ups.
+//!
 //! # Reading order
 //!
 //! 1. `word`, `slots`, `hot`: the protocol. `queue`: what the receiver knows, and when it must look. `latest`: what replaces what.
