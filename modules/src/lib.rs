@@ -3,8 +3,8 @@
 //! ```text
 //! types, interfaces   what modules exchange            robot, builtin   modules that come with Rohrpost
 //! call                commands, at most once           runtime          the loop of a module's thread
-//! publish             subscribers of data               launch           starts, watches and stops a node's modules
-//! parameter           settings that may change         output           lines of output 
+//! publish             subscribers of data              launch           starts, watches and stops a node's modules
+//! parameter           settings that may change         output           lines of output
 //! ```
 //!
 //! Module authors use it through the crate `rohrpost`.
