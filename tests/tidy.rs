@@ -4,6 +4,8 @@
 
 #[path = "tidy/sources.rs"]
 mod sources;
+#[path = "tidy/words.rs"]
+mod words;
 
 use sources::{Crate, find_crates};
 use std::collections::BTreeSet;
@@ -77,6 +79,13 @@ const PAIRS: &[(&str, &str, &str)] = &[
 
 /// Knots of more than two files that are still to be untied: a file of each, and how many there are.
 const KNOTS: &[(&str, usize)] = &[("gui-bridge/src/views.rs", 4), ("gui-bridge/src/scene.rs", 10)];
+
+/// Type names that several files of a crate use, each for a type of its own, and why that is right.
+const SHARED_NAMES: &[(&str, &str, &str)] = &[
+    ("cli/src", "Arguments", "each subcommand has its own, in a file of its name"),
+    ("modules/src", "Settings", "each module has its own, as those of an author have"),
+    ("tests/fuzz/src", "World", "each target is a program of its own, and has one"),
+];
 
 /// Lines that a file may have.
 const LINES_MAX: usize = 400;
@@ -178,4 +187,33 @@ fn files_of_a_crate_do_not_name_each_other_in_circles() {
         mistakes.push(format!("{file} is in no knot of {size} files any more; say in KNOTS what is left of it"));
     }
     assert!(mistakes.is_empty(), "{}", mistakes.join("\n\n"));
+}
+
+#[test]
+fn one_type_name_is_one_thing_in_a_crate() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut crates, mut mistakes, mut found) = (Vec::new(), Vec::new(), BTreeSet::new());
+    find_crates(root, &mut crates);
+    for source in &crates {
+        let folder = source.strip_prefix(root).unwrap().parent().unwrap().to_str().unwrap().to_owned();
+        for (name, files) in Crate::read(source, root).shared_type_names() {
+            match SHARED_NAMES.iter().find(|(of, shared, _)| *of == folder && shared == name) {
+                Some((of, shared, _)) => drop(found.insert((*of, *shared))),
+                None => mistakes.push(format!("{folder}: `{name}` is several types, in {files:?}; rename all but one")),
+            }
+        }
+    }
+    for (folder, name, _) in SHARED_NAMES.iter().filter(|(folder, name, _)| !found.contains(&(*folder, *name))) {
+        mistakes.push(format!("{folder}: `{name}` is one type by now; drop it from SHARED_NAMES"));
+    }
+    assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
+}
+
+#[test]
+fn lines_fit_and_words_are_the_fields() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    find_files(root, &mut files);
+    let mistakes: Vec<String> = files.iter().flat_map(|file| words::mistakes(root, file)).collect();
+    assert!(mistakes.is_empty(), "{} mistakes:\n{}", mistakes.len(), mistakes.join("\n"));
 }

@@ -1,9 +1,9 @@
 //! `rohrpost bw`: how many bytes go in and out of a module, read from the counters of those who send.
 
-use super::published::{Watched, data_of};
+use super::published::{WatchedModule, data_of};
 use super::target::Target;
 use super::units::{bytes, short};
-use super::watch::{Figures, Pace};
+use super::watch::{FlowFigures, Pace};
 use crate::terminal::{Failure, say};
 use rohrpost::survey::is_hop;
 use rohrpost_mailbox::{FlowInfo, Type};
@@ -29,14 +29,14 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let mut watched = Watched::new(&arguments.target, &arguments.name, arguments.pace.window()?)?;
+    let mut watched = WatchedModule::new(&arguments.target, &arguments.name, arguments.pace.window()?)?;
     watched.require_present()?;
     let wanted = arguments.data.as_deref();
     let mut data = match wanted {
         Some(_) => data_of(&watched.running, watched.module, wanted)?,
         None => Vec::new(),
     };
-    let look = |watched: &mut Watched| {
+    let look = |watched: &mut WatchedModule| {
         let Some(survey) = watched.look()? else { return Ok(()) };
         if wanted.is_some() {
             watched.take_published(survey);
@@ -52,14 +52,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         watched.tracks.look(survey.at_ns, flows.filter(counts));
         Ok(())
     };
-    let tell = |watched: &mut Watched| {
+    let tell = |watched: &mut WatchedModule| {
         let sum_of = |which: &dyn Fn(&FlowInfo) -> bool| sum(watched.tracks.figures().filter(|(flow, _)| which(flow)));
         if wanted.is_none() {
             let to = sum_of(&|flow| flow.to.module() == watched.module);
             let from = sum_of(&|flow| flow.from.module() == watched.module);
             return Ok(tell_one(arguments, "in", "in", &to) && tell_one(arguments, "out", "out", &from));
         }
-        let sums: Vec<Sum> = data.iter().map(|(number, _)| sum_of(&|flow| flow.kind == Type::data(*number))).collect();
+        let sums: Vec<FlowSum> =
+            data.iter().map(|(number, _)| sum_of(&|flow| flow.kind == Type::data(*number))).collect();
         let told = data.iter().zip(&sums).all(|((_, name), sum)| tell_one(arguments, name, "published", sum));
         watched.renew(&mut data, wanted);
         Ok(told)
@@ -69,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 /// One line; false when nobody reads any more.
-fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &Sum) -> bool {
+fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &FlowSum) -> bool {
     if !arguments.pace.json {
         return say(sum.text(name));
     }
@@ -91,7 +92,7 @@ fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &Sum) -> bo
 
 /// Several flows together.
 #[derive(Default)]
-struct Sum {
+struct FlowSum {
     packages: u64,
     bytes: u64,
     refused: u64,
@@ -104,8 +105,8 @@ struct Sum {
 }
 
 /// Each flow's rate is by its own first and last package, and so is their sum.
-fn sum<'a>(flows: impl Iterator<Item = (&'a FlowInfo, Figures)>) -> Sum {
-    let mut sum = Sum::default();
+fn sum<'a>(flows: impl Iterator<Item = (&'a FlowInfo, FlowFigures)>) -> FlowSum {
+    let mut sum = FlowSum::default();
     for (_, figures) in flows {
         sum.packages += figures.packages;
         sum.bytes += figures.bytes;
@@ -120,7 +121,7 @@ fn sum<'a>(flows: impl Iterator<Item = (&'a FlowInfo, Figures)>) -> Sum {
     sum
 }
 
-impl Sum {
+impl FlowSum {
     fn mean(&self) -> Option<f64> {
         (self.packages > 0).then(|| self.bytes as f64 / self.packages as f64)
     }

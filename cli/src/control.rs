@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
     };
     let tool = running.join(PATIENCE)?;
     let began = Instant::now();
-    let mut asked = Asked { running: &running, name: module.name, text, launcher, tool, began, timeout };
+    let mut asked = ModuleOrder { running: &running, name: module.name, text, launcher, tool, began, timeout };
     let result = asked.carry_out(order, !arguments.no_wait);
     asked.tool.close();
     say(result?);
@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
 }
 
 /// An order, and whom it is about.
-struct Asked<'a> {
+struct ModuleOrder<'a> {
     running: &'a Running,
     name: Name,
     text: String,
@@ -85,7 +85,7 @@ struct Asked<'a> {
     timeout: Duration,
 }
 
-impl Asked<'_> {
+impl ModuleOrder<'_> {
     /// What to say when it was done.
     fn carry_out(&mut self, order: Order, wait: bool) -> Result<String, Failure> {
         let before = self.child()?.pid.map_or(String::new(), |pid| format!("; before it was process {pid}"));

@@ -1,6 +1,6 @@
 //! `rohrpost delay`: how long packages wait to be taken, and how old data are when they are published.
 
-use super::published::{Watched, data_of};
+use super::published::{WatchedModule, data_of};
 use super::summary::class_name;
 use super::table::table;
 use super::target::{Running, Target};
@@ -41,7 +41,7 @@ struct Wait {
 /// What the tool looks at.
 struct Looked {
     waits: Window<Vec<Wait>>,
-    module: Watched,
+    module: WatchedModule,
 }
 
 #[derive(Serialize)]
@@ -74,7 +74,7 @@ struct Delays<'a> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.pace.window()?;
-    let mut module = Watched::new(&arguments.target, &arguments.name, long)?;
+    let mut module = WatchedModule::new(&arguments.target, &arguments.name, long)?;
     module.require_present()?;
     let mut names = data_of(&module.running, module.module, None).unwrap_or_default();
     let mut looked = Looked { waits: Window::new(long), module };

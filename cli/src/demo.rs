@@ -14,7 +14,7 @@ mod nodes;
 mod sealed_capture;
 mod takeover;
 
-use super::launch::{View, end};
+use super::launch::{TerminalView, end};
 use super::speech::Speech;
 use super::summary::print_classes;
 use crate::terminal::{Failure, say};
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// Until the time is over, the log is over, or it is told to stop.
 fn watch(arguments: &Arguments, long: Option<Duration>, launch: &mut Launch, speech: &Speech) -> Result<(), Failure> {
     let mut deadline = long.map(|long| Instant::now() + long);
-    let mut view = View::new(arguments.quiet, speech);
+    let mut view = TerminalView::new(arguments.quiet, speech);
     let mut ask_at = Instant::now();
     let mut over = false;
     while launch.watch(view.wait()) {

@@ -1,9 +1,9 @@
 //! `rohrpost hz`: how often a module publishes, read from its own counters.
 
-use super::published::{Watched, data_of};
+use super::published::{WatchedModule, data_of};
 use super::target::Target;
 use super::units::{fine, short};
-use super::watch::{Figures, Pace};
+use super::watch::{FlowFigures, Pace};
 use crate::terminal::{Failure, say};
 use rohrpost::output::plain;
 use serde_json::json;
@@ -29,16 +29,16 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let mut watched = Watched::new(&arguments.target, &arguments.name, arguments.pace.window()?)?;
+    let mut watched = WatchedModule::new(&arguments.target, &arguments.name, arguments.pace.window()?)?;
     let wanted = arguments.data.as_deref();
     let mut data = data_of(&watched.running, watched.module, wanted)?;
-    let look = |watched: &mut Watched| {
+    let look = |watched: &mut WatchedModule| {
         if let Some(survey) = watched.look()? {
             watched.take_published(survey);
         }
         Ok(())
     };
-    let tell = |watched: &mut Watched| {
+    let tell = |watched: &mut WatchedModule| {
         watched.renew(&mut data, wanted);
         let wide = data.iter().map(|(_, name)| plain::line(name).len()).max().unwrap_or(0);
         for (number, name) in &data {
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn in_text(name: &str, wide: usize, figures: Option<Figures>) -> String {
+fn in_text(name: &str, wide: usize, figures: Option<FlowFigures>) -> String {
     let Some(figures) = figures else {
         return format!("{name:wide$}  never published; `rohrpost status` tells whether the module is on");
     };
@@ -80,7 +80,7 @@ fn in_text(name: &str, wide: usize, figures: Option<Figures>) -> String {
     )
 }
 
-fn in_json(module: &str, name: &str, figures: Option<Figures>) -> String {
+fn in_json(module: &str, name: &str, figures: Option<FlowFigures>) -> String {
     let figures = figures.unwrap_or_default();
     let object = json!({
         "module": module,

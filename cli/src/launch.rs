@@ -7,7 +7,7 @@ use super::manager::Manager;
 use super::speech::Speech;
 use super::summary::{ModuleLine, module_lines, print_modules_live};
 use crate::terminal::Failure;
-pub(super) use all::{Nodes, lab};
+pub(super) use all::{LaunchedNodes, lab};
 use rohrpost::launch::{Launch, choose_node, events};
 use rohrpost::output::plain::Lines;
 use rohrpost::survey::Survey;
@@ -77,7 +77,7 @@ fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let lab = all::lab(&installation)?;
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
-    let mut nodes = Nodes::begin(installation, lab, arguments.impair, &speech)?;
+    let mut nodes = LaunchedNodes::begin(installation, lab, arguments.impair, &speech)?;
     while nodes.watch(Duration::MAX) {}
     let code = nodes.stop();
     speech.settle();
@@ -94,7 +94,7 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     let mut launch =
         Launch::begin_keeping(installation, &node, std::env::current_exe()?, events()?, &resolved, sockets)?;
     manager.ready(&launch);
-    let mut view = View::new(arguments.quiet, speech);
+    let mut view = TerminalView::new(arguments.quiet, speech);
     view.began(&launch, &node);
     let mut shown = Ok(());
     while shown.is_ok() && launch.watch(view.wait().min(manager.wait())) {
@@ -120,7 +120,7 @@ pub(super) fn end(mut launch: Launch, speech: &Speech) -> ExitCode {
 }
 
 /// What a person at the terminal sees while a node runs.
-pub(super) struct View<'a> {
+pub(super) struct TerminalView<'a> {
     speech: &'a Speech,
     /// Draw the table over and over in one place.
     live: bool,
@@ -133,7 +133,7 @@ pub(super) struct View<'a> {
 /// Notes that stay below the live table.
 const NOTES_MAX: usize = 8;
 
-impl<'a> View<'a> {
+impl<'a> TerminalView<'a> {
     pub(super) fn new(quiet: bool, speech: &'a Speech) -> Self {
         let live = !quiet && std::io::stdout().is_terminal();
         Self { speech, live, begun: Instant::now(), next: Instant::now(), last: None, notes: Vec::new() }

@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (interval, timeout) = (seconds(arguments.interval)?, seconds(arguments.timeout)?);
     let stop = Stop::new()?;
     let mut tool = running.join(timeout)?;
-    let mut rounds = Rounds::default();
+    let mut rounds = PingRounds::default();
     loop {
         // The round encloses the ways: whoever holds this process up in between makes neither longer than the round.
         let (began, before) = (Instant::now(), TimeReport::of(&tool.clock));
@@ -132,7 +132,7 @@ fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
 
 /// All rounds so far, in as much memory for a million as for one.
 #[derive(Default)]
-struct Rounds {
+struct PingRounds {
     sent: u64,
     answered: u64,
     min: Option<Duration>,
@@ -141,7 +141,7 @@ struct Rounds {
     back: WaySum,
 }
 
-impl Rounds {
+impl PingRounds {
     fn answered(&mut self, took: Duration, ways: Option<&RoundTrip>) {
         self.answered += 1;
         if let Some(ways) = ways {
@@ -194,13 +194,13 @@ mod tests {
     #[test]
     fn rounds_are_told_exactly_but_for_the_quantiles() {
         let ms = Duration::from_millis;
-        let mut rounds = Rounds { sent: 101, ..Rounds::default() };
+        let mut rounds = PingRounds { sent: 101, ..PingRounds::default() };
         assert!(rounds.times().is_none());
         (1..=100).for_each(|took| rounds.answered(ms(took), None));
         let [min, mean, p50, p99, max] = rounds.times().unwrap();
         assert_eq!((min, mean, max, rounds.lost()), (ms(1), Duration::from_micros(50_500), ms(100), 1));
         assert!((ms(38)..ms(63)).contains(&p50) && (ms(75)..=ms(100)).contains(&p99), "{p50:?} {p99:?}");
-        let mut one = Rounds { sent: 1, ..Rounds::default() };
+        let mut one = PingRounds { sent: 1, ..PingRounds::default() };
         one.answered(ms(3), None);
         assert_eq!(one.times(), Some([ms(3); 5]));
     }

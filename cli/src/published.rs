@@ -1,7 +1,7 @@
 //! What a module publishes, by its own counters, on a node that may be launched again meanwhile.
 
 use super::target::{Running, Target};
-use super::watch::{Figures, Tracks};
+use super::watch::{FlowFigures, Tracks};
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;
 use rohrpost::output::plain;
@@ -32,7 +32,7 @@ pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Re
 }
 
 /// A module that is looked at again and again.
-pub(super) struct Watched {
+pub(super) struct WatchedModule {
     pub(super) running: Running,
     pub(super) module: Name,
     /// The module as the user named it.
@@ -47,7 +47,7 @@ pub(super) struct Watched {
     silent: bool,
 }
 
-impl Watched {
+impl WatchedModule {
     /// The module of this name, over so long a window.
     pub(super) fn new(target: &Target, text: &str, window: Duration) -> Result<Self, Failure> {
         let running = target.find()?;
@@ -149,7 +149,7 @@ impl Watched {
     }
 
     /// Figures of data of this number, if it was ever published.
-    pub(super) fn figures(&self, number: u16) -> Option<Figures> {
+    pub(super) fn figures(&self, number: u16) -> Option<FlowFigures> {
         self.tracks.figures().find(|(flow, _)| flow.kind == Type::data(number)).map(|(_, figures)| figures)
     }
 }

@@ -36,14 +36,14 @@ struct StatusRow {
     account: Account,
     /// What it says itself.
     #[serde(flatten)]
-    figures: Option<Figures>,
+    figures: Option<ModuleFigures>,
     /// Why it says nothing.
     failure: Option<String>,
 }
 
 /// What only the module itself knows.
 #[derive(Serialize)]
-struct Figures {
+struct ModuleFigures {
     incarnation: u32,
     uptime_ms: u64,
     subscribers: u32,
@@ -55,7 +55,7 @@ struct Figures {
     refused: Refused,
 }
 
-impl From<Status> for Figures {
+impl From<Status> for ModuleFigures {
     fn from(status: Status) -> Self {
         let Status { incarnation, uptime_ms, subscribers, missed, lost, .. } = status;
         let Status { output_lost, output_suppressed, output_level, refused, .. } = status;
@@ -123,7 +123,7 @@ fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silenc
 
 fn print(lines: &[StatusRow]) -> String {
     let rows = lines.iter().map(|line| {
-        let figure = |of: fn(&Figures) -> String| line.figures.as_ref().map_or("-".into(), of);
+        let figure = |of: fn(&ModuleFigures) -> String| line.figures.as_ref().map_or("-".into(), of);
         [
             line.module.clone(),
             line.account.state.to_string(),

@@ -42,7 +42,7 @@ struct NodeTime {
 
 /// All nodes.
 #[derive(Debug, Serialize)]
-struct Nodes {
+struct NodeTimes {
     /// Whether all answer, know the time, and follow one master.
     agree: bool,
     nodes: Vec<NodeTime>,
@@ -54,7 +54,7 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
     let clock = SystemClock::open(&round.running.node);
     let agree = loop {
         let told = round.nodes().into_iter().map(|node| ask(&mut round, &clock, node)).collect();
-        let nodes = Nodes::new(told);
+        let nodes = NodeTimes::new(told);
         let text = if rounds.json { serde_json::to_string(&nodes)? } else { nodes.text() };
         if !say(text.trim_end()) || !rounds.watch || round.stop.within(round.interval) {
             break nodes.agree;
@@ -126,7 +126,7 @@ impl NodeTime {
     }
 }
 
-impl Nodes {
+impl NodeTimes {
     fn new(nodes: Vec<NodeTime>) -> Self {
         let follows = |told: &NodeTime| {
             let clock = told.clock.as_ref().filter(|clock| clock.error_ns.is_some())?;

@@ -160,14 +160,14 @@ impl Tracks {
     }
 
     /// The flows with their figures.
-    pub(super) fn figures(&self) -> impl Iterator<Item = (&FlowInfo, Figures)> {
+    pub(super) fn figures(&self) -> impl Iterator<Item = (&FlowInfo, FlowFigures)> {
         self.tracks.iter().map(|track| (&track.last, track.figures()))
     }
 }
 
 /// What a flow did in the window. Rates and times are exact: they come from the sender's own clock.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Figures {
+pub(super) struct FlowFigures {
     pub(super) packages: u64,
     pub(super) bytes: u64,
     pub(super) refused: u64,
@@ -191,16 +191,16 @@ pub(super) struct Figures {
 }
 
 impl Track {
-    fn figures(&self) -> Figures {
+    fn figures(&self) -> FlowFigures {
         figures(&self.window, &self.seconds)
     }
 }
 
-fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond>) -> Figures {
+fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond>) -> FlowFigures {
     let (Some(Observation { at_ns: began_ns, what: earlier }), Some(Observation { at_ns, what: Some(now) })) =
         (window.seen.front(), window.seen.back())
     else {
-        return Figures::default();
+        return FlowFigures::default();
     };
     let before = |of: fn(&FlowInfo) -> u64| earlier.as_ref().map_or(0, of);
     let refused = now.refused.saturating_sub(before(|flow| flow.refused));
@@ -223,7 +223,7 @@ fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond
     let began_ns = sent.map_or(from_ns, |_| *began_ns);
     let lively = Lively { intervals, from_ns, began_ns, last_ns: now.last_ns, at_ns: *at_ns };
     let since_last_s = at_ns.saturating_sub(now.last_ns) as f64 / 1e9;
-    Figures {
+    FlowFigures {
         packages,
         bytes: now.bytes.saturating_sub(before(|flow| flow.bytes)),
         refused,
@@ -276,7 +276,7 @@ impl Lively {
     }
 }
 
-impl Figures {
+impl FlowFigures {
     /// Bytes a second, exact.
     pub(super) fn bytes_per_s(&self) -> Option<f64> {
         (self.packages > 0).then(|| self.rate_hz.map(|rate_hz| self.bytes as f64 / self.packages as f64 * rate_hz))?

@@ -76,7 +76,7 @@ enum End {
     /// All was written, or its feeder failed.
     Ended,
     /// The file is as large as it may be.
-    OverflowPolicy,
+    Full,
     /// The viewer has closed the connection.
     Gone,
     /// The viewer takes nothing any more.
@@ -210,7 +210,7 @@ impl Work {
                     aside_from = files::WORTH.min(bytes_max);
                     self.rest(&mut backoff, BACKOFF_FILE);
                 }
-                (End::OverflowPolicy, None) => aside_from = 1,
+                (End::Full, None) => aside_from = 1,
                 (_, None) => return if files::is_whole(path) { Ok(()) } else { Err(CloseError::Torn) },
             }
         }
@@ -338,7 +338,7 @@ impl Work {
                     return End::Ended;
                 }
             } else if is_full() {
-                return End::OverflowPolicy;
+                return End::Full;
             }
             for ((before, looks), now) in seen.iter_mut().zip(feeder.waits_for()) {
                 *looks = if now.is_some() && now == *before { *looks + 1 } else { 0 };

@@ -68,7 +68,7 @@ impl Loss {
 }
 
 #[repr(C, align(64))]
-pub(crate) struct Row {
+pub(crate) struct CounterRow {
     /// 0 unused; 0x100 + class; 0x200 the rest.
     class: AtomicU32,
     padding: AtomicU32,
@@ -79,15 +79,15 @@ pub(crate) struct Row {
     latency_sum_ns: AtomicU64,
     body_bytes: AtomicU64,
 }
-const _: () = assert!(size_of::<Row>() == 320);
+const _: () = assert!(size_of::<CounterRow>() == 320);
 
 /// The rows of a mailbox.
 #[repr(C)]
-pub(crate) struct Counters([Row; ROWS]);
+pub(crate) struct Counters([CounterRow; ROWS]);
 
 impl Counters {
     /// The row of a class, claimed if it is new. Bounded: one pass over the rows.
-    fn row(&self, class: Class) -> &Row {
+    fn row(&self, class: Class) -> &CounterRow {
         let mine = USED | u32::from(class.0);
         for row in &self.0[..ROWS - 1] {
             // Looked at before it is claimed, so that counting does not write what it only reads.
@@ -155,18 +155,18 @@ impl Counters {
             let lost = Loss::ALL.into_iter().filter(|cause| cause.was_accepted()).map(|cause| row.lost(cause));
             saturating_sum(lost.chain([row.received]))
         };
-        saturating_sum(self.0.iter().filter_map(Row::read).map(|row| accepted(&row)))
+        saturating_sum(self.0.iter().filter_map(CounterRow::read).map(|row| accepted(&row)))
     }
 
     /// The rows in use, by class as it stands in the names of their senders; the rest last.
     pub(crate) fn read(&self) -> Vec<ClassTraffic> {
-        let mut rows: Vec<ClassTraffic> = self.0.iter().filter_map(Row::read).collect();
+        let mut rows: Vec<ClassTraffic> = self.0.iter().filter_map(CounterRow::read).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.class));
         rows
     }
 }
 
-impl Row {
+impl CounterRow {
     fn read(&self) -> Option<ClassTraffic> {
         let class = match self.class.load(Ordering::Relaxed) {
             0 => return None,
@@ -326,7 +326,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn counters() -> Counters {
-        Counters(std::array::from_fn(|_| Row {
+        Counters(std::array::from_fn(|_| CounterRow {
             class: AtomicU32::new(0),
             padding: AtomicU32::new(0),
             received: AtomicU64::new(0),

@@ -6,7 +6,7 @@ use crate::name::Name;
 use crate::node::Node;
 use crate::package::Type;
 use crate::participant::Participant;
-use crate::traffic::{Key, Row, SECONDS_KEPT, TableView, Writer};
+use crate::traffic::{FlowRow, Key, SECONDS_KEPT, TableView, Writer};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -139,7 +139,7 @@ impl Node {
 }
 
 /// A row as it stands, if anything was counted there. Takes from `naps` what it needs.
-fn look(row: &Row, participant: &ParticipantInfo, naps: &mut u32) -> Option<FlowInfo> {
+fn look(row: &FlowRow, participant: &ParticipantInfo, naps: &mut u32) -> Option<FlowInfo> {
     let mut tries = 0;
     while tries < TRIES_AT_ONCE || *naps > 0 {
         if let Some(flow) = row.read(|row| read(row, participant)) {
@@ -155,7 +155,7 @@ fn look(row: &Row, participant: &ParticipantInfo, naps: &mut u32) -> Option<Flow
     read(row, participant)
 }
 
-fn read(row: &Row, participant: &ParticipantInfo) -> Option<FlowInfo> {
+fn read(row: &FlowRow, participant: &ParticipantInfo) -> Option<FlowInfo> {
     let load = |field: &std::sync::atomic::AtomicU64| field.load(Ordering::Relaxed);
     let (packages, refused) = (load(&row.packages), load(&row.refused));
     if packages == 0 && refused == 0 {

@@ -12,14 +12,14 @@ use crate::slots::{OverflowPolicy, Posted, Slots};
 
 /// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word says.
 pub(crate) struct Posts {
-    posts: Vec<(State, Posted)>,
+    posts: Vec<(LatestState, Posted)>,
     /// One for each slot; 0 when the mailbox is not `latest`.
     most: usize,
 }
 
-type State = (Name, Type, u16);
+type LatestState = (Name, Type, u16);
 
-fn state(label: &Label) -> State {
+fn state(label: &Label) -> LatestState {
     (label.from, label.kind, label.id)
 }
 
@@ -41,7 +41,7 @@ impl Posts {
             return;
         }
         let of = state(label);
-        let gone = |(_, old): &(State, Posted)| slots.load(old.slot) != old.word;
+        let gone = |(_, old): &(LatestState, Posted)| slots.load(old.slot) != old.word;
         if let Some(same) = self.posts.iter_mut().find(|(there, _)| *there == of) {
             same.1 = posted;
         } else if self.posts.len() < self.most {

@@ -76,7 +76,7 @@ impl Receiver {
         (self.queue.len(), self.queue.first())
     }
 
-    pub(crate) fn hand_out(&self, in_hand: InHand) -> Package<'_> {
+    pub(crate) fn hand_out(&self, in_hand: TakenPackage) -> Package<'_> {
         Package { segment: &self.segment, queue: &self.queue, in_hand }
     }
 
@@ -108,7 +108,7 @@ impl Receiver {
     }
 
     /// Takes the next package that is not too old.
-    pub(crate) fn next(&mut self) -> Option<InHand> {
+    pub(crate) fn next(&mut self) -> Option<TakenPackage> {
         self.search_if_due();
         let slots = self.segment.slots();
         loop {
@@ -126,7 +126,7 @@ impl Receiver {
                 if taken.word.is_redelivered() {
                     head.options = head.options.with(Options::REDELIVERED);
                 }
-                return Some(InHand { taken, head, published_ns });
+                return Some(TakenPackage { taken, head, published_ns });
             }
             self.segment.page().counters.lost(taken.word.priority(), Loss::Stale, 1);
             slots.release(taken);
@@ -216,7 +216,7 @@ impl Receiver {
 }
 
 /// A taken slot, and what its prefix says.
-pub(crate) struct InHand {
+pub(crate) struct TakenPackage {
     taken: Taken,
     head: Head,
     published_ns: u64,
@@ -226,7 +226,7 @@ pub(crate) struct InHand {
 pub struct Package<'a> {
     segment: &'a Segment,
     queue: &'a Queue,
-    in_hand: InHand,
+    in_hand: TakenPackage,
 }
 
 impl Package<'_> {

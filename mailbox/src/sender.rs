@@ -33,7 +33,7 @@ pub enum SendError {
     },
     /// All slots are in use by packages as important or more.
     #[error("mailbox {0} is full; its receiver is slow or stopped, or it has too few slots")]
-    OverflowPolicy(Name),
+    Full(Name),
     /// Larger than the mailbox's slots.
     #[error(
         "mailbox {name} takes bodies of at most {max} bytes, this one has {len}; raise its `size` in the configuration"
@@ -215,7 +215,7 @@ impl Sender {
     /// mailbox is known only when it is sent; so in a full one it needs somebody to displace.
     ///
     /// # Errors
-    /// [`SendError::OverflowPolicy`], or what reopening a replaced mailbox brings.
+    /// [`SendError::Full`], or what reopening a replaced mailbox brings.
     pub fn loan(&mut self, priority: Priority) -> Result<Loan<'_>, SendError> {
         // Refused, it is counted in the mailbox alone: what it would have been was not said yet.
         let claim = self.claim(priority, None, 0)?;
@@ -240,9 +240,9 @@ impl Sender {
                     self.place.found(claim.slot, slots.count());
                     return Ok(claim);
                 }
-                Err(NoSlot::OverflowPolicy) => {
+                Err(NoSlot::Full) => {
                     self.segment.page().counters.lost(priority, Loss::Refused, 1);
-                    return Err(SendError::OverflowPolicy(self.segment.name));
+                    return Err(SendError::Full(self.segment.name));
                 }
                 Err(NoSlot::Retired) => {
                     let successor = open(&self.participant, self.to, self.reach)?;

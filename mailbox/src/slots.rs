@@ -72,7 +72,7 @@ impl OverflowPolicy {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum NoSlot {
     /// All are in use by packages as important or more.
-    OverflowPolicy,
+    Full,
     /// The mailbox has been given up.
     Retired,
 }
@@ -211,12 +211,12 @@ impl<'a> Slots<'a> {
             }
         }
         match full {
-            OverflowPolicy::Displace => self.displace(by, priority).ok_or(NoSlot::OverflowPolicy),
+            OverflowPolicy::Displace => self.displace(by, priority).ok_or(NoSlot::Full),
             OverflowPolicy::Latest => {
                 let reused = old.and_then(|old| self.reuse(by, old));
-                reused.or_else(|| self.displace(by, priority)).ok_or(NoSlot::OverflowPolicy)
+                reused.or_else(|| self.displace(by, priority)).ok_or(NoSlot::Full)
             }
-            OverflowPolicy::Reject => Err(NoSlot::OverflowPolicy),
+            OverflowPolicy::Reject => Err(NoSlot::Full),
         }
     }
 

@@ -33,7 +33,7 @@ pub(crate) const SECONDS_KEPT: usize = 4;
 /// Rows that a writer finds without a search: more kinds of package than most send to one mailbox.
 const RECENT: usize = 4;
 
-/// [`Row::writer`] of a row that was never used, and of one whose writer has gone.
+/// [`FlowRow::writer`] of a row that was never used, and of one whose writer has gone.
 const UNUSED: u32 = 0;
 const IDLE: u32 = u32::MAX;
 
@@ -61,7 +61,7 @@ pub(crate) struct Second {
 }
 
 #[repr(C, align(64))]
-pub(crate) struct Row {
+pub(crate) struct FlowRow {
     writer: AtomicU32,
     /// Odd while its writer is inside.
     sequence: AtomicU32,
@@ -88,14 +88,14 @@ pub(crate) struct Row {
 #[repr(C)]
 pub(crate) struct TrafficPage {
     header: Header,
-    rows: [Row; FLOWS],
+    rows: [FlowRow; FLOWS],
 }
 
 // SAFETY: made of atomics alone.
 unsafe impl Shared for TrafficPage {}
 
-const _: () = assert!(size_of::<Header>() == 64 && size_of::<Second>() == 32 && size_of::<Row>() == 256);
-const _: () = assert!(offset_of!(Row, packages) == 24 && offset_of!(Row, seconds) == 128);
+const _: () = assert!(size_of::<Header>() == 64 && size_of::<Second>() == 32 && size_of::<FlowRow>() == 256);
+const _: () = assert!(offset_of!(FlowRow, packages) == 24 && offset_of!(FlowRow, seconds) == 128);
 
 /// What a row counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -160,7 +160,7 @@ impl Table {
         let _ = fs::remove_file(&self.path);
     }
 
-    fn rows(&self) -> &[Row; FLOWS] {
+    fn rows(&self) -> &[FlowRow; FLOWS] {
         &self.mapping.at::<TrafficPage>(0).rows
     }
 
@@ -175,8 +175,9 @@ impl Table {
     #[cold]
     fn claim(&self, me: u32, key: Key) -> usize {
         let rows = &self.rows()[..REST];
-        let take =
-            |row: &Row, from: u32| row.writer.compare_exchange(from, me, Ordering::Acquire, Ordering::Relaxed).is_ok();
+        let take = |row: &FlowRow, from: u32| {
+            row.writer.compare_exchange(from, me, Ordering::Acquire, Ordering::Relaxed).is_ok()
+        };
         if let Some(at) = rows.iter().position(|row| row.writer() == IDLE && row.key() == key && take(row, IDLE)) {
             // Who looked while it was idle may have taken it for another key meanwhile.
             if rows[at].key() == key {
@@ -206,7 +207,7 @@ impl Table {
 
     /// What a row has counted goes to the rest, so that sums stay what they are. While the row is being written, so that who sees
     /// it empty, and then looks at the rest, finds it there; who saw it full a moment before sees it twice, never not at all.
-    fn add_to_rest(&self, row: &Row) {
+    fn add_to_rest(&self, row: &FlowRow) {
         let rest = &self.rows()[REST];
         let pairs = [(&row.packages, &rest.packages), (&row.bytes, &rest.bytes), (&row.refused, &rest.refused)];
         for (from, to) in pairs {
@@ -231,7 +232,7 @@ impl TableView {
         same.then_some(Self(mapping))
     }
 
-    pub(crate) fn rows(&self) -> &[Row; FLOWS] {
+    pub(crate) fn rows(&self) -> &[FlowRow; FLOWS] {
         &self.0.at::<TrafficPage>(0).rows
     }
 }
@@ -276,7 +277,7 @@ impl Writer {
         if let Some((_, at)) = self.recent.iter().flatten().find(|(known, _)| *known == key) {
             return *at;
         }
-        let own = |row: &Row| row.writer() == self.me && row.key() == key;
+        let own = |row: &FlowRow| row.writer() == self.me && row.key() == key;
         let at = table.rows()[..REST].iter().position(own).unwrap_or_else(|| table.claim(self.me, key));
         self.recent[self.next] = Some((key, at));
         self.next = (self.next + 1) % RECENT;
@@ -298,7 +299,7 @@ fn add(count: &AtomicU64, more: u64) {
     count.store(count.load(Ordering::Relaxed).wrapping_add(more), Ordering::Relaxed);
 }
 
-impl Row {
+impl FlowRow {
     fn writer(&self) -> u32 {
         self.writer.load(Ordering::Acquire)
     }

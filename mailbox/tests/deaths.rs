@@ -86,10 +86,7 @@ fn a_dead_sender_s_slot_comes_back_and_the_sleeping_receiver_sees_to_it() {
         let id = receiver.receive_timeout(PATIENCE).map(|package| package.head().id);
         (receiver, id)
     });
-    assert!(
-        matches!(sender.send(&label(HIGH, 2), &[]), Err(SendError::OverflowPolicy(_))),
-        "nobody has said that it died"
-    );
+    assert!(matches!(sender.send(&label(HIGH, 2), &[]), Err(SendError::Full(_))), "nobody has said that it died");
     ground.node().announce_death();
     until("the slot is free", || sender.send(&label(HIGH, 3), &[]).is_ok());
     let (_receiver, id) = sleeper.join().unwrap();

@@ -54,7 +54,7 @@ fn send(board: Board, sender: &mut Sender, full: OverflowPolicy, class: usize, n
     let id = if class == LOW { state } else { number };
     match sender.send(&label(PRIORITIES[class], id as u16), &[&body]) {
         Ok(()) => board.accepted(&mark),
-        Err(SendError::OverflowPolicy(MAILBOX)) => {
+        Err(SendError::Full(MAILBOX)) => {
             board.refused(&mark);
             return false;
         }
@@ -186,7 +186,7 @@ fn holders(ground: &Ground, full: OverflowPolicy) {
         for id in 0..2 {
             sender.send(&label(PRIORITIES[0], 2 * round + id), &[b"goes on"]).unwrap();
         }
-        assert!(matches!(sender.send(&label(PRIORITIES[0], 9_999), &[]), Err(SendError::OverflowPolicy(_))));
+        assert!(matches!(sender.send(&label(PRIORITIES[0], 9_999), &[]), Err(SendError::Full(_))));
         for id in 0..2 {
             let package = receiver.receive_timeout(PATIENCE).unwrap();
             assert_eq!((package.head().id, package.body()), (2 * round + id, &b"goes on"[..]));

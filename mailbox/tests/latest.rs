@@ -34,7 +34,7 @@ fn role() {
         match sender.send(&label(LOW, state), &[&me.incarnation().to_le_bytes(), &number.to_le_bytes()]) {
             Ok(()) => numbers[usize::from(state)] = number,
             // Only when the search for a free slot meets all the others on their ways.
-            Err(SendError::OverflowPolicy(_)) => std::thread::yield_now(),
+            Err(SendError::Full(_)) => std::thread::yield_now(),
             Err(error) => panic!("{error}"),
         }
         if state == 0 && Instant::now() >= end {
@@ -162,11 +162,8 @@ fn one_slot_is_enough_and_a_loan_replaces_too() {
     let mut receiver = ground.join().receiver(MAILBOX, latest(1)).unwrap();
     let mut sender = ground.sender();
     (1..=9u8).for_each(|number| sender.send(&label(LOW, 1), &[&[number]]).unwrap());
-    assert!(
-        matches!(ground.sender().send(&label(LOW, 1), &[]), Err(SendError::OverflowPolicy(_))),
-        "it has nothing to replace"
-    );
-    assert!(matches!(sender.loan(LOW), Err(SendError::OverflowPolicy(_))), "nor does it know yet");
+    assert!(matches!(ground.sender().send(&label(LOW, 1), &[]), Err(SendError::Full(_))), "it has nothing to replace");
+    assert!(matches!(sender.loan(LOW), Err(SendError::Full(_))), "nor does it know yet");
     ground.sender().send(&label(HIGH, 1), &[&[20]]).unwrap();
     assert_eq!(receiver.try_receive().unwrap().body(), [20]);
     assert!(receiver.try_receive().is_none());

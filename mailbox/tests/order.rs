@@ -109,7 +109,7 @@ fn receive(receiver: &mut Receiver) -> Option<u16> {
 fn send(sender: &mut Sender, priority: u8, id: u16, number: u16) -> bool {
     match sender.send(&label(Priority(priority), id), &[&number.to_le_bytes()]) {
         Ok(()) => true,
-        Err(SendError::OverflowPolicy(MAILBOX)) => false,
+        Err(SendError::Full(MAILBOX)) => false,
         Err(error) => panic!("{error}"),
     }
 }

@@ -51,7 +51,7 @@ fn a_stopped_filler_does_not_close_a_mailbox() {
     // A more important package does not take the place of one that is not yet there.
     sender.send(&label(LOW, 1), &[]).unwrap();
     sender.send(&label(HIGH, 2), &[]).unwrap();
-    assert!(matches!(sender.send(&label(HIGH, 3), &[]), Err(SendError::OverflowPolicy(_))));
+    assert!(matches!(sender.send(&label(HIGH, 3), &[]), Err(SendError::Full(_))));
     ground.node().announce_death();
     assert_eq!(receiver.try_receive().unwrap().head().id, 2, "the stopped one lives: its slot stays its own");
     assert_eq!((lost(&ground.look(), Loss::Unfinished), lost(&ground.look(), Loss::Displaced)), (0, 1));
@@ -160,7 +160,7 @@ fn what_is_accepted_while_a_mailbox_closes_is_counted() {
             loop {
                 match sender.send(&label(LOW, 1), &[]) {
                     Ok(()) => accepted += 1,
-                    Err(SendError::OverflowPolicy(_)) => std::thread::yield_now(),
+                    Err(SendError::Full(_)) => std::thread::yield_now(),
                     Err(SendError::NoMailbox(_)) => return accepted,
                     Err(error) => panic!("{error}"),
                 }
@@ -189,7 +189,7 @@ fn no_loss_is_hidden_while_a_mailbox_is_replaced_again_and_again() {
                 while go_on.load(Ordering::Relaxed) {
                     match sender.send(&label(priority, 1), &[&[1; 100]]) {
                         Ok(()) => accepted += 1,
-                        Err(SendError::OverflowPolicy(_)) => std::thread::yield_now(),
+                        Err(SendError::Full(_)) => std::thread::yield_now(),
                         // Just between the old mailbox and the new one.
                         Err(SendError::NoMailbox(_)) => {}
                         Err(error) => panic!("{error}"),

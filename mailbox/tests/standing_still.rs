@@ -42,7 +42,7 @@ fn a_receiver_that_stops_reading_costs_what_is_counted_and_gets_the_rest_when_it
             sent.filter(|sent| match sent {
                 Ok(()) => true,
                 Err(error) => {
-                    assert!(matches!(error, SendError::OverflowPolicy(MAILBOX)), "{error}");
+                    assert!(matches!(error, SendError::Full(MAILBOX)), "{error}");
                     false
                 }
             })

@@ -151,10 +151,10 @@ const OPERATIONS: &[Operation] = &[
 fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
     ptrace::traceme().unwrap();
     let stop = || raise(Signal::SIGSTOP).unwrap();
-    // OverflowPolicy: it may look at each slot just while that one is in use, since the others act between any two of its instructions.
+    // Full: it may look at each slot just while that one is in use, since the others act between any two of its instructions.
     let told = |sent| match sent {
         Ok(()) => DONE,
-        Err(SendError::OverflowPolicy(_)) => REFUSED,
+        Err(SendError::Full(_)) => REFUSED,
         Err(error) => panic!("{error}"),
     };
     let send = |sender: &mut Sender, priority| told(sender.send(&label(priority, 1), &[b"step", b" by step"]));
@@ -222,7 +222,7 @@ impl Others {
             assert!(self.receive(), "{what}: packages wait, and none is received");
             self.send().unwrap_or_else(|error| panic!("{what}: {error}, though a slot was freed just now"));
         } else if let Err(error) = self.send() {
-            assert!(matches!(error, SendError::OverflowPolicy(_)), "{what}: {error}");
+            assert!(matches!(error, SendError::Full(_)), "{what}: {error}");
         }
     }
 }

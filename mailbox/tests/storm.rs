@@ -257,7 +257,7 @@ impl Storm {
             let sent = sender.send(&label(PRIORITIES[0], number as u16), &[&body]);
             match sent {
                 Ok(()) => self.board.accepted(&mark),
-                Err(SendError::OverflowPolicy(_)) => self.board.refused(&mark),
+                Err(SendError::Full(_)) => self.board.refused(&mark),
                 Err(error) => panic!("{error}"),
             }
             assert_eq!(number > u32::from(shape.slots), sent.is_err(), "{self}: slot {number}");

@@ -28,7 +28,7 @@ pub(crate) struct Newest {
 
 /// Of a request that subscribes.
 #[derive(Clone, Copy)]
-pub(crate) struct Asked {
+pub(crate) struct RequestOrigin {
     /// Reply mailbox of the subscriber.
     pub(crate) by: Name,
     /// Whose share of places it uses.
@@ -44,11 +44,11 @@ pub(crate) struct Asked {
 }
 
 /// One subscription.
-pub(crate) struct Subscription {
+pub(crate) struct SubscriptionEntry {
     pub(crate) endpoint: usize,
     pub(crate) wish: Subscribe,
     /// The request that began or last renewed it; the data carry its priority and incarnation.
-    pub(crate) asked: Asked,
+    pub(crate) asked: RequestOrigin,
     pub(crate) sequence: u32,
     pub(crate) missed: u32,
     ends_ns: u64,
@@ -65,7 +65,7 @@ pub(crate) enum Delivery {
     /// Accepted.
     Sent,
     /// The subscriber's mailbox was full.
-    OverflowPolicy,
+    Full,
     /// The subscriber's mailbox takes no value of this size, and this was said.
     TooLarge,
     /// The subscriber is gone.
@@ -74,7 +74,7 @@ pub(crate) enum Delivery {
 
 /// All subscriptions to a module's data.
 pub(crate) struct Subscriptions {
-    list: Vec<Subscription>,
+    list: Vec<SubscriptionEntry>,
     places: Places,
     /// Misses of subscriptions that have ended.
     missed_before: u64,
@@ -88,7 +88,13 @@ impl Subscriptions {
     }
 
     /// Begins or renews; false when there is no place. Times are monotonic.
-    pub(crate) fn subscribe(&mut self, endpoint: usize, asked: Asked, mut wish: Subscribe, now_ns: u64) -> bool {
+    pub(crate) fn subscribe(
+        &mut self,
+        endpoint: usize,
+        asked: RequestOrigin,
+        mut wish: Subscribe,
+        now_ns: u64,
+    ) -> bool {
         wish.period_us = if wish.period_us == 0 { 0 } else { wish.period_us.max(PERIOD_MIN_US) };
         let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms.min(LEASE_MAX_MS)) * 1_000_000);
         let due_ns = if wish.period_us == 0 { 0 } else { now_ns };
@@ -110,7 +116,7 @@ impl Subscriptions {
         if !self.places.allows(asked.principal, held) {
             return false;
         }
-        self.list.push(Subscription {
+        self.list.push(SubscriptionEntry {
             endpoint,
             wish,
             asked,
@@ -129,7 +135,7 @@ impl Subscriptions {
         self.retain(|subscription| subscription.asked.to != to || subscription.wish.id != id);
     }
 
-    fn retain(&mut self, keep: impl Fn(&Subscription) -> bool) {
+    fn retain(&mut self, keep: impl Fn(&SubscriptionEntry) -> bool) {
         let gone = self.list.iter().filter(|s| !keep(s)).map(|s| u64::from(s.missed));
         self.missed_before += gone.sum::<u64>();
         self.list.retain(keep);
@@ -145,7 +151,7 @@ impl Subscriptions {
     }
 
     /// A new value: `deliver` it to those who want each.
-    pub(crate) fn published(&mut self, newest: &Newest, mut deliver: impl FnMut(&Subscription) -> Delivery) {
+    pub(crate) fn published(&mut self, newest: &Newest, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
         let mut gone = false;
         for subscription in &mut self.list {
             if (subscription.endpoint, subscription.wish.number) != (newest.endpoint, newest.number) {
@@ -163,7 +169,7 @@ impl Subscriptions {
     }
 
     /// Delivers what is due and drops those whose lease has ended.
-    pub(crate) fn tick(&mut self, now_ns: u64, mut deliver: impl FnMut(&Subscription) -> Delivery) {
+    pub(crate) fn tick(&mut self, now_ns: u64, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
         if self.list.iter().any(|subscription| subscription.ends_ns <= now_ns) {
             self.retain(|subscription| subscription.ends_ns > now_ns);
         }
@@ -191,12 +197,12 @@ impl Subscriptions {
     }
 }
 
-impl Subscription {
+impl SubscriptionEntry {
     /// Notes a delivery; false when the subscriber is gone.
     fn settle(&mut self, delivery: Delivery) -> bool {
         match delivery {
             Delivery::Sent => self.sequence = self.sequence.wrapping_add(1),
-            Delivery::OverflowPolicy | Delivery::TooLarge => {
+            Delivery::Full | Delivery::TooLarge => {
                 self.told |= matches!(delivery, Delivery::TooLarge);
                 // The number is used up, so that the subscriber sees the gap.
                 self.sequence = self.sequence.wrapping_add(1);
@@ -221,9 +227,9 @@ mod tests {
         Subscribe { number: 1, id: 7, period_us: period_ms * 1000, lease_ms: 1000, mailbox: 2 }
     }
 
-    fn asked(local: u8) -> Asked {
+    fn asked(local: u8) -> RequestOrigin {
         let name = |local| Name::new(1, 9, 0, local);
-        Asked {
+        RequestOrigin {
             by: name(1),
             principal: Principal::Unknown,
             incarnation: 5,
@@ -316,8 +322,12 @@ mod tests {
         let mut all = Subscriptions::new(&[named]);
         let take = |all: &mut Subscriptions, principal: Principal, class: u8| {
             let places = |id: &u16| {
-                let asked =
-                    Asked { principal, by: Name::new(1, class, 0, 1), to: Name::new(1, class, 0, 2), ..asked(2) };
+                let asked = RequestOrigin {
+                    principal,
+                    by: Name::new(1, class, 0, 1),
+                    to: Name::new(1, class, 0, 2),
+                    ..asked(2)
+                };
                 all.subscribe(0, asked, Subscribe { id: *id, lease_ms: u32::MAX, ..wish(0) }, 1)
             };
             (0..200).filter(places).count()
@@ -327,7 +337,7 @@ mod tests {
         assert_eq!(take(&mut all, Principal::System(9), 9), 0, "all that are for all are taken");
         assert_eq!(take(&mut all, named, 140), OWN_SUBSCRIPTIONS);
         // Over, and not dropped yet.
-        let again = Asked { principal: Principal::System(9), ..asked(2) };
+        let again = RequestOrigin { principal: Principal::System(9), ..asked(2) };
         assert!(all.subscribe(0, again, wish(0), 60_000 * MS + 1));
     }
 
@@ -335,8 +345,8 @@ mod tests {
     fn a_subscriber_that_was_started_again_has_none_of_its_earlier_subscriptions() {
         let mut all = subscribed(0);
         assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
-        publish(&mut all, || Delivery::OverflowPolicy);
-        let later = Asked { incarnation: 6, ..asked(2) };
+        publish(&mut all, || Delivery::Full);
+        let later = RequestOrigin { incarnation: 6, ..asked(2) };
         assert!(all.subscribe(0, later, Subscribe { number: 2, ..wish(0) }, 2));
         let left: Vec<_> = all.list.iter().map(|s| (s.wish.number, s.asked.incarnation, s.sequence)).collect();
         assert_eq!((left, all.missed()), (vec![(2, 6, 0)], 2), "and its numbers begin at 0");
@@ -388,7 +398,7 @@ mod tests {
     #[test]
     fn full_is_a_gap_and_a_miss_and_gone_is_gone() {
         let mut all = subscribed(0);
-        publish(&mut all, || Delivery::OverflowPolicy);
+        publish(&mut all, || Delivery::Full);
         assert_eq!((all.list[0].sequence, all.missed()), (1, 1));
         publish(&mut all, || Delivery::Gone);
         assert_eq!((all.len(), all.missed()), (0, 1), "what was missed stays counted");

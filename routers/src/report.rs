@@ -45,7 +45,7 @@ pub enum NotDelivered {
 impl From<SendError> for NotDelivered {
     fn from(error: SendError) -> Self {
         match error {
-            SendError::OverflowPolicy(_) | SendError::InUse(_) => Self::MailboxFull,
+            SendError::Full(_) | SendError::InUse(_) => Self::MailboxFull,
             SendError::TooLarge { .. } => Self::TooLarge,
             SendError::NoMailbox(_) | SendError::NoRouter { .. } | SendError::Reclaimed(_) | SendError::Bad(..) => {
                 Self::NoMailbox

@@ -43,7 +43,7 @@ fn send(sender: &mut Sender, priority: u8, id: u16, body: &[u8]) {
     loop {
         match sender.send(&label(module(0), priority, id), &[body]) {
             Ok(()) => return,
-            Err(SendError::OverflowPolicy(_)) => std::thread::yield_now(),
+            Err(SendError::Full(_)) => std::thread::yield_now(),
             Err(error) => panic!("{error}"),
         }
     }

@@ -190,7 +190,7 @@ fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
             return;
         }
         let (mut listeners, slow) = (Listeners::new(&segment), &segment.stations[2]);
-        let full = || slow.shell().failures().of(Failure::OverflowPolicy);
+        let full = || slow.shell().failures().of(Failure::Full);
         let (mut flood, mut id, began) = (slow.sender(1), 0, Instant::now());
         while full() < 100 {
             assert!(began.elapsed() < PATIENCE, "all is taken: {:?}", slow.slots());

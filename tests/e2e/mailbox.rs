@@ -52,7 +52,7 @@ fn a_full_mailbox_of_a_stopped_receiver_shows_who_fills_it_and_what_was_lost() {
     let mut sender = me.sender(robot.name("probe.0")).unwrap();
     let label = Label { priority: TOOL, kind: Type::command(16), ..Label::default() };
     (0..4).for_each(|_| sender.send(&label, &[b"nonsense"]).unwrap());
-    assert!(matches!(sender.send(&label, &[]), Err(SendError::OverflowPolicy(_))));
+    assert!(matches!(sender.send(&label, &[]), Err(SendError::Full(_))));
     // Both before one dies: else the other takes its place in the node's table, and its number is gone.
     let (mut dead, alive) = (fill(&robot), fill(&robot));
     let dead_pid = dead.pid();

@@ -46,9 +46,16 @@ pub(crate) struct Crate {
     /// Macros that the root has, wherever they stand.
     exported: BTreeMap<String, String>,
     arrows: BTreeMap<(String, String), String>,
+    /// Files that define a type of a name.
+    types: BTreeMap<String, BTreeSet<String>>,
 }
 
 impl Crate {
+    /// Names that several files give to types of their own.
+    pub(crate) fn shared_type_names(&self) -> impl Iterator<Item = (&String, &BTreeSet<String>)> {
+        self.types.iter().filter(|(_, files)| files.len() > 1)
+    }
+
     pub(crate) fn read(source: &Path, root: &Path) -> Self {
         let mut read = Self::default();
         let mut files = Vec::new();
@@ -107,6 +114,9 @@ impl Crate {
             module.children.insert(name);
         }
         for item in items() {
+            if let Some(name) = type_name(item) {
+                self.types.entry(name).or_default().insert(file.to_owned());
+            }
             match item {
                 syn::Item::Use(item) => {
                     for Used { path, name } in used(&item.tree) {
@@ -361,6 +371,14 @@ fn attributes(item: &syn::Item) -> &[syn::Attribute] {
         syn::Item::Use(item) => &item.attrs,
         _ => &[],
     }
+}
+
+fn type_name(item: &syn::Item) -> Option<String> {
+    let is_type = matches!(
+        item,
+        syn::Item::Enum(_) | syn::Item::Struct(_) | syn::Item::Trait(_) | syn::Item::Type(_) | syn::Item::Union(_)
+    );
+    if is_type { defines(item) } else { None }
 }
 
 fn defines(item: &syn::Item) -> Option<String> {

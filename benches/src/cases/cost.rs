@@ -5,9 +5,9 @@
 
 use super::case::Case;
 use crate::floors::ring::DEPTH;
-use crate::floors::vyukov::{Memory, Vyukov};
+use crate::floors::vyukov::{QueueMemory, Vyukov};
 use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
-use crate::one_way::{Ground, Retry, Sink, Source};
+use crate::one_way::{OwnNode, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use rohrpost_mailbox::{OverflowPolicy, monotonic_ns};
@@ -44,7 +44,7 @@ impl Case for Cost {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let bursts = settings.count(32_000) / self.burst + GROUP;
         let ours = Contender::sampled("rohrpost", || {
-            let ground = Ground::new(DEPTH, BYTES, OverflowPolicy::Displace)?;
+            let ground = OwnNode::new(DEPTH, BYTES, OverflowPolicy::Displace)?;
             cost(self.burst, bursts, || ground.sink(100, Retry::Never), || ground.source(true))
         });
         let wakeable = Contender::sampled("Vyukov, wakeable", || vyukov::<true>(self.burst, bursts));
@@ -55,14 +55,14 @@ impl Case for Cost {
 }
 
 fn vyukov<const FENCED: bool>(burst: usize, bursts: usize) -> Result<Vec<f64>, Failure> {
-    let memory = Shared::<Memory>::new()?;
+    let memory = Shared::<QueueMemory>::new()?;
     let open = || Ok(Vyukov::<FENCED>::new(&memory, BYTES));
     open()?.format();
     cost(burst, bursts, open, open)
 }
 
 #[repr(C)]
-struct Turn {
+struct CostTurn {
     gate: Gate,
     samples: Samples,
     /// On lines of its own: whoever sends looks at it again and again.
@@ -70,7 +70,7 @@ struct Turn {
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Turn {}
+unsafe impl Zeroable for CostTurn {}
 
 /// Nanoseconds a send, one figure for each group of bursts.
 fn cost<I: Sink, O: Source>(
@@ -79,7 +79,7 @@ fn cost<I: Sink, O: Source>(
     sink: impl Fn() -> Result<I, Failure>,
     source: impl Fn() -> Result<O, Failure>,
 ) -> Result<Vec<f64>, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<CostTurn>::new()?;
     let all = (burst * (WARM_UP + bursts)) as u64;
     let receiver = Child::start(|| {
         let mut source = source()?;
@@ -97,15 +97,15 @@ fn cost<I: Sink, O: Source>(
         turn.gate.meet(2)?;
         let mut sink = sink()?;
         settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
-        let clock = Clock::new();
+        let clock = CycleCounter::new();
         turn.gate.meet(4)?;
         let (mut sent, mut group_ns) = (0, 0.0);
         for number in 0..WARM_UP + bursts {
-            let began = Clock::now();
+            let began = CycleCounter::now();
             for _ in 0..burst {
                 sink.send(&[7; BYTES])?;
             }
-            let took_ns = clock.ns(began, Clock::now());
+            let took_ns = clock.ns(began, CycleCounter::now());
             if number >= WARM_UP {
                 group_ns += took_ns;
             }
@@ -137,13 +137,13 @@ fn await_received(received: &AtomicU64, sent: u64) -> Result<(), Failure> {
 }
 
 /// Times spans of some tens of nanoseconds: the processor's counter, where it has one that can be read in order.
-struct Clock {
+struct CycleCounter {
     ns_per_tick: f64,
     /// Of two readings with nothing in between, the median.
     own_ticks: f64,
 }
 
-impl Clock {
+impl CycleCounter {
     fn new() -> Self {
         let (began, began_ns) = (Self::now(), monotonic_ns());
         while monotonic_ns() < began_ns + 10_000_000 {}

@@ -13,7 +13,7 @@ use super::case::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::{Queue, TwoRings, TwoRingsReceiver, TwoRingsSender};
 use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
-use crate::one_way::{Ground, QueueSink, Retry, Sink, Source};
+use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use rohrpost_mailbox::{OverflowPolicy, monotonic_ns, sys};
@@ -53,7 +53,7 @@ impl Case for Flood {
         // Where the urgent can be refused, as they are by no means under `displace` and `latest`, their sender tries again.
         let ours = |full, states, room: Option<u64>| {
             move || {
-                let ground = Ground::new(DEPTH, BYTES, full)?;
+                let ground = OwnNode::new(DEPTH, BYTES, full)?;
                 let low = || Ok(ground.sink(LOW, Retry::Sleep(REFUSED))?.with_states(states));
                 let high = || {
                     Ok(ground
@@ -97,7 +97,7 @@ impl Case for Flood {
 }
 
 #[repr(C)]
-struct Turn {
+struct FloodTurn {
     gate: Gate,
     /// Ordinary ones sent and received.
     sent: AtomicU64,
@@ -110,7 +110,7 @@ struct Turn {
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Turn {}
+unsafe impl Zeroable for FloodTurn {}
 
 /// Microseconds that each of so many urgent messages took. With `room` the flooder leaves as many of the ordinary ones on the way.
 ///
@@ -123,7 +123,7 @@ fn flood<I: Sink, L: Sink, O: Source>(
     low_sink: impl Fn() -> Result<L, Failure>,
     source: impl Fn() -> Result<O, Failure>,
 ) -> Result<Vec<f64>, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<FloodTurn>::new()?;
     let receiver = Child::start(|| {
         let mut source = source()?;
         settle(End::Pong, Placement::TwoCores, Scheduling::Fifo)?;
@@ -156,7 +156,7 @@ fn flood<I: Sink, L: Sink, O: Source>(
     Err(Failure::Failed(format!("of {urgent} urgent ones only {} came", turn.samples.len())))
 }
 
-fn send_urgent(sink: &mut impl Sink, turn: &Turn, urgent: usize) -> Result<(), Failure> {
+fn send_urgent(sink: &mut impl Sink, turn: &FloodTurn, urgent: usize) -> Result<(), Failure> {
     let mut message = [0; BYTES];
     let mut sent = 0;
     while sent < urgent {
@@ -174,7 +174,7 @@ fn send_urgent(sink: &mut impl Sink, turn: &Turn, urgent: usize) -> Result<(), F
     Ok(())
 }
 
-fn send_low(sink: &mut impl Sink, turn: &Turn, room: Option<u64>) -> Result<(), Failure> {
+fn send_low(sink: &mut impl Sink, turn: &FloodTurn, room: Option<u64>) -> Result<(), Failure> {
     let mut message = [0; BYTES];
     message[..8].copy_from_slice(&ORDINARY.to_le_bytes());
     while turn.over.load(Ordering::Acquire) == 0 {
@@ -199,7 +199,7 @@ fn send_low(sink: &mut impl Sink, turn: &Turn, room: Option<u64>) -> Result<(), 
     sink.send(&message)
 }
 
-fn receive(source: &mut impl Source, turn: &Turn) -> Result<(), Failure> {
+fn receive(source: &mut impl Source, turn: &FloodTurn) -> Result<(), Failure> {
     let mut message = [0; BYTES];
     loop {
         source.receive(&mut message)?;

@@ -20,13 +20,13 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let what = [What::FirstSend, What::Survey, What::List];
+    let what = [MailboxAction::FirstSend, MailboxAction::Survey, MailboxAction::List];
     what.map(|what| -> Box<dyn Case> { Box::new(what) }).into_iter().collect()
 }
 
 /// What is done with the mailboxes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum What {
+enum MailboxAction {
     /// Each is opened by name and gets its first package.
     FirstSend,
     /// The library looks at all of them.
@@ -35,7 +35,7 @@ enum What {
     List,
 }
 
-impl What {
+impl MailboxAction {
     fn limit(self) -> (&'static str, f64) {
         match self {
             Self::FirstSend => ("100 us", 100.0),
@@ -61,7 +61,7 @@ impl What {
     }
 }
 
-impl Case for What {
+impl Case for MailboxAction {
     fn name(&self) -> String {
         match self {
             Self::FirstSend => "many-first-send",

@@ -2,7 +2,7 @@
 
 use super::case::Case;
 use crate::harness::Failure;
-use crate::one_way::Ground;
+use crate::one_way::OwnNode;
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -19,15 +19,15 @@ const BLOCK: u64 = 512;
 /// All of them: small and large, few slots and many.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let shapes = [(1, 64), (8, 64), (32, 1024), (64, 64), (65, 64), (64, 16_384), (256, 256), (1024, 64), (1024, 4096)];
-    shapes.map(|(slots, bytes)| -> Box<dyn Case> { Box::new(Memory { slots, bytes }) }).into_iter().collect()
+    shapes.map(|(slots, bytes)| -> Box<dyn Case> { Box::new(MemoryCase { slots, bytes }) }).into_iter().collect()
 }
 
-struct Memory {
+struct MemoryCase {
     slots: usize,
     bytes: usize,
 }
 
-impl Memory {
+impl MemoryCase {
     /// Slots, 64 B for each, and a page; the kernel gives whole pages.
     fn allowed_bytes(&self) -> usize {
         let slot = (SLOT_PREFIX + self.bytes).next_multiple_of(LINE);
@@ -36,7 +36,7 @@ impl Memory {
 
     /// What the file of a mailbox of this shape takes.
     fn taken_bytes(&self) -> Result<u64, Failure> {
-        let ground = Ground::new(self.slots, self.bytes, OverflowPolicy::Displace)?;
+        let ground = OwnNode::new(self.slots, self.bytes, OverflowPolicy::Displace)?;
         let _source = ground.source(false)?;
         let files = std::fs::read_dir(ground.path()).map_err(|error| Failure::of("node's directory", error))?;
         let sizes = files.filter_map(|file| {
@@ -51,7 +51,7 @@ impl Memory {
     }
 }
 
-impl Case for Memory {
+impl Case for MemoryCase {
     fn name(&self) -> String {
         format!("memory-{}-slots", self.slots)
     }

@@ -7,7 +7,7 @@ use super::case::Case;
 use crate::counting::heap_uses;
 use crate::floors::Queue;
 use crate::harness::{Failure, sample_in_child};
-use crate::one_way::{Ground, QueueSink, Retry, Sink, Source};
+use crate::one_way::{OwnNode, QueueSink, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -80,7 +80,7 @@ fn counted<'a>(name: &'static str, count: impl Fn() -> Result<f64, Failure> + 'a
 
 /// Sends batch after batch into a mailbox of this process, with `mark` before and after each, and receives it again.
 fn mailbox_under(batches: usize, mut mark: impl FnMut()) -> Result<usize, Failure> {
-    let ground = Ground::new(2 * BATCH, BYTES, OverflowPolicy::Displace)?;
+    let ground = OwnNode::new(2 * BATCH, BYTES, OverflowPolicy::Displace)?;
     let mut source = ground.source(false)?;
     let mut sink = ground.sink(100, Retry::Never)?;
     let mut message = [0; BYTES];

@@ -5,9 +5,9 @@
 
 use super::case::Case;
 use crate::floors::Queue;
-use crate::floors::ring::{Bare, DEPTH, Futex, RingReceiver, RingSender, Shared as Ring};
+use crate::floors::ring::{BareRing, DEPTH, Futex, RingReceiver, RingSender, SharedRing as Ring};
 use crate::harness::{Failure, Scheduling, Shared};
-use crate::one_way::{Ground, QueueSink, Retry, Stream, rate};
+use crate::one_way::{OwnNode, QueueSink, Retry, Stream, rate};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
@@ -48,7 +48,11 @@ impl Case for OneSender {
         });
         let bare = rated("ring", || {
             let ring = Shared::<Ring>::new()?;
-            rate(&stream, |_| Ok(Bare::<RingSender>::sender(&ring)), || Ok(Bare::<RingReceiver>::receiver(&ring)))
+            rate(
+                &stream,
+                |_| Ok(BareRing::<RingSender>::sender(&ring)),
+                || Ok(BareRing::<RingReceiver>::receiver(&ring)),
+            )
         });
         let queue = rated("posix-mq", || {
             let queue = Queue::new(DEPTH, self.bytes)?;
@@ -108,6 +112,6 @@ fn rated<'a>(name: &'static str, turn: impl Fn() -> Result<f64, Failure> + 'a) -
 }
 
 fn ours(stream: &Stream, spins: bool, retry: Retry) -> Result<f64, Failure> {
-    let ground = Ground::new(DEPTH, stream.bytes, OverflowPolicy::Reject)?;
+    let ground = OwnNode::new(DEPTH, stream.bytes, OverflowPolicy::Reject)?;
     rate(stream, |sender| ground.sink(PRIORITIES[sender % PRIORITIES.len()], retry), || ground.source(spins))
 }

@@ -38,10 +38,10 @@ const QUEUE_BYTES_MAX: usize = 8192;
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let all = [
-        (Start::New, From::Exec),
-        (Start::New, From::Main),
-        (Start::Waiting, From::Exec),
-        (Start::Waiting, From::Main),
+        (Start::New, StartupClock::Exec),
+        (Start::New, StartupClock::Main),
+        (Start::Waiting, StartupClock::Exec),
+        (Start::Waiting, StartupClock::Main),
     ];
     all.map(|(start, from)| -> Box<dyn Case> { Box::new(Startup { start, from }) }).into_iter().collect()
 }
@@ -66,7 +66,7 @@ impl Start {
 
 /// When the clock starts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum From {
+enum StartupClock {
     Exec,
     /// The first line of `main`.
     Main,
@@ -74,32 +74,32 @@ enum From {
 
 struct Startup {
     start: Start,
-    from: From,
+    from: StartupClock,
 }
 
 impl Case for Startup {
     fn name(&self) -> String {
-        let from = if self.from == From::Exec { "" } else { "-after-main" };
+        let from = if self.from == StartupClock::Exec { "" } else { "-after-main" };
         format!("startup-{}{from}", self.start.name())
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let starts = settings.count(STARTS);
-        let ours = Contender::sampled("rohrpost", || self.turn(starts, Mailboxes::new));
-        let queue = Contender::sampled("posix-mq", || self.turn(starts, Queues::new));
+        let ours = Contender::sampled("rohrpost", || self.turn(starts, HubNode::new));
+        let queue = Contender::sampled("posix-mq", || self.turn(starts, HubQueue::new));
         let subject = Subject { case: self.name(), bytes: Some(BODY.len()), unit: "us" };
-        let target = (self.from == From::Exec).then_some(Target::AtMost(1.5));
+        let target = (self.from == StartupClock::Exec).then_some(Target::AtMost(1.5));
         Ok(compare(settings, &subject, &[ours, queue], &[Versus { name: "posix-mq", p50: target, p99: None }]))
     }
 }
 
 impl Startup {
     /// Microseconds of each start.
-    fn turn<G: Ground>(&self, starts: usize, ground: impl FnOnce() -> Done<G>) -> Result<Vec<f64>, Failure> {
+    fn turn<G: Host>(&self, starts: usize, ground: impl FnOnce() -> Done<G>) -> Result<Vec<f64>, Failure> {
         sample_in_child(PATIENCE, |samples| self.start_all(starts, ground, samples).map_err(as_failure("start-up")))
     }
 
-    fn start_all<G: Ground>(&self, starts: usize, ground: impl FnOnce() -> Done<G>, samples: &Samples) -> Done<()> {
+    fn start_all<G: Host>(&self, starts: usize, ground: impl FnOnce() -> Done<G>, samples: &Samples) -> Done<()> {
         let mut ground = ground()?;
         std::thread::scope(|scope| {
             let (roles, to_start) = mpsc::channel();
@@ -120,7 +120,7 @@ impl Startup {
                 }
                 let times = ended.recv()???;
                 ground.forget()?;
-                let began_ns = if self.from == From::Exec { times.exec_ns } else { times.main_ns };
+                let began_ns = if self.from == StartupClock::Exec { times.exec_ns } else { times.main_ns };
                 samples.push((times.first_ns - began_ns) as f64 / 1000.0);
             }
             Ok(())
@@ -148,7 +148,7 @@ fn run(role: &str) -> Done<Times> {
 }
 
 /// What a program is started on: a node, or queues.
-trait Ground {
+trait Host {
     /// Makes the program's mailbox or queue, with something in it.
     fn make_waiting(&mut self) -> Done<()>;
 
@@ -163,13 +163,13 @@ trait Ground {
 }
 
 /// A node with a hub on it.
-struct Mailboxes {
+struct HubNode {
     scratch: Scratch,
     hub: Receiver,
     participant: Arc<Participant>,
 }
 
-impl Mailboxes {
+impl HubNode {
     fn new() -> Done<Self> {
         let scratch = Scratch::new()?;
         let participant = Participant::join(&Node::create(&scratch.directory().join("node"), 0o700)?, HUB)?;
@@ -186,7 +186,7 @@ fn label() -> Label {
     Label { from: OWN, kind: Type::data(0), ..Label::default() }
 }
 
-impl Ground for Mailboxes {
+impl Host for HubNode {
     fn make_waiting(&mut self) -> Done<()> {
         // Dropped, it stays, as if its owner had died.
         drop(self.participant.receiver(OWN, Shape::default())?);
@@ -210,12 +210,12 @@ impl Ground for Mailboxes {
 }
 
 /// A hub's queue, and the names of both.
-struct Queues {
+struct HubQueue {
     hub: MqdT,
     names: [String; 2],
 }
 
-impl Queues {
+impl HubQueue {
     fn new() -> Done<Self> {
         let names = ["hub", "own"].map(|name| format!("/rohrpost-bench-{}-{name}", std::process::id()));
         Ok(Self { hub: make_queue(&names[0])?, names })
@@ -228,7 +228,7 @@ impl Queues {
     }
 }
 
-impl Ground for Queues {
+impl Host for HubQueue {
     fn make_waiting(&mut self) -> Done<()> {
         mq_close(make_queue(&self.names[1])?)?;
         self.answer()
@@ -248,7 +248,7 @@ impl Ground for Queues {
     }
 }
 
-impl Drop for Queues {
+impl Drop for HubQueue {
     fn drop(&mut self) {
         for name in &self.names {
             // The program's is gone unless a start failed.

@@ -1,6 +1,6 @@
 //! A ring for one sender and one receiver: what two processors can hand over at best, in order and once.
 //!
-//! It knows no priorities, no second sender and no death. [`Bare`] spins when it is empty or full, [`Futex`] sleeps.
+//! It knows no priorities, no second sender and no death. [`BareRing`] spins when it is empty or full, [`Futex`] sleeps.
 
 use crate::Failure;
 use crate::harness::Zeroable;
@@ -19,7 +19,7 @@ pub struct CacheLine<T>(pub T);
 
 /// A ring's memory.
 #[repr(C)]
-pub struct Memory {
+pub struct RingMemory {
     produced: CacheLine<AtomicU64>,
     consumed: CacheLine<AtomicU64>,
     room: Bell,
@@ -27,19 +27,19 @@ pub struct Memory {
 }
 
 // SAFETY: a slot's bytes are written by the sender before it says `produced` and read by the receiver before it says `consumed`.
-unsafe impl Sync for Memory {}
+unsafe impl Sync for RingMemory {}
 // SAFETY: atomics and an `UnsafeCell` of bytes; zeroes are an empty ring.
-unsafe impl Zeroable for Memory {}
+unsafe impl Zeroable for RingMemory {}
 
 /// A ring and the word that its receiver sleeps on.
 #[repr(C)]
-pub struct Shared {
-    ring: Memory,
+pub struct SharedRing {
+    ring: RingMemory,
     bell: Bell,
 }
 
 // SAFETY: made of such.
-unsafe impl Zeroable for Shared {}
+unsafe impl Zeroable for SharedRing {}
 
 /// A word that one process sleeps on: 1 while it does or is about to.
 #[repr(C)]
@@ -70,7 +70,7 @@ impl Bell {
     }
 }
 
-impl Memory {
+impl RingMemory {
     fn slot(&self, number: u64) -> *mut u8 {
         let at = number as usize % DEPTH * BYTES_MAX;
         // SAFETY: inside the slots.
@@ -80,7 +80,7 @@ impl Memory {
 
 /// The sending side.
 pub struct RingSender<'a> {
-    memory: &'a Memory,
+    memory: &'a RingMemory,
     produced: u64,
     /// As last seen.
     consumed: u64,
@@ -88,7 +88,7 @@ pub struct RingSender<'a> {
 
 impl<'a> RingSender<'a> {
     /// There must be one only.
-    pub fn new(memory: &'a Memory) -> Self {
+    pub fn new(memory: &'a RingMemory) -> Self {
         Self { memory, produced: 0, consumed: 0 }
     }
 
@@ -119,7 +119,7 @@ impl<'a> RingSender<'a> {
 
 /// The receiving side.
 pub struct RingReceiver<'a> {
-    memory: &'a Memory,
+    memory: &'a RingMemory,
     consumed: u64,
     /// As last seen.
     produced: u64,
@@ -127,7 +127,7 @@ pub struct RingReceiver<'a> {
 
 impl<'a> RingReceiver<'a> {
     /// There must be one only.
-    pub fn new(memory: &'a Memory) -> Self {
+    pub fn new(memory: &'a RingMemory) -> Self {
         Self { memory, consumed: 0, produced: 0 }
     }
 
@@ -165,23 +165,23 @@ impl<'a> RingReceiver<'a> {
 }
 
 /// One side of a ring that never sleeps.
-pub struct Bare<T>(T);
+pub struct BareRing<T>(T);
 
-impl<'a> Bare<RingSender<'a>> {
+impl<'a> BareRing<RingSender<'a>> {
     /// The one sender.
-    pub fn sender(shared: &'a Shared) -> Self {
+    pub fn sender(shared: &'a SharedRing) -> Self {
         Self(RingSender::new(&shared.ring))
     }
 }
 
-impl<'a> Bare<RingReceiver<'a>> {
+impl<'a> BareRing<RingReceiver<'a>> {
     /// The one receiver.
-    pub fn receiver(shared: &'a Shared) -> Self {
+    pub fn receiver(shared: &'a SharedRing) -> Self {
         Self(RingReceiver::new(&shared.ring))
     }
 }
 
-impl Sink for Bare<RingSender<'_>> {
+impl Sink for BareRing<RingSender<'_>> {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         while !self.0.has_room(Ordering::Acquire) {}
         self.0.push(message, Ordering::Release);
@@ -189,7 +189,7 @@ impl Sink for Bare<RingSender<'_>> {
     }
 }
 
-impl Source for Bare<RingReceiver<'_>> {
+impl Source for BareRing<RingReceiver<'_>> {
     fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
         while !self.0.pop(message, Ordering::Release) {}
         Ok(())
@@ -204,14 +204,14 @@ pub struct Futex<'a, T> {
 
 impl<'a> Futex<'a, RingSender<'a>> {
     /// The one sender.
-    pub fn sender(shared: &'a Shared) -> Self {
+    pub fn sender(shared: &'a SharedRing) -> Self {
         Self { side: RingSender::new(&shared.ring), bell: &shared.bell }
     }
 }
 
 impl<'a> Futex<'a, RingReceiver<'a>> {
     /// The one receiver.
-    pub fn receiver(shared: &'a Shared) -> Self {
+    pub fn receiver(shared: &'a SharedRing) -> Self {
         Self { side: RingReceiver::new(&shared.ring), bell: &shared.bell }
     }
 }

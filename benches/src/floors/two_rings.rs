@@ -1,7 +1,7 @@
 //! A ring for each of two priorities, the urgent one looked at first, and one word to sleep on: the least that gets something
 //! urgent past a flood. It has exactly two priorities, and one sender for each.
 
-use super::ring::{Bell, Memory, RingReceiver, RingSender};
+use super::ring::{Bell, RingMemory, RingReceiver, RingSender};
 use crate::Failure;
 use crate::harness::Zeroable;
 use crate::one_way::{Sink, Source};
@@ -10,8 +10,8 @@ use std::sync::atomic::Ordering;
 /// Both rings' memory.
 #[repr(C)]
 pub struct TwoRings {
-    urgent: Memory,
-    ordinary: Memory,
+    urgent: RingMemory,
+    ordinary: RingMemory,
     bell: Bell,
 }
 

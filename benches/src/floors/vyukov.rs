@@ -16,7 +16,7 @@ const TURN_BYTES: usize = size_of::<AtomicU64>();
 
 /// The queue's memory.
 #[repr(C)]
-pub struct Memory {
+pub struct QueueMemory {
     next: CacheLine<AtomicU64>,
     sleeping: CacheLine<AtomicU32>,
     /// Each slot's number, and the message behind it; how far apart they are depends on the message.
@@ -24,13 +24,13 @@ pub struct Memory {
 }
 
 // SAFETY: a slot's bytes belong to the sender whose number it shows, or to the receiver when that is one more.
-unsafe impl Sync for Memory {}
+unsafe impl Sync for QueueMemory {}
 // SAFETY: atomics and an `UnsafeCell` of bytes; zeroes are made a queue by `Vyukov::format`.
-unsafe impl Zeroable for Memory {}
+unsafe impl Zeroable for QueueMemory {}
 
 /// Either side.
 pub struct Vyukov<'a, const FENCED: bool> {
-    memory: &'a Memory,
+    memory: &'a QueueMemory,
     /// Bytes from one slot to the next.
     stride: usize,
     /// The receiver's own.
@@ -39,7 +39,7 @@ pub struct Vyukov<'a, const FENCED: bool> {
 
 impl<'a, const FENCED: bool> Vyukov<'a, FENCED> {
     /// Messages of this size; all sides must say the same.
-    pub fn new(memory: &'a Memory, bytes: usize) -> Self {
+    pub fn new(memory: &'a QueueMemory, bytes: usize) -> Self {
         Self { memory, stride: (TURN_BYTES + bytes).next_multiple_of(64), received: 0 }
     }
 

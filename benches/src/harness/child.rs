@@ -10,20 +10,20 @@ use std::time::{Duration, Instant};
 
 /// What a child has to say of its end.
 #[repr(C)]
-struct Report {
+struct ChildReport {
     /// 0: nothing said; else one of the below.
     end: AtomicU32,
     text: [AtomicU8; 508],
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Report {}
+unsafe impl Zeroable for ChildReport {}
 
 const DONE: u32 = 1;
 const SKIPPED: u32 = 2;
 const FAILED: u32 = 3;
 
-impl Report {
+impl ChildReport {
     fn write(&self, result: &Result<(), Failure>) {
         let (end, text) = match result {
             Ok(()) => (DONE, ""),
@@ -53,7 +53,7 @@ impl Report {
 /// A forked process. Killed, if it still runs, when this is dropped.
 pub struct Child {
     pid: Pid,
-    report: Shared<Report>,
+    report: Shared<ChildReport>,
     ended: bool,
 }
 
@@ -65,7 +65,7 @@ impl Child {
     /// # Errors
     /// When there can be no further process.
     pub fn start(body: impl FnOnce() -> Result<(), Failure>) -> Result<Self, Failure> {
-        let report = Shared::<Report>::new()?;
+        let report = Shared::<ChildReport>::new()?;
         let parent = nix::unistd::getpid();
         // SAFETY: the parent has no other thread (see above), so the child may do what any process may.
         match unsafe { fork() }.map_err(|error| Failure::of("fork", error))? {

@@ -77,16 +77,16 @@ impl Cell {
 
 /// What the ends of a turn share.
 #[repr(C)]
-struct Turn {
+struct PingPongTurn {
     gate: Gate,
     /// One way, µs.
     samples: Samples,
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Turn {}
+unsafe impl Zeroable for PingPongTurn {}
 
-impl Turn {
+impl PingPongTurn {
     /// Of round trips, ns.
     fn record(&self, round_trips: &[u64]) {
         round_trips.iter().for_each(|ns| self.samples.push(*ns as f64 / 2000.0));
@@ -176,7 +176,7 @@ pub fn time_two_processes<L: Link>(
     cell: &Cell,
     make: impl Fn(End, &mut Meetings) -> Result<L, Failure>,
 ) -> Result<Vec<f64>, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<PingPongTurn>::new()?;
     let open = |end| {
         let mut meetings = Meetings { gate: &turn.gate, met: 0 };
         let link = make(end, &mut meetings)?;
@@ -225,7 +225,7 @@ impl Meetings<'_> {
 /// What either end failed with.
 #[cfg(feature = "peers")]
 pub fn time_two_threads<L: Link + Send>(cell: &Cell, make: impl Fn() -> [L; 2]) -> Result<Vec<f64>, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<PingPongTurn>::new()?;
     let open = |end| {
         settle(end, cell.placement, cell.scheduling)?;
         turn.gate.meet(2)

@@ -73,12 +73,12 @@ impl Link for Module {
 }
 
 /// Where a stream of packages goes in.
-pub struct Source {
+pub struct LanSource {
     sender: Sender,
     label: Label,
 }
 
-impl Source {
+impl LanSource {
     /// A sender on the node with this directory, of the priority of its class.
     ///
     /// # Errors
@@ -91,7 +91,7 @@ impl Source {
     }
 }
 
-impl Source {
+impl LanSource {
     /// From now on sends data of this type.
     #[must_use]
     pub fn of_type(self, kind: Type) -> Self {
@@ -105,13 +105,13 @@ impl Source {
     pub fn offer(&mut self, message: &[u8]) -> Result<bool, Failure> {
         match self.sender.send(&self.label, &[message]) {
             Ok(()) => Ok(true),
-            Err(SendError::OverflowPolicy(_)) => Ok(false),
+            Err(SendError::Full(_)) => Ok(false),
             Err(error) => Err(Failure::of("send", error)),
         }
     }
 }
 
-impl Inlet for Source {
+impl Inlet for LanSource {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         // The receiver counts what is missing.
         self.offer(message).map(drop)
@@ -119,11 +119,11 @@ impl Inlet for Source {
 }
 
 /// Where it comes out.
-pub struct Sink {
+pub struct LanSink {
     receiver: Receiver,
 }
 
-impl Sink {
+impl LanSink {
     /// A mailbox on the node with this directory.
     ///
     /// # Errors
@@ -143,7 +143,7 @@ impl Sink {
     }
 }
 
-impl Outlet for Sink {
+impl Outlet for LanSink {
     fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
         // With something there it looks at no clock.
         let waiting = match self.receiver.try_receive() {

@@ -78,7 +78,7 @@ impl Flown {
 }
 
 #[repr(C)]
-struct Turn {
+struct FlowTurn {
     gate: Gate,
     /// Not 0: this many were sent, and no more will be.
     sent: AtomicU64,
@@ -88,7 +88,7 @@ struct Turn {
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Turn {}
+unsafe impl Zeroable for FlowTurn {}
 
 /// Sends from one process to another. Each opens its own side; the receiving one first. What comes must be whole and in order,
 /// nothing twice.
@@ -100,7 +100,7 @@ pub fn flow<I: Inlet, O: Outlet>(
     inlet: impl Fn() -> Result<I, Failure>,
     outlet: impl Fn() -> Result<O, Failure>,
 ) -> Result<Flown, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<FlowTurn>::new()?;
     let mut receiver = Child::start(|| {
         let mut outlet = outlet()?;
         settle(End::Pong, Placement::TwoCores, Scheduling::Fifo)?;
@@ -129,7 +129,7 @@ pub fn flow<I: Inlet, O: Outlet>(
     Ok(flown)
 }
 
-fn send_all(inlet: &mut impl Inlet, flow: &Flow, turn: &Turn) -> Result<(), Failure> {
+fn send_all(inlet: &mut impl Inlet, flow: &Flow, turn: &FlowTurn) -> Result<(), Failure> {
     let mut message = vec![FILLER; flow.bytes];
     let over = Instant::now() + flow.cap;
     let mut window = Window { size: flow.window.unwrap_or(u64::MAX), lost_before: 0 };
@@ -206,7 +206,7 @@ fn put_number(message: &mut [u8], number: u64) {
     message[tail..].copy_from_slice(&bytes);
 }
 
-fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &Turn) -> Result<(), Failure> {
+fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &FlowTurn) -> Result<(), Failure> {
     let mut message = vec![0; flow.bytes];
     let (mut next, mut received) = (0, 0);
     let (mut first_ns, mut last_ns) = (0, 0);
@@ -275,7 +275,7 @@ mod tests {
     fn received(messages: impl IntoIterator<Item = Vec<u8>>) -> Result<u64, Failure> {
         let flow =
             Flow { bytes: 32, messages: 10, window: None, sender: End::Ping, sender_fifo: 50, cap: Duration::ZERO };
-        let turn = Shared::<Turn>::new()?;
+        let turn = Shared::<FlowTurn>::new()?;
         turn.sent.store(10, Ordering::Release);
         receive_all(&mut Canned(messages.into_iter().collect()), &flow, &turn)?;
         Ok(turn.received.load(Ordering::Acquire))
@@ -310,7 +310,7 @@ mod tests {
 
     #[test]
     fn a_window_opens_when_half_of_it_came_and_when_nothing_comes() {
-        let turn = Shared::<Turn>::new().unwrap();
+        let turn = Shared::<FlowTurn>::new().unwrap();
         turn.credit.arrived(3);
         let mut window = Window { size: 4, lost_before: 0 };
         window.await_room(6, &turn.credit);

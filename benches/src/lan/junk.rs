@@ -14,21 +14,21 @@ const BURST: u64 = 64;
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
 #[repr(C)]
-struct Counts {
+struct JunkCounts {
     begun: Gate,
     over: AtomicU64,
     sent: AtomicU64,
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Counts {}
+unsafe impl Zeroable for JunkCounts {}
 
 /// Junk on its way to a node, until it is ended or dropped.
 ///
 /// Who makes it has the near processor with what else runs there: with two processors there is no third for it. What a datagram costs until it is dropped
 /// or in a socket is spent on that processor too, since the network of namespaces carries each datagram in the thread that sends it.
 pub struct Junk {
-    counts: Shared<Counts>,
+    counts: Shared<JunkCounts>,
     child: Child,
     began: Instant,
     ports: u64,
@@ -40,7 +40,7 @@ impl Junk {
     /// # Errors
     /// When there can be no further process, or no socket.
     pub fn start(go: impl FnOnce() -> Result<(), Failure>, to: IpAddr, ports: &[u16]) -> Result<Self, Failure> {
-        let counts = Shared::<Counts>::new()?;
+        let counts = Shared::<JunkCounts>::new()?;
         let child = Child::start(|| {
             go()?;
             let sockets: Result<Vec<_>, Failure> = ports.iter().map(|port| open((to, *port).into())).collect();
@@ -75,7 +75,7 @@ fn open(to: SocketAddr) -> Result<UdpSocket, Failure> {
 }
 
 /// Each port in turn, until it is over.
-fn send(sockets: &[UdpSocket], counts: &Counts) -> Result<(), Failure> {
+fn send(sockets: &[UdpSocket], counts: &JunkCounts) -> Result<(), Failure> {
     let (began, message) = (Instant::now(), [0x5a; BYTES]);
     let wanted_s = WANTED_S * sockets.len() as u64;
     while counts.over.load(Ordering::Acquire) == 0 {

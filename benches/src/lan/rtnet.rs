@@ -27,20 +27,20 @@ const MESSAGE_BYTES: usize = 16;
 const GRACE: Duration = Duration::from_secs(30);
 
 #[repr(C)]
-struct Turn {
+struct ExchangeTurn {
     gate: Gate,
     samples: Samples,
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Turn {}
+unsafe impl Zeroable for ExchangeTurn {}
 
 /// How far off a slave on the far end was after each of so many synchronisations, µs.
 ///
 /// # Errors
 /// When an end cannot do its part.
 pub fn errors_us(wire: &Wire, synchronisations: usize) -> Result<Vec<f64>, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<ExchangeTurn>::new()?;
     let open = |end| {
         let socket = Stamped::open(wire, end)?;
         settle(end, Placement::TwoCores, Scheduling::Fifo)?;

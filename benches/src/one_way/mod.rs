@@ -5,7 +5,7 @@ mod ours;
 mod peers;
 mod queue;
 
-pub use ours::{Ground, OurSink, OurSource, Retry};
+pub use ours::{OurSink, OurSource, OwnNode, Retry};
 #[cfg(feature = "peers")]
 pub use peers::{channel_rate, iceoryx_rate};
 pub use queue::QueueSink;
@@ -69,16 +69,16 @@ impl Stream {
 }
 
 #[repr(C)]
-struct Turn {
+struct StreamTurn {
     gate: Gate,
     received: AtomicU64,
     took_ns: AtomicU64,
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Turn {}
+unsafe impl Zeroable for StreamTurn {}
 
-impl Turn {
+impl StreamTurn {
     /// Messages a second.
     fn rate(&self) -> f64 {
         let (received, took_ns) = (self.received.load(Ordering::Acquire), self.took_ns.load(Ordering::Acquire));
@@ -98,7 +98,7 @@ pub fn rate<I: Sink, O: Source>(
     sink: impl Fn(usize) -> Result<I, Failure>,
     source: impl Fn() -> Result<O, Failure>,
 ) -> Result<f64, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<StreamTurn>::new()?;
     let all = stream.senders as u32 + 1;
     let receiver = Child::start(|| {
         let mut source = source()?;
@@ -151,7 +151,7 @@ fn put_number(message: &mut [u8], number: u64) {
     message[tail..].copy_from_slice(&bytes);
 }
 
-fn receive_all(source: &mut impl Source, stream: &Stream, turn: &Turn) -> Result<(), Failure> {
+fn receive_all(source: &mut impl Source, stream: &Stream, turn: &StreamTurn) -> Result<(), Failure> {
     let mut message = vec![0; stream.bytes];
     let mut expected = [0; SENDERS_MAX];
     let mut running = stream.senders;

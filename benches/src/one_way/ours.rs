@@ -14,12 +14,12 @@ const MAILBOX: Name = Name::new(1, 200, 0, 0);
 const SPIN: Duration = Duration::from_millis(100);
 
 /// A node of its own in shared memory; gone when this is dropped.
-pub struct Ground {
+pub struct OwnNode {
     scratch: Scratch,
     shape: Shape,
 }
 
-impl Ground {
+impl OwnNode {
     /// Makes the directory; the processes of a turn make the rest. The mailbox will have `slots` for `bytes` each.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ impl Sink for OurSink {
         loop {
             match self.sender.send(&self.label, &[message]) {
                 Ok(()) => return Ok(()),
-                Err(SendError::OverflowPolicy(_)) if self.retry != Retry::Never => self.pause(),
+                Err(SendError::Full(_)) if self.retry != Retry::Never => self.pause(),
                 Err(error) => return Err(Failure::of("send", error)),
             }
         }

@@ -1,6 +1,6 @@
 //! iceoryx2 between processes and crossbeam's channel between threads, one way.
 
-use super::{Sink, Source, Stream, Turn, receive_all, send_all};
+use super::{Sink, Source, Stream, StreamTurn, receive_all, send_all};
 use crate::Failure;
 use crate::harness::{Child, End, Placement, Scratch, Shared, settle};
 use crate::peers::{IceoryxReceiver, IceoryxSender};
@@ -63,7 +63,7 @@ pub fn channel_rate(stream: &Stream) -> Result<f64, Failure> {
 }
 
 fn between_threads<const N: usize>(stream: &Stream) -> Result<f64, Failure> {
-    let turn = Shared::<Turn>::new()?;
+    let turn = Shared::<StreamTurn>::new()?;
     let process = Child::start(|| {
         let (sender, receiver) = bounded(DEPTH);
         std::thread::scope(|scope| {

@@ -33,13 +33,13 @@ pub(super) trait Door {
 }
 
 /// A module wakes its relay by a pipe through which the message goes, and is woken by a futex.
-pub(super) struct Bare<'a> {
+pub(super) struct BareRelayModule<'a> {
     out: File,
     hand_over: HandOver<'a>,
     piece: Vec<u8>,
 }
 
-/// What [`Bare`] needs, made before the processes are.
+/// What [`BareRelayModule`] needs, made before the processes are.
 pub(super) struct Hall {
     lanes: Shared<Lanes>,
     /// Out of the pipe, and into it.
@@ -52,15 +52,15 @@ impl Hall {
     }
 
     /// For the relay.
-    pub(super) fn door(&self) -> Result<Bare<'_>, Failure> {
+    pub(super) fn door(&self) -> Result<BareRelayModule<'_>, Failure> {
         let hand_over = HandOver::new(&self.lanes, End::Pong, Wake::Futex);
-        Ok(Bare { out: file(&self.pipe.0)?, hand_over, piece: vec![0; PIECE_BYTES] })
+        Ok(BareRelayModule { out: file(&self.pipe.0)?, hand_over, piece: vec![0; PIECE_BYTES] })
     }
 
     /// For the module.
-    pub(super) fn module(&self) -> Result<Module<'_>, Failure> {
+    pub(super) fn module(&self) -> Result<DoorModule<'_>, Failure> {
         let hand_over = HandOver::new(&self.lanes, End::Ping, Wake::Futex);
-        Ok(Module { into: file(&self.pipe.1)?, hand_over })
+        Ok(DoorModule { into: file(&self.pipe.1)?, hand_over })
     }
 }
 
@@ -68,7 +68,7 @@ fn file(descriptor: &OwnedFd) -> Result<File, Failure> {
     descriptor.try_clone().map(File::from).map_err(|error| Failure::of("pipe", error))
 }
 
-impl Door for Bare<'_> {
+impl Door for BareRelayModule<'_> {
     fn wait(&mut self, socket: &mut TcpStream) -> Result<bool, Failure> {
         let watched = [self.out.as_fd(), socket.as_fd()];
         let mut waits = watched.map(|descriptor| PollFd::new(descriptor, PollFlags::POLLIN));
@@ -87,12 +87,12 @@ impl Door for Bare<'_> {
 }
 
 /// The module at such a door.
-pub(super) struct Module<'a> {
+pub(super) struct DoorModule<'a> {
     into: File,
     hand_over: HandOver<'a>,
 }
 
-impl Link for Module<'_> {
+impl Link for DoorModule<'_> {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
         self.into.write_all(message).map_err(|error| Failure::of("pipe", error))
     }
@@ -103,13 +103,13 @@ impl Link for Module<'_> {
 }
 
 /// Both have a mailbox, as modules and the clients of nodes have.
-pub(super) struct Mailboxes {
+pub(super) struct MailboxDoor {
     receiver: Receiver,
     watches: Watches,
     back: Station,
 }
 
-impl Mailboxes {
+impl MailboxDoor {
     /// For the relay, on the node in this directory.
     pub(super) fn open(directory: &Path, socket: &TcpStream, bytes: usize) -> Result<Self, Failure> {
         let failed = |error: &dyn std::fmt::Display| Failure::of("mailbox", error);
@@ -129,7 +129,7 @@ impl Mailboxes {
     }
 }
 
-impl Door for Mailboxes {
+impl Door for MailboxDoor {
     fn wait(&mut self, socket: &mut TcpStream) -> Result<bool, Failure> {
         self.watches.wait_any(&mut [&mut self.receiver], Waiting::default(), || false);
         while let Some(package) = self.receiver.try_receive() {

@@ -7,7 +7,7 @@
 //! As the client of a node, the outer relays sleep on what their module hands over and on their socket at once, so a module wakes them by a
 //! pipe; the middle one sleeps in epoll.
 
-use super::door::{Door, Hall, Mailboxes};
+use super::door::{Door, Hall, MailboxDoor};
 use super::systems::free_address;
 use crate::harness::{Cell, Child, End, Failure, Gate, Link, Scratch, Shared, settle, time_two_processes};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
@@ -38,8 +38,8 @@ pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
 pub fn time_mailbox_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
     let directory = |end| scratch.directory().join(if end == End::Ping { "near" } else { "far" });
-    let door = |end, socket: &TcpStream| Mailboxes::open(&directory(end), socket, cell.bytes);
-    time(cell, door, |end| Mailboxes::module(&directory(end), cell.bytes))
+    let door = |end, socket: &TcpStream| MailboxDoor::open(&directory(end), socket, cell.bytes);
+    time(cell, door, |end| MailboxDoor::module(&directory(end), cell.bytes))
 }
 
 fn time<D: Door, M: Link>(

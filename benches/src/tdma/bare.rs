@@ -22,7 +22,7 @@ const STANDSTILL_CYCLES: u64 = 3;
 
 /// How late bare threads were.
 #[derive(Clone, Debug)]
-pub struct Bare {
+pub struct BareThreads {
     /// Of each slot of each node: how long after its beginning, µs.
     pub late_us: Vec<f64>,
     /// How often one of those who may be master missed all its windows of three cycles in a row.
@@ -36,7 +36,7 @@ struct Said {
     standstills: Shared<Samples>,
 }
 
-impl Bare {
+impl BareThreads {
     /// One process for each node, for so long.
     ///
     /// # Errors

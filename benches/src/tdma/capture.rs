@@ -30,7 +30,7 @@ pub const STAMP_BYTES: usize = 8;
 /// What a frame is, as far as it matters here.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
-pub enum What {
+pub enum FrameKind {
     /// Packages, or a part of one.
     Packages,
     /// A master's synchronisation.
@@ -49,7 +49,7 @@ pub struct Crossed {
     /// Node that sent it.
     pub from: u8,
     /// What it is.
-    pub what: What,
+    pub what: FrameKind,
 }
 
 /// A package that said when it was published.
@@ -143,7 +143,7 @@ impl Capture {
 fn crossed(words: &[AtomicU64; 2]) -> Option<Crossed> {
     let [at_ns, what] = words.each_ref().map(|word| word.load(Ordering::Relaxed));
     let [from, what, ..] = what.to_le_bytes();
-    let all = [What::Packages, What::Sync, What::Replacement, What::Said];
+    let all = [FrameKind::Packages, FrameKind::Sync, FrameKind::Replacement, FrameKind::Said];
     let what = all.into_iter().find(|known| *known as u8 == what)?;
     Some(Crossed { at_ns, from, what })
 }
@@ -206,21 +206,21 @@ fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
             for (package, body) in packages.filter(|(package, _)| package.kind == STAMPED) {
                 arrive(seen, at_ns, from, package.from, body);
             }
-            What::Packages
+            FrameKind::Packages
         }
         Frame::Fragment(part) => {
             // Parts leave in their order.
             if part.head.kind == STAMPED && part.index + 1 == part.count {
                 arrive(seen, at_ns, from, part.head.from, part.bytes);
             }
-            What::Packages
+            FrameKind::Packages
         }
         Frame::Time(rest) => match Message::parse(head.kind, rest) {
-            Ok(Message::Sync(sync)) if sync.replacement => What::Replacement,
-            Ok(Message::Sync(_)) => What::Sync,
-            _ => What::Said,
+            Ok(Message::Sync(sync)) if sync.replacement => FrameKind::Replacement,
+            Ok(Message::Sync(_)) => FrameKind::Sync,
+            _ => FrameKind::Said,
         },
-        Frame::Alive(_) | Frame::Refusal(_) => What::Said,
+        Frame::Alive(_) | Frame::Refusal(_) => FrameKind::Said,
     };
     seen.frame(&Crossed { at_ns, from, what });
 }

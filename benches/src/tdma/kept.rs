@@ -1,6 +1,6 @@
 //! How slots were kept: what the capture saw, held against the table by the master's time.
 
-use super::capture::{Crossed, What};
+use super::capture::{Crossed, FrameKind};
 use super::stage::NODES;
 use crate::statistics::median;
 use rohrpost_mailbox::TimeRecord;
@@ -43,7 +43,8 @@ impl Kept {
             } else {
                 kept.outside += 1;
                 kept.in_anothers += usize::from(owners[0].is_some());
-                let nearest = nearest_slot(table, at_ns).filter(|_| matches!(frame.what, What::Packages | What::Said));
+                let nearest =
+                    nearest_slot(table, at_ns).filter(|_| matches!(frame.what, FrameKind::Packages | FrameKind::Said));
                 kept.off_us.extend(nearest.and_then(|window| node.first_in(window, at_ns)).map(f64::abs));
             }
         }
@@ -101,7 +102,9 @@ mod tests {
     };
 
     fn frames(all: &[(u8, u64)]) -> Vec<Crossed> {
-        all.iter().map(|(from, at_us)| Crossed { at_ns: at_us * 1000, from: *from, what: What::Packages }).collect()
+        all.iter()
+            .map(|(from, at_us)| Crossed { at_ns: at_us * 1000, from: *from, what: FrameKind::Packages })
+            .collect()
     }
 
     #[test]
@@ -131,7 +134,7 @@ mod tests {
         assert_eq!((late.outside, late.in_anothers), (3, 1));
         assert_eq!(late.off_us, [1_000.0, 460.0]);
         // What is no slot's is outside alone.
-        let sync = [Crossed { what: What::Sync, ..frames(&[(0, 3_000)])[0] }];
+        let sync = [Crossed { what: FrameKind::Sync, ..frames(&[(0, 3_000)])[0] }];
         let sync = Kept::of(&sync, &tables, &TIME);
         assert_eq!((sync.outside, sync.off_us.len()), (1, 0));
     }

@@ -1,6 +1,6 @@
 //! The real routers of three nodes that send in slots.
 
-use super::capture::{Capture, What};
+use super::capture::{Capture, FrameKind};
 use super::counts::Counts;
 use super::plan::{INSTALLATION, Plan};
 use super::rights::Rights;
@@ -115,7 +115,7 @@ impl<'a> Routers<'a> {
             capture.check()?;
             let frames = capture.since(from);
             let sends = |node: &u8| {
-                let its = frames.iter().filter(|frame| frame.from == *node && frame.what == What::Packages);
+                let its = frames.iter().filter(|frame| frame.from == *node && frame.what == FrameKind::Packages);
                 its.take(FRAMES).count() == FRAMES
             };
             if nodes.iter().all(sends) {

@@ -1,6 +1,6 @@
 //! A master that is killed, and what others do about it, as the capture and their pages show it.
 
-use super::capture::{Capture, Crossed, What};
+use super::capture::{Capture, Crossed, FrameKind};
 use super::plan::Plan;
 use super::routers::Routers;
 use super::stage::NODES;
@@ -35,18 +35,18 @@ pub struct TakenOver {
 
 /// Who synchronised last as the master.
 fn master(frames: &[Crossed]) -> Option<u8> {
-    frames.iter().rev().find(|frame| frame.what == What::Sync).map(|frame| frame.from)
+    frames.iter().rev().find(|frame| frame.what == FrameKind::Sync).map(|frame| frame.from)
 }
 
 /// How often another node than before synchronised as the master.
 pub fn changes_of_master(frames: &[Crossed]) -> usize {
-    let masters = || frames.iter().filter(|frame| frame.what == What::Sync).map(|frame| frame.from);
+    let masters = || frames.iter().filter(|frame| frame.what == FrameKind::Sync).map(|frame| frame.from);
     masters().zip(masters().skip(1)).filter(|(before, after)| before != after).count()
 }
 
 /// How many of so many cycles had no master's synchronisation, percent.
 pub fn without_sync_percent(frames: &[Crossed], cycle: Duration, cycles: f64) -> f64 {
-    let syncs = || frames.iter().filter(|frame| frame.what == What::Sync).map(|frame| frame.at_ns);
+    let syncs = || frames.iter().filter(|frame| frame.what == FrameKind::Sync).map(|frame| frame.at_ns);
     // Of one cycle are those that follow each other within half of one: each slave gets one.
     let half_ns = cycle.as_nanos() as u64 / 2;
     let begun = syncs().zip(syncs().skip(1)).filter(|(before, at)| at - before > half_ns).count() + 1;
@@ -83,8 +83,9 @@ pub fn kill_master(
     await_reign(capture, first, dead, cycle, &mut pages)?;
     let frames = capture.since(first);
     let never = || Failure::Failed("nobody synchronised in a dead master's place".into());
-    let last = frames.iter().rposition(|frame| frame.what == What::Sync && frame.from == dead).ok_or_else(never)?;
-    let cycles_until = |is: &[What]| {
+    let last =
+        frames.iter().rposition(|frame| frame.what == FrameKind::Sync && frame.from == dead).ok_or_else(never)?;
+    let cycles_until = |is: &[FrameKind]| {
         let next = frames[last..].iter().find(|frame| frame.from != dead && is.contains(&frame.what))?;
         Some((next.at_ns - frames[last].at_ns) as f64 / cycle.as_nanos() as f64)
     };
@@ -95,8 +96,8 @@ pub fn kill_master(
     }
     Ok(TakenOver {
         dead,
-        replaced_cycles: cycles_until(&[What::Sync, What::Replacement]).ok_or_else(never)?,
-        reigns_cycles: cycles_until(&[What::Sync]).ok_or_else(never)?,
+        replaced_cycles: cycles_until(&[FrameKind::Sync, FrameKind::Replacement]).ok_or_else(never)?,
+        reigns_cycles: cycles_until(&[FrameKind::Sync]).ok_or_else(never)?,
         slots_lost,
         step_us: pages.moved_ns as f64 / 1000.0,
     })
@@ -176,7 +177,7 @@ mod tests {
     #[test]
     fn a_cycle_has_a_sync_however_many_slaves_get_one() {
         let cycle = Duration::from_millis(5);
-        let sync = |at_us: u64| Crossed { at_ns: at_us * 1_000, from: 0, what: What::Sync };
+        let sync = |at_us: u64| Crossed { at_ns: at_us * 1_000, from: 0, what: FrameKind::Sync };
         let all = [0, 5_000, 15_200, 20_000].map(|at_us| [sync(at_us), sync(at_us + 20)]);
         assert_eq!(without_sync_percent(all.as_flattened(), cycle, 5.0), 20.0);
         assert_eq!(without_sync_percent(&all.as_flattened()[..4], cycle, 2.0), 0.0);

@@ -9,7 +9,7 @@ use super::routers::Routers;
 use super::stage::NODES;
 use crate::Failure;
 use crate::harness::{Child, Gate, Shared, Zeroable};
-use crate::lan::ends::{Sink, Source};
+use crate::lan::ends::{LanSink, LanSource};
 use rohrpost_mailbox::{Name, monotonic_ns};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -23,7 +23,7 @@ const EAR_EACH: Duration = Duration::from_millis(1);
 const COMES_WITHIN: Duration = Duration::from_secs(2);
 
 #[repr(C)]
-struct Counts {
+struct TalkerCounts {
     gate: Gate,
     over: AtomicU64,
     ended: AtomicU64,
@@ -32,11 +32,11 @@ struct Counts {
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Counts {}
+unsafe impl Zeroable for TalkerCounts {}
 
 /// Until this is dropped.
 pub struct Talkers {
-    counts: Shared<Counts>,
+    counts: Shared<TalkerCounts>,
     children: Vec<Child>,
 }
 
@@ -55,7 +55,7 @@ impl Talkers {
     /// # Errors
     /// When a mailbox cannot be made.
     pub fn start(routers: &Routers<'_>, plan: &Plan) -> Result<Self, Failure> {
-        let counts = Shared::<Counts>::new()?;
+        let counts = Shared::<TalkerCounts>::new()?;
         let mut children = Vec::new();
         for node in 0..NODES {
             let directory = routers.directory(node);
@@ -74,7 +74,7 @@ impl Talkers {
         let count = |count: &AtomicU64| count.load(Ordering::Acquire);
         self.counts.over.store(1, Ordering::Release);
         let give_up = Instant::now() + COMES_WITHIN;
-        let is_over = |counts: &Counts| {
+        let is_over = |counts: &TalkerCounts| {
             count(&counts.ended) == u64::from(NODES) && count(&counts.taken) >= count(&counts.published)
         };
         while !is_over(&self.counts) && Instant::now() < give_up {
@@ -88,9 +88,9 @@ impl Talkers {
 }
 
 /// Takes whatever comes for declared flows.
-fn listen(directory: &Path, node: u8, plan: &Plan, counts: &Counts) -> Result<(), Failure> {
+fn listen(directory: &Path, node: u8, plan: &Plan, counts: &TalkerCounts) -> Result<(), Failure> {
     let largest = plan.flows.iter().map(|flow| flow.bytes).max().unwrap_or_default();
-    let mut sink = Sink::open(directory, ear(node), largest as usize)?;
+    let mut sink = LanSink::open(directory, ear(node), largest as usize)?;
     counts.gate.meet(ALL)?;
     loop {
         counts.taken.fetch_add(sink.drain(), Ordering::AcqRel);
@@ -104,7 +104,7 @@ const ALL: u32 = 2 * NODES as u32 + 1;
 /// A flow, and when its next package is due.
 struct Due<'a> {
     flow: &'a Declared,
-    source: Source,
+    source: LanSource,
     body: Vec<u8>,
     at_ns: u64,
     each_ns: u64,
@@ -113,7 +113,7 @@ struct Due<'a> {
 impl<'a> Due<'a> {
     fn open(directory: &Path, flow: &'a Declared, node: u8, place: u64) -> Result<Self, Failure> {
         let (own, to): (Name, Name) = (flow.sender(node), flow.receiver(node));
-        let source = Source::open(directory, own, to)?.of_type(STAMPED);
+        let source = LanSource::open(directory, own, to)?.of_type(STAMPED);
         // No two flows have the same pace, so that their moments meet in all ways.
         let drift_us = DRIFT_US + 5 * (place + 3 * u64::from(node));
         let each_ns = (flow.period_us + drift_us) * 1000;
@@ -130,7 +130,7 @@ impl<'a> Due<'a> {
     }
 }
 
-fn talk(directory: &Path, node: u8, plan: &Plan, counts: &Counts) -> Result<(), Failure> {
+fn talk(directory: &Path, node: u8, plan: &Plan, counts: &TalkerCounts) -> Result<(), Failure> {
     let (ready, over) = (&counts.gate, &counts.over);
     let mut flows = Vec::new();
     for (flow, place) in plan.flows.iter().zip(0..) {

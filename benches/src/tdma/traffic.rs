@@ -5,7 +5,7 @@ use super::routers::Routers;
 use super::stage::NODES;
 use crate::Failure;
 use crate::harness::{Child, Gate, Shared};
-use crate::lan::ends::{Sink, Source};
+use crate::lan::ends::{LanSink, LanSource};
 use std::time::Duration;
 
 /// Fills a datagram of 1500 bytes, all heads counted.
@@ -30,15 +30,15 @@ impl Traffic {
         let feeder = |node: u8| {
             Child::start(|| {
                 let (directory, to) = (routers.directory(node), flood((node + 1) % NODES));
-                let mut sink = Sink::open(&directory, flood(node), BYTES)?;
-                let mut source = Source::open(&directory, flood(node), to)?;
+                let mut sink = LanSink::open(&directory, flood(node), BYTES)?;
+                let mut source = LanSource::open(&directory, flood(node), to)?;
                 ready.meet(all)?;
                 let package = [7; BYTES];
                 loop {
                     sink.drain();
                     let offered = (0..BURST).try_for_each(|_| source.offer(&package).map(drop));
                     // Its router is gone, and perhaps there again.
-                    if let (Err(_), Ok(again)) = (offered, Source::open(&directory, flood(node), to)) {
+                    if let (Err(_), Ok(again)) = (offered, LanSource::open(&directory, flood(node), to)) {
                         source = again;
                     }
                     std::thread::sleep(EACH);

@@ -26,7 +26,7 @@ pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Result<Ve
 
 /// What a class did, at all ends together.
 #[derive(Default)]
-struct Sum {
+struct ClassSum {
     /// Meant to go to the TCP router.
     meant: u64,
     left: u64,
@@ -38,7 +38,7 @@ struct Sum {
     lost: BTreeMap<String, u64>,
 }
 
-impl Sum {
+impl ClassSum {
     /// Handed to a connection, and never come out of another.
     fn on_way(&self) -> u64 {
         self.left.saturating_sub(self.came)
@@ -51,8 +51,8 @@ impl Sum {
     }
 }
 
-fn sums(links: &[BeyondLink]) -> BTreeMap<u8, Sum> {
-    let mut sums: BTreeMap<u8, Sum> = BTreeMap::new();
+fn sums(links: &[BeyondLink]) -> BTreeMap<u8, ClassSum> {
+    let mut sums: BTreeMap<u8, ClassSum> = BTreeMap::new();
     for link in links {
         for class in &link.sent {
             let sum = sums.entry(class.class).or_default();

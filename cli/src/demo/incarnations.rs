@@ -22,7 +22,7 @@ pub(super) struct Death {
 }
 
 /// A node whose router is watched.
-struct Watched {
+struct WatchedNode {
     /// By its place in the configuration.
     index: usize,
     node: Arc<Node>,
@@ -33,7 +33,7 @@ struct Watched {
 
 /// Watches routers, one of each node at most, in the tables of the nodes' memory: nobody is asked, so nobody is disturbed.
 pub(super) struct Incarnations {
-    nodes: Vec<Watched>,
+    nodes: Vec<WatchedNode>,
     pub(super) deaths: Vec<Death>,
 }
 
@@ -43,9 +43,9 @@ impl Incarnations {
         let watched = |(index, config): (usize, &rohrpost_config::Node)| {
             let router = router(&config.name)?;
             let node = Node::open(&node_directory(&installation.name, &config.name));
-            Some(node.map(|node| Watched { index, node, router, pid: None }))
+            Some(node.map(|node| WatchedNode { index, node, router, pid: None }))
         };
-        let nodes: Result<Vec<Watched>, NodeError> =
+        let nodes: Result<Vec<WatchedNode>, NodeError> =
             installation.nodes.iter().enumerate().filter_map(watched).collect();
         let mut incarnations = Self { nodes: nodes?, deaths: Vec::new() };
         incarnations.look();
@@ -81,7 +81,7 @@ impl Incarnations {
     }
 }
 
-impl Watched {
+impl WatchedNode {
     /// The process that is the router now, if it is ready.
     fn ready(&self) -> Option<u32> {
         let all = self.node.participants();

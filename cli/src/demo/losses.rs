@@ -15,11 +15,11 @@ const OVERDUE: Duration = Duration::from_secs(1);
 const AGAIN: Duration = Duration::from_millis(50);
 
 /// What modules say of their exchange with others.
-pub(super) struct Losses {
+pub(super) struct ExchangeLosses {
     told: BTreeMap<Name, Vec<Exchange>>,
 }
 
-impl Losses {
+impl ExchangeLosses {
     /// Asks both ends of each declared flow. One that does not answer was told of elsewhere. A call that was given up a moment ago may yet
     /// be answered: that is waited for a little.
     pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Self {

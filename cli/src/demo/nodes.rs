@@ -4,10 +4,10 @@ use super::account::{self, Balance};
 use super::arguments::{Arguments, Joined};
 use super::asked::{FIRST_FUNCTION, map_line, running};
 use super::drawing::{drawing, drawn};
-use super::losses::Losses;
+use super::losses::ExchangeLosses;
 use super::takeover::{TakeoverRecord, Victim, Watch};
 use super::{beyond, copy};
-use crate::launch::{Nodes, lab};
+use crate::launch::{LaunchedNodes, lab};
 use crate::speech::Speech;
 use crate::summary::print_classes;
 use crate::terminal::{Failure, say};
@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     let lab = lab(&installation)?;
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
-    let mut nodes = Nodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
+    let mut nodes = LaunchedNodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
     let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == Joined::Tcp)];
     let victims = victims.into_iter().filter(|(_, is_one)| *is_one).map(|(victim, _)| victim).collect();
     let summary = watch(&mut nodes, &installation, long, victims).map(|seen| summary(&installation, &seen?));
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
 
 /// Until the time is over, which begins when all modules are on, or it is told to stop; what was seen of routers, or none if not all ran.
 fn watch(
-    nodes: &mut Nodes<'_>,
+    nodes: &mut LaunchedNodes<'_>,
     installation: &Arc<Installation>,
     long: Option<Duration>,
     victims: Vec<Victim>,
@@ -104,7 +104,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord) -> Result<(S
     let surveys = nodes.iter().zip(&installation.nodes).map(survey).collect::<Result<Vec<_>, _>>()?;
     let died = seen.died();
     let links = settled(installation, &mut tool, &died)?;
-    let losses = Losses::ask(installation, &mut tool);
+    let losses = ExchangeLosses::ask(installation, &mut tool);
     let kept = in_slots(installation, &mut tool)?;
     let late: Vec<FlowStates> = of_routers(installation, &mut tool, RouterInterface::FLOWS)?;
     let beyond = beyond::ask(installation, &mut tool)?;

@@ -2,7 +2,7 @@
 
 /// How good something is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) enum State {
+pub(super) enum Grade {
     Ok,
     /// A robot runs, and may be late.
     Warn,
@@ -10,7 +10,7 @@ pub(super) enum State {
     Bad,
 }
 
-impl State {
+impl Grade {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -24,7 +24,7 @@ impl State {
 #[derive(Debug)]
 pub(super) struct Finding {
     pub(super) what: &'static str,
-    pub(super) state: State,
+    pub(super) state: Grade,
     /// What is.
     pub(super) is: String,
     /// Why it matters.
@@ -35,12 +35,12 @@ pub(super) struct Finding {
 
 impl Finding {
     pub(super) fn ok(what: &'static str, is: impl Into<String>, why: &'static str) -> Self {
-        Self { what, state: State::Ok, is: is.into(), why, fix: None }
+        Self { what, state: Grade::Ok, is: is.into(), why, fix: None }
     }
 
     /// Something that is not as it should be, and what fixes it.
     pub(super) fn not(
-        state: State,
+        state: Grade,
         what: &'static str,
         is: impl Into<String>,
         why: &'static str,

@@ -1,6 +1,6 @@
 //! The kernel and the processor: what may keep a thread waiting.
 
-use super::finding::{Finding, State};
+use super::finding::{Finding, Grade};
 use super::machine::Machine;
 use crate::daemons::{self, Daemon};
 
@@ -23,7 +23,7 @@ fn time_daemons(machine: &Machine) -> Vec<Finding> {
     let finding = |daemon: Daemon| {
         let (what, is) = ("time daemon", format!("{} runs", daemon.name));
         match machine.asked.lan {
-            Some(_) => Finding::not(State::Warn, what, is, daemons::WHY, daemon.ends),
+            Some(_) => Finding::not(Grade::Warn, what, is, daemons::WHY, daemon.ends),
             None => Finding::ok(what, is, "it is in nobody's way, unless nodes have the time of a master"),
         }
     };
@@ -42,7 +42,7 @@ fn version(machine: &Machine) -> Option<Finding> {
     Some(if version >= KERNEL_LEAST {
         Finding::ok("kernel", text, why)
     } else {
-        Finding::not(State::Bad, "kernel", text, why, "install a newer kernel")
+        Finding::not(Grade::Bad, "kernel", text, why, "install a newer kernel")
     })
 }
 
@@ -62,7 +62,7 @@ fn preemption(machine: &Machine) -> Option<Finding> {
         None => "none or voluntary".into(),
     };
     Some(Finding::not(
-        State::Warn,
+        Grade::Warn,
         "preemption",
         format!("{model}; not PREEMPT_RT"),
         why,
@@ -77,8 +77,8 @@ fn throttling(machine: &Machine) -> Option<Finding> {
     let period = machine.number("/proc/sys/kernel/sched_rt_period_us").unwrap_or(1_000_000).max(1);
     let fix = "sudo sysctl -w kernel.sched_rt_runtime_us=950000";
     Some(match runtime {
-        0 => Finding::not(State::Bad, what, "0 µs: SCHED_FIFO threads never run", why, fix),
-        ..0 => Finding::not(State::Warn, what, "no limit: a runaway takes the computer with it", why, fix),
+        0 => Finding::not(Grade::Bad, what, "0 µs: SCHED_FIFO threads never run", why, fix),
+        ..0 => Finding::not(Grade::Warn, what, "no limit: a runaway takes the computer with it", why, fix),
         _ => Finding::ok(what, format!("{runtime} of {period} µs"), why),
     })
 }
@@ -106,7 +106,7 @@ fn clock_source(machine: &Machine) -> Option<Finding> {
         Some(better) => format!("echo {better} | sudo tee {folder}/current_clocksource"),
         None => "look why the kernel gave up the better one: `dmesg | grep -i clocksource`".into(),
     };
-    Some(Finding::not(State::Warn, what, format!("{source} (slow)"), why, fix))
+    Some(Finding::not(Grade::Warn, what, format!("{source} (slow)"), why, fix))
 }
 
 fn governor(machine: &Machine) -> Finding {
@@ -121,7 +121,7 @@ fn governor(machine: &Machine) -> Finding {
         [only] if only == "performance" => Finding::ok(what, "performance", why),
         several => {
             let fix = "sudo cpupower frequency-set -g performance";
-            Finding::not(State::Warn, what, several.join(", "), why, fix)
+            Finding::not(Grade::Warn, what, several.join(", "), why, fix)
         }
     }
 }
@@ -141,7 +141,7 @@ fn idle(machine: &Machine) -> Finding {
         }
         Some((latency, name)) => {
             let fix = format!("sudo cpupower idle-set -D {IDLE_LATENCY_US}");
-            Finding::not(State::Warn, what, format!("deepest is {name}, {latency} µs"), why, fix)
+            Finding::not(Grade::Warn, what, format!("deepest is {name}, {latency} µs"), why, fix)
         }
     }
 }
@@ -157,7 +157,7 @@ fn cores(machine: &Machine) -> Finding {
     };
     if count == 1 {
         let fix = "give it more cores, or lift the restriction (`taskset -pc $$`, cpuset of the container)";
-        return Finding::not(State::Warn, what, is, why, fix);
+        return Finding::not(Grade::Warn, what, is, why, fix);
     }
     Finding::ok(what, is, why)
 }

@@ -4,7 +4,7 @@ use std::net::IpAddr;
 
 /// The network of a node, as its configuration has it and as this computer sees it.
 #[derive(Clone, Debug)]
-pub(super) struct Lan {
+pub(super) struct LanView {
     pub(super) node: String,
     pub(super) address: IpAddr,
     pub(super) mtu: u16,
@@ -17,7 +17,7 @@ pub(super) struct Lan {
     /// A router of this node runs here.
     pub(super) runs: bool,
     pub(super) stamps: Stamps,
-    pub(super) peers: Vec<Peer>,
+    pub(super) peers: Vec<PeerNode>,
 }
 
 /// A port that a router needs.
@@ -50,7 +50,7 @@ pub(super) enum Stamps {
 
 /// Another node.
 #[derive(Clone, Debug)]
-pub(super) struct Peer {
+pub(super) struct PeerNode {
     pub(super) name: String,
     pub(super) address: IpAddr,
     /// Largest packet on the way there, as far as this computer knows.

@@ -1,6 +1,6 @@
 //! What is read of a computer: files below a root, and the few things that no file tells.
 
-use super::lan::Lan;
+use super::lan::LanView;
 use super::protection::Protection;
 use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
 use rohrpost_mailbox::sys::{self, Room};
@@ -64,11 +64,11 @@ fn beside() -> PathBuf {
 /// A computer.
 pub(super) struct Machine {
     root: PathBuf,
-    pub(super) asked: Asked,
+    pub(super) asked: AskedOfKernel,
 }
 
 /// What no file tells.
-pub(super) struct Asked {
+pub(super) struct AskedOfKernel {
     /// Whether a thread was given the scheduling that is needed, or why not.
     pub(super) fifo: Result<(), String>,
     /// Where nodes lie.
@@ -79,7 +79,7 @@ pub(super) struct Asked {
     pub(super) bridge: Option<Bridge>,
     pub(super) viewer: Option<PathBuf>,
     /// The network of a configuration of several nodes.
-    pub(super) lan: Option<Lan>,
+    pub(super) lan: Option<LanView>,
     pub(super) protection: Protection,
 }
 
@@ -112,12 +112,12 @@ pub(super) enum NodeDirectory {
 
 impl Machine {
     /// This computer.
-    pub(super) fn this(needs: &Needs, lan: Option<Lan>, protection: Protection) -> Self {
+    pub(super) fn this(needs: &Needs, lan: Option<LanView>, protection: Protection) -> Self {
         let base = base_directory();
         let program = |name| find_program(name, Path::new("."), &beside());
         // The directory is made by the first launch; before that, what counts is where it will be.
         let there = base.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
-        let asked = Asked {
+        let asked = AskedOfKernel {
             fifo: try_fifo(needs.priority),
             room: sys::room(there).ok(),
             nodes: nodes(&base),
@@ -132,7 +132,7 @@ impl Machine {
 
     /// A computer that was written down.
     #[cfg(test)]
-    pub(super) fn at(root: &Path, asked: Asked) -> Self {
+    pub(super) fn at(root: &Path, asked: AskedOfKernel) -> Self {
         Self { root: root.into(), asked }
     }
 

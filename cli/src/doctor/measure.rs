@@ -1,6 +1,6 @@
 //! How late a thread wakes up: a second of sleeping until each millisecond.
 
-use super::finding::{Finding, State};
+use super::finding::{Finding, Grade};
 use crate::table::time;
 use rohrpost_mailbox::sys::{self, Scheduling};
 use std::time::{Duration, Instant};
@@ -17,7 +17,7 @@ const WHY: &str = "so late is a module that waits for its time, when this comput
 pub(super) fn wake_up(priority: u8) -> Finding {
     match std::thread::spawn(move || measure(priority)).join() {
         Ok((latenesses, fifo)) => validate(&latenesses, fifo.then_some(priority)),
-        Err(_) => Finding::not(State::Warn, WHAT, "the measuring thread has panicked", WHY, "try again"),
+        Err(_) => Finding::not(Grade::Warn, WHAT, "the measuring thread has panicked", WHY, "try again"),
     }
 }
 
@@ -29,7 +29,7 @@ pub(super) fn validate(latenesses: &[Duration], fifo: Option<u8>) -> Finding {
     let is = format!("half by {}, 99 % by {}, all by {} late, of {wakes} under {how}", at(0.5), at(0.99), at(1.0));
     if latenesses.last().is_some_and(|most| *most > LATE) {
         let fix = "see what warns above; then look for what else runs (`top -H`)";
-        return Finding::not(State::Warn, WHAT, is, WHY, fix);
+        return Finding::not(Grade::Warn, WHAT, is, WHY, fix);
     }
     Finding::ok(WHAT, is, WHY)
 }

@@ -12,7 +12,7 @@ mod rights;
 mod security;
 
 use crate::terminal::{Failure, say};
-use finding::{Finding, State};
+use finding::{Finding, Grade};
 use machine::{Machine, Needs};
 use protection::Protection;
 use rohrpost::launch::choose_node;
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     } else {
         say(page(&findings));
     }
-    let bad = findings.iter().any(|finding| finding.state == State::Bad);
+    let bad = findings.iter().any(|finding| finding.state == Grade::Bad);
     Ok(if bad { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
@@ -84,11 +84,11 @@ fn page(findings: &[Finding]) -> String {
         }
     }
     let count = |state| findings.iter().filter(|finding| finding.state == state).count();
-    text + &format!("\n{} ok, {} warnings, {} bad", count(State::Ok), count(State::Warn), count(State::Bad))
+    text + &format!("\n{} ok, {} warnings, {} bad", count(Grade::Ok), count(Grade::Warn), count(Grade::Bad))
 }
 
 fn json(findings: &[Finding]) -> serde_json::Value {
-    let worst = findings.iter().map(|finding| finding.state).max().unwrap_or(State::Ok);
+    let worst = findings.iter().map(|finding| finding.state).max().unwrap_or(Grade::Ok);
     let findings = findings.iter().map(|Finding { what, state, is, why, fix }| {
         serde_json::json!({ "what": what, "state": state.name(), "is": is, "why": why, "fix": fix })
     });

@@ -1,6 +1,6 @@
 //! Where a node would lie, what surrounds it, and what is there already.
 
-use super::finding::{Finding, State};
+use super::finding::{Finding, Grade};
 use super::machine::{Bridge, Machine, Needs, NodeDirectory};
 use rohrpost_config::size_text;
 use std::path::Path;
@@ -69,7 +69,7 @@ fn file_system(machine: &Machine) -> Option<Finding> {
     if mount.is_memory() {
         return Some(Finding::ok(what, is, why));
     }
-    Some(Finding::not(State::Warn, what, is, why, "unset ROHRPOST_DIR, or set it to a folder below /dev/shm"))
+    Some(Finding::not(Grade::Warn, what, is, why, "unset ROHRPOST_DIR, or set it to a folder below /dev/shm"))
 }
 
 fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
@@ -80,7 +80,7 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
             Some(mount) if mount.is_memory() => format!("df {}", mount.quoted()),
             _ => "mount -t tmpfs tmpfs /dev/shm".to_owned(),
         };
-        return Some(Finding::not(State::Warn, what, "its size is not told", why, fix));
+        return Some(Finding::not(Grade::Warn, what, "its size is not told", why, fix));
     };
     let needed = match &needs.from {
         Some(file) => format!("; {} needs {} for its mailboxes", file.display(), size(needs.memory)),
@@ -92,8 +92,8 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
         format!("rohrpost clean; {}", more_room(mount.as_ref(), wanted))
     };
     Some(match room.free {
-        free if free < needs.memory.max(LEAST) => Finding::not(State::Bad, what, is, why, fix()),
-        free if free < needs.memory + SPARE => Finding::not(State::Warn, what, is, why, fix()),
+        free if free < needs.memory.max(LEAST) => Finding::not(Grade::Bad, what, is, why, fix()),
+        free if free < needs.memory + SPARE => Finding::not(Grade::Warn, what, is, why, fix()),
         _ => Finding::ok(what, is, why),
     })
 }
@@ -135,7 +135,7 @@ fn share_of_time(machine: &Machine) -> Option<Finding> {
         Some(quota.parse::<f64>().ok()? / period.parse::<f64>().ok()?)
     })?;
     let fix = format!("echo max | sudo tee {path}, or start the container without `--cpus`");
-    Some(Finding::not(State::Warn, "CPU quota", format!("{value} cores ({path})"), why, fix))
+    Some(Finding::not(Grade::Warn, "CPU quota", format!("{value} cores ({path})"), why, fix))
 }
 
 /// Version 1 of control groups gives real-time threads nothing unless told.
@@ -144,7 +144,7 @@ fn share_of_real_time(machine: &Machine) -> Option<Finding> {
     let (_, path) = least.filter(|(value, _)| *value <= 0.0)?;
     let fix = format!("echo 950000 | sudo tee {path}, in the groups around it first");
     let why = "SCHED_FIFO is refused in such a group";
-    Some(Finding::not(State::Warn, "real-time quota", format!("0 µs ({path})"), why, fix))
+    Some(Finding::not(Grade::Warn, "real-time quota", format!("0 µs ({path})"), why, fix))
 }
 
 fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding> {
@@ -155,7 +155,7 @@ fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding>
         return Some(Finding::ok(what, is, why));
     }
     let fix = "start the container with more `--memory`, or MemoryMax= in the unit";
-    Some(Finding::not(State::Bad, what, is, why, fix))
+    Some(Finding::not(Grade::Bad, what, is, why, fix))
 }
 
 fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
@@ -169,7 +169,7 @@ fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
     }
     let more = used + 10 * wanted;
     let fix = format!("echo {more} | sudo tee {path}, or `--pids-limit` of the container, TasksMax= of the unit");
-    Some(Finding::not(State::Bad, what, is, why, fix))
+    Some(Finding::not(Grade::Bad, what, is, why, fix))
 }
 
 /// A limit in bytes or processes. What is as good as none (version 1 writes it as the largest number of pages) is none.
@@ -214,10 +214,10 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
             NodeDirectory::Launched(pid) => Finding::ok(what, format!("{path}: launched by process {pid}"), why),
             NodeDirectory::InUse => Finding::ok(what, format!("{path}: in use, without a launch"), why),
             NodeDirectory::Dead => {
-                Finding::not(State::Warn, what, format!("{path}: nothing lives there"), why, "rohrpost clean")
+                Finding::not(Grade::Warn, what, format!("{path}: nothing lives there"), why, "rohrpost clean")
             }
             NodeDirectory::OtherVersion(version) => Finding::not(
-                State::Warn,
+                Grade::Warn,
                 what,
                 format!(
                     "{path}: made by another version (layout {version}, this program {})",
@@ -227,7 +227,7 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
                 format!("stop what runs there (with the program that launched it), then rm -r {path}"),
             ),
             NodeDirectory::Unreadable(error) => {
-                Finding::not(State::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
+                Finding::not(Grade::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
             }
         }
     };
@@ -238,7 +238,7 @@ fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     // Who wants to see nothing misses nothing.
     let missing = |what, why, fix: &str| match &needs.from {
         Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} shows nothing", file.display()), why),
-        _ => Finding::not(State::Warn, what, "not found", why, fix),
+        _ => Finding::not(Grade::Warn, what, "not found", why, fix),
     };
     let (what, why) = ("GUI bridge", "draws what modules publish; the module `gui.0` of the demo is it");
     let bridge = match &machine.asked.bridge {

@@ -9,14 +9,14 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Protection {
     /// Between the nodes of the LAN; none if nothing goes over one.
-    pub(super) lan: Option<Lan>,
+    pub(super) lan: Option<LanProtection>,
     /// To the TCP router; none if the file has none.
     pub(super) tcp: Option<Tcp>,
 }
 
 /// What protects datagrams of the LAN.
 #[derive(Clone, Debug)]
-pub(super) enum Lan {
+pub(super) enum LanProtection {
     Open,
     /// Sealed with the keys of a file, by their numbers; or why these cannot be used.
     Keys {
@@ -43,9 +43,9 @@ impl Protection {
                 let file = Keys::file(folder);
                 let ids = Keys::load(&file).map_err(|error| error.to_string());
                 let ids = ids.map(|keys| [Some(keys.newest), keys.older].into_iter().flatten().map(|key| key.id.get()));
-                Lan::Keys { ids: ids.map(Iterator::collect), file }
+                LanProtection::Keys { ids: ids.map(Iterator::collect), file }
             }
-            _ => Lan::Open,
+            _ => LanProtection::Open,
         });
         let tcp = installation.tcp.as_ref().map(|tcp| match &tcp.certificates {
             None => Tcp::Open,

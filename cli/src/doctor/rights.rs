@@ -1,6 +1,6 @@
 //! What this user and this process may.
 
-use super::finding::{Finding, State};
+use super::finding::{Finding, Grade};
 use super::machine::{Limit, Machine, Needs};
 use rohrpost_config::FIFO_MAX;
 
@@ -39,7 +39,7 @@ fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
                 "echo \"$USER - rtprio {FIFO_MAX}\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in anew; \
                  in a container: `--ulimit rtprio={FIFO_MAX} --cap-add=SYS_NICE`"
             );
-            Some(Finding::not(State::Warn, what, format!("refused ({right}): {error}; {wanted}"), why, fix))
+            Some(Finding::not(Grade::Warn, what, format!("refused ({right}): {error}; {wanted}"), why, fix))
         }
     }
 }
@@ -64,7 +64,7 @@ fn memory_lock(machine: &Machine) -> Option<Finding> {
         Limit::Of(bytes) => {
             let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
                         anew; in a container: `--ulimit memlock=-1`";
-            Finding::not(State::Warn, what, format!("at most {}", super::place::size(bytes)), why, fix)
+            Finding::not(Grade::Warn, what, format!("at most {}", super::place::size(bytes)), why, fix)
         }
     })
 }
@@ -81,7 +81,7 @@ fn swap(machine: &Machine) -> Option<Finding> {
     if machine.limit("Max locked memory") == Some(Limit::None) {
         return Some(Finding::ok(what, format!("{is}; real-time modules lock their memory"), why));
     }
-    Some(Finding::not(State::Warn, what, is, why, "sudo swapoff -a, or lift the limit of locked memory"))
+    Some(Finding::not(Grade::Warn, what, is, why, "sudo swapoff -a, or lift the limit of locked memory"))
 }
 
 fn files(machine: &Machine) -> Option<Finding> {
@@ -90,7 +90,7 @@ fn files(machine: &Machine) -> Option<Finding> {
         Limit::Of(limit) if limit < FILES_LEAST => {
             let fix =
                 format!("ulimit -n {FILES_LEAST}, or a line `$USER - nofile {FILES_LEAST}` in /etc/security/limits.d");
-            Finding::not(State::Warn, what, format!("at most {limit}"), why, fix)
+            Finding::not(Grade::Warn, what, format!("at most {limit}"), why, fix)
         }
         Limit::Of(limit) => Finding::ok(what, format!("at most {limit}"), why),
         Limit::None => Finding::ok(what, "no limit", why),

@@ -1,8 +1,8 @@
 //! What protects packages that leave this computer.
 
-use super::finding::{Finding, State};
+use super::finding::{Finding, Grade};
 use super::machine::{Machine, Needs};
-use super::protection::{Lan, Protection, Tcp};
+use super::protection::{LanProtection, Protection, Tcp};
 
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     let from = needs.from.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
@@ -10,12 +10,12 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     of_lan.iter().map(|of| lan(of, &from)).chain(of_tcp.iter().map(|of| tcp(of, &from))).collect()
 }
 
-fn lan(protection: &Lan, from: &str) -> Finding {
+fn lan(protection: &LanProtection, from: &str) -> Finding {
     let (what, why) =
         ("network security", "packages between nodes are sealed, or anyone on the network reads and sends");
     match protection {
-        Lan::Open => Finding::not(
-            State::Warn,
+        LanProtection::Open => Finding::not(
+            Grade::Warn,
             what,
             format!("none, as {from} says"),
             why,
@@ -24,13 +24,13 @@ fn lan(protection: &Lan, from: &str) -> Finding {
                  and run `rohrpost keys new {from}`"
             ),
         ),
-        Lan::Keys { file, ids: Ok(ids) } => {
+        LanProtection::Keys { file, ids: Ok(ids) } => {
             let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
             let word = if ids.len() == 1 { "key" } else { "keys" };
             Finding::ok(what, format!("{word} {} of {}, as {from} says", ids.join(" and "), file.display()), why)
         }
-        Lan::Keys { ids: Err(error), .. } => Finding::not(
-            State::Bad,
+        LanProtection::Keys { ids: Err(error), .. } => Finding::not(
+            Grade::Bad,
             what,
             format!("keys, as {from} says, and there are none: {error}"),
             why,
@@ -44,7 +44,7 @@ fn tcp(protection: &Tcp, from: &str) -> Finding {
         ("TCP security", "packages to and from the TCP router are sealed, or anyone on the way reads and sends");
     match protection {
         Tcp::Open => Finding::not(
-            State::Warn,
+            Grade::Warn,
             what,
             format!("none, as {from} says"),
             why,
@@ -57,7 +57,7 @@ fn tcp(protection: &Tcp, from: &str) -> Finding {
             Finding::ok(what, format!("TLS 1.3 with certificates in {}, as {from} says", folder.display()), why)
         }
         Tcp::Tls { lacking, .. } => Finding::not(
-            State::Bad,
+            Grade::Bad,
             what,
             format!("TLS, as {from} says, and this node cannot: {}", lacking.join("; ")),
             why,

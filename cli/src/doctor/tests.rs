@@ -1,8 +1,8 @@
 //! What `doctor` says of computers that were written down, and of networks.
 
-use super::lan::{Lan, Peer, Port, PortState, Reach, Stamps};
-use super::machine::{Asked, Bridge, NodeDirectory, NodeFound};
-use super::protection::{Lan as OfLan, Tcp as OfTcp};
+use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
+use super::machine::{AskedOfKernel, Bridge, NodeDirectory, NodeFound};
+use super::protection::{LanProtection, Tcp};
 use super::*;
 use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
 use std::fs;
@@ -19,14 +19,14 @@ fn unpack(text: &str, to: &Path) {
     }
 }
 
-fn examined(name: &str, (asked, needs): (Asked, Needs)) -> Vec<Finding> {
+fn examined(name: &str, (asked, needs): (AskedOfKernel, Needs)) -> Vec<Finding> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/doctor");
     let root = tempfile::tempdir().unwrap();
     unpack(&fs::read_to_string(folder.join(format!("{name}.machine"))).unwrap(), root.path());
     examine(&Machine::at(root.path(), asked), &needs)
 }
 
-fn said(name: &str, computer: (Asked, Needs)) -> String {
+fn said(name: &str, computer: (AskedOfKernel, Needs)) -> String {
     page(&examined(name, computer)) + "\n"
 }
 
@@ -39,14 +39,14 @@ fn compare(name: &str, said: &str) {
     assert_eq!(said, fs::read_to_string(&golden).unwrap(), "{}", golden.display());
 }
 
-fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> Lan {
-    let peer = |(host, (name, mtu, reach)): (u8, &(&str, u32, Reach))| Peer {
+fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> LanView {
+    let peer = |(host, (name, mtu, reach)): (u8, &(&str, u32, Reach))| PeerNode {
         name: (*name).into(),
         address: [10, 77, 0, host].into(),
         mtu: Some(*mtu),
         reach: reach.clone(),
     };
-    Lan {
+    LanView {
         node: "base".into(),
         address: [10, 77, 0, 1].into(),
         mtu: 1500,
@@ -59,17 +59,17 @@ fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> Lan {
     }
 }
 
-fn lan_that_works() -> Lan {
+fn lan_that_works() -> LanView {
     lan(
         [PortState::InUse, PortState::Free, PortState::Free],
         &[("arm", 1500, Reach::NoRouter), ("desk", 9000, Reach::Neighbour)],
     )
 }
 
-fn lan_of_trouble() -> Lan {
+fn lan_of_trouble() -> LanView {
     let no_way = Reach::NoWay("Network is unreachable (os error 101)".into());
     let refused = PortState::Refused("Permission denied (os error 13)".into());
-    Lan {
+    LanView {
         is_here: false,
         addresses: vec![("eth0".into(), [192, 168, 0, 7].into()), ("wlan0".into(), "fd00::7".parse().unwrap())],
         runs: false,
@@ -80,17 +80,17 @@ fn lan_of_trouble() -> Lan {
 
 fn sealed(ids: Result<Vec<u8>, String>, lacking: Vec<String>) -> Protection {
     Protection {
-        lan: Some(OfLan::Keys { file: "keys/udp.keys".into(), ids }),
-        tcp: Some(OfTcp::Tls { folder: "certificates".into(), lacking }),
+        lan: Some(LanProtection::Keys { file: "keys/udp.keys".into(), ids }),
+        tcp: Some(Tcp::Tls { folder: "certificates".into(), lacking }),
     }
 }
 
 fn open() -> Protection {
-    Protection { lan: Some(OfLan::Open), tcp: Some(OfTcp::Open) }
+    Protection { lan: Some(LanProtection::Open), tcp: Some(Tcp::Open) }
 }
 
-fn good() -> (Asked, Needs) {
-    let asked = Asked {
+fn good() -> (AskedOfKernel, Needs) {
+    let asked = AskedOfKernel {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-1000".into(),
         room: Some(Room { bytes: 8 << 30, free: 7 << 30 }),
@@ -104,8 +104,8 @@ fn good() -> (Asked, Needs) {
     (asked, Needs { priority: 34, memory: 4 << 20, gui: true, bridge: None, processes: 6, from })
 }
 
-fn bad() -> (Asked, Needs) {
-    let asked = Asked {
+fn bad() -> (AskedOfKernel, Needs) {
+    let asked = AskedOfKernel {
         fifo: Err("Operation not permitted (os error 1)".into()),
         base: "/home/robot/nodes".into(),
         room: Some(Room { bytes: 64 << 20, free: 1 << 20 }),
@@ -126,8 +126,8 @@ fn bad() -> (Asked, Needs) {
 }
 
 /// As the unit for systemd has it, in /run: what holds there is told of /run, not of /dev/shm.
-fn too_little_room_in_run() -> (Asked, Needs) {
-    let asked = Asked {
+fn too_little_room_in_run() -> (AskedOfKernel, Needs) {
+    let asked = AskedOfKernel {
         base: "/run/rohrpost/main".into(),
         room: Some(Room { bytes: 64 << 20, free: 60 << 20 }),
         bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: None }),
@@ -136,18 +136,18 @@ fn too_little_room_in_run() -> (Asked, Needs) {
     (asked, Needs { memory: 70 << 20, from: Some("robot.toml".into()), ..Needs::default() })
 }
 
-fn elsewhere() -> (Asked, Needs) {
-    let lan = Lan {
+fn elsewhere() -> (AskedOfKernel, Needs) {
+    let lan = LanView {
         addresses: Vec::new(),
         stamps: Stamps::None("Protocol not available".into()),
-        ..Lan { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &[]) }
+        ..LanView { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &[]) }
     };
-    let asked = Asked { lan: Some(lan), protection: open(), ..nothing_told() };
+    let asked = AskedOfKernel { lan: Some(lan), protection: open(), ..nothing_told() };
     (asked, Needs { from: Some("robot.toml".into()), ..Needs::default() })
 }
 
-fn nothing_told() -> Asked {
-    Asked {
+fn nothing_told() -> AskedOfKernel {
+    AskedOfKernel {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-0".into(),
         room: None,
@@ -195,8 +195,8 @@ fn a_computer_that_tells_nothing() {
 /// With or without a configuration, a node cannot be made in no room.
 #[test]
 fn full_shared_memory_is_bad() {
-    for (free, state) in [(64 << 10, State::Bad), (8 << 20, State::Warn), (64 << 20, State::Ok)] {
-        let asked = Asked { room: Some(Room { bytes: 1 << 30, free }), ..nothing_told() };
+    for (free, state) in [(64 << 10, Grade::Bad), (8 << 20, Grade::Warn), (64 << 20, Grade::Ok)] {
+        let asked = AskedOfKernel { room: Some(Room { bytes: 1 << 30, free }), ..nothing_told() };
         let found = examined("run", (asked, Needs::default()));
         let found = found.iter().find(|finding| finding.what == "shared memory").unwrap();
         assert_eq!(found.state, state, "{found:?}");
@@ -206,7 +206,7 @@ fn full_shared_memory_is_bad() {
 #[test]
 fn waking_up_late_is_told() {
     let validate = |most| measure::validate(&[Duration::from_micros(60), Duration::from_micros(most)], Some(34));
-    assert_eq!((validate(90).state, validate(6000).state), (State::Ok, State::Warn));
+    assert_eq!((validate(90).state, validate(6000).state), (Grade::Ok, Grade::Warn));
     assert_ne!(validate(90).is, validate(6000).is);
 }
 
@@ -227,7 +227,7 @@ fn each_line_is_tested_with_the_opposite_state() {
     let found: Vec<Finding> = computers.into_iter().flat_map(|(name, computer)| examined(name, computer)).collect();
     for what in found.iter().map(|finding| finding.what) {
         let same = || found.iter().filter(|finding| finding.what == what);
-        let (fine, wrong): (Vec<_>, Vec<_>) = same().partition(|finding| finding.state == State::Ok);
+        let (fine, wrong): (Vec<_>, Vec<_>) = same().partition(|finding| finding.state == Grade::Ok);
         if NEVER_RIGHT.contains(&what) {
             assert!(fine.is_empty(), "{what} is said although nothing is wrong");
             continue;

@@ -57,7 +57,7 @@ fn files(folder: &Path, name: &str) -> [PathBuf; 2] {
 
 /// What is there of a holder.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum State {
+enum HolderState {
     Holds,
     Missing,
     /// The key is not that of the certificate.
@@ -66,16 +66,16 @@ enum State {
     Unsigned,
 }
 
-fn state(folder: &Path, authority: Option<&Authority>, holder: &Holder) -> State {
+fn state(folder: &Path, authority: Option<&Authority>, holder: &Holder) -> HolderState {
     let [certificate, secret] = files(folder, &holder.file_name());
     if !certificate.exists() || !secret.exists() {
-        State::Missing
+        HolderState::Missing
     } else if !is_pair(&certificate, &secret) {
-        State::NoPair
+        HolderState::NoPair
     } else if authority.is_some_and(|authority| authority.has_signed(&certificate)) {
-        State::Holds
+        HolderState::Holds
     } else {
-        State::Unsigned
+        HolderState::Unsigned
     }
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn make(installation: &Installation, which: Which, days: u32) -> Resu
         Which::Missing | Which::All => signing(&folder, installation)?,
     };
     for holder in holders(installation) {
-        if which != Which::Missing || state(&folder, Some(&authority), &holder) != State::Holds {
+        if which != Which::Missing || state(&folder, Some(&authority), &holder) != HolderState::Holds {
             let [certificate, secret] = files(&folder, AUTHORITY);
             let issuer = issuer.as_ref();
             let issuer = issuer.ok_or_else(|| CertificateError::NoKey(certificate, secret, installation.shown.clone()));

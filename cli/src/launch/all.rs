@@ -57,7 +57,7 @@ pub(super) fn stop_with_it() -> Result<(), Failure> {
 }
 
 /// The nodes of an installation, all running here.
-pub(crate) struct Nodes<'a> {
+pub(crate) struct LaunchedNodes<'a> {
     installation: Arc<Installation>,
     nodes: Vec<Node>,
     happenings: Receiver<Happening>,
@@ -117,7 +117,7 @@ pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
     Ok(lab)
 }
 
-impl<'a> Nodes<'a> {
+impl<'a> LaunchedNodes<'a> {
     /// Starts the launch of each node. The calling thread must live as long as they: the kernel takes its end for this command's.
     ///
     /// # Errors

@@ -45,7 +45,7 @@ fn names(module: Name, running: &Running) -> String {
 }
 
 #[derive(Serialize)]
-struct Set {
+struct LevelArguments {
     module: String,
     level: &'static str,
     before: Option<&'static str>,
@@ -56,9 +56,11 @@ pub(super) fn set(settings: &[Setting], running: &Running, arguments: &Arguments
     let mut code = ExitCode::SUCCESS;
     for (module, level) in settings.iter().flat_map(|set| set.modules.iter().map(|module| (*module, set.level))) {
         let set = match tool.output_level(module, level) {
-            Ok(before) => {
-                Set { module: names(module, running), level: level.name(), before: before.map(OutputLevel::name) }
-            }
+            Ok(before) => LevelArguments {
+                module: names(module, running),
+                level: level.name(),
+                before: before.map(OutputLevel::name),
+            },
             Err(error) => {
                 complain(format_args!(
                     "{}: its level is not set: {}",

@@ -22,17 +22,17 @@ use std::process::ExitCode;
   rohrpost param load tuned.toml --dry-run     what a file would change")]
 pub(super) struct Arguments {
     #[command(subcommand)]
-    action: Action,
+    action: ParamCommand,
 }
 
 #[derive(clap::Subcommand)]
-enum Action {
+enum ParamCommand {
     /// List parameters with their values.
     List(List),
     /// Show the parameters of a module, or one of them.
     Get(Get),
     /// Change a parameter of a running module.
-    Set(Set),
+    ParamAssignment(ParamAssignment),
     /// Write present values into a file.
     Save(Save),
     /// Set what a file says: of each module all of it, or nothing.
@@ -73,7 +73,7 @@ struct Get {
 }
 
 #[derive(clap::Args)]
-struct Set {
+struct ParamAssignment {
     /// Module, such as pilot.0.
     name: String,
     /// Parameter, as `param get` lists it.
@@ -109,13 +109,21 @@ struct Load {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     match &arguments.action {
-        Action::List(list) => at_work(&list.common, |session| show::list(session, list.name.as_deref(), list.json)),
-        Action::Get(get) => {
+        ParamCommand::List(list) => {
+            at_work(&list.common, |session| show::list(session, list.name.as_deref(), list.json))
+        }
+        ParamCommand::Get(get) => {
             at_work(&get.common, |session| show::get(session, &get.name, get.parameter.as_deref(), get.json))
         }
-        Action::Set(set) => at_work(&set.common, |session| set::run(session, &set.name, &set.parameter, &set.value)),
-        Action::Save(save) => at_work(&save.common, |session| save::run(session, &save.names, save.output.as_deref())),
-        Action::Load(load) => at_work(&load.common, |session| load::run(session, load.file.as_deref(), load.dry_run)),
+        ParamCommand::ParamAssignment(set) => {
+            at_work(&set.common, |session| set::run(session, &set.name, &set.parameter, &set.value))
+        }
+        ParamCommand::Save(save) => {
+            at_work(&save.common, |session| save::run(session, &save.names, save.output.as_deref()))
+        }
+        ParamCommand::Load(load) => {
+            at_work(&load.common, |session| load::run(session, load.file.as_deref(), load.dry_run))
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! What the person at the terminal has chosen, and what keys change about it. Pure: what has to be done comes back as an
-//! [`Action`].
+//! [`ScreenAction`].
 
 use super::columns::Column;
 use super::model::{Model, Row};
@@ -59,7 +59,7 @@ pub(super) struct LineFilter {
 
 /// What a key asks for beyond the screen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Action {
+pub(super) enum ScreenAction {
     Quit,
     Switch(Name, bool),
     Restart(Name),
@@ -105,9 +105,9 @@ impl App {
     }
 
     /// Takes a key.
-    pub(super) fn key(&mut self, key: KeyEvent, model: &Model) -> Option<Action> {
+    pub(super) fn key(&mut self, key: KeyEvent, model: &Model) -> Option<ScreenAction> {
         if key.modifiers.contains(KeyModifiers::CONTROL) {
-            return (key.code == KeyCode::Char('c')).then_some(Action::Quit);
+            return (key.code == KeyCode::Char('c')).then_some(ScreenAction::Quit);
         }
         match std::mem::replace(&mut self.prompt, Prompt::None) {
             Prompt::Filter(before) => {
@@ -117,7 +117,7 @@ impl App {
             Prompt::Restart(name) => {
                 let yes = matches!(key.code, KeyCode::Char('y' | 'Y'));
                 self.message = (!yes).then(|| "not restarted".into());
-                yes.then_some(Action::Restart(name))
+                yes.then_some(ScreenAction::Restart(name))
             }
             Prompt::None => {
                 self.message = None;
@@ -142,9 +142,9 @@ impl App {
         self.prompt = Prompt::Filter(before);
     }
 
-    fn command(&mut self, key: KeyCode, model: &Model) -> Option<Action> {
+    fn command(&mut self, key: KeyCode, model: &Model) -> Option<ScreenAction> {
         match (key, self.screen) {
-            (KeyCode::Char('q'), _) => return Some(Action::Quit),
+            (KeyCode::Char('q'), _) => return Some(ScreenAction::Quit),
             (KeyCode::Char('?'), screen) => {
                 self.show(if screen == Screen::Help { Screen::Table } else { Screen::Help })
             }
@@ -159,8 +159,8 @@ impl App {
                 self.lines.module = if self.lines.module == target { None } else { target };
             }
             (KeyCode::Char('L'), _) => self.lines.level = next_level(self.lines.level),
-            (KeyCode::Char('o'), _) => return self.target(model).map(|name| Action::Switch(name, true)),
-            (KeyCode::Char('f'), _) => return self.target(model).map(|name| Action::Switch(name, false)),
+            (KeyCode::Char('o'), _) => return self.target(model).map(|name| ScreenAction::Switch(name, true)),
+            (KeyCode::Char('f'), _) => return self.target(model).map(|name| ScreenAction::Switch(name, false)),
             (KeyCode::Char('r'), _) => self.prompt = self.target(model).map_or(Prompt::None, Prompt::Restart),
             (KeyCode::Enter | KeyCode::Right, Screen::Table) => {
                 let name = self.target(model)?;

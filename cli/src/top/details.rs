@@ -5,7 +5,7 @@ use super::super::list::mailbox_lines;
 use super::super::summary::print_classes;
 use super::super::table::{table, time};
 use super::columns::{memory, short};
-use super::model::{Model, Peer, Row, Sample};
+use super::model::{FlowEnd, Model, Row, Sample};
 use rohrpost::Name;
 use rohrpost::output::plain;
 use rohrpost::schema::{Description, describe_field, describe_result};
@@ -120,7 +120,7 @@ fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> Stri
 }
 
 /// Whom it has to do with, and how much.
-fn peers(head: &str, peers: &[Peer]) -> Vec<String> {
+fn peers(head: &str, peers: &[FlowEnd]) -> Vec<String> {
     if peers.is_empty() {
         return Vec::new();
     }

@@ -28,7 +28,7 @@ const OUTPUT_MIN: u16 = 4;
 const SPLIT_MIN: u16 = 20;
 
 /// All that a screen is drawn from.
-pub(super) struct View<'a> {
+pub(super) struct ScreenModel<'a> {
     pub(super) model: &'a Model,
     pub(super) app: &'a App,
     /// Output lines that pass the filter, oldest first.
@@ -47,7 +47,7 @@ pub(super) struct OutputText {
     pub(super) text: String,
 }
 
-impl View<'_> {
+impl ScreenModel<'_> {
     pub(super) fn draw(&self, area: Rect, to: &mut Buffer) {
         let head = if area.height >= 8 { 2 } else { u16::from(area.height >= 4) };
         let [top, middle, foot] =

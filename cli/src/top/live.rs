@@ -2,10 +2,10 @@
 
 use super::super::observer::Silence;
 use super::super::target::Running;
-use super::app::{Action, App, Screen};
+use super::app::{App, Screen, ScreenAction};
 use super::calls::{Answer, Calls};
 use super::details;
-use super::draw::{OutputText, View, columns};
+use super::draw::{OutputText, ScreenModel, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
@@ -283,14 +283,14 @@ impl Live {
             return false;
         }
         match self.app.key(key, &self.model) {
-            Some(Action::Quit) => return true,
+            Some(ScreenAction::Quit) => return true,
             Some(action) => self.act(action),
             None => {}
         }
         false
     }
 
-    fn act(&mut self, action: Action) {
+    fn act(&mut self, action: ScreenAction) {
         if self.calls.is_none() {
             self.join();
         }
@@ -300,13 +300,13 @@ impl Live {
         };
         let mut answers = Vec::new();
         match action {
-            Action::Quit => {}
-            Action::Switch(name, on) => {
+            ScreenAction::Quit => {}
+            ScreenAction::Switch(name, on) => {
                 let name_text = self.running.text(name);
                 self.app.message = Some(format!("switching {name_text} {} ...", if on { "on" } else { "off" }));
                 answers.extend(calls.switch(&self.running, name, on));
             }
-            Action::Restart(name) => {
+            ScreenAction::Restart(name) => {
                 self.app.message = Some(format!("restarting {} ...", self.running.text(name)));
                 answers.extend(calls.restart(&self.running, name));
             }
@@ -330,7 +330,7 @@ impl Live {
         };
         self.app.columns = columns(&self.model, terminal.size()?.width).into_iter().map(|(column, _)| column).collect();
         let output: Vec<OutputText> = self.output.shown(&self.running.installation, self.app.lines);
-        let view = View {
+        let view = ScreenModel {
             model: &self.model,
             app: &self.app,
             output: &output,

@@ -3,7 +3,7 @@
 //! ```text
 //! shared memory, /proc ─────┬─sample──▶ Sample ─┐
 //! launches of other nodes ──┘           Sample ─┴─▶ Model ──┐
-//! keys ──▶ App ──▶ Action ──▶ Calls ──answers──▶ Live ──────┴──▶ View ──▶ screen
+//! keys ──▶ App ──▶ ScreenAction ──▶ Calls ──answers──▶ Live ──────┴──▶ ScreenModel ──▶ screen
 //! ```
 //!
 //! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` touch the world.

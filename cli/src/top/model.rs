@@ -94,13 +94,13 @@ pub(super) struct Row {
     /// Share of one processor.
     pub(super) cpu_percent: Option<f64>,
     pub(super) memory_bytes: Option<u64>,
-    pub(super) sends_to: Vec<Peer>,
-    pub(super) receives_from: Vec<Peer>,
+    pub(super) sends_to: Vec<FlowEnd>,
+    pub(super) receives_from: Vec<FlowEnd>,
 }
 
 /// The other end of a way that packages took.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct Peer {
+pub(super) struct FlowEnd {
     pub(super) module: String,
     pub(super) packages: u64,
     pub(super) packages_per_s: Option<f64>,
@@ -193,9 +193,9 @@ fn peers(
     now: &Sample,
     earlier: Option<&Sample>,
     end: impl Fn(&FlowInfo) -> Option<Name>,
-) -> Vec<Peer> {
+) -> Vec<FlowEnd> {
     let since = earlier.map(|earlier| (earlier, between(earlier.survey.at_ns, now.survey.at_ns)));
-    let mut peers: Vec<Peer> = Vec::new();
+    let mut peers: Vec<FlowEnd> = Vec::new();
     for flow in now.survey.flows.iter().filter(|flow| !flow.is_publication()) {
         let Some(name) = end(flow).filter(|name| *name != Name::NONE) else { continue };
         let packages_per_s = since.map(|(earlier, interval)| {
@@ -208,7 +208,7 @@ fn peers(
                 peer.packages += flow.packages;
                 peer.packages_per_s = peer.packages_per_s.zip(packages_per_s).map(|(sum, more)| sum + more);
             }
-            None => peers.push(Peer { module, packages: flow.packages, packages_per_s }),
+            None => peers.push(FlowEnd { module, packages: flow.packages, packages_per_s }),
         }
     }
     peers.sort_by_key(|peer| std::cmp::Reverse(peer.packages));

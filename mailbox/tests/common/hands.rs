@@ -55,7 +55,7 @@ pub(crate) const OPERATIONS: &[Operation] = &[
         "send and be refused",
         OFTEN,
         |hands| hands.fill(HIGH),
-        |hands| assert!(matches!(hands.sender.send(&label(LOW, 1), &[]), Err(SendError::OverflowPolicy(_)))),
+        |hands| assert!(matches!(hands.sender.send(&label(LOW, 1), &[]), Err(SendError::Full(_)))),
     ),
     operation("send what is too large", OFTEN, nothing, |hands| {
         assert!(matches!(hands.sender.send(&label(LOW, 1), &[&[0; 1000]]), Err(SendError::TooLarge { .. })));

@@ -106,7 +106,7 @@ impl Talker {
                 self.board.accepted(mark);
             }
             Ok(false) => {}
-            Err(SendError::OverflowPolicy(_)) => {
+            Err(SendError::Full(_)) => {
                 self.board.refused(mark);
                 std::thread::yield_now();
             }

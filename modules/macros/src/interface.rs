@@ -14,12 +14,12 @@ use syn::{
 const ARGUMENTS_MAX: usize = 8;
 
 /// `class = "motor"`, and for our own crates `crate = crate`.
-struct Options {
+struct InterfaceOptions {
     class: LitStr,
     krate: TokenStream,
 }
 
-impl Parse for Options {
+impl Parse for InterfaceOptions {
     fn parse(input: ParseStream<'_>) -> Result<Self> {
         let (mut class, mut krate) = (None, quote!(::rohrpost::macro_support));
         while !input.is_empty() {
@@ -86,7 +86,7 @@ struct Data {
 }
 
 pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
-    let Options { class, krate } = syn::parse2(attributes)?;
+    let InterfaceOptions { class, krate } = syn::parse2(attributes)?;
     let mut item: ItemTrait = syn::parse2(item)?;
     let (mut commands, mut data) = (Vec::new(), Vec::new());
     let mut kept = Vec::new();

@@ -15,11 +15,11 @@ use syn::{
 const WRITTEN: [&str; 3] = ["crate", "deny_unknown_fields", "rename_all"];
 
 /// `crate = crate::macro_support`, for our own crates alone.
-struct Options {
+struct ParameterOptions {
     krate: TokenStream,
 }
 
-impl Parse for Options {
+impl Parse for ParameterOptions {
     fn parse(input: ParseStream<'_>) -> Result<Self> {
         if input.is_empty() {
             return Ok(Self { krate: quote!(::rohrpost::macro_support) });
@@ -138,7 +138,7 @@ fn nothing_twice(attributes: &[Attribute], ours: &[&str]) -> Result<()> {
 }
 
 pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
-    let Options { krate } = syn::parse2(attributes)?;
+    let ParameterOptions { krate } = syn::parse2(attributes)?;
     let mut item: ItemStruct = syn::parse2(item)
         .map_err(|error| Error::new(error.span(), "parameters are fields of a struct: the module's settings"))?;
     if !item.generics.params.is_empty() {
@@ -212,7 +212,7 @@ fn parameter_set(owner: &Ident, krate: &TokenStream, parameters: &[Parameter]) -
 }
 
 pub(crate) fn expand_choice(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
-    let Options { krate } = syn::parse2(attributes)?;
+    let ParameterOptions { krate } = syn::parse2(attributes)?;
     let item: ItemEnum = syn::parse2(item)
         .map_err(|error| Error::new(error.span(), "a choice is an enum whose variants carry nothing"))?;
     if !item.generics.params.is_empty() {

@@ -26,12 +26,12 @@ const UNSAID: [&str; 11] = [
 ];
 
 /// `crate = path, name = "rohrpost.Pose"` before the item.
-struct Options {
+struct SchemaOptions {
     schema: TokenStream,
     name: Option<LitStr>,
 }
 
-impl Options {
+impl SchemaOptions {
     fn of(attributes: &[Attribute]) -> Result<Self> {
         let mut options = Self { schema: quote!(::rohrpost_schema), name: None };
         for attribute in attributes.iter().filter(|attribute| attribute.path().is_ident("schema")) {
@@ -83,7 +83,7 @@ pub(crate) fn expand(item: TokenStream) -> Result<TokenStream> {
         Item::Enum(item) => (item.attrs, item.ident, item.generics, Body::Enum(item.variants.into_iter().collect())),
         other => return Err(Error::new(other.span(), "structs and enums have a description")),
     };
-    let Options { schema, name } = Options::of(&attributes)?;
+    let SchemaOptions { schema, name } = SchemaOptions::of(&attributes)?;
     let name = name.as_ref().map(LitStr::value).map_or_else(|| name_of(&ident, &attributes), Ok)?;
     let text = text_of(&attributes);
     let mut writer = Writer { schema, types: Vec::new(), proofs: Vec::new() };

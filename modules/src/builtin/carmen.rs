@@ -1,6 +1,6 @@
 //! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed.
 
-use super::settings::{self, Refused, Settings as _};
+use super::settings::{self, RefusedSetting, Settings as _};
 use crate::interfaces::{Laser, LaserInterface, Player, PlayerInterface, Progress, Wheels, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::robot::carmen::{self, Record};
@@ -30,11 +30,11 @@ pub(super) struct Settings {
 }
 
 impl settings::Settings for Settings {
-    fn check(&self) -> Result<(), Refused> {
+    fn check(&self) -> Result<(), RefusedSetting> {
         if self.speed > 0.0 && self.speed <= SPEED_MAX {
             return Ok(());
         }
-        Err(Refused { key: "speed", why: format!("is {}; use more than 0, at most {SPEED_MAX}", self.speed) })
+        Err(RefusedSetting { key: "speed", why: format!("is {}; use more than 0, at most {SPEED_MAX}", self.speed) })
     }
 }
 

@@ -1,6 +1,6 @@
 //! `mapper`: draws a map from scans and poses.
 
-use super::settings::{self, Called, Refused, Settings as _};
+use super::settings::{self, Called, RefusedSetting, Settings as _};
 use crate::interface::Interface;
 use crate::interfaces::{Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface};
 use crate::module::{Module, ModuleError};
@@ -30,11 +30,11 @@ pub(super) struct Settings {
 }
 
 impl settings::Settings for Settings {
-    fn check(&self) -> Result<(), Refused> {
+    fn check(&self) -> Result<(), RefusedSetting> {
         if (0.005..=1.0).contains(&self.resolution_m) {
             return Ok(());
         }
-        Err(Refused { key: "resolution-m", why: format!("is {}; use 0.005 to 1", self.resolution_m) })
+        Err(RefusedSetting { key: "resolution-m", why: format!("is {}; use 0.005 to 1", self.resolution_m) })
     }
 
     fn calls(&self) -> Vec<Called<'_>> {

@@ -11,7 +11,7 @@ pub(super) trait Settings: DeserializeOwned {
     ///
     /// # Errors
     /// Says which, and what would be right.
-    fn check(&self) -> Result<(), Refused> {
+    fn check(&self) -> Result<(), RefusedSetting> {
         Ok(())
     }
 
@@ -29,7 +29,7 @@ pub(super) trait Settings: DeserializeOwned {
 /// A value that the module refuses.
 #[derive(Debug, thiserror::Error)]
 #[error("`{key}` {why}")]
-pub(super) struct Refused {
+pub(super) struct RefusedSetting {
     /// Key of the setting.
     pub(super) key: &'static str,
     /// What it is, and what it should be.

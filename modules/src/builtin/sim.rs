@@ -1,6 +1,6 @@
 //! `sim`: a robot in a text map stands in for the drivers of motor, wheels and scanner.
 
-use super::settings::{self, Refused, Settings as _};
+use super::settings::{self, RefusedSetting, Settings as _};
 use crate::interfaces::{DriveError, LaserInterface, Motor, MotorInterface, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::parameter::ParameterSet;
@@ -54,14 +54,14 @@ impl settings::Settings for Settings {
         self.names()
     }
 
-    fn check(&self) -> Result<(), Refused> {
+    fn check(&self) -> Result<(), RefusedSetting> {
         for (key, value, least, most) in [
             ("beams", self.beams as f64, 1.0, 10_000.0),
             ("dead-man-ms", self.dead_man_ms as f64, 10.0, 60_000.0),
             ("range-max-m", self.range_max_m, 0.1, 1000.0),
         ] {
             if !(least..=most).contains(&value) {
-                return Err(Refused { key, why: format!("is {value}; use {least} to {most}") });
+                return Err(RefusedSetting { key, why: format!("is {value}; use {least} to {most}") });
             }
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use super::absent::Absent;
 use super::envelope::micros;
-use super::tally::{Ending, Tallies, Tally};
+use super::tally::{CallOutcome, Tallies, Tally};
 use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope, VALIDITY_MAX};
 use rohrpost_mailbox::{
     ALL_SYSTEMS, Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type, monotonic_ns,
@@ -34,7 +34,7 @@ pub struct Link {
     replies: Receiver,
     senders: Vec<Sender>,
     absent: Absent,
-    calls: Vec<Call>,
+    calls: Vec<PendingCall>,
     tallies: Tallies,
     /// Buffers of calls that are over, to be used again.
     spare: Vec<Vec<u8>>,
@@ -45,7 +45,7 @@ pub struct Link {
 pub type Caller = Rc<RefCell<Link>>;
 
 /// A call under way.
-struct Call {
+struct PendingCall {
     sequence: u32,
     to: Name,
     /// The whole body of the command, to be sent again; then, when the answer has come, the answer.
@@ -59,7 +59,7 @@ struct Call {
     answer: Option<Head>,
 }
 
-impl Call {
+impl PendingCall {
     /// When its time is over, ns.
     fn deadline_ns(&self) -> u64 {
         self.began_ns.saturating_add(ns(self.timeout))
@@ -218,7 +218,8 @@ impl Link {
         let kind = Type::command(function);
         let repeat_ns = began_ns + ns(repeat_after(timeout));
         let label = self.label(kind, sequence, options);
-        let call = Call { sequence, to, body, label, began_ns, timeout, repeat_ns, repeated: false, answer: None };
+        let call =
+            PendingCall { sequence, to, body, label, began_ns, timeout, repeat_ns, repeated: false, answer: None };
         match self.send(to, &label, &[&call.body]) {
             Ok(()) => {
                 self.calls.push(call);
@@ -227,8 +228,8 @@ impl Link {
             Err(error) => {
                 self.spare.push(call.body);
                 // One whose server is not there is none of the calls that should have had an answer.
-                if matches!(error, SendError::OverflowPolicy(_)) {
-                    self.tallies.ended(sequence, to, Ending::Refused);
+                if matches!(error, SendError::Full(_)) {
+                    self.tallies.ended(sequence, to, CallOutcome::Refused);
                 }
                 Err(error.into())
             }
@@ -307,9 +308,9 @@ impl Link {
             Some(_) => read(&call.body).map_err(|error| CallError::BadReply(call.to, error.to_string())),
         };
         let ending = match &result {
-            Err(CallError::Timeout(..)) => Ending::Overdue,
-            Err(CallError::Fault(_, fault)) => Ending::by(fault),
-            _ => Ending::Answered,
+            Err(CallError::Timeout(..)) => CallOutcome::Overdue,
+            Err(CallError::Fault(_, fault)) => CallOutcome::by(fault),
+            _ => CallOutcome::Answered,
         };
         self.tallies.ended(call.sequence, call.to, ending);
         self.spare.push(call.body);
@@ -338,7 +339,7 @@ impl Link {
                 continue;
             }
             // The sequence number, not the 16-bit id, tells calls apart: ids wrap.
-            let its = |call: &&mut Call| {
+            let its = |call: &&mut PendingCall| {
                 call.sequence == envelope.sequence
                     && is_to(call.to, head.from)
                     && head.kind.0 == -call.label.kind.0

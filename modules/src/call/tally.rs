@@ -24,7 +24,7 @@ pub struct Tally {
 
 /// How a call ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Ending {
+pub(super) enum CallOutcome {
     /// With an answer of who was called; also one that says it was not run.
     Answered,
     /// Its command was not delivered, and a router or a mailbox said so.
@@ -33,7 +33,7 @@ pub(super) enum Ending {
     Overdue,
 }
 
-impl Ending {
+impl CallOutcome {
     /// Of a call that ended with this fault.
     pub(super) fn by(fault: &Fault) -> Self {
         if fault.is_of_this_try() { Self::Refused } else { Self::Answered }
@@ -55,11 +55,11 @@ impl Tallies {
     }
 
     /// Counts a call that has ended.
-    pub(super) fn ended(&mut self, sequence: u32, to: Name, ending: Ending) {
+    pub(super) fn ended(&mut self, sequence: u32, to: Name, ending: CallOutcome) {
         let tally = self.of(to);
         tally.calls += 1;
-        tally.unanswered += u64::from(ending != Ending::Answered);
-        if ending == Ending::Overdue {
+        tally.unanswered += u64::from(ending != CallOutcome::Answered);
+        if ending == CallOutcome::Overdue {
             if self.overdue.len() == OVERDUE_MAX {
                 self.overdue.pop_front();
             }
@@ -106,10 +106,10 @@ mod tests {
     #[test]
     fn an_answer_that_comes_late_is_no_longer_missing_and_counts_once() {
         let mut tallies = Tallies::default();
-        tallies.ended(1, SERVER, Ending::Answered);
-        tallies.ended(2, SERVER, Ending::Overdue);
-        tallies.ended(3, SERVER.with_local(9), Ending::Refused);
-        tallies.ended(4, OTHER, Ending::Overdue);
+        tallies.ended(1, SERVER, CallOutcome::Answered);
+        tallies.ended(2, SERVER, CallOutcome::Overdue);
+        tallies.ended(3, SERVER.with_local(9), CallOutcome::Refused);
+        tallies.ended(4, OTHER, CallOutcome::Overdue);
         assert_eq!(counts(&tallies), [(SERVER, 3, 2, 0), (OTHER, 1, 1, 0)]);
         // Of no call; of one that was answered, or refused; of another module's.
         for (sequence, from) in [(9, SERVER), (1, SERVER), (3, SERVER), (2, OTHER)] {
@@ -126,7 +126,7 @@ mod tests {
     fn of_calls_given_up_the_last_are_remembered_and_the_others_stay_unanswered() {
         let mut tallies = Tallies::default();
         let given_up = 0..OVERDUE_MAX as u32 + 10;
-        given_up.clone().for_each(|sequence| tallies.ended(sequence, SERVER, Ending::Overdue));
+        given_up.clone().for_each(|sequence| tallies.ended(sequence, SERVER, CallOutcome::Overdue));
         given_up.for_each(|sequence| tallies.came_late(sequence, |_| true));
         assert_eq!(counts(&tallies), [(SERVER, OVERDUE_MAX as u64 + 10, 10, OVERDUE_MAX as u64)]);
     }

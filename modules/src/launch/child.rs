@@ -14,7 +14,7 @@ use super::repeats::Repeats;
 use crate::common::OutputLevel;
 use crate::launcher::{ChildState, Phase};
 use crate::output::Relay;
-use ending::Ending;
+use ending::ChildShutdown;
 use nix::sys::signal::Signal;
 use rohrpost_config::{Installation, Module, Start};
 use rohrpost_mailbox::{ModuleState, Name, Node};
@@ -66,7 +66,7 @@ pub(super) struct Child {
     mailboxes: Mailboxes,
     /// Its process has ended so, then; what it printed last may still come.
     over: Option<(ExitStatus, Instant)>,
-    ending: Option<Ending>,
+    ending: Option<ChildShutdown>,
     /// It was started then, or will be.
     since: Instant,
     /// Processes it has had.

@@ -17,7 +17,7 @@ const MOMENT: Duration = Duration::from_millis(100);
 const HASTE_AFTER: Duration = Duration::from_millis(300);
 
 /// How far the end has come.
-pub(super) struct Ending {
+pub(super) struct LaunchShutdown {
     began: Instant,
     /// Children from here on were told.
     told: usize,
@@ -29,7 +29,7 @@ pub(super) struct Ending {
     words: u32,
 }
 
-impl Ending {
+impl LaunchShutdown {
     pub(super) fn begin(children: &mut [Child], words: u32, now: Instant) -> Self {
         children.iter_mut().for_each(Child::begin_last_incarnation);
         Self { began: now, told: children.len(), told_at: now, disorder: false, words }

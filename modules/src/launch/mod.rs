@@ -38,7 +38,7 @@ use crate::output::{Relay, plain};
 use crate::runtime::{ClientError, ToolLink};
 use crate::survey::Survey;
 use child::Child;
-use end::Ending;
+use end::LaunchShutdown;
 use events::Bell;
 use look::Looks;
 use program::Program;
@@ -307,7 +307,7 @@ impl Launch {
     /// Stops all modules, the last first, and removes the node. What does not stop in its time is killed; all is killed at
     /// once when a second word to stop comes. Returns what there is to say about it.
     pub fn stop(mut self) -> Vec<String> {
-        let mut ending = Ending::begin(&mut self.children, self.bell.words(), Instant::now());
+        let mut ending = LaunchShutdown::begin(&mut self.children, self.bell.words(), Instant::now());
         loop {
             let now = Instant::now();
             for child in &mut self.children {

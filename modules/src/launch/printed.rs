@@ -26,7 +26,7 @@ const HOLD: Duration = Duration::from_millis(200);
 
 /// What one process printed: the one that runs, or the one that ended last.
 pub(super) struct Printed {
-    lines: Arc<Mutex<Lines>>,
+    lines: Arc<Mutex<PrintedLines>>,
     readers: Vec<JoinHandle<()>>,
     voice: Option<OutputProxy>,
     /// Where the panic came from that was told last.
@@ -34,7 +34,7 @@ pub(super) struct Printed {
 }
 
 #[derive(Default)]
-struct Lines {
+struct PrintedLines {
     last: VecDeque<String>,
     /// Where its panic came from.
     trace: Vec<String>,
@@ -43,7 +43,7 @@ struct Lines {
     quiet_until: Option<Instant>,
 }
 
-impl Lines {
+impl PrintedLines {
     /// Takes the next line that was held long enough.
     fn take_due(&mut self, now: Instant) -> Option<Held> {
         if self.due_at()? <= now { self.held.pop_front() } else { None }
@@ -82,7 +82,7 @@ impl Printed {
     pub(super) fn begin(&mut self, quiet_until: Option<Instant>) -> io::Result<[PipeWriter; 2]> {
         self.pass_on(false);
         // Of its own: who left processes behind that still print must not mix with what follows.
-        self.lines = Arc::new(Mutex::new(Lines { quiet_until, ..Lines::default() }));
+        self.lines = Arc::new(Mutex::new(PrintedLines { quiet_until, ..PrintedLines::default() }));
         self.readers.clear();
         let out = self.read("stdout", OutputLevel::Info)?;
         Ok([out, self.read("stderr", OutputLevel::Warn)?])
@@ -169,12 +169,12 @@ fn below<'a>(lines: impl IntoIterator<Item = &'a String>) -> String {
     lines.into_iter().map(|line| format!("\n    {line}")).collect()
 }
 
-fn lock(lines: &Mutex<Lines>) -> MutexGuard<'_, Lines> {
+fn lock(lines: &Mutex<PrintedLines>) -> MutexGuard<'_, PrintedLines> {
     lines.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Keeps the last lines that come through a pipe, until it closes.
-fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<Lines>, whisper: Option<&WeakOutputProxy>) {
+fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<PrintedLines>, whisper: Option<&WeakOutputProxy>) {
     let mut pipe = BufReader::new(pipe);
     let mut line = Vec::new();
     while let Ok(1..) = io::Read::take(&mut pipe, LINE_BYTES_MAX).read_until(b'\n', &mut line) {
@@ -217,12 +217,12 @@ mod tests {
     const QUIET: Duration = Duration::from_secs(10);
 
     /// Of a process that was started at `start` and printed at these times after it.
-    fn printed(start: Instant, quiet: Option<Duration>, after: &[Duration]) -> Lines {
+    fn printed(start: Instant, quiet: Option<Duration>, after: &[Duration]) -> PrintedLines {
         let line = |&after| Held { level: OutputLevel::Info, time_ns: 0, since: start + after, text: String::new() };
-        Lines {
+        PrintedLines {
             held: after.iter().map(line).collect(),
             quiet_until: quiet.map(|quiet| start + quiet),
-            ..Lines::default()
+            ..PrintedLines::default()
         }
     }
 

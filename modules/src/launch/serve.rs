@@ -8,7 +8,7 @@ use crate::interface::{Interface, Serve};
 use crate::launcher::{Children, ControlError, Launcher, LauncherInterface};
 use crate::launcher::{LookError, LookPage, SnapshotRequest};
 use crate::runtime::refusals::{Cause, Refusals};
-use crate::runtime::server::{Call, CommandHandler, CommandServer, admit};
+use crate::runtime::server::{Command, CommandHandler, CommandServer, admit};
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{CreateError, Head, Label, Name, Node, Receiver, SendError, Shape};
 use rohrpost_schema::Description;
@@ -87,7 +87,7 @@ impl CommandHandler for Clerk<'_> {
         number < common::FIRST_OWN || self.description.functions.iter().any(|f| f.number == number && f.idempotent)
     }
 
-    fn run(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+    fn run(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         call.require_interface(LauncherInterface::hash())?;
         match call.number {
             common::DESCRIBE => call.describe(self.bytes, reply),

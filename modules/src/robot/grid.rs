@@ -13,7 +13,7 @@ use super::traverse::Traversal;
 use crate::types::{LaserScan, OccupancyGrid, Pose};
 use std::collections::BTreeMap;
 use thiserror::Error;
-use tile::{Change, Tile};
+use tile::{Tile, TileChange};
 
 /// Log-odds of one scan and of a square, in hundredths: how sure a scan is, and how sure a square may become.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -191,7 +191,7 @@ impl Mapper {
         cursor.place = Some(place);
         match self.tiles[place].update(column, row, odds, self.settings.bound, self.scan) {
             None => {}
-            Some(Change { before, after }) => self.counts.recount(before, after),
+            Some(TileChange { before, after }) => self.counts.recount(before, after),
         }
     }
 

@@ -390,7 +390,7 @@ fn deliver(
     classes: &ClassTable,
     endpoints: &[Name],
     newest: &Newest,
-    to: &crate::publish::Subscription,
+    to: &crate::publish::SubscriptionEntry,
 ) -> Delivery {
     let asked = &to.asked;
     let (stamp_ns, incarnation) = (newest.stamp_ns, asked.incarnation);
@@ -415,6 +415,6 @@ fn deliver(
             }
             Delivery::TooLarge
         }
-        Err(_) => Delivery::OverflowPolicy,
+        Err(_) => Delivery::Full,
     }
 }

@@ -6,12 +6,12 @@ use super::exchange;
 use super::incarnation::Incarnation;
 use super::parameters;
 use super::refusals::Cause;
-use super::server::{Call, CommandHandler, admit, read_arguments, write_result};
+use super::server::{Command, CommandHandler, admit, read_arguments, write_result};
 use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
 use crate::module::Module;
 use crate::output;
-use crate::publish::Asked;
+use crate::publish::RequestOrigin;
 use rohrpost_config::Principal;
 use rohrpost_mailbox::{Head, Label, Name, Options, SendError, Work, local, monotonic_ns};
 
@@ -29,7 +29,7 @@ impl<M: Module> CommandHandler for Hosted<'_, M> {
         number < common::FIRST_OWN || self.offer.idempotent.contains(&number)
     }
 
-    fn run(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+    fn run(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         call.require_interface(self.offer.hash)?;
         if call.number < common::FIRST_OWN {
             return self.common(call, reply);
@@ -54,7 +54,7 @@ impl<M: Module> CommandHandler for Hosted<'_, M> {
 }
 
 impl<M: Module> Hosted<'_, M> {
-    fn common(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+    fn common(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         match call.number {
             common::ON => {
                 let () = read_arguments(call.arguments)?;
@@ -76,7 +76,7 @@ impl<M: Module> Hosted<'_, M> {
                 let to = data_mailbox(call, wish.mailbox)?;
                 let now_ns = monotonic_ns();
                 let subscriptions = &mut self.context.subscriptions;
-                let asked = Asked {
+                let asked = RequestOrigin {
                     by: call.head.from,
                     principal: self.context.installation.principal(call.head.from),
                     incarnation: call.incarnation,
@@ -125,7 +125,7 @@ impl<M: Module> Hosted<'_, M> {
         }
     }
 
-    fn get_data(&self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+    fn get_data(&self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         let (number,): (u16,) = read_arguments(call.arguments)?;
         self.offer.require_data(number)?;
         let is_it = |newest: &&crate::publish::Newest| (newest.endpoint, newest.number) == (self.index, number);
@@ -138,7 +138,7 @@ impl<M: Module> Hosted<'_, M> {
 }
 
 /// A mailbox of the caller's that takes data: those for commands and replies do not.
-fn data_mailbox(call: &Call<'_>, local: u8) -> Result<Name, Fault> {
+fn data_mailbox(call: &Command<'_>, local: u8) -> Result<Name, Fault> {
     if local >= local::DATA {
         return Ok(call.head.from.with_local(local));
     }

@@ -12,7 +12,7 @@ pub(crate) trait CommandHandler {
     /// Whether a function may be run twice without harm.
     fn is_idempotent(&self, number: u16) -> bool;
     /// Runs a command; what it has to say is appended to the reply.
-    fn run(&mut self, call: &Call<'_>, reply: &mut Vec<u8>) -> Result<(), Fault>;
+    fn run(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault>;
     /// Whose share of places a command uses, unless its sender may not command at all.
     fn admit(&self, head: &Head) -> Result<Principal, Fault>;
     /// Counts what is not taken.
@@ -71,7 +71,7 @@ impl CommandServer {
             Verdict::Run => {
                 self.reply.clear();
                 let CallEnvelope { interface: hash, incarnation, .. } = envelope;
-                let call = Call { number, head, hash, incarnation, arguments };
+                let call = Command { number, head, hash, incarnation, arguments };
                 let error = match handler.run(&call, &mut self.reply) {
                     Ok(()) => false,
                     Err(fault) => {
@@ -160,7 +160,7 @@ fn answer(
 }
 
 /// A command that is to be run.
-pub(crate) struct Call<'a> {
+pub(crate) struct Command<'a> {
     pub(crate) number: u16,
     pub(crate) head: Head,
     /// Hash of the interface that the caller knows.
@@ -170,7 +170,7 @@ pub(crate) struct Call<'a> {
     pub(crate) arguments: &'a [u8],
 }
 
-impl Call<'_> {
+impl Command<'_> {
     /// The caller knows the interface that is served here; common functions are of none.
     pub(crate) fn require_interface(&self, own: u32) -> Result<(), Fault> {
         let of_interface =

@@ -49,11 +49,11 @@ pub struct Distant {
     there: usize,
     /// First byte that nobody has been asked for.
     next: usize,
-    under_way: Vec<Asked>,
+    under_way: Vec<AskedPage>,
 }
 
 /// A page that was asked for.
-struct Asked {
+struct AskedPage {
     sequence: u32,
     from: usize,
 }
@@ -116,7 +116,7 @@ impl Distant {
     }
 
     /// What it says is a claim of another process.
-    fn take(&mut self, asked: &Asked, page: &LookPage, link: &mut Link) -> Result<(), LookFailure> {
+    fn take(&mut self, asked: &AskedPage, page: &LookPage, link: &mut Link) -> Result<(), LookFailure> {
         let total = page.total as usize;
         let fits = |known: usize| {
             let long = known.saturating_sub(asked.from).min(self.page.into());
@@ -168,7 +168,7 @@ impl Distant {
         };
         let patience = left.min(PAGE_PATIENCE);
         let sequence = link.begin(self.launcher, function, LauncherInterface::hash(), patience, write)?;
-        self.under_way.push(Asked { sequence, from });
+        self.under_way.push(AskedPage { sequence, from });
         Ok(())
     }
 }

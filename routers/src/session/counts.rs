@@ -11,7 +11,7 @@ pub enum Cause {
     /// Nobody hosts its mailbox.
     NoRoute,
     /// Too much waited, and this was the least important and newest.
-    OverflowPolicy,
+    Full,
     /// Too much waited, of its sender more than of others.
     Share,
     /// It was under way for too long.
@@ -40,7 +40,7 @@ impl Cause {
     /// All, in their order.
     pub const ALL: [Self; 13] = [
         Self::NoRoute,
-        Self::OverflowPolicy,
+        Self::Full,
         Self::Share,
         Self::Stale,
         Self::Gone,
@@ -58,7 +58,7 @@ impl Cause {
     pub const fn word(self) -> &'static str {
         match self {
             Self::NoRoute => "no-route",
-            Self::OverflowPolicy => "full",
+            Self::Full => "full",
             Self::Share => "share",
             Self::Stale => "stale",
             Self::Gone => "gone",
@@ -77,7 +77,7 @@ impl Cause {
     pub const fn told(self) -> Option<counts::Cause> {
         Some(match self {
             Self::NoRoute | Self::Hops => counts::Cause::NoRoute,
-            Self::OverflowPolicy | Self::Share => counts::Cause::Quota,
+            Self::Full | Self::Share => counts::Cause::Quota,
             Self::Stale => counts::Cause::Stale,
             Self::Gone | Self::Offline => counts::Cause::Silent,
             Self::Foreign => return None,

@@ -276,7 +276,7 @@ fn gives_way(sender: u16, fates: &mut impl Fates) -> impl FnMut(&Waiting, &[u8])
 /// Lost for lack of room. `for_others`: since it would be more than its sender's part of it.
 fn lose(waiting: &Waiting, body: &[u8], for_others: bool, fates: &mut impl Fates) {
     fates.crowded(waiting.share.sender);
-    fates.lost(&waiting.head, body, if for_others { Cause::Share } else { Cause::OverflowPolicy });
+    fates.lost(&waiting.head, body, if for_others { Cause::Share } else { Cause::Full });
 }
 
 pub(super) fn is_stale(now_ns: u64, published_ns: u64) -> bool {

@@ -15,7 +15,7 @@ pub enum Failure {
     /// The kernel or the network card had no room.
     NoRoom,
     /// So much waits already for its device that the kernel takes no more; nobody waits for that.
-    OverflowPolicy,
+    Full,
     /// Nobody is known there that it could be sealed to.
     Unacquainted,
     /// Anything else.
@@ -24,15 +24,8 @@ pub enum Failure {
 
 impl Failure {
     /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::NobodyThere,
-        Self::NoWay,
-        Self::TooLong,
-        Self::NoRoom,
-        Self::OverflowPolicy,
-        Self::Unacquainted,
-        Self::Other,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Full, Self::Unacquainted, Self::Other];
 
     pub(super) fn of(error: &io::Error) -> Self {
         use nix::errno::Errno;
@@ -48,7 +41,7 @@ impl Failure {
             | Errno::EPERM => Self::NoWay,
             Errno::EMSGSIZE => Self::TooLong,
             Errno::ENOBUFS | Errno::ENOMEM => Self::NoRoom,
-            Errno::EAGAIN => Self::OverflowPolicy,
+            Errno::EAGAIN => Self::Full,
             _ => Self::Other,
         }
     }
@@ -65,7 +58,7 @@ impl Failure {
             Self::NoWay => "no-way",
             Self::TooLong => "too-long",
             Self::NoRoom => "no-room",
-            Self::OverflowPolicy => "full",
+            Self::Full => "full",
             Self::Unacquainted => "unacquainted",
             Self::Other => "other",
         }
@@ -82,7 +75,7 @@ impl Failure {
             Self::NoRoom => {
                 "the kernel had no room; lower `rate` in [network], or with time slots `link` in [tdma], to what the network can carry"
             }
-            Self::OverflowPolicy => {
+            Self::Full => {
                 "its device has not sent what it was given before; does it stand still, or carry less than `rate` in [network], or with time slots \
                  `link` in [tdma], says (`ethtool DEVICE`), and is net.core.wmem_max enough for a slot (`sysctl`)?"
             }

@@ -404,7 +404,7 @@ mod tests {
             sender.send(&[IoSlice::new(b"hello")]).unwrap();
             assert!(matches!(there.receive(&mut [0; 10]), Received::Datagram { bytes: 5, .. }));
         }
-        assert_eq!(Failure::of(&Errno::EAGAIN.into()), Failure::OverflowPolicy, "and is told when that is not enough");
+        assert_eq!(Failure::of(&Errno::EAGAIN.into()), Failure::Full, "and is told when that is not enough");
     }
 
     #[test]

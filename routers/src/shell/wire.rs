@@ -134,9 +134,9 @@ impl Wire {
     fn send_now(&mut self, to: NodeIndex, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
         let Some(Some(socket)) = self.sockets.get_mut(usize::from(to)) else { return Ok(()) };
         let is_full = self.full_ones & 1 << to != 0;
-        let sent = if is_full { Err(Failure::OverflowPolicy) } else { socket.send(parts) };
+        let sent = if is_full { Err(Failure::Full) } else { socket.send(parts) };
         match (sent, self.full.get_mut(usize::from(to))) {
-            (Err(Failure::OverflowPolicy), Some(stalled)) if !is_full => {
+            (Err(Failure::Full), Some(stalled)) if !is_full => {
                 // Kept, and handed over when there is room. Nothing more is made for this peer until then.
                 stalled.keep(parts);
                 self.full_ones |= 1 << to;
@@ -168,12 +168,12 @@ impl Wire {
             if stalled.is_old(now_ns) {
                 // It has left as far as its packages' accounts know, and is lost on its way: its receiver will miss it.
                 stalled.datagram.clear();
-                self.failures.count(Failure::OverflowPolicy);
-                self.news.iter_mut().for_each(|news| news.fails(to, Failure::OverflowPolicy));
+                self.failures.count(Failure::Full);
+                self.news.iter_mut().for_each(|news| news.fails(to, Failure::Full));
             }
             let has_room = match stalled.datagram.is_empty() {
                 true => socket.has_room(),
-                false => socket.send(&[IoSlice::new(&stalled.datagram)]) != Err(Failure::OverflowPolicy),
+                false => socket.send(&[IoSlice::new(&stalled.datagram)]) != Err(Failure::Full),
             };
             if has_room {
                 stalled.datagram.clear();

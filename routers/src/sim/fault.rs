@@ -47,7 +47,7 @@ pub enum Fault {
         module: Name,
     },
     /// The mailboxes of a module are full.
-    OverflowPolicy {
+    Full {
         /// Where it is.
         node: usize,
         /// Which.

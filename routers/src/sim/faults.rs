@@ -64,7 +64,7 @@ impl World<'_> {
                 self.stations[to].echo_ns = Some(delay_ns);
             }
             Fault::Absent { node, module } => self.mailboxes(node, module, |mailbox| mailbox.absent += 1),
-            Fault::OverflowPolicy { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full += 1),
+            Fault::Full { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full += 1),
             Fault::ModuleRestart { node, module } => {
                 self.oracle.saw("module killed");
                 let dies = self.chance.percent(70);
@@ -148,7 +148,7 @@ impl World<'_> {
             Fault::Split { side } => self.split(side, |cuts| *cuts -= 1),
             Fault::Bad { from, to, .. } => self.links[from][to].quality = self.plan.quality,
             Fault::Absent { node, module } => self.mailboxes(node, module, |mailbox| mailbox.absent -= 1),
-            Fault::OverflowPolicy { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full -= 1),
+            Fault::Full { node, module } => self.mailboxes(node, module, |mailbox| mailbox.full -= 1),
             Fault::ModuleRestart { node, module } => self.restart_module(node, module),
             Fault::Unsendable { node } => self.stations[node].host.unsendable -= 1,
             Fault::Echo { to, .. } => self.stations[to].echo_ns = None,

@@ -100,7 +100,7 @@ pub enum Closed {
     /// There is none of that name.
     Absent,
     /// There is no room.
-    OverflowPolicy,
+    Full,
 }
 
 /// A computer but for its router.
@@ -128,7 +128,7 @@ impl Host {
             return Err(Closed::Absent);
         };
         if mailbox.full > 0 || mailbox.waiting >= COMMAND_SLOTS {
-            return Err(Closed::OverflowPolicy);
+            return Err(Closed::Full);
         }
         // Data and replies are read at once, commands when their turn comes.
         mailbox.waiting += usize::from(to.local() == rohrpost_mailbox::local::COMMANDS);

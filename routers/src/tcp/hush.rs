@@ -139,7 +139,7 @@ mod tests {
         let mut hush = Hush::default();
         let joined = (0..40).filter(|_| hush.line(S, Topic::Joined, "joins").is_some()).count();
         assert_eq!(joined, AT_ONCE as usize);
-        for topic in [Topic::Unsealed, Topic::Objected, Topic::Left(None), Topic::Refused(Reason::OverflowPolicy)] {
+        for topic in [Topic::Unsealed, Topic::Objected, Topic::Left(None), Topic::Refused(Reason::Full)] {
             assert!(hush.line(S, topic, "first of its cause").is_some());
         }
     }

@@ -32,7 +32,7 @@ impl Talker {
         loop {
             match self.sender.send(&label(self.from, 100, id), &[&id.to_le_bytes()]) {
                 Ok(()) => return,
-                Err(SendError::OverflowPolicy(_)) => std::thread::sleep(Duration::from_micros(100)),
+                Err(SendError::Full(_)) => std::thread::sleep(Duration::from_micros(100)),
                 Err(error) => panic!("{} to {}: {error}", self.from, self.to),
             }
             assert!(began.elapsed() < PATIENCE, "{} to {}: {id}", self.from, self.to);

@@ -38,7 +38,7 @@ impl Source {
         self.body[..8].copy_from_slice(&self.sent.to_le_bytes());
         match self.sender.send(&self.label, &[&self.body]) {
             Ok(()) => self.sent += 1,
-            Err(SendError::OverflowPolicy(_)) => return false,
+            Err(SendError::Full(_)) => return false,
             Err(error) => panic!("{error}"),
         }
         true

@@ -40,12 +40,12 @@ const RTNET: &str = "RTnet's formula";
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Clock)]
+    vec![Box::new(LanClockCase)]
 }
 
-struct Clock;
+struct LanClockCase;
 
-impl Case for Clock {
+impl Case for LanClockCase {
     fn name(&self) -> String {
         "clock".into()
     }

@@ -12,7 +12,7 @@ pub(super) const WHOLE: u16 = u16::MAX;
 pub(super) const ETHERNET: u16 = 1_500;
 
 /// What all turns of a case happen on.
-pub(super) struct Ground {
+pub(super) struct LanSegment {
     /// None where there may be no namespaces.
     wire: Result<Wire, Failure>,
     /// None where there is no command, or it does not start: then ours has no figure, and the floors still have.
@@ -20,7 +20,7 @@ pub(super) struct Ground {
     turns: Counter<u8>,
 }
 
-impl Ground {
+impl LanSegment {
     /// Makes the network and starts the routers.
     pub(super) fn new(settings: &Settings, network: &Network) -> Self {
         Self::on(settings, network, Wire::new(network.mtu))

@@ -1,6 +1,6 @@
 //! How long a package takes from a module on one node to a module on another, one at a time; everybody sleeps who waits.
 
-use super::ground::{ETHERNET, Ground, WHOLE};
+use super::ground::{ETHERNET, LanSegment, WHOLE};
 use crate::cases::Case;
 use crate::harness::{Cell, Failure, time_two_processes};
 use crate::lan::chain::{time_chain, time_mailbox_chain};
@@ -17,15 +17,15 @@ const PACE: Duration = Duration::from_micros(500);
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let whole = |bytes| Hop { name: "hop", bytes, mtu: WHOLE, pace: None, judged: true };
+    let whole = |bytes| LanHop { name: "hop", bytes, mtu: WHOLE, pace: None, judged: true };
     let mut cases = [64, 1024, 16_384, 62_000].map(whole).to_vec();
-    cases.push(Hop { name: "hop, paced", pace: Some(PACE), judged: false, ..whole(64) });
-    cases.push(Hop { name: "hop, in fragments", mtu: ETHERNET, judged: false, ..whole(16_384) });
+    cases.push(LanHop { name: "hop, paced", pace: Some(PACE), judged: false, ..whole(64) });
+    cases.push(LanHop { name: "hop, in fragments", mtu: ETHERNET, judged: false, ..whole(16_384) });
     cases.into_iter().map(|case| Box::new(case) as Box<dyn Case>).collect()
 }
 
 #[derive(Clone)]
-struct Hop {
+struct LanHop {
     name: &'static str,
     bytes: usize,
     mtu: u16,
@@ -34,13 +34,14 @@ struct Hop {
     judged: bool,
 }
 
-impl Case for Hop {
+impl Case for LanHop {
     fn name(&self) -> String {
         self.name.into()
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = Ground::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB", sealed: false });
+        let ground =
+            LanSegment::new(settings, &Network { mtu: self.mtu, rate: UNPACED, quota: "1 MiB", sealed: false });
         let messages = settings.count(if self.pace.is_some() { MESSAGES_PACED } else { Cell::HOP_MESSAGES });
         let cell = Cell { pace: self.pace, ..Cell::hop(self.bytes, messages) };
         let contenders = [

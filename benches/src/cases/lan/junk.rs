@@ -9,7 +9,7 @@
 //! `junk`: from an address that no node has; `junk of a peer`: from that of the near node, as an attacker may write it on what it sends. The floor of each: a
 //! bare hop by UDP under the same junk, to ports that nobody reads. It tells what the junk costs the computer that carries it, whoever is its target.
 
-use super::ground::{ETHERNET, Ground};
+use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;
 use crate::harness::{Cell, End, Failure, time_two_processes};
 use crate::lan::Wire;
@@ -33,7 +33,7 @@ const UNREAD: [u16; 2] = [21_217, 21_218];
 
 /// Whose address stands on it.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum From {
+enum JunkSource {
     /// That of a third computer, which is no node.
     Stranger,
     /// That of the near end: a node that the far one takes datagrams of.
@@ -42,30 +42,30 @@ enum From {
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let case = |name, from| Box::new(Junked { name, from }) as Box<dyn Case>;
-    vec![case("junk", From::Stranger), case("junk of a peer", From::Peer)]
+    let case = |name, from| Box::new(LanJunk { name, from }) as Box<dyn Case>;
+    vec![case("junk", JunkSource::Stranger), case("junk of a peer", JunkSource::Peer)]
 }
 
-struct Junked {
+struct LanJunk {
     name: &'static str,
-    from: From,
+    from: JunkSource,
 }
 
-impl Case for Junked {
+impl Case for LanJunk {
     fn name(&self) -> String {
         self.name.into()
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
-        let ground = Ground::on(settings, &network, Wire::with_stranger(network.mtu));
+        let ground = LanSegment::on(settings, &network, Wire::with_stranger(network.mtu));
         let cell = Cell { pace: Some(PACE), ..Cell::hop(BYTES, settings.count(MESSAGES)) };
         let rates = RefCell::new(Vec::new());
         let under_junk = |ports, timed: &dyn Fn() -> Result<Vec<f64>, Failure>| {
             let wire = ground.wire()?;
             let go = || match self.from {
-                From::Stranger => wire.enter_stranger(),
-                From::Peer => wire.enter(End::Ping),
+                JunkSource::Stranger => wire.enter_stranger(),
+                JunkSource::Peer => wire.enter(End::Ping),
             };
             let junk = Junk::start(go, address(End::Pong), ports)?;
             let samples = timed();
@@ -83,7 +83,7 @@ impl Case for Junked {
             Contender::sampled("udp, junk on unread ports", || under_junk(&UNREAD, &udp)),
             Contender::sampled("udp", udp),
         ];
-        let judged = (self.from == From::Stranger).then_some(Target::AtMost(1.2));
+        let judged = (self.from == JunkSource::Stranger).then_some(Target::AtMost(1.2));
         let versus = [
             Versus { name: "no junk", p50: None, p99: judged },
             Versus { name: "udp, junk on unread ports", p50: None, p99: None },

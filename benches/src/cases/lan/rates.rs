@@ -11,10 +11,10 @@
 //! Two nodes share two processors here, so the sending router has one for itself, as the raw sender has. With the sending module on
 //! that one, too, and below its router as launch schedules it, each package costs two changes of process: that is told beside.
 
-use super::ground::{Ground, WHOLE};
+use super::ground::{LanSegment, WHOLE};
 use crate::cases::Case;
 use crate::harness::{End, Failure};
-use crate::lan::ends::{Sink, Source};
+use crate::lan::ends::{LanSink, LanSource};
 use crate::lan::flow::{Flow, Flown, SILENCE, flow};
 use crate::lan::nodes::{self, Network, UNPACED};
 use crate::lan::udp::Datagrams;
@@ -65,7 +65,7 @@ impl Case for Rate {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let one = (BEFORE_PACKAGES + HEAD_BYTES + self.bytes).max(MTU_MIN);
         let mtu = if self.packs { WHOLE } else { u16::try_from(one).unwrap_or(WHOLE) };
-        let ground = Ground::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB", sealed: false });
+        let ground = LanSegment::new(settings, &Network { mtu, rate: UNPACED, quota: "64 MiB", sealed: false });
         let losses = Losses::default();
         let raw = Flow {
             bytes: self.bytes,
@@ -82,8 +82,8 @@ impl Case for Rate {
             let [from, to] = [End::Ping, End::Pong].map(|end| nodes::bench(end, turn));
             flow(
                 ours,
-                || Source::open(&nodes.directory(End::Ping), from, to),
-                || Sink::open(&nodes.directory(End::Pong), to, self.bytes),
+                || LanSource::open(&nodes.directory(End::Ping), from, to),
+                || LanSink::open(&nodes.directory(End::Pong), to, self.bytes),
             )
         };
         let mut contenders = vec![

@@ -1,6 +1,6 @@
 //! What it costs that datagrams are sealed: the hop with keys beside the same without, turn by turn.
 
-use super::ground::{ETHERNET, Ground};
+use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;
 use crate::harness::{Cell, Failure, time_two_processes};
 use crate::lan::ends::Module;
@@ -24,9 +24,9 @@ impl Case for Sealed {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let network = Network { mtu: ETHERNET, rate: UNPACED, quota: "1 MiB", sealed: false };
-        let [sealed, open] = [true, false].map(|sealed| Ground::new(settings, &Network { sealed, ..network }));
+        let [sealed, open] = [true, false].map(|sealed| LanSegment::new(settings, &Network { sealed, ..network }));
         let cell = Cell::hop(self.bytes, settings.count(Cell::HOP_MESSAGES));
-        let time = |ground: &Ground| {
+        let time = |ground: &LanSegment| {
             let (nodes, turn) = ground.turn()?;
             time_two_processes(&cell, |end, meetings| Module::open(nodes, end, turn, self.bytes, meetings))
         };

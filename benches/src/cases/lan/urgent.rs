@@ -16,13 +16,13 @@
 //!
 //! The floor, `udp`: sockets in the modules themselves, the flood from one of its own to one of its own, as fast as the routers may send.
 
-use super::ground::Ground;
+use super::ground::LanSegment;
 use crate::cases::Case;
 use crate::harness::{
     Cell, Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle, time_two_processes,
 };
 use crate::lan::Wire;
-use crate::lan::ends::{Module, Sink, Source};
+use crate::lan::ends::{LanSink, LanSource, Module};
 use crate::lan::flow::{Inlet, Outlet};
 use crate::lan::nodes::{self, Network, Nodes};
 use crate::lan::udp::Datagrams;
@@ -76,7 +76,7 @@ impl Case for Urgent {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let ground = Ground::new(settings, &self.network);
+        let ground = LanSegment::new(settings, &self.network);
         let messages = settings.count(MESSAGES);
         let cell = Cell {
             bytes: BYTES,
@@ -88,7 +88,7 @@ impl Case for Urgent {
             cap: CAP,
         };
         let floods = [RefCell::new(Vec::new()), RefCell::new(Vec::new())];
-        let beside = |flood: Flood, floods: &RefCell<Vec<_>>, samples: Result<Vec<f64>, Failure>| {
+        let beside = |flood: Flooder, floods: &RefCell<Vec<_>>, samples: Result<Vec<f64>, Failure>| {
             let flooded = flood.end();
             let samples = samples?;
             floods.borrow_mut().push(flooded?);
@@ -98,14 +98,14 @@ impl Case for Urgent {
         let contenders = [
             Contender::sampled("rohrpost", || {
                 let (nodes, turn) = ground.turn()?;
-                let flood = Flood::over(nodes, turn)?;
+                let flood = Flooder::over(nodes, turn)?;
                 beside(flood, &floods[0], urgent(nodes, turn, &cell))
             }),
             Contender::sampled("no flood", || {
                 let (nodes, turn) = ground.turn()?;
                 urgent(nodes, turn, &cell)
             }),
-            Contender::sampled("udp", || beside(Flood::bare(ground.wire()?, self.bytes_s)?, &floods[1], udp())),
+            Contender::sampled("udp", || beside(Flooder::bare(ground.wire()?, self.bytes_s)?, &floods[1], udp())),
             Contender::sampled("udp, no flood", udp),
         ];
         let versus = [
@@ -137,7 +137,7 @@ struct Flooded {
 }
 
 #[repr(C)]
-struct Counts {
+struct UrgentCounts {
     /// There is a mailbox to flood.
     swamp: Gate,
     /// It is being flooded.
@@ -148,22 +148,22 @@ struct Counts {
 }
 
 // SAFETY: atomics only.
-unsafe impl Zeroable for Counts {}
+unsafe impl Zeroable for UrgentCounts {}
 
 /// A flooder and who takes what it sends, until it is ended or dropped.
-struct Flood {
-    counts: Shared<Counts>,
+struct Flooder {
+    counts: Shared<UrgentCounts>,
     children: [Child; 2],
     began: Instant,
 }
 
-impl Flood {
+impl Flooder {
     /// From a module of the near node to one of the far one.
     fn over(nodes: &Nodes, turn: u8) -> Result<Self, Failure> {
         let [from, to] = [End::Ping, End::Pong].map(|end| nodes::flood(end, turn));
-        let sink = || Sink::open(&nodes.directory(End::Pong), to, FLOOD_BYTES);
+        let sink = || LanSink::open(&nodes.directory(End::Pong), to, FLOOD_BYTES);
         let source = || {
-            let mut source = Source::open(&nodes.directory(End::Ping), from, to)?;
+            let mut source = LanSource::open(&nodes.directory(End::Ping), from, to)?;
             Ok(move |message: &[u8]| source.offer(message))
         };
         Self::start(sink, source)
@@ -195,7 +195,7 @@ impl Flood {
         sink: impl FnOnce() -> Result<O, Failure>,
         source: impl FnOnce() -> Result<S, Failure>,
     ) -> Result<Self, Failure> {
-        let counts = Shared::<Counts>::new()?;
+        let counts = Shared::<UrgentCounts>::new()?;
         let swamp = Child::start(|| {
             let mut sink = sink()?;
             settle_low(End::Ping)?;

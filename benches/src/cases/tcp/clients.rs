@@ -40,10 +40,10 @@ const BESIDE: f64 = 1.2;
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let habits =
         Habits { guests: GUESTS, per_s: PER_S, bytes: BYTES, one_stalls: false, warm_up: WARM_UP, counted: COUNTED };
-    let plain = Turn { who: OURS, habits, security: Security::None, is_hostile: false };
-    let beside = Turn { habits: Habits { per_s: PER_S_BESIDE, ..habits }, ..plain };
-    let sealed = Turn { security: Security::Tls, ..beside };
-    let stalled = Turn { habits: Habits { one_stalls: true, ..beside.habits }, ..beside };
+    let plain = ClientTurn { who: OURS, habits, security: Security::None, is_hostile: false };
+    let beside = ClientTurn { habits: Habits { per_s: PER_S_BESIDE, ..habits }, ..plain };
+    let sealed = ClientTurn { security: Security::Tls, ..beside };
+    let stalled = ClientTurn { habits: Habits { one_stalls: true, ..beside.habits }, ..beside };
     let bound = Versus { name: BOUND.0, p50: None, p99: Some(Target::AtMost(1.0)) };
     let other = |name, p99| Versus { name, p50: None, p99 };
     let felt = Some(Target::AtMost(BESIDE));
@@ -51,17 +51,17 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
         Clients { name: "clients", turns: vec![plain], versus: vec![bound] },
         Clients {
             name: "clients, sealed",
-            turns: vec![sealed, Turn { who: "not sealed", ..beside }],
+            turns: vec![sealed, ClientTurn { who: "not sealed", ..beside }],
             versus: vec![bound, other("not sealed", None)],
         },
         Clients {
             name: "clients, one stalled",
-            turns: vec![stalled, Turn { who: "none stalled", ..beside }],
+            turns: vec![stalled, ClientTurn { who: "none stalled", ..beside }],
             versus: vec![other("none stalled", felt)],
         },
         Clients {
             name: "clients, hostile beside",
-            turns: vec![Turn { is_hostile: true, ..beside }, Turn { who: "nobody beside", ..beside }],
+            turns: vec![ClientTurn { is_hostile: true, ..beside }, ClientTurn { who: "nobody beside", ..beside }],
             versus: vec![other("nobody beside", felt)],
         },
     ]
@@ -72,12 +72,12 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
 struct Clients {
     name: &'static str,
     /// Ours first.
-    turns: Vec<Turn>,
+    turns: Vec<ClientTurn>,
     versus: Vec<Versus>,
 }
 
 #[derive(Clone, Copy)]
-struct Turn {
+struct ClientTurn {
     who: &'static str,
     habits: Habits,
     security: Security,
@@ -127,7 +127,7 @@ impl Case for Clients {
     }
 }
 
-impl Turn {
+impl ClientTurn {
     fn take(&self, settings: &Settings) -> Result<(Vec<f64>, ClientFigures), Failure> {
         let habits = self.habits(settings);
         let mut systems = Systems::start(settings, self.security)?;

@@ -20,25 +20,25 @@ const OF_OPEN: f64 = 1.3;
 
 /// All of them.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let hop = |is_sealed| move |bytes| Box::new(Hop { bytes, is_sealed }) as Box<dyn Case>;
+    let hop = |is_sealed| move |bytes| Box::new(TcpHop { bytes, is_sealed }) as Box<dyn Case>;
     let plain = [64, 1024, 16_384, 62_000].map(hop(false));
     plain.into_iter().chain([64, 1024].map(hop(true))).collect()
 }
 
-struct Hop {
+struct TcpHop {
     bytes: usize,
     /// With TLS beside without; else beside the floor and zenoh.
     is_sealed: bool,
 }
 
-impl Case for Hop {
+impl Case for TcpHop {
     fn name(&self) -> String {
         if self.is_sealed { "hop, sealed" } else { "hop" }.into()
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let cell = Cell::hop(self.bytes, settings.count(Cell::HOP_MESSAGES));
-        let start = |security| Ground::start(settings, security);
+        let start = |security| TcpSegment::start(settings, security);
         let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit: "us" };
         let at_most = |name, bound: Option<f64>| Versus { name, p50: bound.map(Target::AtMost), p99: None };
         let open = start(Security::None);
@@ -66,13 +66,13 @@ impl Case for Hop {
 }
 
 /// What all turns of a case happen on.
-struct Ground {
+struct TcpSegment {
     /// None where there is no command, or it does not start: then the others still have figures.
     systems: Result<Systems, Failure>,
     turns: Counter<u8>,
 }
 
-impl Ground {
+impl TcpSegment {
     fn start(settings: &Settings, security: Security) -> Self {
         let systems = Systems::start(settings, security).and_then(Systems::with_clients);
         Self { systems, turns: Counter::new(0) }

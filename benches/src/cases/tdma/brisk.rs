@@ -1,6 +1,6 @@
 //! The shortest cycle that there is.
 
-use super::contest::{ALWAYS, Contest, Figure, Watched};
+use super::contest::{ALWAYS, Contest, Figure, WatchedContender};
 use super::goals::Goal;
 use super::observed::RunConditions;
 use super::plans::BRISK;
@@ -29,7 +29,7 @@ impl Case for Brisk {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, loaded| Watched {
+        let watched = |who, loaded| WatchedContender {
             who,
             plan: BRISK,
             way: RunConditions { rights: Rights::RealTime, loaded, junk: false },

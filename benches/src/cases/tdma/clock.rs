@@ -44,12 +44,12 @@ const MOST: [Goal; 2] = [Goal { name: "must 15 us", most: 15.0 }, Goal { name: "
 const AFTER_A_SECOND: [Goal; 2] = [Goal { name: "must 5 us", most: 5.0 }, Goal { name: "hoped 2 us", most: 2.0 }];
 
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Clock), Box::new(Holdover)]
+    vec![Box::new(SlotClockCase), Box::new(Holdover)]
 }
 
-struct Clock;
+struct SlotClockCase;
 
-impl Case for Clock {
+impl Case for SlotClockCase {
     fn name(&self) -> String {
         "clock".into()
     }

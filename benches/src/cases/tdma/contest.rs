@@ -6,14 +6,14 @@ use crate::Failure;
 use crate::rounds::{Contender, Row, Subject, Versus, compare};
 use crate::settings::Settings;
 use crate::statistics::Summary;
-use crate::tdma::bare::Bare;
+use crate::tdma::bare::BareThreads;
 use crate::tdma::plan::Plan;
 use crate::tdma::stage::Stage;
 use std::cell::RefCell;
 
 /// Somebody who is watched.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Watched {
+pub(super) struct WatchedContender {
     /// As the table calls it.
     pub who: &'static str,
     /// Its slots.
@@ -68,7 +68,7 @@ pub(super) struct Held {
     /// Of each contender.
     pub seen: Vec<ObservedRounds>,
     /// Of the floor, round after round.
-    pub bare: Vec<Bare>,
+    pub bare: Vec<BareThreads>,
 }
 
 /// A case of this kind.
@@ -76,7 +76,7 @@ pub(super) struct Contest {
     /// Its name.
     pub case: &'static str,
     /// Those watched.
-    pub watched: Vec<Watched>,
+    pub watched: Vec<WatchedContender>,
     /// Goals are for the first so many.
     pub judged: usize,
     /// What slots are held against that has a name and figures.
@@ -93,23 +93,25 @@ impl Contest {
         let stage = Stage::new();
         let all: Vec<RefCell<ObservedRounds>> = self.watched.iter().map(|_| RefCell::default()).collect();
         let turn = |at: usize| -> Result<Summary, Failure> {
-            let Watched { plan, way, .. } = &self.watched[at];
+            let WatchedContender { plan, way, .. } = &self.watched[at];
             let seen = Observed::turn(stage.as_ref().map_err(Clone::clone)?, plan, *way, settings)?;
             let summary = seen.summary()?;
             all[at].borrow_mut().push(seen);
             Ok(summary)
         };
         let turn = &turn;
-        let contender =
-            |(at, watched): (usize, &Watched)| Contender { name: watched.who, turn: Box::new(move || turn(at)) };
+        let contender = |(at, watched): (usize, &WatchedContender)| Contender {
+            name: watched.who,
+            turn: Box::new(move || turn(at)),
+        };
         let fixed = |(name, bounds): &(&'static str, Summary)| {
             let bounds = *bounds;
             Contender { name, turn: Box::new(move || Ok(bounds)) }
         };
         let bare = RefCell::new(Vec::new());
         let floor = Contender::sampled(BARE, || {
-            let Watched { plan, way, .. } = &self.watched[0];
-            let seen = Bare::turn(stage.as_ref().map_err(Clone::clone)?, plan, way.loaded, watched(settings))?;
+            let WatchedContender { plan, way, .. } = &self.watched[0];
+            let seen = BareThreads::turn(stage.as_ref().map_err(Clone::clone)?, plan, way.loaded, watched(settings))?;
             let late_us = seen.late_us.clone();
             bare.borrow_mut().push(seen);
             Ok(late_us)
@@ -128,8 +130,8 @@ impl Contest {
     }
 
     /// Slots that bare threads would have left out, and how many times as many the first contender has.
-    fn beside_bare(&self, seen: &ObservedRounds, bare: &[Bare]) -> Vec<Row> {
-        let omitted: Vec<f64> = bare.iter().map(Bare::omitted_percent).collect();
+    fn beside_bare(&self, seen: &ObservedRounds, bare: &[BareThreads]) -> Vec<Row> {
+        let omitted: Vec<f64> = bare.iter().map(BareThreads::omitted_percent).collect();
         let mut rows = figure(&self.subject("%", Some(OMITTED)), BARE, &omitted, &[]);
         // A round in which nobody was late says nothing about their ratio.
         let both = seen.iter().map(Observed::omitted_percent).zip(omitted).filter(|(_, bare)| *bare > 0.0);

@@ -10,7 +10,7 @@ use crate::harness::{Failure, Machine, alone, rest};
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
 use crate::statistics::{Summary, median};
-use crate::tdma::bare::Bare;
+use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::{Arrived, Capture};
 use crate::tdma::counts::Counts;
 use crate::tdma::plan::Declared;
@@ -35,14 +35,14 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
 struct Flows;
 
 /// One turn.
-struct Watched {
+struct FlowTurns {
     arrivals: Vec<Arrived>,
     counts: Counts,
     talked: Talked,
     /// Steal in each window, percent.
     windows: Vec<f64>,
     waited_ms_s: f64,
-    bare: Bare,
+    bare: BareThreads,
 }
 
 impl Case for Flows {
@@ -62,7 +62,7 @@ impl Case for Flows {
     }
 }
 
-fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
+fn watch(stage: &Stage, settings: &Settings) -> Result<FlowTurns, Failure> {
     let routers = Routers::start(stage, &FLOWS, Rights::RealTime, settings)?;
     let mut capture = Capture::start(stage)?;
     let traffic = Traffic::start(&routers)?;
@@ -76,8 +76,8 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<Watched, Failure> {
     capture.check()?;
     let arrivals = capture.arrivals();
     drop((traffic, capture, routers));
-    let bare = Bare::turn(stage, &FLOWS, false, watched(settings))?;
-    Ok(Watched { arrivals, counts, talked, windows, waited_ms_s, bare })
+    let bare = BareThreads::turn(stage, &FLOWS, false, watched(settings))?;
+    Ok(FlowTurns { arrivals, counts, talked, windows, waited_ms_s, bare })
 }
 
 /// Sleeps for so long; what the hypervisor took in each window of it, percent.
@@ -99,7 +99,7 @@ struct Measured {
     latencies_us: Vec<f64>,
 }
 
-fn measured(turns: &[Watched]) -> Result<Vec<Measured>, Failure> {
+fn measured(turns: &[FlowTurns]) -> Result<Vec<Measured>, Failure> {
     let installation = FLOWS.installation()?;
     let bounds = rohrpost_config::bounds(&installation);
     let of = |Declared { class: (class, name), .. }: &Declared| {
@@ -116,7 +116,7 @@ fn measured(turns: &[Watched]) -> Result<Vec<Measured>, Failure> {
     FLOWS.flows.iter().map(of).collect()
 }
 
-fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
+fn rows(turns: &[FlowTurns]) -> Result<Vec<Row>, Failure> {
     let mut late_us: Vec<f64> = turns.iter().flat_map(|turn| turn.bare.late_us.iter().copied()).collect();
     let wake_up_us = Summary::of(&mut late_us).and_then(|summary| summary.p999).unwrap_or_default();
     let mut rows = Vec::new();
@@ -158,12 +158,12 @@ fn rows(turns: &[Watched]) -> Result<Vec<Row>, Failure> {
 }
 
 /// Slots that threads which only wake up would have left out, beside nothing else, of each turn.
-fn bare_percent(turns: &[Watched]) -> Vec<f64> {
+fn bare_percent(turns: &[FlowTurns]) -> Vec<f64> {
     turns.iter().map(|turn| turn.bare.omitted_percent()).collect()
 }
 
 /// Windows of a second in which the hypervisor took something, and how much.
-fn steal_rows(turns: &[Watched]) -> Vec<Row> {
+fn steal_rows(turns: &[FlowTurns]) -> Vec<Row> {
     let windows: Vec<f64> = turns.iter().flat_map(|turn| turn.windows.iter().copied()).collect();
     let stolen_from: Vec<f64> = windows.iter().copied().filter(|percent| *percent > 0.0).collect();
     let share = stolen_from.len() as f64 * 100.0 / windows.len().max(1) as f64;

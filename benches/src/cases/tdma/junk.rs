@@ -11,7 +11,7 @@ use crate::cases::Case;
 use crate::harness::Failure;
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
-use crate::tdma::bare::Bare;
+use crate::tdma::bare::BareThreads;
 use crate::tdma::rights::Rights;
 use crate::tdma::stage::Stage;
 
@@ -20,12 +20,12 @@ const ROUNDS_MAX: usize = 3;
 const OF_NO_JUNK: [Goal; 1] = [Goal { name: "must 1.2", most: 1.2 }];
 
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    vec![Box::new(Junked)]
+    vec![Box::new(SlotJunk)]
 }
 
-struct Junked;
+struct SlotJunk;
 
-impl Case for Junked {
+impl Case for SlotJunk {
     fn name(&self) -> String {
         "slots, junk".into()
     }
@@ -38,7 +38,7 @@ impl Case for Junked {
         };
         let bare = |junk: bool| {
             let load = || junk.then(|| stage.junk(&PORTS)).transpose();
-            Bare::beside(&LOADED, load, watched(settings)).map(|bare| bare.omitted_percent())
+            BareThreads::beside(&LOADED, load, watched(settings)).map(|bare| bare.omitted_percent())
         };
         let (mut seen, mut floor) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
         for _ in 0..settings.rounds.min(ROUNDS_MAX) {

@@ -1,7 +1,7 @@
 //! How short a slot for 1400 B can be, and how much of its end must be kept free: tables by the shortest slots that `check` lets pass, and
 //! how far into the guard the latest frame began. A table that was not kept is none that can be had.
 
-use super::contest::{ALWAYS, Contest, Figure, Held, Watched};
+use super::contest::{ALWAYS, Contest, Figure, Held, WatchedContender};
 use super::goals::{Goal, NONE, figure};
 use super::observed::{Observed, RunConditions};
 use super::plans::{SHORT_PITCH, SHORTEST_PITCH, WIDE_GUARD};
@@ -32,7 +32,7 @@ impl Case for Pitch {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, plan| Watched {
+        let watched = |who, plan| WatchedContender {
             who,
             plan,
             way: RunConditions { rights: Rights::RealTime, loaded: true, junk: false },

@@ -1,6 +1,6 @@
 //! How far off their nominal beginning slots begin, with everything else at work, without, and with routers that the kernel denies real time.
 
-use super::contest::{ALWAYS, BARE, Contest, Figure, Held, ObservedRounds, Watched};
+use super::contest::{ALWAYS, BARE, Contest, Figure, Held, ObservedRounds, WatchedContender};
 use super::goals::{Goal, figure};
 use super::observed::{Observed, RunConditions};
 use super::plans::LOADED;
@@ -9,7 +9,7 @@ use crate::harness::Failure;
 use crate::rounds::{Row, Target, Versus};
 use crate::settings::Settings;
 use crate::statistics::Summary;
-use crate::tdma::bare::Bare;
+use crate::tdma::bare::BareThreads;
 use crate::tdma::rights::Rights;
 
 const fn bounds(p50: f64, p99: f64, p999: f64) -> Summary {
@@ -71,8 +71,11 @@ impl Case for Slots {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched =
-            |who, rights, loaded| Watched { who, plan: LOADED, way: RunConditions { rights, loaded, junk: false } };
+        let watched = |who, rights, loaded| WatchedContender {
+            who,
+            plan: LOADED,
+            way: RunConditions { rights, loaded, junk: false },
+        };
         let at_most = |p50: Option<f64>, p99: f64| (p50.map(Target::AtMost), Some(Target::AtMost(p99)));
         let versus = [
             (MUST.0, at_most(Some(1.0), 1.0)),
@@ -116,7 +119,7 @@ type Far = fn(&Observed) -> (u64, u64);
 const NOT_KEPT: &str = "left out or over 250 us off";
 
 /// What bare threads would have left out, by what is not kept without real time: no router is better.
-fn floor(bare: &Bare, ordinary: &Observed) -> f64 {
+fn floor(bare: &BareThreads, ordinary: &Observed) -> f64 {
     let (some, all) = not_kept(ordinary);
     bare.omitted_percent() / 100.0 * all.max(1) as f64 / some.max(1) as f64
 }

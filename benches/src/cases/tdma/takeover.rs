@@ -8,7 +8,7 @@ use crate::cases::Case;
 use crate::harness::{Failure, alone, rest};
 use crate::rounds::{Row, Subject};
 use crate::settings::Settings;
-use crate::tdma::bare::Bare;
+use crate::tdma::bare::BareThreads;
 use crate::tdma::capture::Capture;
 use crate::tdma::rights::Rights;
 use crate::tdma::routers::Routers;
@@ -105,7 +105,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
     found.without_sync.push(without_sync_percent(&frames, Duration::from_micros(LOADED.cycle_us), cycles));
     found.quiet_cycles += cycles;
     drop((traffic, capture, routers));
-    let bare = Bare::turn(stage, &LOADED, false, quiet)?;
+    let bare = BareThreads::turn(stage, &LOADED, false, quiet)?;
     found.standstills.push(bare.standstills as f64 * 1e5 / (cycles * f64::from(LOADED.masters)));
     Ok(())
 }

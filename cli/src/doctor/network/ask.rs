@@ -1,6 +1,6 @@
 //! Asks this computer how it is joined to the other nodes. Each peer is sent one empty datagram, which a router takes for nobody's.
 
-use crate::doctor::lan::{Lan, Peer, Port, PortState, Reach, Stamps};
+use crate::doctor::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use nix::errno::Errno;
 use nix::ifaddrs::getifaddrs;
 use nix::net::if_::InterfaceFlags;
@@ -21,7 +21,7 @@ const LOOK: Duration = Duration::from_millis(10);
 const ATF_COM: u32 = 0x2;
 
 /// What of the configuration's network this computer sees, as this node; none with one node only.
-pub(in crate::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> Option<Lan> {
+pub(in crate::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> Option<LanView> {
     let (network, address) = (installation.network?, node.address?);
     let is_here = UdpSocket::bind((address, 0)).is_ok();
     let ports = [Some(network.port), Some(network.time_port()), installation.rest_port()].into_iter().flatten();
@@ -37,7 +37,7 @@ pub(in crate::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> 
         })
         .collect();
     let (peers, stamps) = wait(probes);
-    Some(Lan {
+    Some(LanView {
         node: node.name.clone(),
         address,
         mtu: network.mtu,
@@ -161,7 +161,7 @@ fn is_neighbour(address: IpAddr) -> bool {
     text.lines().any(|line| complete(line).is_some())
 }
 
-fn wait(mut probes: Vec<Probe>) -> (Vec<Peer>, Stamps) {
+fn wait(mut probes: Vec<Probe>) -> (Vec<PeerNode>, Stamps) {
     let deadline = Instant::now() + PATIENCE;
     // All are looked at each time, not only up to the first that still waits.
     while probes.iter_mut().fold(false, |waits, probe| probe.look() | waits) && Instant::now() < deadline {
@@ -175,7 +175,7 @@ fn wait(mut probes: Vec<Probe>) -> (Vec<Peer>, Stamps) {
             Some(Err(error)) => Stamps::None(error.clone()),
         },
     };
-    let peer = |probe: Probe| Peer {
+    let peer = |probe: Probe| PeerNode {
         name: probe.name,
         address: probe.to,
         mtu: probe.mtu,

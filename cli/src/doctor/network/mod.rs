@@ -4,8 +4,8 @@ mod ask;
 
 pub(super) use ask::ask;
 
-use super::finding::{Finding, State};
-use super::lan::{Lan, Peer, Port, PortState, Reach, Stamps};
+use super::finding::{Finding, Grade};
+use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use super::machine::{Machine, Needs};
 
 /// What a router asks the kernel for, to hold what comes while nobody reads.
@@ -27,7 +27,7 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     findings
 }
 
-fn address(lan: &Lan, from: &str) -> Finding {
+fn address(lan: &LanView, from: &str) -> Finding {
     let (what, why) = ("node address", "other nodes send to it, and take nothing from any other");
     if lan.is_here {
         let device = lan.addresses.iter().find(|(_, address)| *address == lan.address);
@@ -37,7 +37,7 @@ fn address(lan: &Lan, from: &str) -> Finding {
     let others: Vec<String> = lan.addresses.iter().map(|(device, address)| format!("{address} ({device})")).collect();
     let others = if others.is_empty() { "none".into() } else { others.join(", ") };
     Finding::not(
-        State::Bad,
+        Grade::Bad,
         what,
         format!("{} is not one of this computer, which has {others}", lan.address),
         why,
@@ -49,7 +49,7 @@ fn address(lan: &Lan, from: &str) -> Finding {
     )
 }
 
-fn port(lan: &Lan, port: &Port, from: &str) -> Finding {
+fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
     let what = match lan.ports.iter().position(|known| known.number == port.number) {
         Some(0) => "port of packages",
         Some(1) => "port of time",
@@ -61,7 +61,7 @@ fn port(lan: &Lan, port: &Port, from: &str) -> Finding {
         PortState::Free => Finding::ok(what, format!("UDP {number}, free"), why),
         PortState::InUse if lan.runs => Finding::ok(what, format!("UDP {number}, this node's router has it"), why),
         PortState::InUse => Finding::not(
-            State::Bad,
+            Grade::Bad,
             what,
             format!("UDP {number}, another program has it"),
             why,
@@ -70,14 +70,14 @@ fn port(lan: &Lan, port: &Port, from: &str) -> Finding {
             ),
         ),
         PortState::Unknown => Finding::not(
-            State::Warn,
+            Grade::Warn,
             what,
             format!("UDP {number}, not tried"),
             why,
             "first the node's address, then this again",
         ),
         PortState::Refused(error) => Finding::not(
-            State::Bad,
+            Grade::Bad,
             what,
             format!("UDP {number}, refused: {error}"),
             why,
@@ -96,11 +96,11 @@ fn buffers(machine: &Machine) -> Option<Finding> {
     Some(if limit >= RECEIVE_BYTES_LEAST {
         Finding::ok(what, is, why)
     } else {
-        Finding::not(State::Warn, what, is, why, format!("sudo sysctl -w net.core.rmem_max={RECEIVE_BYTES}"))
+        Finding::not(Grade::Warn, what, is, why, format!("sudo sysctl -w net.core.rmem_max={RECEIVE_BYTES}"))
     })
 }
 
-fn stamps(lan: &Lan) -> Option<Finding> {
+fn stamps(lan: &LanView) -> Option<Finding> {
     let (what, why) = (
         "time stamps",
         "clocks of nodes are compared by when the kernel sent and received; else by when a thread came to run",
@@ -108,20 +108,20 @@ fn stamps(lan: &Lan) -> Option<Finding> {
     let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and software-receive";
     Some(match &lan.stamps {
         Stamps::Both => Finding::ok(what, "sending and receiving", why),
-        Stamps::NoSent => Finding::not(State::Warn, what, "receiving only", why, fix),
-        Stamps::None(error) => Finding::not(State::Warn, what, format!("none ({error})"), why, fix),
+        Stamps::NoSent => Finding::not(Grade::Warn, what, "receiving only", why, fix),
+        Stamps::None(error) => Finding::not(Grade::Warn, what, format!("none ({error})"), why, fix),
         Stamps::Unknown => return None,
     })
 }
 
-fn reach(peer: &Peer, lan: &Lan) -> Finding {
+fn reach(peer: &PeerNode, lan: &LanView) -> Finding {
     let (what, why) = ("peer", "each node's router sends to each other one");
     let node = format!("{} at {}", peer.name, peer.address);
     match &peer.reach {
         Reach::NoRouter => Finding::ok(what, format!("{node}: is there; no router runs on it yet"), why),
         Reach::Neighbour => Finding::ok(what, format!("{node}: is there"), why),
         Reach::Silent => Finding::not(
-            State::Warn,
+            Grade::Warn,
             what,
             format!("{node}: does not answer"),
             why,
@@ -133,7 +133,7 @@ fn reach(peer: &Peer, lan: &Lan) -> Finding {
             ),
         ),
         Reach::NoWay(error) => Finding::not(
-            State::Bad,
+            Grade::Bad,
             what,
             format!("{node}: {error}"),
             why,
@@ -142,14 +142,14 @@ fn reach(peer: &Peer, lan: &Lan) -> Finding {
     }
 }
 
-fn mtu(peer: &Peer, lan: &Lan, from: &str) -> Option<Finding> {
+fn mtu(peer: &PeerNode, lan: &LanView, from: &str) -> Option<Finding> {
     let (what, why) = ("packet size", "a datagram that does not fit on the way is lost, or refused by the kernel");
     let way = peer.mtu?;
     Some(if way >= lan.mtu.into() {
         Finding::ok(what, format!("{} B of the {way} B that go to {}", lan.mtu, peer.name), why)
     } else {
         Finding::not(
-            State::Bad,
+            Grade::Bad,
             what,
             format!("{} B, and only {way} B go to {}", lan.mtu, peer.name),
             why,

@@ -1,6 +1,6 @@
 //! What there is of certificates, for people, and for how long it holds.
 
-use super::{AUTHORITY, DAY, State, files, folder, holders, is_pair, state};
+use super::{AUTHORITY, DAY, HolderState, files, folder, holders, is_pair, state};
 use rcgen::date_time_ymd;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::realtime_ns;
@@ -50,24 +50,26 @@ pub(crate) fn lacking(installation: &Installation, node: &str) -> Vec<String> {
     for holder in holders(installation).filter(is_its) {
         let state = state(&folder, known.as_ref().ok(), &holder);
         // Without the authority nothing can be said of who has signed.
-        if state == State::Holds || (state == State::Unsigned && known.is_err()) {
+        if state == HolderState::Holds || (state == HolderState::Unsigned && known.is_err()) {
             continue;
         }
         let [certificate, secret] = files(&folder, &holder.file_name());
-        let is_at_fault = |file: &PathBuf| state != State::Missing || !file.exists();
+        let is_at_fault = |file: &PathBuf| state != HolderState::Missing || !file.exists();
         lines.extend([certificate, secret].into_iter().filter(is_at_fault).take(1).map(|file| line(&file, state)));
     }
     lines
 }
 
 /// One of the two files of a holder.
-fn line(file: &Path, state: State) -> String {
+fn line(file: &Path, state: HolderState) -> String {
     match state {
-        State::Holds => format!("{}: is there{}", file.display(), lasts(file, "keys rotate")),
-        State::Missing if file.exists() => format!("{}: is there without the other file; {MAKES}", file.display()),
-        State::Missing => format!("{}: is missing; {MAKES}", file.display()),
-        State::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
-        State::Unsigned => {
+        HolderState::Holds => format!("{}: is there{}", file.display(), lasts(file, "keys rotate")),
+        HolderState::Missing if file.exists() => {
+            format!("{}: is there without the other file; {MAKES}", file.display())
+        }
+        HolderState::Missing => format!("{}: is missing; {MAKES}", file.display()),
+        HolderState::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
+        HolderState::Unsigned => {
             format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
         }
     }

@@ -4,7 +4,7 @@
 
 mod robot;
 
-use super::app::{Action, App, Prompt, Screen};
+use super::app::{App, Prompt, Screen, ScreenAction};
 use super::columns::Column;
 use super::text;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
@@ -25,7 +25,7 @@ fn check(name: &str, screen: &str) {
 }
 
 /// Types keys, one a letter; `\n` is Enter, `\x1b` Esc, `\x08` Backspace, `v` and `^` the arrows.
-fn press(app: &mut App, robot: &Robot, keys: &str) -> Option<Action> {
+fn press(app: &mut App, robot: &Robot, keys: &str) -> Option<ScreenAction> {
     let code = |letter| match letter {
         '\n' => KeyCode::Enter,
         '\x1b' => KeyCode::Esc,
@@ -169,7 +169,11 @@ fn a_filter_is_typed_kept_taken_back_and_cleared() {
     assert_eq!(order(&app, &robot), ["motor.0"], "an alias counts");
     press(&mut app, &robot, "x\x08\n");
     assert_eq!((app.filter.as_str(), &app.prompt), ("odom", &Prompt::None));
-    assert_eq!(press(&mut app, &robot, "f"), Some(Action::Switch(robot.name("motor.0"), false)), "of those shown");
+    assert_eq!(
+        press(&mut app, &robot, "f"),
+        Some(ScreenAction::Switch(robot.name("motor.0"), false)),
+        "of those shown"
+    );
     press(&mut app, &robot, "/q\x1b");
     assert_eq!((app.filter.as_str(), order(&app, &robot).len()), ("odom", 1), "Esc takes back what was typed");
     press(&mut app, &robot, "/q\n");
@@ -184,24 +188,24 @@ fn keys_ask_for_what_they_say() {
     let (motor, pilot) = (robot.name("motor.0"), robot.name("pilot.0"));
     let mut app = App::new();
     press(&mut app, &robot, "v");
-    assert_eq!(press(&mut app, &robot, "o"), Some(Action::Switch(motor, true)));
-    assert_eq!(press(&mut app, &robot, "f"), Some(Action::Switch(motor, false)));
+    assert_eq!(press(&mut app, &robot, "o"), Some(ScreenAction::Switch(motor, true)));
+    assert_eq!(press(&mut app, &robot, "f"), Some(ScreenAction::Switch(motor, false)));
     press(&mut app, &robot, "\n");
     assert_eq!(app.screen, Screen::Details(motor));
-    assert_eq!(press(&mut app, &robot, "f"), Some(Action::Switch(motor, false)), "also among the details");
+    assert_eq!(press(&mut app, &robot, "f"), Some(ScreenAction::Switch(motor, false)), "also among the details");
     press(&mut app, &robot, "\x1bjj");
     assert_eq!(press(&mut app, &robot, "r"), None, "it asks first");
     assert_eq!(press(&mut app, &robot, "n"), None);
     assert_eq!(press(&mut app, &robot, "r\x1b"), None);
-    assert_eq!(press(&mut app, &robot, "ry"), Some(Action::Restart(pilot)));
+    assert_eq!(press(&mut app, &robot, "ry"), Some(ScreenAction::Restart(pilot)));
     for keys in ["q", "?q", "\nq"] {
-        assert_eq!(press(&mut App::new(), &robot, keys), Some(Action::Quit), "{keys:?}");
+        assert_eq!(press(&mut App::new(), &robot, keys), Some(ScreenAction::Quit), "{keys:?}");
     }
     let control_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
     for keys in ["", "/x", "r", "?"] {
         let mut app = App::new();
         press(&mut app, &robot, keys);
-        assert_eq!(app.key(control_c, &robot.model), Some(Action::Quit), "{keys:?}");
+        assert_eq!(app.key(control_c, &robot.model), Some(ScreenAction::Quit), "{keys:?}");
     }
     let control_o = KeyEvent::new(KeyCode::Char('o'), KeyModifiers::CONTROL);
     assert_eq!(App::new().key(control_o, &robot.model), None);

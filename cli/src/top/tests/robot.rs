@@ -1,7 +1,7 @@
 //! The demo's robot as two looks at it, a second apart, with numbers that are easy to follow.
 
 use super::super::details;
-use super::super::draw::{OutputText, View};
+use super::super::draw::{OutputText, ScreenModel};
 use super::super::model::{Model, Sample, TimeNow};
 use super::super::palette::Palette;
 use super::super::{app::App, output};
@@ -98,7 +98,7 @@ impl Robot {
             }
             _ => Vec::new(),
         };
-        let view = View {
+        let view = ScreenModel {
             model: &self.model,
             app,
             output: &self.output(app),

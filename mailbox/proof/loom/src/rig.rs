@@ -183,7 +183,7 @@ impl Sender<'_> {
         let slots = self.mailbox.slots();
         let mut claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full, self.last) {
             Ok(claim) => claim,
-            Err(NoSlot::OverflowPolicy) => return Sent::Refused,
+            Err(NoSlot::Full) => return Sent::Refused,
             Err(NoSlot::Retired) => return Sent::Retired,
         };
         let cell = &self.mailbox.bodies[claim.slot];

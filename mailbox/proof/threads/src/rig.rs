@@ -224,7 +224,7 @@ impl Sender {
         let (slots, counts) = (self.slots(), &self.mailbox.counts);
         let mut claim = match slots.claim(self.by, &mut self.cursor, Priority(priority), self.full, self.last) {
             Ok(claim) => claim,
-            Err(NoSlot::OverflowPolicy) => {
+            Err(NoSlot::Full) => {
                 add(&counts.refused);
                 return Sent::Refused;
             }

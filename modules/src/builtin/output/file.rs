@@ -1,6 +1,6 @@
 //! The collector's file. A line is one write, as soon as it comes: nothing is kept back that a killed collector could lose.
 
-use super::sink::{Change, Health};
+use super::sink::{SinkChange, SinkHealth};
 use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -20,7 +20,7 @@ pub(super) struct LogFile {
     open: Option<Open>,
     /// When it is looked at again.
     look_at: Option<Instant>,
-    health: Health,
+    health: SinkHealth,
 }
 
 struct Open {
@@ -34,7 +34,7 @@ impl LogFile {
     /// Opens a file, or begins one.
     pub(super) fn open(path: &Path, size_max: u64, kept: u32) -> io::Result<Self> {
         let open = Some(Open::at(path)?);
-        Ok(Self { path: path.to_owned(), size_max, kept, open, look_at: None, health: Health::default() })
+        Ok(Self { path: path.to_owned(), size_max, kept, open, look_at: None, health: SinkHealth::default() })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -42,7 +42,7 @@ impl LogFile {
     }
 
     /// Writes a line, which has no end yet. When there is no room it goes on without, and tries again every second.
-    pub(super) fn write(&mut self, line: &str, now: Instant) -> Option<Change> {
+    pub(super) fn write(&mut self, line: &str, now: Instant) -> Option<SinkChange> {
         let Self { path, size_max, kept, open, look_at, health } = self;
         if look_at.is_none_or(|at| now >= at) {
             *look_at = Some(now + LOOK);
@@ -189,7 +189,7 @@ mod tests {
         assert!(file.write("third", start + 2 * LOOK).is_none());
         assert_eq!(read(&path), "third\n");
 
-        // OverflowPolicy before it is noticed: what was put aside stays where it is.
+        // Full before it is noticed: what was put aside stays where it is.
         fs::remove_file(&path).unwrap();
         assert!(file.write("a line that fills the file", start + 2 * LOOK).is_none());
         assert_eq!(read(&path), "a line that fills the file\n");
@@ -205,14 +205,14 @@ mod tests {
         let mut file = LogFile::open(&path, 1000, 1).unwrap();
         let start = Instant::now();
         let second = Duration::from_secs(1);
-        let Some(Change::Fails(error)) = file.write("first", start) else { panic!("a full disk takes nothing") };
+        let Some(SinkChange::Fails(error)) = file.write("first", start) else { panic!("a full disk takes nothing") };
         assert_eq!(error.kind(), io::ErrorKind::StorageFull);
         assert!(file.write("second", start + second / 2).is_none(), "it is not tried");
         assert!(file.write("third", start + second).is_none(), "it is tried, and said already");
         // There is room again.
         fs::remove_file(&path).unwrap();
         assert!(file.write("fourth", start + second * 3 / 2).is_none());
-        let Some(Change::Works(missing)) = file.write("fifth", start + 2 * second) else { panic!("there is room") };
+        let Some(SinkChange::Works(missing)) = file.write("fifth", start + 2 * second) else { panic!("there is room") };
         assert_eq!((missing, read(&path).as_str()), (4, "fifth\n"));
         assert!(file.write("sixth", start + 2 * second).is_none());
         assert_eq!(read(&path), "fifth\nsixth\n");

@@ -3,7 +3,7 @@
 //! A line is one datagram of fields. The socket never blocks: a journal that hangs costs its own lines, not ours. The crates
 //! that speak this protocol bring a logger of their own, or cryptography for other things systemd does.
 
-use super::sink::{Change, Health};
+use super::sink::{SinkChange, SinkHealth};
 use crate::common::OutputLevel;
 use crate::output::OutputLine;
 use rohrpost_config::Installation;
@@ -19,17 +19,17 @@ pub(super) struct Journal {
     socket: UnixDatagram,
     path: PathBuf,
     datagram: Vec<u8>,
-    health: Health,
+    health: SinkHealth,
 }
 
 impl Journal {
     pub(super) fn new(path: &Path) -> io::Result<Self> {
         let socket = UnixDatagram::unbound()?;
         socket.set_nonblocking(true)?;
-        Ok(Self { socket, path: path.to_owned(), datagram: Vec::with_capacity(1024), health: Health::default() })
+        Ok(Self { socket, path: path.to_owned(), datagram: Vec::with_capacity(1024), health: SinkHealth::default() })
     }
 
-    pub(super) fn write(&mut self, line: &OutputLine, installation: &Installation, now: Instant) -> Option<Change> {
+    pub(super) fn write(&mut self, line: &OutputLine, installation: &Installation, now: Instant) -> Option<SinkChange> {
         let Self { socket, path, datagram, health } = self;
         health.put(now, || {
             datagram.clear();
@@ -177,23 +177,23 @@ optional = true
             second += 1;
             journal.write(&line(OutputLevel::Info, "x"), &installation, start + second * Duration::from_secs(1))
         };
-        assert!(matches!(write(), Some(Change::Fails(_))), "nobody listens");
+        assert!(matches!(write(), Some(SinkChange::Fails(_))), "nobody listens");
         assert!(write().is_none(), "said once");
 
         let hangs = UnixDatagram::bind(&path).unwrap();
-        assert!(matches!(write(), Some(Change::Works(2))));
+        assert!(matches!(write(), Some(SinkChange::Works(2))));
         // It reads nothing: its queue is full at some time, and the writer still returns.
         let full = (0..100_000).find_map(|_| write());
-        let Some(Change::Fails(error)) = full else { panic!("a queue without end: {full:?}") };
+        let Some(SinkChange::Fails(error)) = full else { panic!("a queue without end: {full:?}") };
         assert_eq!(error.kind(), io::ErrorKind::WouldBlock);
         read(&hangs);
-        assert!(matches!(write(), Some(Change::Works(1))), "it reads again");
+        assert!(matches!(write(), Some(SinkChange::Works(1))), "it reads again");
         drop(hangs);
 
         std::fs::remove_file(&path).unwrap();
-        assert!(matches!(write(), Some(Change::Fails(_))), "it was ended");
+        assert!(matches!(write(), Some(SinkChange::Fails(_))), "it was ended");
         let again = UnixDatagram::bind(&path).unwrap();
-        assert!(matches!(write(), Some(Change::Works(1))), "and started again");
+        assert!(matches!(write(), Some(SinkChange::Works(1))), "and started again");
         assert_eq!(read(&again)["MESSAGE"], "x");
     }
 }

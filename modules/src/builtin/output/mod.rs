@@ -18,7 +18,7 @@ use ring::Ring;
 use rohrpost_config::{LineFormat, Output, Principal};
 use rohrpost_mailbox::{Shape, monotonic_ns};
 use serde::Deserialize;
-use sink::Change;
+use sink::SinkChange;
 use std::path::Path;
 use std::time::Instant;
 
@@ -110,12 +110,12 @@ impl OutputModule {
 }
 
 /// What the collector says itself comes to its own mailbox as a line like any other.
-fn tell(change: Option<Change>, what: &dyn std::fmt::Display) {
+fn tell(change: Option<SinkChange>, what: &dyn std::fmt::Display) {
     match change {
-        Some(Change::Fails(error)) => {
+        Some(SinkChange::Fails(error)) => {
             tracing::error!("{what} takes no lines: {error}; goes on without, and tries again every second");
         }
-        Some(Change::Works(missing)) => tracing::warn!("{what} takes lines again; {missing} are missing there"),
+        Some(SinkChange::Works(missing)) => tracing::warn!("{what} takes lines again; {missing} are missing there"),
         None => {}
     }
 }

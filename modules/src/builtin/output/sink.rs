@@ -8,7 +8,7 @@ const RETRY: Duration = Duration::from_secs(1);
 
 /// A change that somebody should be told of.
 #[derive(Debug)]
-pub(super) enum Change {
+pub(super) enum SinkChange {
     /// From now on lines are missing there.
     Fails(io::Error),
     /// It works again; so many lines are missing.
@@ -17,15 +17,15 @@ pub(super) enum Change {
 
 /// Whether a sink works.
 #[derive(Default)]
-pub(super) struct Health {
+pub(super) struct SinkHealth {
     /// None while it works.
     retry_at: Option<Instant>,
     missing: u64,
 }
 
-impl Health {
+impl SinkHealth {
     /// Tries to put a line there, unless that failed a moment ago.
-    pub(super) fn put(&mut self, now: Instant, put: impl FnOnce() -> io::Result<()>) -> Option<Change> {
+    pub(super) fn put(&mut self, now: Instant, put: impl FnOnce() -> io::Result<()>) -> Option<SinkChange> {
         if self.retry_at.is_some_and(|at| now < at) {
             self.missing += 1;
             return None;
@@ -33,12 +33,12 @@ impl Health {
         match put() {
             Ok(()) => {
                 self.retry_at.take()?;
-                Some(Change::Works(std::mem::take(&mut self.missing)))
+                Some(SinkChange::Works(std::mem::take(&mut self.missing)))
             }
             Err(error) => {
                 self.missing += 1;
                 let failed_before = self.retry_at.replace(now + RETRY).is_some();
-                (!failed_before).then_some(Change::Fails(error))
+                (!failed_before).then_some(SinkChange::Fails(error))
             }
         }
     }

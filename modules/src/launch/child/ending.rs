@@ -19,7 +19,7 @@ pub(in crate::launch) enum Then {
 }
 
 /// A process on its way to its end.
-pub(super) struct Ending {
+pub(super) struct ChildShutdown {
     then: Then,
     /// When it was told.
     since: Instant,
@@ -29,7 +29,7 @@ pub(super) struct Ending {
     left_behind: bool,
 }
 
-impl Ending {
+impl ChildShutdown {
     /// When there is something to do about it, if it has not ended by then.
     pub(super) fn press_at(&self, stop_within: Duration) -> Option<Instant> {
         match self.killed {
@@ -41,7 +41,7 @@ impl Ending {
 }
 
 impl Child {
-    pub(super) fn ended_as_told(&mut self, ending: &Ending, how: &str, now: Instant) -> Option<String> {
+    pub(super) fn ended_as_told(&mut self, ending: &ChildShutdown, how: &str, now: Instant) -> Option<String> {
         let obeyed = if ending.killed.is_some() { "since it did not stop when told to" } else { "when told to" };
         self.last_end = format!("{how} {obeyed}");
         match ending.then {
@@ -79,7 +79,7 @@ impl Child {
         if self.process.is_some() || self.over.is_some() {
             self.kill(Signal::SIGTERM);
             self.phase = Phase::Stopping;
-            self.ending = Some(Ending { then, since: now, killed: None, left_behind: false });
+            self.ending = Some(ChildShutdown { then, since: now, killed: None, left_behind: false });
         } else if then == Then::Start {
             (self.phase, self.since) = (Phase::Waiting, now);
         } else if !self.phase.is_over() {

@@ -28,7 +28,7 @@ impl TileIndex {
 }
 
 /// What an update did to a square's log-odds.
-pub(super) struct Change {
+pub(super) struct TileChange {
     /// None: seen for the first time.
     pub(super) before: Option<i16>,
     pub(super) after: i16,
@@ -49,7 +49,7 @@ impl Tile {
     }
 
     /// Adds to a square's log-odds, unless this scan did so before.
-    pub(super) fn update(&mut self, column: i64, row: i64, odds: i16, bound: i16, scan: u16) -> Option<Change> {
+    pub(super) fn update(&mut self, column: i64, row: i64, odds: i16, bound: i16, scan: u16) -> Option<TileChange> {
         let cell = cell(column, row);
         if self.touched[cell] == scan {
             return None;
@@ -63,7 +63,7 @@ impl Tile {
         }
         self.odds[cell] = after;
         self.changed = true;
-        Some(Change { before, after })
+        Some(TileChange { before, after })
     }
 
     pub(super) fn percent(&self, column: i64, row: i64) -> Option<u8> {

@@ -109,7 +109,7 @@ pub enum Reason {
     /// Another digest of what must be equal inside a system.
     System = 3,
     /// It has as many clients as it takes.
-    OverflowPolicy = 4,
+    Full = 4,
     /// A later connection of the same client is there.
     Replaced = 5,
     /// It sent what is no frame, or no frame for then.
@@ -129,7 +129,7 @@ impl Reason {
         Self::Version,
         Self::Common,
         Self::System,
-        Self::OverflowPolicy,
+        Self::Full,
         Self::Replaced,
         Self::Damaged,
         Self::Silent,
@@ -144,7 +144,7 @@ impl Reason {
             Self::Version => "version",
             Self::Common => "common-digest",
             Self::System => "system-digest",
-            Self::OverflowPolicy => "full",
+            Self::Full => "full",
             Self::Replaced => "replaced",
             Self::Damaged => "damaged",
             Self::Silent => "silent",
@@ -210,10 +210,10 @@ impl std::fmt::Display for Refusal<'_> {
                 "the system's digest here is {yours:016x}, that of {text} {ours:016x}; start all of a system from the same file \
                  (`rohrpost check`, on both)"
             ),
-            Reason::OverflowPolicy if text.is_empty() => {
+            Reason::Full if text.is_empty() => {
                 write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some")
             }
-            Reason::OverflowPolicy => {
+            Reason::Full => {
                 write!(f, "the TCP router has as many clients as it takes, and {text}; raise `clients`, or end some")
             }
             Reason::Replaced if text.is_empty() => write!(f, "a later connection of this client has taken its place"),

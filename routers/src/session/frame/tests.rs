@@ -92,7 +92,7 @@ fn refusals_say_what_differs_and_what_to_do() {
         (Reason::Version, ["format 7", "same version"]),
         (Reason::Common, ["00000000000000aa", "00000000000000bb"]),
         (Reason::System, ["00000000000000aa", "node arm 00000000000000bb"]),
-        (Reason::OverflowPolicy, ["as many clients", "`clients`"]),
+        (Reason::Full, ["as many clients", "`clients`"]),
         (Reason::Damaged, ["could not read", "node arm"]),
     ] {
         let said = refusal(reason);

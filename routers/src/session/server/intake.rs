@@ -85,7 +85,7 @@ impl Server {
             self.refuse(now_ns, older, Reason::Replaced, (0, 0), "", host);
         }
         if !self.take_in(now_ns, client, hello, host) {
-            return self.refuse(now_ns, client, Reason::OverflowPolicy, (0, 0), "", host);
+            return self.refuse(now_ns, client, Reason::Full, (0, 0), "", host);
         }
         if let Some(member) = self.member(client) {
             host.event(Event::Joined { name: &member.name });

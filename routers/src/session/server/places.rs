@@ -123,7 +123,7 @@ impl Server {
             let Some(newest) = self.gives_way_to(&whose) else { return false };
             self.places.crowded.clients += 1;
             let text = "who has most connections gives way to who has fewer";
-            self.refuse(now_ns, newest, Reason::OverflowPolicy, (0, 0), text, host);
+            self.refuse(now_ns, newest, Reason::Full, (0, 0), text, host);
         }
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return false };
         self.places.greets_no_more(client, member);

@@ -291,7 +291,7 @@ fn what_waits_is_bounded_and_the_least_important_gives_way() {
         }
     };
     send(&mut ground, 40, 500);
-    let full = |ground: &Ground, class: u8| ground.server.counts().class(Priority(class)).lost(Cause::OverflowPolicy);
+    let full = |ground: &Ground, class: u8| ground.server.counts().class(Priority(class)).lost(Cause::Full);
     assert!(full(&ground, 40) > 300);
     let before = full(&ground, 40);
     send(&mut ground, 200, 20);

@@ -140,7 +140,7 @@ fn check_flood() {
         world.run(3 * S);
         assert_eq!(world.oracle.problems, [""; 0], "seed {seed}");
         let flooder = world.plan.flooder.unwrap();
-        let lost = world.server.counts().lost_for(Cause::OverflowPolicy) + world.server.counts().lost_for(Cause::Share);
+        let lost = world.server.counts().lost_for(Cause::Full) + world.server.counts().lost_for(Cause::Share);
         assert!(lost > 1000, "seed {seed}: {lost} lost of what was too much");
         // What goes to all systems nobody says to be lost.
         let is_one = |package: &&oracle::Posted| package.head.to.system() != ALL_SYSTEMS;

@@ -160,7 +160,7 @@ fn of_more_states_than_have_hints_the_newest_goes_last() {
     assert!(end.log.replaced.len() > 400, "{} of 500", end.log.replaced.len());
     for id in 0..250 {
         let of_id = left.iter().filter(|(left, _)| *left == id).map(|(_, value)| *value);
-        let is_full = end.log.lost.contains(&(id, Cause::OverflowPolicy));
+        let is_full = end.log.lost.contains(&(id, Cause::Full));
         assert!(of_id.clone().is_sorted() && (is_full || of_id.max() == Some(2)), "{id}");
     }
 }

@@ -131,7 +131,7 @@ impl Answers for Teller<'_> {
         self.oracle.saw(why.word());
         let package = &mut self.oracle.packages[number];
         // What goes to all systems each of them answers for itself.
-        let is_lack = matches!(why, Cause::OverflowPolicy | Cause::Share | Cause::Stale);
+        let is_lack = matches!(why, Cause::Full | Cause::Share | Cause::Stale);
         if is_lack && self.oracle.flooder.is_some_and(|flooder| flooder != package.from) {
             self.oracle.problems.push(format!(
                 "{number} of client {} is lost by another's flood: {}",

@@ -64,24 +64,20 @@ fn check_memory_of_a_queue() {
         send(&mut ground, 0, 2, 250, data, 1000);
         write(&mut ground, robot, 0);
     }
-    let full = lost(&ground, 250, Cause::OverflowPolicy);
+    let full = lost(&ground, 250, Cause::Full);
     assert!(full > 20, "{full}");
     for _ in 0..20 {
         send(&mut ground, 1, 2, 60, Type::command(16), 100);
         send(&mut ground, 0, 2, 250, data, 1000);
         write(&mut ground, robot, 0);
     }
-    assert_eq!(
-        (lost(&ground, 60, Cause::OverflowPolicy), lost(&ground, 60, Cause::Share)),
-        (0, 0),
-        "the operator's commands"
-    );
+    assert_eq!((lost(&ground, 60, Cause::Full), lost(&ground, 60, Cause::Share)), (0, 0), "the operator's commands");
     assert!(lost(&ground, 250, Cause::Share) > 5, "the flood gives way to them: {}", lost(&ground, 250, Cause::Share));
     let lost_of = |end: usize| {
         let place = ground.ends[end].1.unwrap();
         ground.server.views().find(|view| view.index == place).unwrap().lost
     };
-    let all = ground.server.counts().lost_for(Cause::OverflowPolicy) + ground.server.counts().lost_for(Cause::Share);
+    let all = ground.server.counts().lost_for(Cause::Full) + ground.server.counts().lost_for(Cause::Share);
     assert_eq!((lost_of(0), lost_of(1)), (all, 0), "counted as whose it was");
 }
 
@@ -203,7 +199,7 @@ fn check_connections_of_one() {
     assert!(joins(&mut ground, 21, 6).is_some(), "the last that has more than one gives way");
     assert_eq!(joins(&mut ground, 22, 7), None, "all have one");
     assert_eq!(ground.server.crowded().clients, 6, "{:?}", ground.server.crowded());
-    let told = ground.said.events.iter().filter(|event| event.contains("Left") && event.contains("OverflowPolicy"));
+    let told = ground.said.events.iter().filter(|event| event.contains("Left") && event.contains("Full"));
     assert_eq!(told.count(), 5);
 }
 

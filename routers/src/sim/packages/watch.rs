@@ -70,7 +70,7 @@ impl Deliver for Watch<'_, '_> {
         io.line(|| format!("delivers {number} from {from}: {taken:?}"));
         taken.map_err(|closed| match closed {
             Closed::Absent => NotDelivered::NoMailbox,
-            Closed::OverflowPolicy => NotDelivered::MailboxFull,
+            Closed::Full => NotDelivered::MailboxFull,
         })?;
         io.oracle.saw("delivered");
         if self.came.is_some_and(|came| io.now.monotonic_ns.saturating_sub(came.at_ns) > SOCKET_MAX_NS) {

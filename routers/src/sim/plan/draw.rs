@@ -90,7 +90,7 @@ impl Plan {
             6 => Fault::Split { side: chance.bits() },
             7..9 => Fault::Bad { from: node, to, quality: bad(chance) },
             9 => Fault::Absent { node, module },
-            10 => Fault::OverflowPolicy { node, module },
+            10 => Fault::Full { node, module },
             11..13 => Fault::ModuleRestart { node, module },
             13 | 14 => Fault::Step { node, by_ns: chance.around(5 * S as i64) },
             15 => Fault::Foreign { to, count: chance.scale(1, 200) },

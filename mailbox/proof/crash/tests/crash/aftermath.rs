@@ -62,7 +62,7 @@ pub(crate) fn all_usable(ground: &Ground, mut receiver: Receiver) {
     for id in ids.clone() {
         send(&mut sender, LOW, id).unwrap();
     }
-    assert!(matches!(send(&mut sender, LOW, 1), Err(SendError::OverflowPolicy(MAILBOX))));
+    assert!(matches!(send(&mut sender, LOW, 1), Err(SendError::Full(MAILBOX))));
     for id in ids {
         let package = receiver.receive_timeout(Duration::from_secs(20)).unwrap();
         assert_eq!(package.body()[..4], id.to_le_bytes());
