@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   network/graph            nodes on a circle; on each link, in each direction, how it is: state, packages a second, lost
-//!   network/packages/A → B   packages a second        network/lost/A → B    packages lost on the wire so far
+//!   network/packages/A → B   packages a second        network/counters/…    what each node counts of its peers
 //!   network/clock/NODE       error bound, µs          network/offset/NODE   offset at the last exchange, µs
 //!   network/latency/…        by class and hop, µs: until the router has it, until it is delivered, until it is taken
 //! ```
@@ -17,7 +17,7 @@ use rerun::blueprint::{ContainerLike, GraphView, Horizontal, TimeSeriesView, Ver
 use rerun::{AsComponents, GraphEdges, GraphNodes, Scalars, SerializedComponentBatch};
 use rohrpost::Class;
 use rohrpost::interfaces::{ClockState, LinkState, Links, PeerLink};
-use rohrpost::schema::{DataItem, Description};
+use rohrpost::schema::{DataItem, Description, counters};
 use rohrpost_config::Installation;
 use std::collections::{BTreeMap, HashMap};
 use std::f32::consts::TAU;
@@ -38,7 +38,7 @@ pub(crate) fn tab() -> Tab {
             |name: &str, origin: &str| -> ContainerLike { TimeSeriesView::new(name).with_origin(origin).into() };
         let charts = Vertical::new([
             chart("Packages per second, by link", "network/packages"),
-            chart("Lost on the wire since start", "network/lost"),
+            chart("Counted of links since start", "network/counters"),
             chart("Clock error bound, µs", "network/clock"),
             chart("Waits by class and hop, µs: 99 of 100", "network/latency"),
         ]);
@@ -75,8 +75,10 @@ impl View for Network {
             let name = format!("{} → {}", links.node, peer.node);
             let per_s = self.rates.get(&(links.node.clone(), peer.node.clone())).copied().unwrap_or(0.0);
             scene.curve(&["network", "packages", &name], per_s);
-            // Who receives knows what is missing; it is drawn as the loss of the way to it.
-            scene.curve(&["network", "lost", &format!("{} → {}", peer.node, links.node)], peer.lost as f64);
+            for (counter, count) in counters(&peer.counters) {
+                let name = format!("{}, of {}", links.node, peer.node);
+                scene.curve(&["network", "counters", &counter.name, &name], count as f64);
+            }
         }
         for class in &links.classes {
             let Some(age) = class.age else { continue };
@@ -193,7 +195,7 @@ fn words(peer: &PeerLink, per_s: f64) -> String {
         LinkState::Unheard => "does not hear, ",
         LinkState::Refused => "refused, ",
     };
-    format!("{state}{per_s:.0}/s, {} lost", peer.missed)
+    format!("{state}{per_s:.0}/s, {} lost", peer.counters.missed)
 }
 
 fn colour(state: LinkState) -> palette::Rgb {
@@ -251,11 +253,11 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost::interfaces::Carried;
+    use rohrpost::interfaces::{Carried, LinkCounters};
 
     fn links(node: &str, peer: &str, uptime_ms: u64, packages: u64) -> Links {
-        let sent = Carried { packages, datagrams: packages, bytes: 0, parts: 0 };
-        let received = Carried { packages: 0, datagrams: 0, bytes: 0, parts: 0 };
+        let sent = Carried { packages, datagrams: packages, bytes: 0, fragments: 0 };
+        let received = Carried { packages: 0, datagrams: 0, bytes: 0, fragments: 0 };
         let peer = PeerLink {
             node: peer.into(),
             address: "127.0.0.1".into(),
@@ -264,14 +266,7 @@ mod tests {
             heard_ms: Some(1),
             sent,
             received,
-            unsent: 0,
-            lost: 3,
-            missed: 4,
-            copies: 0,
-            damaged: 0,
-            refused: 0,
-            overtaken: 0,
-            restarts: 0,
+            counters: LinkCounters { lost: 3, missed: 4, ..LinkCounters::default() },
         };
         Links {
             node: node.into(),

@@ -4,11 +4,12 @@
 //! data have one id, so the newer replaces the older; commands each have their own, so none is ever replaced: whoever
 //! called waits for the answer.
 
+use crate::full::OverflowPolicy;
 use crate::layout::Shape;
 use crate::name::Name;
 use crate::package::Type;
 use crate::sender::Label;
-use crate::slots::{OverflowPolicy, Posted, Slots};
+use crate::slots::{Posted, Slots};
 
 /// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word says.
 pub(crate) struct Posts {

@@ -61,7 +61,7 @@
 //! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes on with (H)
-//! and (I); `traffic` and `system_time` have letters of their own.
+//! and (I); `cell` has letters of its own.
 //!
 //! ```
 //! use rohrpost_mailbox::{Label, Name, Node, Participant, Priority, Shape, Type};
@@ -81,12 +81,15 @@
 
 mod about;
 mod bell;
+mod causes;
+mod cell;
 mod clock;
 mod counters;
 mod doorbell;
 mod entry;
 mod files;
 mod flows;
+mod full;
 mod hot;
 mod inspect;
 mod latest;
@@ -112,6 +115,7 @@ pub mod step;
 mod sync;
 pub mod sys;
 mod system_time;
+mod throttle;
 mod traffic;
 mod unlink;
 mod waiting;
@@ -119,10 +123,12 @@ mod watch;
 mod word;
 mod work;
 
+pub use cell::SeqCount;
 pub use clock::{monotonic_ns, realtime_ns, slept_ns, unslewed_ns};
 pub use counters::{ClassTraffic, LATENCY_BUCKETS, Latency, Loss, saturating_sum};
 pub use entry::{ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 pub use flows::{FlowInfo, FlowSecond, Publications};
+pub use full::OverflowPolicy;
 pub use inspect::{InspectError, MailboxDetail, MailboxInfo, Party, SlotInfo, VictimInfo, WaitingPackage};
 pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
@@ -133,8 +139,9 @@ pub use receiver::{Package, Receiver};
 pub use registry::CreateError;
 pub use routes::ROUTES_MAX;
 pub use sender::{Label, Loan, SendError, Sender};
-pub use slots::{OverflowPolicy, SLOTS_MAX};
+pub use slots::SLOTS_MAX;
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
+pub use throttle::Throttle;
 pub use waiting::{Waiting, wait_above, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};
 pub use work::{InHand, Work};

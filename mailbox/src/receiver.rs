@@ -77,7 +77,8 @@ impl Receiver {
     }
 
     pub(crate) fn hand_out(&self, in_hand: TakenPackage) -> Package<'_> {
-        Package { segment: &self.segment, queue: &self.queue, in_hand }
+        let TakenPackage { taken, head, published_ns } = in_hand;
+        Package { segment: &self.segment, queue: &self.queue, taken: Some(taken), head, published_ns }
     }
 
     /// Lays these words beside the mailbox, in place of what an earlier owner said.
@@ -100,7 +101,7 @@ impl Receiver {
         self.queue.rescan(&slots);
         let mut lost = 0;
         while let Some(taken) = self.queue.take(&slots) {
-            self.segment.page().counters.lost(taken.word.priority(), Loss::Closed, 1);
+            self.segment.page().counters.lost(taken.word().priority(), Loss::Closed, 1);
             slots.release(taken);
             lost += 1;
         }
@@ -118,17 +119,16 @@ impl Receiver {
             if depth > depth_max.load(Ordering::Relaxed) {
                 depth_max.store(depth, Ordering::Relaxed);
             }
-            // SAFETY: just taken, and freed only below or by its guard.
-            let (published_ns, mut head) = unsafe { self.segment.read_head(taken.slot) };
+            let (published_ns, mut head) = self.segment.read_head(&taken);
             let waited_ns = monotonic_ns().saturating_sub(published_ns);
             if waited_ns <= self.max_age_ns {
-                self.segment.page().counters.received(taken.word.priority(), waited_ns, head.len.into());
-                if taken.word.is_redelivered() {
+                self.segment.page().counters.received(taken.word().priority(), waited_ns, head.len.into());
+                if taken.word().is_redelivered() {
                     head.options = head.options.with(Options::REDELIVERED);
                 }
                 return Some(TakenPackage { taken, head, published_ns });
             }
-            self.segment.page().counters.lost(taken.word.priority(), Loss::Stale, 1);
+            self.segment.page().counters.lost(taken.word().priority(), Loss::Stale, 1);
             slots.release(taken);
         }
     }
@@ -226,19 +226,21 @@ pub(crate) struct TakenPackage {
 pub struct Package<'a> {
     segment: &'a Segment,
     queue: &'a Queue,
-    in_hand: TakenPackage,
+    /// None once it is released, which dropping does.
+    taken: Option<Taken>,
+    head: Head,
+    published_ns: u64,
 }
 
 impl Package<'_> {
     /// Its head; the option `redelivered` tells that an earlier receiver died with it in hand.
     pub fn head(&self) -> &Head {
-        &self.in_hand.head
+        &self.head
     }
 
     /// Its body.
     pub fn body(&self) -> &[u8] {
-        // SAFETY: taken, and freed only when `self` drops.
-        unsafe { self.segment.body(self.in_hand.taken.slot, self.in_hand.head.len) }
+        self.taken.as_ref().map_or(&[], |taken| self.segment.body(taken, self.head.len))
     }
 
     /// Whether others seem to wait behind it, as far as can be seen without looking at their slots.
@@ -248,12 +250,14 @@ impl Package<'_> {
 
     /// When it was published, on the monotonic clock.
     pub fn published_ns(&self) -> u64 {
-        self.in_hand.published_ns
+        self.published_ns
     }
 }
 
 impl Drop for Package<'_> {
     fn drop(&mut self) {
-        self.segment.slots().release(self.in_hand.taken);
+        if let Some(taken) = self.taken.take() {
+            self.segment.slots().release(taken);
+        }
     }
 }

@@ -195,7 +195,7 @@ fn retire(old: &Segment) {
     let mut queue = Queue::new(slots.count());
     queue.rescan(&slots);
     while let Some(taken) = queue.take(&slots) {
-        old.page().counters.lost(taken.word.priority(), Loss::Closed, 1);
+        old.page().counters.lost(taken.word().priority(), Loss::Closed, 1);
         slots.release(taken);
     }
     slots.settle(|victim| old.page().counters.gave_way(victim));

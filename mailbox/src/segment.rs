@@ -7,16 +7,22 @@ use crate::mapped;
 use crate::memory::{Mapping, Use};
 use crate::name::Name;
 use crate::package::{HEAD_BYTES, Head};
-use crate::slots::{Bodies, Slots};
+use crate::slots::{Bodies, Claim, Slots, Taken};
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Numbers the segments of this process; none comes twice.
+static NEXT: AtomicU64 = AtomicU64::new(0);
 
 /// A mailbox's memory. What it is was checked when it was mapped and is not read again.
 pub(crate) struct Segment {
     mapping: Mapping,
+    /// No other segment of this process has this number, also no other of the same file.
+    number: u64,
     pub(crate) name: Name,
     pub(crate) shape: Shape,
     /// What the shape says, worked out once.
@@ -83,7 +89,8 @@ impl Segment {
 
     fn new(mapping: Mapping, name: Name, shape: Shape) -> Self {
         let (word_stride, slots_offset, slot_bytes) = (shape.word_stride(), shape.slots_offset(), shape.slot_bytes());
-        Self { mapping, name, shape, word_stride, slots_offset, slot_bytes }
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        Self { mapping, number, name, shape, word_stride, slots_offset, slot_bytes }
     }
 
     /// What a file says that it is. Read, not mapped: a map costs more than all of the rest.
@@ -114,39 +121,34 @@ impl Segment {
     pub(crate) fn slots(&self) -> Slots<'_> {
         let slots = usize::from(self.shape.slots);
         let words = self.mapping.slice(crate::layout::PAGE, slots * self.word_stride);
-        let bodies = Bodies { first: self.mapping.bytes_at(self.slots_offset, 0).as_ptr(), bytes: self.slot_bytes };
+        let first = self.mapping.bytes_at(self.slots_offset, 0).as_ptr();
+        let bodies = Bodies { first, bytes: self.slot_bytes, segment: self.number };
         Slots::new(&self.page().hot, words, self.word_stride, slots, bodies)
     }
 
+    /// A slot that this process has claimed or taken.
+    ///
+    /// # Panics
+    /// If it is a slot of another segment.
     #[inline]
-    fn slot(&self, slot: usize) -> NonNull<u8> {
-        assert!(slot < usize::from(self.shape.slots));
+    fn slot(&self, slot: usize, segment: u64) -> NonNull<u8> {
+        assert!(segment == self.number && slot < usize::from(self.shape.slots));
         self.mapping.bytes_at(self.slots_offset + slot * self.slot_bytes, self.slot_bytes)
     }
 
-    /// The body of a slot, to write.
-    ///
-    /// # Safety
-    /// The caller holds the claim on this slot, and nothing else of this process reaches its bytes while the result lives.
-    #[expect(clippy::mut_from_ref, reason = "exclusive by the claim, not by the borrow")]
-    pub(crate) unsafe fn body_mut(&self, slot: usize) -> &mut [u8] {
-        // SAFETY: `slot` gives room for prefix and body; the claim makes it ours alone (see `slots`); the borrow keeps the map.
-        unsafe {
-            std::slice::from_raw_parts_mut(
-                self.slot(slot).add(SLOT_PREFIX).as_ptr(),
-                usize::from(self.shape.body_bytes_max),
-            )
-        }
+    /// The body of a claimed slot, to write.
+    pub(crate) fn body_mut<'a>(&'a self, claim: &'a mut Claim) -> &'a mut [u8] {
+        let (slot, len) = (self.slot(claim.slot(), claim.segment()), usize::from(self.shape.body_bytes_max));
+        // SAFETY: `slot` gives room for prefix and body, and the borrow of `self` keeps the map. The claim is of this segment
+        // (`slot`), the only one of its slot (see `slots`), and borrowed: nothing else reaches these bytes.
+        unsafe { std::slice::from_raw_parts_mut(slot.add(SLOT_PREFIX).as_ptr(), len) }
     }
 
-    /// Writes a slot's prefix: the time (which is the result) and the head.
-    ///
-    /// # Safety
-    /// As for [`Segment::body_mut`].
+    /// Writes the prefix of a claimed slot: the time (which is the result) and the head.
     #[inline]
-    pub(crate) unsafe fn write_head(&self, slot: usize, head: &Head) -> u64 {
-        let (prefix, now_ns) = (self.slot(slot), monotonic_ns());
-        // SAFETY: inside the slot and aligned (slots start at multiples of 64); the claim makes it ours alone.
+    pub(crate) fn write_head(&self, claim: &mut Claim, head: &Head) -> u64 {
+        let (prefix, now_ns) = (self.slot(claim.slot(), claim.segment()), monotonic_ns());
+        // SAFETY: inside the slot and aligned (slots start at multiples of 64); exclusive as in `body_mut`.
         unsafe {
             prefix.cast::<u64>().write(now_ns);
             prefix.add(8).cast::<[u8; HEAD_BYTES]>().write(head.to_bytes());
@@ -154,14 +156,11 @@ impl Segment {
         now_ns
     }
 
-    /// When a slot's package was published (monotonic ns), and its head, whose length is one that the slot has room for.
-    ///
-    /// # Safety
-    /// The caller has taken this slot.
+    /// When a taken package was published (monotonic ns), and its head, whose length is one that the slot has room for.
     #[inline]
-    pub(crate) unsafe fn read_head(&self, slot: usize) -> (u64, Head) {
-        let prefix = self.slot(slot);
-        // SAFETY: inside the slot and aligned; taken, so nobody writes it.
+    pub(crate) fn read_head(&self, taken: &Taken) -> (u64, Head) {
+        let prefix = self.slot(taken.slot(), taken.segment());
+        // SAFETY: inside the slot and aligned; taken, and of this segment (`slot`), so nobody writes it.
         let (published_ns, head) =
             unsafe { (prefix.cast::<u64>().read(), prefix.add(8).cast::<[u8; HEAD_BYTES]>().read()) };
         // Sixteen bytes are always a head; its length is only believed as far as the slot goes.
@@ -169,14 +168,12 @@ impl Segment {
         (published_ns, Head { len: head.len.min(self.shape.body_bytes_max), ..head })
     }
 
-    /// The first `len` bytes of a slot's body.
-    ///
-    /// # Safety
-    /// The caller has taken this slot, and does not free it while the result lives.
+    /// The first `len` bytes of a taken package's body.
     #[inline]
-    pub(crate) unsafe fn body(&self, slot: usize, len: u16) -> &[u8] {
-        let len = usize::from(len.min(self.shape.body_bytes_max));
-        // SAFETY: `len` stays inside the slot; taken, so nobody writes it.
-        unsafe { std::slice::from_raw_parts(self.slot(slot).add(SLOT_PREFIX).as_ptr(), len) }
+    pub(crate) fn body<'a>(&'a self, taken: &'a Taken, len: u16) -> &'a [u8] {
+        let (slot, len) = (self.slot(taken.slot(), taken.segment()), len.min(self.shape.body_bytes_max));
+        // SAFETY: `len` stays inside the slot. Taken, and of this segment (`slot`), so nobody writes it; it is borrowed, so it is
+        // not released while the result lives.
+        unsafe { std::slice::from_raw_parts(slot.add(SLOT_PREFIX).as_ptr(), usize::from(len)) }
     }
 }

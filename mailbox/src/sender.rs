@@ -2,6 +2,7 @@
 
 use crate::counters::Loss;
 use crate::doorbell;
+use crate::full::NoSlot;
 use crate::latest::Posts;
 use crate::name::{Name, Priority};
 use crate::package::{Head, Options, Type};
@@ -9,7 +10,7 @@ use crate::participant::Participant;
 use crate::place::Place;
 use crate::routes;
 use crate::segment::{BadSegment, Segment};
-use crate::slots::{Claim, NoSlot, Published};
+use crate::slots::{Claim, Published};
 use crate::step::step;
 use crate::traffic::{Key, Writer};
 use std::sync::Arc;
@@ -237,7 +238,7 @@ impl Sender {
             let slots = self.segment.slots();
             match slots.claim(me, self.place.first(), priority, self.segment.shape.full, old) {
                 Ok(claim) => {
-                    self.place.found(claim.slot, slots.count());
+                    self.place.found(claim.slot(), slots.count());
                     return Ok(claim);
                 }
                 Err(NoSlot::Full) => {
@@ -291,12 +292,10 @@ impl Sender {
     fn publish(&mut self, mut claim: Claim, label: &Label, len: usize) -> Result<(), SendError> {
         let name = self.name();
         for _ in 0..REOPEN_MAX {
-            // SAFETY: `claim` is ours, and the loan that could reach its bytes has been consumed.
-            let published_ns = unsafe { self.segment.write_head(claim.slot, &label.head(name, len)) };
+            let published_ns = self.segment.write_head(&mut claim, &label.head(name, len));
             self.count_victim(&claim);
             let slots = self.segment.slots();
-            if let Some(instead) = self.posts.of(label).and_then(|old| slots.replace(claim, old)) {
-                claim = instead;
+            if self.posts.of(label).is_some_and(|old| slots.replace(&mut claim, old)) {
                 self.count_victim(&claim);
             }
             match slots.publish(claim, label.priority) {
@@ -311,7 +310,7 @@ impl Sender {
                     return Ok(());
                 }
                 Published::Reclaimed => return Err(SendError::Reclaimed(name)),
-                Published::Retired => claim = self.move_on(claim, label.priority, len)?,
+                Published::Retired(old) => claim = self.move_on(old, label.priority, len)?,
             }
         }
         self.count_victim(&claim);
@@ -320,7 +319,7 @@ impl Sender {
     }
 
     /// Copies a claim of a retired mailbox into one of its successor.
-    fn move_on(&mut self, old: Claim, priority: Priority, len: usize) -> Result<Claim, SendError> {
+    fn move_on(&mut self, mut old: Claim, priority: Priority, len: usize) -> Result<Claim, SendError> {
         let successor = open(&self.participant, self.to, self.reach);
         let retired = match successor.and_then(|successor| self.enter(successor)) {
             Ok(retired) => retired,
@@ -333,10 +332,9 @@ impl Sender {
             // Its loss is in counters that were carried over before: here it is counted again, once too often at worst.
             self.segment.page().counters.gave_way(victim);
         }
-        let result = self.claim(priority, None, len).inspect(|claim| {
-            // SAFETY: both claims are ours, on different segments.
-            let (from, to) = unsafe { (retired.body_mut(old.slot), self.segment.body_mut(claim.slot)) };
-            to[..len].copy_from_slice(&from[..len]);
+        let result = self.claim(priority, None, len).map(|mut claim| {
+            self.segment.body_mut(&mut claim)[..len].copy_from_slice(&retired.body_mut(&mut old)[..len]);
+            claim
         });
         retired.slots().abandon(old);
         result
@@ -386,9 +384,8 @@ pub struct Loan<'a> {
 impl Loan<'_> {
     /// Room for the body; what was there before is somebody else's old package.
     pub fn body(&mut self) -> &mut [u8] {
-        match &self.claim {
-            // SAFETY: the claim is ours, and the borrow of `self` is the only way to these bytes.
-            Some(claim) => unsafe { self.sender.segment.body_mut(claim.slot) },
+        match &mut self.claim {
+            Some(claim) => self.sender.segment.body_mut(claim),
             None => &mut [],
         }
     }

@@ -24,6 +24,7 @@
 //! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
 //! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G) and (J).
 
+use crate::full::{NoSlot, OverflowPolicy};
 use crate::hot::{Hot, rings};
 use crate::name::Priority;
 use crate::step::step;
@@ -36,51 +37,13 @@ pub const SLOTS_MAX: usize = 1024;
 /// is owed to another process that was quicker, and n looks at n slots would be n².
 const DISPLACE_LOOKS_MAX: usize = 4;
 
-/// What happens to a package that finds no free slot. The numbers stand in the segment.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum OverflowPolicy {
-    /// It takes the place of the newest of the least important packages, if it is more important; else it is refused.
-    #[default]
-    Displace = 0,
-    /// For state, of which only the newest counts. A package replaces the older one of the same sender, type and id that
-    /// still waits, whether or not the mailbox is full, and takes its place in the order: the older one is counted as
-    /// replaced. One that has nothing to replace and finds no free slot displaces as above.
-    ///
-    /// Commands are never replaced, since each has an id of its own. A sender knows what it sent itself, through this
-    /// [`Sender`](crate::Sender): what it sent before it was started again is received as well, before the newer. Between
-    /// different states of one sender there is no order when one of them has replaced an older package.
-    Latest = 2,
-    /// It is refused (seed 002, 3.2).
-    Reject = 1,
-}
-
-impl OverflowPolicy {
-    /// All policies, in the order of their codes in a segment.
-    pub const ALL: [Self; 3] = [Self::Displace, Self::Reject, Self::Latest];
-
-    /// The word for it in configuration and tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Displace => "displace",
-            Self::Latest => "latest",
-            Self::Reject => "reject",
-        }
-    }
-}
-
-/// Why a slot was not to be had.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum NoSlot {
-    /// All are in use by packages as important or more.
-    Full,
-    /// The mailbox has been given up.
-    Retired,
-}
-
-/// A slot being filled; its owner alone may write the body.
-#[derive(Clone, Copy, Debug)]
+/// A slot being filled; its owner alone may write the body. It is the only one of its slot: it cannot be copied, nothing else
+/// makes one, and [`Slots::publish`] and [`Slots::abandon`] consume it. Dropped, it stays claimed until its participant dies.
+#[must_use = "the slot stays claimed until this is published or abandoned"]
+#[derive(Debug)]
 pub(crate) struct Claim {
-    pub(crate) slot: usize,
+    slot: usize,
+    segment: u64,
     word: Word,
     /// The package that this one replaces.
     place: Option<Word>,
@@ -89,6 +52,14 @@ pub(crate) struct Claim {
 }
 
 impl Claim {
+    pub(crate) fn slot(&self) -> usize {
+        self.slot
+    }
+
+    pub(crate) fn segment(&self) -> u64 {
+        self.segment
+    }
+
     /// The accepted package that lost its place to this one.
     pub(crate) fn victim(&self) -> Option<Victim> {
         match self.word.state() {
@@ -120,21 +91,37 @@ impl Posted {
 }
 
 /// How publishing ended.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Debug)]
 pub(crate) enum Published {
     /// Accepted. `wake`: the receiver sleeps, ring its bell.
     Accepted { posted: Posted, wake: bool },
     /// The mailbox was given up meanwhile; the slot is the filler's again, send its package anew.
-    Retired,
+    Retired(Claim),
     /// The receiver held the filler for dead and took the slot back: the package is not accepted.
     Reclaimed,
 }
 
-/// A taken package; its receiver alone may read the body.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// A taken package; its receiver alone may read the body. The only one of its slot, like a [`Claim`], until it is released.
+#[must_use = "the slot stays taken until this is released"]
+#[derive(Debug)]
 pub(crate) struct Taken {
-    pub(crate) slot: usize,
-    pub(crate) word: Word,
+    slot: usize,
+    segment: u64,
+    word: Word,
+}
+
+impl Taken {
+    pub(crate) fn slot(&self) -> usize {
+        self.slot
+    }
+
+    pub(crate) fn segment(&self) -> u64 {
+        self.segment
+    }
+
+    pub(crate) fn word(&self) -> Word {
+        self.word
+    }
 }
 
 /// The shared part of a mailbox's slots, as every process sees it.
@@ -154,6 +141,8 @@ pub(crate) struct Bodies {
     pub(crate) first: *const u8,
     /// From one slot's to the next.
     pub(crate) bytes: usize,
+    /// Number of the segment in this process: claims and taken packages are of one segment, and of no use in another.
+    pub(crate) segment: u64,
 }
 
 impl<'a> Slots<'a> {
@@ -185,6 +174,11 @@ impl<'a> Slots<'a> {
         self.word(slot).compare_exchange(from.0, to.0, Ordering::SeqCst, Ordering::Relaxed).is_ok()
     }
 
+    /// Panics on a slot of another segment: somebody else may use it there.
+    fn is_of_this(&self, segment: u64) {
+        assert_eq!(segment, self.bodies.segment, "a slot of another segment");
+    }
+
     // ---- senders ----
 
     /// A slot to fill. `cursor` is the sender's own: the search goes on where the last one ended. `old` is what the package
@@ -207,7 +201,7 @@ impl<'a> Slots<'a> {
             step!("claim: before");
             if Word(self.word(slot).load(Ordering::Relaxed)) == FREE && self.change(slot, FREE, word) {
                 step!("claim: claimed");
-                return Ok(Claim { slot, word, place: None, late: false });
+                return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false });
             }
         }
         match full {
@@ -237,7 +231,7 @@ impl<'a> Slots<'a> {
                 // victim, or this is seen here.
                 seq_cst_accesses();
                 let late = victim.is_some() && self.hot.receiver.0.retired.load(Ordering::SeqCst) != 0;
-                return Some(Claim { slot, word, place: None, late });
+                return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });
             }
         }
         None
@@ -250,39 +244,44 @@ impl<'a> Slots<'a> {
         step!("reuse: chosen");
         let reused = self.change(old.slot, old.word, word);
         step!("reuse: claimed");
-        reused.then_some(Claim { slot: old.slot, word, place: Some(old.word), late: false })
+        let segment = self.bodies.segment;
+        reused.then_some(Claim { slot: old.slot, segment, word, place: Some(old.word), late: false })
     }
 
     /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the order:
-    /// with a new ticket each time, who sends faster than others are received would never be. None: it no longer waits.
+    /// with a new ticket each time, a sender that is faster than its receiver would never be received. False: it no longer waits.
     ///
     /// If `claim` has a victim, its loss has been counted. That of the old one is to be counted after this.
-    pub(crate) fn replace(&self, claim: Claim, old: Posted) -> Option<Claim> {
+    pub(crate) fn replace(&self, claim: &mut Claim, old: Posted) -> bool {
+        self.is_of_this(claim.segment);
         // It has been replaced in its own slot already.
         if claim.place.is_some() {
-            return None;
+            return false;
         }
-        let State::Filling { by, .. } = claim.word.state() else { return None };
+        let State::Filling { by, .. } = claim.word.state() else { return false };
         // First the loss goes into a word that outlives us, then the package. The old one's slot is freed by one step and not
         // claimed for it: nobody may hold two slots, since mailboxes are as large as one for each sender asks for.
         let marked = Word::filling(by, Some(old.as_victim()));
         if !self.change(claim.slot, claim.word, marked) {
             // Given up meanwhile, or we are held for dead: `publish` finds out.
-            return None;
+            return false;
         }
         step!("replace: marked");
         if self.change(old.slot, old.word, FREE) {
             step!("replace: freed");
-            return Some(Claim { slot: claim.slot, word: marked, place: Some(old.word), late: claim.late });
+            claim.word = marked;
+            claim.place = Some(old.word);
+            return true;
         }
         // It is being received, or was displaced.
         self.change(claim.slot, marked, claim.word);
         step!("replace: unmarked");
-        None
+        false
     }
 
     /// Makes a filled slot a package. The caller has counted the displaced one, if there was one.
     pub(crate) fn publish(&self, claim: Claim, priority: Priority) -> Published {
+        self.is_of_this(claim.segment);
         let slot = claim.slot;
         // ORDERING: AcqRel, so that whoever reads the counter sees what came before the tickets it counts. A receiver that
         // reads T sees the hints of all packages that one sender published before its package T.
@@ -294,7 +293,7 @@ impl<'a> Slots<'a> {
             // ORDERING: Acquire; pairs with the Release of the change that was in the way: if it was `settle`'s, then
             // `retired` is seen below.
             fence(Ordering::Acquire);
-            return if self.is_retired() { Published::Retired } else { Published::Reclaimed };
+            return if self.is_retired() { Published::Retired(claim) } else { Published::Reclaimed };
         }
         step!("publish: ready");
         self.hint(slot);
@@ -307,11 +306,10 @@ impl<'a> Slots<'a> {
         let receiver = &self.hot.receiver.0;
         if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {
             step!("publish: taken back");
-            return Published::Retired;
+            return Published::Retired(claim);
         }
-        // A retired mailbox whose word is no longer ours: it was received before the mailbox retired, or displaced by one who counts
-        // that; so it was accepted.
-
+        // A retired mailbox, and the word is no longer ours: the package was received before, or displaced by a sender that counts
+        // it. So it was accepted.
         // With another priority than what it replaces, and of the level, it may stand before what the receiver knows of the level.
         let moved = claim.place.is_some_and(|old| old.priority() != priority);
         if u32::from(priority.0) + u32::from(moved) > receiver.level.load(Ordering::SeqCst) {
@@ -326,6 +324,7 @@ impl<'a> Slots<'a> {
 
     /// Gives a claimed slot back unpublished.
     pub(crate) fn abandon(&self, claim: Claim) {
+        self.is_of_this(claim.segment);
         step!("abandon: before");
         self.change(claim.slot, claim.word, FREE);
         step!("abandon: freed");
@@ -350,13 +349,14 @@ impl<'a> Slots<'a> {
     pub(crate) fn take(&self, slot: usize, seen: Word) -> Option<Taken> {
         step!("take: chosen");
         let word = seen.taken();
-        let taken = self.change(slot, seen, word).then_some(Taken { slot, word });
+        let taken = self.change(slot, seen, word).then_some(Taken { slot, segment: self.bodies.segment, word });
         step!("take: taken");
         taken
     }
 
     /// Frees a taken slot.
     pub(crate) fn release(&self, taken: Taken) {
+        self.is_of_this(taken.segment);
         step!("release: before");
         // Only its receiver frees a taken slot, so this succeeds, whatever word a foreign program wrote there.
         self.change(taken.slot, taken.word, FREE);

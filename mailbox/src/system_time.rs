@@ -5,6 +5,7 @@
 //! an *epoch* it only moves forward; a step is a new epoch, which readers can see. Timeouts and leases never use it: they
 //! are measured by the monotonic clock.
 
+use crate::cell::SeqLatch;
 use crate::clock::{monotonic_ns, realtime_ns, slept_ns, slept_ns_min};
 use crate::files::{allocate, open_shared};
 use crate::memory::{Mapping, Shared, Use};
@@ -12,7 +13,7 @@ use crate::node::{Node, NodeError};
 use crate::step::step;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// A reader that was overtaken twice by the writer tries again, so often: the writer writes at most some thousand times a
@@ -166,7 +167,7 @@ impl Written {
 #[repr(C)]
 pub(crate) struct TimePage {
     /// Records written so far; the last is in place `index % 2`. 0: none yet.
-    index: AtomicU64,
+    index: SeqLatch,
     writer_pid: AtomicU32,
     padding: AtomicU32,
     /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which its next incarnation takes for a clock that
@@ -220,47 +221,13 @@ impl TimePage {
 
     /// The record, and what `meanwhile` said while it was the valid one.
     fn read_while<T>(&self, meanwhile: impl Fn() -> T) -> Option<(Written, T)> {
-        for _ in 0..READ_TRIES {
-            // ORDERING: Acquire (A); pairs with (B): the record that the index names is whole.
-            let index = self.index.load(Ordering::Acquire);
-            if index == 0 {
-                return None;
-            }
-            let record = self.records[(index % 2) as usize].load();
-            let said = meanwhile();
-            // ORDERING (C): the fields before the second look; pairs with (D). While the index stands, the writer is at most
-            // in the other record.
-            fence(Ordering::Acquire);
-            if self.index.load(Ordering::Relaxed) == index {
-                return Some((record?, said));
-            }
-        }
-        None
-    }
-
-    /// The index that the next record gets, never 0. It counts a few writes a second; only what somebody else wrote there wraps.
-    fn next(&self) -> u64 {
-        match self.index.load(Ordering::Relaxed) {
-            // Even, so that it is the other record's turn.
-            u64::MAX => 2,
-            index => index + 1,
-        }
+        let (record, said) = self.index.read(READ_TRIES, |place| (self.records[place].load(), meanwhile()))?;
+        Some((record?, said))
     }
 
     /// Writes the record that the index does not name.
     fn fill(&self, written: &Written) {
-        let next = self.next();
-        // ORDERING (D): the index of last time before the fields of this time; pairs with (C).
-        fence(Ordering::Release);
-        self.records[(next % 2) as usize].store(written);
-    }
-
-    /// Makes the record just filled the valid one.
-    fn turn(&self) {
-        let next = self.next();
-        // ORDERING: Release (B); pairs with (A).
-        self.index.store(next, Ordering::Release);
-        step!("time: turned");
+        self.index.fill(|place| self.records[place].store(written));
     }
 }
 
@@ -341,7 +308,7 @@ impl TimeKeeper {
             error_ns: 0,
             drift_ns_s: 0,
         }));
-        page.turn();
+        page.index.publish();
         Ok(keeper)
     }
 
@@ -419,7 +386,7 @@ impl TimeKeeper {
         let now_ns = monotonic_ns();
         let goes_on = last.is_none_or(|last| last.at(now_ns).ns <= record.at(now_ns).ns);
         if goes_on {
-            page.turn();
+            page.index.publish();
         }
         goes_on
     }
@@ -440,7 +407,7 @@ impl TimeKeeper {
             page.fill(&Written { record, slept_ns });
             // From here to the turn are nanoseconds; a thread held up just there for longer than the lead would be late.
             if lead_ns == 0 || monotonic_ns() < begin_ns {
-                page.turn();
+                page.index.publish();
                 return true;
             }
         }

@@ -12,6 +12,7 @@
 //! A value published that finds none is not counted, since it is no package; those that carry it to subscribers are.
 //! A new participant of the same index makes a new file: readers of the old one are not confused.
 
+use crate::cell::SeqCount;
 use crate::files::{allocate, open_shared, open_to_read};
 use crate::layout::{MAGIC, VERSION};
 use crate::memory::{Mapping, Shared, Use};
@@ -23,7 +24,7 @@ use crate::word::Claimant;
 use std::fs;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Rows of a participant; the last takes the rest.
 pub(crate) const FLOWS: usize = 128;
@@ -63,8 +64,8 @@ pub(crate) struct Second {
 #[repr(C, align(64))]
 pub(crate) struct FlowRow {
     writer: AtomicU32,
-    /// Odd while its writer is inside.
-    sequence: AtomicU32,
+    /// Guards all that follows.
+    sequence: SeqCount,
     pub(crate) to: AtomicU32,
     pub(crate) from: AtomicU32,
     /// As the 16 bits of a head.
@@ -314,27 +315,12 @@ impl FlowRow {
 
     /// Changes fields so that readers see all of the change or none. By the row's writer alone.
     fn write(&self, change: impl FnOnce(&Self)) {
-        let sequence = self.sequence.load(Ordering::Relaxed);
-        self.sequence.store(sequence.wrapping_add(1), Ordering::Relaxed);
-        // ORDERING (A): who sees a new field sees the odd number. Pairs with (B).
-        fence(Ordering::Release);
-        step!("traffic: inside");
-        change(self);
-        // ORDERING (C): who sees the even number sees all fields. Pairs with (D).
-        self.sequence.store(sequence.wrapping_add(2), Ordering::Release);
+        self.sequence.write(|| change(self));
     }
 
     /// What `look` sees while nobody changes it; none when its writer is inside just now, as it is for nanoseconds.
     pub(crate) fn read<T>(&self, look: impl FnOnce(&Self) -> T) -> Option<T> {
-        // ORDERING: Acquire (D); pairs with (C).
-        let sequence = self.sequence.load(Ordering::Acquire);
-        if sequence % 2 == 1 {
-            return None;
-        }
-        let seen = look(self);
-        // ORDERING (B): the fields before the second look; pairs with (A).
-        fence(Ordering::Acquire);
-        (self.sequence.load(Ordering::Relaxed) == sequence).then_some(seen)
+        self.sequence.read(|| look(self)).map(|(_, seen)| seen)
     }
 
     fn set_key(&self, key: Key) {

@@ -264,10 +264,13 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
     // A call that timed out was made anew, as another one: what one call runs, it runs once.
     assert!((0..20).all(|number| counted.contains(&number)), "{counted:?}");
     // Known when it is clear that they do not come late.
-    wait("losses and copies are counted", || {
+    wait("losses and duplicates are counted", || {
         let told = lan.say(&["echo", "router.0", "links", "--count", "1", "--json"]).json();
         let peer = &told["value"]["peers"][0];
-        ["lost", "copies", "damaged"].iter().all(|count| peer[count].as_u64().unwrap() > 0).then_some(())
+        ["lost", "duplicates", "damaged"]
+            .iter()
+            .all(|count| peer["counters"][count].as_u64().unwrap() > 0)
+            .then_some(())
     });
     lan.stop();
 }
@@ -346,7 +349,10 @@ fn net_shows_what_was_refused_and_what_to_do() {
         assert!(text.contains(&words), "no `{words}` in:\n{text}");
     }
     let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
-    assert_eq!((&told[0]["links"]["peers"][0]["refused"], &told[0]["links"]["foreign"]), (&3.into(), &1.into()));
+    assert_eq!(
+        (&told[0]["links"]["peers"][0]["counters"]["refused"], &told[0]["links"]["foreign"]),
+        (&3.into(), &1.into())
+    );
     lan.stop();
 }
 

@@ -113,7 +113,7 @@ fn settled(robots: &[Robot; 3]) -> Option<usize> {
 
 /// The demo, whose master's router is killed again and again; what it said, and whether it ended well.
 fn killed_again(place: &Place) -> Option<Said> {
-    let demo = ["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet"];
+    let demo = ["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet", "-v"];
     let mut demo = Running::start(place.command(&demo));
     wait("all nodes run, or cannot", || {
         let all = NODES.iter().all(|node| demo.out().contains(&format!("node {node} of demo-tdma runs")));
@@ -178,7 +178,8 @@ fn ended_well(place: &Place, arguments: &[&str]) -> Option<Said> {
 fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
     repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
-        let arguments = ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "--kill-master"];
+        let arguments =
+            ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "-v", "--kill-master"];
         let Some(Said { out: said, .. }) = ended_well(&place, &arguments) else { return };
         for words in
             ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
@@ -204,7 +205,8 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
 fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
     repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
-        let arguments = ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "--kill-master"];
+        let arguments =
+            ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "-v", "--kill-master"];
         let Some(Said { out, err, .. }) = ended_well(&place, &arguments) else { return };
         assert!(err.contains("is sealed with") || out.contains("is sealed with"), "{out}{err}");
         for words in

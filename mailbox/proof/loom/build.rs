@@ -1,4 +1,5 @@
-//! Writes the slot core once as it is and once per broken variant, each beside the models, with loom's atomics.
+//! Writes the slot core and the cells once as they are and once per broken variant, each beside its models, with loom's
+//! atomics.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -6,13 +7,40 @@ use std::{env, fs};
 
 #[path = "src/broken.rs"]
 mod broken;
+#[path = "src/cell_broken.rs"]
+mod cell_broken;
 
-use broken::{BROKEN, Edit, MIRRORED, MODELS};
+use broken::{Broken, Edit, MIRRORED};
 
 const MAILBOX: &str = "../../src";
-/// What a variant consists of: the mailbox's, and ours.
-const PARTS: [&str; 7] = ["word", "hot", "slots", "queue", "bell", "rig", "models"];
-const OURS: [&str; 2] = ["rig", "models"];
+/// Files of this crate; the others are the mailbox's.
+const OURS: [&str; 3] = ["rig", "models", "cell_models"];
+
+/// A part of the mailbox that is proved by itself.
+struct Proof {
+    /// The module of the source as it is.
+    real: &'static str,
+    /// What a variant consists of; the last file has the models.
+    parts: &'static [&'static str],
+    /// Each model and the bound on its preemptions.
+    models: &'static [(&'static str, usize)],
+    broken: &'static [Broken],
+}
+
+const PROOFS: [Proof; 2] = [
+    Proof {
+        real: "real",
+        parts: &["word", "full", "hot", "slots", "queue", "bell", "rig", "models"],
+        models: broken::MODELS,
+        broken: broken::BROKEN,
+    },
+    Proof {
+        real: "real_cell",
+        parts: &["cell", "cell_models"],
+        models: cell_broken::MODELS,
+        broken: cell_broken::BROKEN,
+    },
+];
 
 fn main() {
     println!("cargo:rerun-if-changed=src");
@@ -37,43 +65,50 @@ fn generate(out: &Path) {
     }
     fs::write(out.join("name.rs"), plain(&source("name"))).expect("OUT_DIR can be written");
 
-    let mut index = String::new();
-    for (model, preemptions) in MODELS {
-        let test = format!("#[test] fn {model}() {{ crate::holds({preemptions}, models::{model}); }}\n");
-        index.push_str(&test);
-    }
-    let mut index = variant(out, "real", &[], &index);
-    for broken in BROKEN {
-        let (_, preemptions) =
-            MODELS.iter().find(|(model, _)| *model == broken.caught_by).expect("`caught_by` names a model");
-        let test = format!(
-            "#[test] fn is_caught() {{ crate::is_caught({:?}, {preemptions}, models::{}); }}\n",
-            broken.says, broken.caught_by
-        );
-        index.push_str(&variant(out, broken.name, broken.edits, &test));
-    }
+    let index: String = PROOFS.iter().map(|proof| variants(out, proof)).collect();
     fs::write(out.join("variants.rs"), index).expect("OUT_DIR can be written");
 }
 
+/// The modules of a proof's variants, with their tests.
+fn variants(out: &Path, proof: &Proof) -> String {
+    let models = proof.parts.last().expect("a proof has models");
+    let mut tests = String::new();
+    for (model, preemptions) in proof.models {
+        let test = format!("#[test] fn {model}() {{ crate::holds({preemptions}, {models}::{model}); }}\n");
+        tests.push_str(&test);
+    }
+    let mut index = variant(out, proof.parts, proof.real, &[], &tests);
+    for broken in proof.broken {
+        let (_, preemptions) =
+            proof.models.iter().find(|(model, _)| *model == broken.caught_by).expect("`caught_by` names a model");
+        let test = format!(
+            "#[test] fn is_caught() {{ crate::is_caught({:?}, {preemptions}, {models}::{}); }}\n",
+            broken.says, broken.caught_by
+        );
+        index.push_str(&variant(out, proof.parts, broken.name, broken.edits, &test));
+    }
+    index
+}
+
 /// Writes the files of a variant, and returns its module.
-fn variant(out: &Path, name: &str, edits: &[Edit], tests: &str) -> String {
+fn variant(out: &Path, parts: &[&str], name: &str, edits: &[Edit], tests: &str) -> String {
     fs::create_dir_all(out.join(name)).expect("OUT_DIR can be written");
     let mut module = format!("mod {name} {{\n");
-    for part in PARTS {
+    for part in parts {
         let mut text = plain(&source(part));
-        for edit in edits.iter().filter(|edit| edit.file == part) {
+        for edit in edits.iter().filter(|edit| edit.file == *part) {
             let found = text.matches(edit.from).count();
             assert_eq!(found, 1, "variant {name}: {part}.rs must have this once, not {found} times:\n{}", edit.from);
             text = text.replacen(edit.from, edit.to, 1);
         }
-        for part in PARTS {
+        for part in parts {
             text = text.replace(&format!("crate::{part}::"), &format!("super::{part}::"));
         }
         fs::write(out.join(name).join(part).with_extension("rs"), text).expect("OUT_DIR can be written");
         writeln!(module, "mod {part} {{ include!(concat!(env!(\"OUT_DIR\"), \"/{name}/{part}.rs\")); }}")
             .expect("a String takes all");
     }
-    assert!(edits.iter().all(|edit| PARTS.contains(&edit.file)), "variant {name}: edits a file that is not its own");
+    assert!(edits.iter().all(|edit| parts.contains(&edit.file)), "variant {name}: edits a file that is not its own");
     module + tests + "}\n"
 }
 

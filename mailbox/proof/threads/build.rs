@@ -14,7 +14,7 @@ mod caught;
 use broken::{BROKEN, Edit};
 use caught::CAUGHT;
 
-const CORE: [&str; 5] = ["word", "hot", "slots", "queue", "bell"];
+const CORE: [&str; 7] = ["word", "full", "hot", "slots", "queue", "bell", "cell"];
 const OURS: [&str; 2] = ["rig", "runs"];
 
 fn main() {

@@ -25,6 +25,7 @@ extern crate self as rohrpost_schema;
 
 mod argument;
 mod bytes;
+mod counters;
 mod decode;
 mod description;
 mod encode;
@@ -42,6 +43,7 @@ mod words;
 
 pub use argument::parse_argument;
 pub use bytes::{SchemaError, TYPES_MAX, VERSION, hash};
+pub use counters::{counter_fields, counters};
 pub use decode::decode;
 pub use description::{DataItem, Description, Function};
 pub use encode::encode;

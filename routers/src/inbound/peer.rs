@@ -10,7 +10,7 @@ use crate::frame::{Alive, FrameHead, NodeIndex, Reason};
 use crate::link::{REFUSED_FOR_NS, SILENT_AFTER_NS, State};
 use crate::report::{Deliver, Event, Mismatch, NotDelivered};
 use crate::stats::{PeerStats, Stats};
-use rohrpost_mailbox::Head;
+use rohrpost_mailbox::{Head, Throttle};
 use std::net::IpAddr;
 
 /// Lives of a peer that are known to be over.
@@ -30,7 +30,7 @@ pub(super) struct Peer {
     is_sure: bool,
     doubt: Doubt,
     /// When it was told last that an incarnation began, ns; 0: never.
-    restart_told_ns: u64,
+    restarts_told: Throttle,
     old: [Old; OLD_KEPT],
     old_next: usize,
     pub(super) window: Window,
@@ -113,8 +113,7 @@ impl Peer {
             self.old_next += usize::from(was.is_none());
             self.old[place] = Old { incarnation: self.incarnation, next };
             self.told = PeerNotices { heard: true, twice: self.told.twice, ..PeerNotices::default() };
-            if self.restart_told_ns == 0 || now_ns >= self.restart_told_ns + RESTARTS_TOLD_NS {
-                self.restart_told_ns = now_ns;
+            if self.restarts_told.note(now_ns, RESTARTS_TOLD_NS).is_some() {
                 deliver.event(Event::Restarted { peer: way.from });
             }
         }
@@ -206,12 +205,12 @@ impl Peer {
         way.peer.link.next.set(self.window.next());
         match arrival {
             Arrival::Newest => return true,
-            Arrival::Overtaken => received.overtaken.add(1),
+            Arrival::Overtaken => received.reordered.add(1),
             Arrival::Returned => {
-                received.overtaken.add(1);
+                received.reordered.add(1);
                 received.returned.add(1);
             }
-            Arrival::Copy => received.copies.add(1),
+            Arrival::Copy => received.duplicates.add(1),
         }
         arrival != Arrival::Copy
     }

@@ -7,9 +7,10 @@ use super::tally::Rejections;
 use super::{HELLO_BYTES, HELLO_DATAGRAM_BYTES};
 use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
 use crate::settings::Settings;
+use rohrpost_mailbox::SeqCount;
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Which of a router's ports: each has keys and sequences of its own.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -173,7 +174,7 @@ impl PeerSessions {
 
     /// Grows with each incarnation that begins.
     pub(super) fn version(&self, peer: NodeIndex) -> u32 {
-        self.peer(peer).life.version.load(Ordering::Relaxed)
+        self.peer(peer).life.version.version()
     }
 
     /// None while it is being written: then it is to be looked at again.
@@ -289,8 +290,7 @@ const _: () = {
 /// An incarnation that one thread writes and others read, whole. Who reads while it is written gets nothing, and goes on with what it had.
 #[derive(Default)]
 struct Published {
-    /// Odd while it is written; 0: nothing was.
-    version: AtomicU32,
+    version: SeqCount,
     incarnation: AtomicU64,
     key: AtomicU64,
     next: [AtomicU64; 2],
@@ -298,27 +298,20 @@ struct Published {
 
 impl Published {
     fn write(&self, life: PeerIncarnation) {
-        let version = self.version.load(Ordering::Relaxed);
-        self.version.store(version | 1, Ordering::Relaxed);
-        // ORDERING (A): who reads a new word sees the odd version. Pairs with (B).
-        fence(Ordering::Release);
-        self.incarnation.store(life.incarnation, Ordering::Relaxed);
-        self.key.store(life.key as u64, Ordering::Relaxed);
-        self.next.iter().zip(life.next).for_each(|(place, next)| place.store(next, Ordering::Relaxed));
-        // ORDERING (C): publishes the words. Pairs with (D).
-        self.version.store((version | 1).wrapping_add(1), Ordering::Release);
+        self.version.write(|| {
+            self.incarnation.store(life.incarnation, Ordering::Relaxed);
+            self.key.store(life.key as u64, Ordering::Relaxed);
+            self.next.iter().zip(life.next).for_each(|(place, next)| place.store(next, Ordering::Relaxed));
+        });
     }
 
     fn read(&self) -> Option<(u32, Option<PeerIncarnation>)> {
-        // ORDERING (D)
-        let version = self.version.load(Ordering::Acquire);
-        let incarnation = self.incarnation.load(Ordering::Relaxed);
-        let key = self.key.load(Ordering::Relaxed) as usize;
-        let next = self.next.each_ref().map(|next| next.load(Ordering::Relaxed));
-        // ORDERING (B)
-        fence(Ordering::Acquire);
-        let is_whole = version.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == version;
-        is_whole.then_some((version, (incarnation != 0).then_some(PeerIncarnation { incarnation, key, next })))
+        self.version.read(|| {
+            let incarnation = self.incarnation.load(Ordering::Relaxed);
+            let key = self.key.load(Ordering::Relaxed) as usize;
+            let next = self.next.each_ref().map(|next| next.load(Ordering::Relaxed));
+            (incarnation != 0).then_some(PeerIncarnation { incarnation, key, next })
+        })
     }
 }
 

@@ -3,30 +3,27 @@
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What the kernel says instead of sending a datagram.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Failure {
-    /// The computer is there, but nobody listens at the port. Told of an earlier datagram; this one was sent.
-    NobodyThere,
-    /// No way to the address: the network is down, the way is missing, or a firewall forbids it.
-    NoWay,
-    /// Longer than what is between can carry.
-    TooLong,
-    /// The kernel or the network card had no room.
-    NoRoom,
-    /// So much waits already for its device that the kernel takes no more; nobody waits for that.
-    Full,
-    /// Nobody is known there that it could be sealed to.
-    Unacquainted,
-    /// Anything else.
-    Other,
+rohrpost_mailbox::causes! {
+    /// What the kernel says instead of sending a datagram.
+    pub enum Failure {
+        /// The computer is there, but nobody listens at the port. Told of an earlier datagram; this one was sent.
+        NobodyThere = "nobody-there",
+        /// No way to the address: the network is down, the way is missing, or a firewall forbids it.
+        NoWay = "no-way",
+        /// Longer than what is between can carry.
+        TooLong = "too-long",
+        /// The kernel or the network card had no room.
+        NoRoom = "no-room",
+        /// So much waits already for its device that the kernel takes no more; nobody waits for that.
+        OverflowPolicy = "full",
+        /// Nobody is known there that it could be sealed to.
+        Unacquainted = "unacquainted",
+        /// Anything else.
+        Other = "other",
+    }
 }
 
 impl Failure {
-    /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Full, Self::Unacquainted, Self::Other];
-
     pub(super) fn of(error: &io::Error) -> Self {
         use nix::errno::Errno;
         match Errno::from_raw(error.raw_os_error().unwrap_or(0)) {
@@ -49,19 +46,6 @@ impl Failure {
     /// Whether the datagram was not sent.
     pub const fn is_loss(self) -> bool {
         !matches!(self, Self::NobodyThere)
-    }
-
-    /// One word for people and programs.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::NobodyThere => "nobody-there",
-            Self::NoWay => "no-way",
-            Self::TooLong => "too-long",
-            Self::NoRoom => "no-room",
-            Self::Full => "full",
-            Self::Unacquainted => "unacquainted",
-            Self::Other => "other",
-        }
     }
 
     /// What happened, and what to do.

@@ -23,7 +23,7 @@ fn a_link_that_is_cut_is_told_at_both_ends_and_once_mended_carries_as_before() {
         field.wait_told("router.0", &["node arm", "is heard"], round + 1);
     }
     for (node, peer) in [("base", "arm"), ("arm", "base")] {
-        assert_eq!(field.peer(node, peer).restarts, 0, "the same routers as before");
+        assert_eq!(field.peer(node, peer).counters.restarts, 0, "the same routers as before");
     }
     for module in ["probe.0", "probe.1"] {
         assert!(!field.counted(module).contains(&super::NEVER), "{module}: what was answered with a fault was run");

@@ -256,28 +256,23 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[
             edit(
                 "slots",
-                "    pub(crate) slot: usize,\n    word: Word,\n",
-                "    pub(crate) slot: usize,\n    word: Word,\n    ticket: u64,\n",
+                "    segment: u64,\n    word: Word,\n    /// The package that",
+                "    segment: u64,\n    word: Word,\n    ticket: u64,\n    /// The package that",
             ),
             edit(
                 "slots",
-                "return Ok(Claim { slot, word, place: None, late: false });",
-                "return Ok(Claim { slot, word, place: None, late: false, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false });",
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "return Some(Claim { slot, word, place: None, late });",
-                "return Some(Claim { slot, word, place: None, late, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });",
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "slot: old.slot, word, place: Some(old.word), late: false })",
-                "slot: old.slot, word, place: Some(old.word), late: false, ticket: 0 })",
-            ),
-            edit(
-                "slots",
-                "word: marked, place: Some(old.word), late: claim.late })",
-                "word: marked, place: Some(old.word), late: claim.late, ticket: 0 })",
+                "slot: old.slot, segment, word, place: Some(old.word), late: false })",
+                "slot: old.slot, segment, word, place: Some(old.word), late: false, ticket: 0 })",
             ),
             edit(
                 "slots",
@@ -494,7 +489,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[edit(
             "slots",
             "self.change(claim.slot, marked, claim.word);",
-            "if true { return Some(Claim { word: marked, ..claim }); }",
+            "if true { claim.word = marked; return true; }",
         )],
         caught_by: "the_newest_replaces_what_waits",
         says: WRONG,
@@ -504,8 +499,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "nothing_is_replaced",
         edits: &[edit(
             "slots",
-            "        let State::Filling { by, .. } = claim.word.state() else { return None };",
-            "        let State::Filling { by, .. } = claim.word.state() else { return None };\n        if true { return None; }",
+            "        let State::Filling { by, .. } = claim.word.state() else { return false };",
+            "        let State::Filling { by, .. } = claim.word.state() else { return false };\n        if true { return false; }",
         )],
         caught_by: "the_newest_keeps_its_place",
         says: WRONG,
@@ -516,8 +511,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[
             edit(
                 "rig",
-                "if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {",
-                "let late = self.last;\n        if let Some(instead) = None {",
+                "if self.last.is_some_and(|old| slots.replace(&mut claim, old)) {",
+                "let late = self.last;\n        if false {",
             ),
             edit("slots", "claim.place.map_or(ticket, Word::ticket)", "claim.place.map_or(0, Word::ticket)"),
             edit(
@@ -863,7 +858,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         lines: &[
             "fn publish(",
             "self.count_victim(&claim);",
-            "self.posts.of(label).and_then(|old| slots.replace(claim, old))",
+            "self.posts.of(label).is_some_and(|old| slots.replace(&mut claim, old))",
             "self.count_victim(&claim);",
             ".publish(claim, label.priority)",
             "self.posts.remember(label, posted, &slots);",

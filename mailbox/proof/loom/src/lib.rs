@@ -12,6 +12,7 @@
 //! - `broken.rs`: a table of mistakes, each with the model that catches it. A proof that cannot fail proves nothing. An
 //!   edit must find its text exactly once, so that a variant cannot rot: the build fails and names it.
 //! - `step.rs`: the core's crash points, here places to switch threads and to die.
+//! - `cell_models.rs`, `cell_broken.rs`: the same for the single-writer cells of `cell.rs`.
 //! - `build.rs`: puts them together with loom's atomics. It also compares what the models had to write again (what is asked of the
 //!   kernel, waiting, sending, giving up) with the lines that the mailbox has.
 //!
@@ -57,6 +58,8 @@ mod variants {
     include!(concat!(env!("OUT_DIR"), "/variants.rs"));
 }
 // Never compiled here, only beside each variant; named so that rustfmt finds it.
+#[cfg(any())]
+mod cell_models;
 #[cfg(any())]
 mod models;
 

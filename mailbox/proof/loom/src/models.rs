@@ -1,10 +1,11 @@
-//! The models. Each is one small program, run by loom in every order of its threads' steps and with every stale value
-//! that a load may read. This file is compiled beside the real slot core and beside each broken one.
+//! The models. Loom runs each small program in every order of its threads' steps and with every stale value. This file is
+//! compiled beside the real slot core and beside each broken one.
 
+use crate::full::OverflowPolicy;
 use crate::name::Priority;
 use crate::queue::Queue;
 use crate::rig::{Mailbox, Receiver, Sender, Sent, of_first, sorted};
-use crate::slots::{OverflowPolicy, Published};
+use crate::slots::Published;
 use crate::step::{dies_at, reached};
 use crate::sync::Ordering;
 use loom::thread;
@@ -59,7 +60,7 @@ pub(crate) fn publishing_gives_the_order() {
         [1, 2].map(|_| slots.claim(sender.by, &mut sender.cursor, Priority(10), OverflowPolicy::Reject, None).unwrap());
     for (claim, body) in claims.into_iter().rev().zip([1, 2]) {
         // SAFETY: the claim is ours.
-        mailbox.bodies[claim.slot].with_mut(|cell| unsafe { *cell = body });
+        mailbox.bodies[claim.slot()].with_mut(|cell| unsafe { *cell = body });
         assert!(matches!(slots.publish(claim, Priority(10)), Published::Accepted { wake: false, .. }));
     }
     assert_eq!(mailbox.receiver().drain(), [1, 2]);
@@ -319,7 +320,7 @@ pub(crate) fn a_word_comes_back_with_the_newer_package() {
     let seen = last.unwrap();
     let late = slots.take(seen.slot, seen.word).map(|taken| {
         // SAFETY: taken by us; if that were wrong, loom would tell.
-        let body = mailbox.bodies[taken.slot].with(|cell| unsafe { *cell });
+        let body = mailbox.bodies[taken.slot()].with(|cell| unsafe { *cell });
         slots.release(taken);
         body
     });

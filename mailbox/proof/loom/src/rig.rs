@@ -5,9 +5,10 @@
 
 use crate::name::Priority;
 use crate::bell::Bell;
+use crate::full::{OverflowPolicy, NoSlot};
 use crate::queue::Queue;
 use crate::hot::Hot;
-use crate::slots::{Bodies, OverflowPolicy, NoSlot, Posted, Published, Slots};
+use crate::slots::{Bodies, Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use crate::word::{Claimant, FREE, Victim, Word};
@@ -68,7 +69,7 @@ impl Mailbox {
     }
 
     pub(super) fn slots(&self) -> Slots<'_> {
-        let unseen = Bodies { first: std::ptr::null(), bytes: 0 };
+        let unseen = Bodies { first: std::ptr::null(), bytes: 0, segment: 0 };
         Slots::new(&self.hot, &self.words, 1, self.words.len(), unseen)
     }
 
@@ -186,12 +187,11 @@ impl Sender<'_> {
             Err(NoSlot::Full) => return Sent::Refused,
             Err(NoSlot::Retired) => return Sent::Retired,
         };
-        let cell = &self.mailbox.bodies[claim.slot];
+        let cell = &self.mailbox.bodies[claim.slot()];
         // SAFETY: the claim is ours; if that were wrong, loom would tell.
         cell.with_mut(|cell| unsafe { *cell = body });
         claim.victim().into_iter().for_each(|victim| self.mailbox.count(victim));
-        if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {
-            claim = instead;
+        if self.last.is_some_and(|old| slots.replace(&mut claim, old)) {
             claim.victim().into_iter().for_each(|victim| self.mailbox.count(victim));
         }
         match slots.publish(claim, Priority(priority)) {
@@ -202,7 +202,7 @@ impl Sender<'_> {
                 }
                 Sent::Accepted
             }
-            Published::Retired => {
+            Published::Retired(claim) => {
                 // SAFETY: the claim is ours again; the real sender copies the body to the mailbox that took the place.
                 assert_eq!(cell.with(|cell| unsafe { *cell }), body);
                 self.mailbox.late.lock().unwrap().extend(claim.late_victim());
@@ -234,9 +234,9 @@ impl Receiver<'_> {
     pub(super) fn take_with(&mut self, look: impl FnOnce(Word)) -> Option<u8> {
         let slots = self.mailbox.slots();
         let taken = self.queue.take(&slots)?;
-        look(taken.word);
+        look(taken.word());
         // SAFETY: taken by us; if that were wrong, loom would tell.
-        let body = self.mailbox.bodies[taken.slot].with(|cell| unsafe { *cell });
+        let body = self.mailbox.bodies[taken.slot()].with(|cell| unsafe { *cell });
         slots.release(taken);
         Some(body)
     }

@@ -2,7 +2,7 @@
 //! address space, since two mappings of one file are two memories to ThreadSanitizer.
 //!
 //! ```text
-//!  mailbox/src/{word,slots,queue,bell}.rs ─┬── unchanged ──▶ every run ends, and nothing is reported
+//!  mailbox/src/{word,slots,…,cell}.rs ─────┬── unchanged ──▶ every run ends, and nothing is reported
 //!  src/{rig,runs}.rs ──────────────────────┤
 //!  ../loom/src/broken.rs, one edit each ───┴── edited ─────▶ a data race is reported (src/caught.rs says in which run)
 //! ```

@@ -4,9 +4,10 @@
 //! no fences: what a body's hand-over rested on a fence for would be reported here, though it were right. None does.
 
 use super::bell::Bell;
+use super::full::{NoSlot, OverflowPolicy};
 use super::hot::Hot;
 use super::queue::Queue;
-use super::slots::{Bodies, NoSlot, OverflowPolicy, Posted, Published, Slots};
+use super::slots::{Bodies, Posted, Published, Slots};
 use super::word::{Claimant, FREE, State, Victim};
 use crate::name::Priority;
 use crate::step::{dice, reached, shake};
@@ -75,7 +76,7 @@ impl Mailbox {
     }
 
     pub(crate) fn slots(&self) -> Slots<'_> {
-        let bodies = Bodies { first: self.bodies.as_ptr().cast(), bytes: size_of::<Body>() };
+        let bodies = Bodies { first: self.bodies.as_ptr().cast(), bytes: size_of::<Body>(), segment: 0 };
         Slots::new(&self.hot, &self.words, 1, self.words.len(), bodies)
     }
 
@@ -133,7 +134,7 @@ impl Mailbox {
                     Err(_) => thread::yield_now(),
                 }
             };
-            sender.fill(claim.slot);
+            sender.fill(claim.slot());
             self.dead.fetch_or(1 << participant, Ordering::Release);
         })
     }
@@ -230,10 +231,9 @@ impl Sender {
             }
             Err(NoSlot::Retired) => return Sent::Retired,
         };
-        self.fill(claim.slot);
+        self.fill(claim.slot());
         self.mailbox.count(claim.victim());
-        if let Some(instead) = self.last.and_then(|old| slots.replace(claim, old)) {
-            claim = instead;
+        if self.last.is_some_and(|old| slots.replace(&mut claim, old)) {
             self.mailbox.count(claim.victim());
         }
         match slots.publish(claim, Priority(priority)) {
@@ -245,9 +245,9 @@ impl Sender {
                 }
                 Sent::Accepted
             }
-            Published::Retired => {
+            Published::Retired(claim) => {
                 // SAFETY: the claim is ours again; the real sender copies the body to the mailbox that took the place.
-                let body = unsafe { *self.mailbox.bodies[claim.slot].get() };
+                let body = unsafe { *self.mailbox.bodies[claim.slot()].get() };
                 assert!(body.is_whole());
                 slots.abandon(claim);
                 Sent::Retired
@@ -298,7 +298,7 @@ impl Receiver {
         let Some(taken) = self.queue.take(&slots) else { return false };
         reached("take: before reading");
         // SAFETY: taken by us; if that were wrong, ThreadSanitizer would tell.
-        let body = unsafe { *self.mailbox.bodies[taken.slot].get() };
+        let body = unsafe { *self.mailbox.bodies[taken.slot()].get() };
         assert!(body.is_whole(), "torn: {body:?}");
         if !die {
             add(&self.mailbox.counts.received);
@@ -357,7 +357,7 @@ impl Receiver {
         self.queue.rescan(&slots);
         while let Some(taken) = self.queue.take(&slots) {
             // SAFETY: taken by us, as above.
-            assert!(unsafe { *mailbox.bodies[taken.slot].get() }.is_whole());
+            assert!(unsafe { *mailbox.bodies[taken.slot()].get() }.is_whole());
             add(&mailbox.counts.closed);
             slots.release(taken);
         }

@@ -1,10 +1,11 @@
 //! The runs: each lets threads do one thing many times, and judges the accounts at the end.
 
+use super::cell::{SeqCount, SeqLatch};
+use super::full::OverflowPolicy;
 use super::rig::{Mailbox, Receiver, Sender, Sent};
-use super::slots::OverflowPolicy;
 use crate::scaled;
-use crate::step::shake;
-use std::sync::atomic::Ordering;
+use crate::step::{reached, shake};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 
 /// All, with what each is called.
@@ -17,6 +18,7 @@ pub(crate) const ALL: &[(&str, fn())] = &[
     ("reclaiming", reclaiming),
     ("adopting", adopting),
     ("retiring", retiring),
+    ("reading_cells", reading_cells),
 ];
 
 fn join(threads: impl IntoIterator<Item = JoinHandle<()>>) {
@@ -146,4 +148,64 @@ pub(crate) fn retiring() {
         Receiver::new(new).drain(false);
         new.is_accounted();
     }
+}
+
+/// Words of a cell, all of them one number.
+type Words = [AtomicU64; 4];
+
+#[derive(Default)]
+struct Cells {
+    count: SeqCount,
+    words: Words,
+    latch: SeqLatch,
+    places: [Words; 2],
+}
+
+fn store(words: &Words, value: u64) {
+    for word in words {
+        word.store(value, Ordering::Relaxed);
+        reached("words: stored");
+    }
+}
+
+fn load(words: &Words) -> [u64; 4] {
+    words.each_ref().map(|word| word.load(Ordering::Relaxed))
+}
+
+fn whole(words: [u64; 4]) -> u64 {
+    assert!(words.iter().all(|word| *word == words[0]), "torn: {words:?}");
+    words[0]
+}
+
+/// One thread writes cells of both types, two read them: each value is whole, and none is older than the one before.
+pub(crate) fn reading_cells() {
+    let cells: &'static Cells = Box::leak(Box::default());
+    let values = scaled(20_000);
+    let writer = thread::spawn(move || {
+        for value in 1..=values {
+            cells.count.write(|| store(&cells.words, value));
+            cells.latch.fill(|place| store(&cells.places[place], value));
+            cells.latch.publish();
+        }
+    });
+    let readers = [1, 2].map(|seed| {
+        thread::spawn(move || {
+            shake(seed);
+            let (mut in_place, mut latched) = (0, 0);
+            while in_place < values || latched < values {
+                if let Some((_, words)) = cells.count.read(|| load(&cells.words)) {
+                    let value = whole(words);
+                    assert!(value >= in_place, "{value} after {in_place}");
+                    in_place = value;
+                }
+                if let Some(words) = cells.latch.read(8, |place| load(&cells.places[place])) {
+                    let value = whole(words);
+                    assert!(value >= latched, "{value} after {latched}");
+                    latched = value;
+                }
+                thread::yield_now();
+            }
+        })
+    });
+    join(readers.into_iter().chain([writer]));
 }

@@ -65,7 +65,7 @@ pub(super) fn check_restart() {
     base.take(START + MS, 1, &new[1]);
     assert_eq!(base.log.ids(), [0, 1], "nothing of the old incarnation, nothing twice");
     let received = &base.stats.peer(1).received;
-    assert_eq!((received.restarts.get(), received.old.get(), received.copies.get()), (1, 2, 1));
+    assert_eq!((received.restarts.get(), received.old.get(), received.duplicates.get()), (1, 2, 1));
     assert_eq!(received.lost.get(), 1, "the first incarnation's first, which only said that it is there");
 
     // A second router that goes on as the same node is noticed, and kept out.
@@ -232,7 +232,7 @@ pub(super) fn check_jump() {
     assert_eq!(base.log.delivered.len(), 4);
     let stats = base.stats.clone();
     let received = &stats.peer(1).received;
-    assert_eq!((received.missing(), received.old.get(), received.copies.get()), (0, 4, 0));
+    assert_eq!((received.missing(), received.old.get(), received.duplicates.get()), (0, 4, 0));
     // Who was not reached for long is far ahead, and says so again.
     (0..2 * WINDOW).for_each(|_| drop(send()));
     (0..2).for_each(|_| base.take(START, 1, &send()));

@@ -263,7 +263,7 @@ impl Packages {
         let received = &peer.received;
         let dropped =
             rejected + received.old.get() + received.damaged.get() + received.refused.get() + self.stats.foreign.get();
-        (received.datagrams.get(), received.copies.get(), dropped)
+        (received.datagrams.get(), received.duplicates.get(), dropped)
     }
 }
 

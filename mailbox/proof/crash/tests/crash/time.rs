@@ -19,7 +19,7 @@ fn a_writer_dies_beginning_the_first_epoch() {
         8,
         |_| (),
         |ground, (), death| {
-            let turned = death.is_none_or(|death| death.step == "time: turned");
+            let turned = death.is_none_or(|death| death.step == "cell: published");
             assert_eq!(read(ground), turned.then_some((1, 5, 2_000_000_000)), "{death:?}");
         },
     );
@@ -29,7 +29,7 @@ fn a_writer_dies_beginning_the_first_epoch() {
 fn a_writer_dies_beginning_another_epoch() {
     let scene = |ground: &Ground| drop(TimeKeeper::begin(&ground.node(), TimeSource::Local, FIRST_NS, 1.0).unwrap());
     each_step("begin time", 8, scene, |ground, (), death| {
-        let turned = death.is_none_or(|death| death.step == "time: turned");
+        let turned = death.is_none_or(|death| death.step == "cell: published");
         let expected = if turned { (2, 5, 2_000_000_000) } else { (1, 3, 1_000_000_000) };
         assert_eq!(read(ground), Some(expected), "{death:?}");
         TimeKeeper::begin(&ground.node(), TimeSource::Local, 7_000_000_000, 1.0).unwrap();
@@ -44,7 +44,7 @@ fn a_writer_dies_changing_the_pace() {
         8,
         |_| (),
         |ground, (), death| {
-            let turned = death.is_none_or(|death| death.step == "time: turned");
+            let turned = death.is_none_or(|death| death.step == "cell: published");
             let pace = if turned { 3_000_000_000 } else { 2_000_000_000 };
             let (epoch, seconds, found) = read(ground).unwrap();
             assert_eq!((epoch, found), (1, pace), "{death:?}");
