@@ -24,7 +24,8 @@
 //! let errors = Installation::parse(text, "small.toml".as_ref()).unwrap_err();
 //! assert_eq!(
 //!     errors.to_string(),
-//!     "small.toml:13: module `mapper.0` calls `laser.0`, which no [[module]] defines; add one, or drop it from `calls`"
+//!     "small.toml:13: module `mapper.0` calls `laser.0`, which no [[module]] defines; \
+//!      add one, or drop it from `calls`"
 //! );
 //! ```
 //!

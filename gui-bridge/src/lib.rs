@@ -5,18 +5,19 @@
 //!   (a module's thread, which waits for nobody)      │   (a thread of its own, watched and cut off by the Pen)
 //! ```
 //!
-//! A [`View`] says what is drawn of modules of a class; [`run_with`] makes a bridge with views of one's own. A [`Scene`]
-//! knows nothing of mailboxes: who receives packages calls one of its methods for each. This is the only crate that knows
-//! Rerun.
+//! A [`View`] says what is drawn of modules of a class; [`run_with`] makes a bridge with views of one's own. A
+//! [`Scene`] knows nothing of mailboxes: the receiver of packages calls one of its methods for each. This is the only
+//! crate that knows Rerun.
 //!
-//! Rerun waits for its sink without end. So the module's thread only fills the store (one pending row for each entity, the
-//! newest wins), and the feeder alone calls Rerun. When a viewer stands still, its connection is cut: the call fails, Rerun's
-//! threads end, its memory is free. Each new stream gets the last value of everything from the store.
+//! Rerun waits for its sink without end. So the module's thread only fills the store (one pending row for each
+//! entity, the newest wins), and the feeder alone calls Rerun. When a viewer stands still, its connection is cut: the
+//! call fails, Rerun's threads end, its memory is free. Each new stream gets the last value of everything from the
+//! store.
 //!
-//! **Invariants:** nothing that a viewer or a disk does makes the module's thread wait, also when it is switched on or off:
-//! files are made and ended by the pen's threads. At its end alone the process waits for the end of the drawing, for
-//! some seconds. And the bridge holds a bounded amount however long it runs: what the store holds, one stream of Rerun's,
-//! and, while a drawing that was switched off does not end, that one's store.
+//! **Invariants:** nothing that a viewer or a disk does makes the module's thread wait, also when it is switched on
+//! or off: files are made and ended by the pen's threads. At its end alone the process waits for the end of the
+//! drawing, for some seconds. And the bridge holds a bounded amount however long it runs: what the store holds, one
+//! stream of Rerun's, and, while a drawing that was switched off does not end, that one's store.
 #![forbid(unsafe_code)]
 
 mod asking;

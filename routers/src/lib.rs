@@ -1,7 +1,7 @@
 //! Carries packages between the nodes of a system, and keeps one time for all of them (seed 002, 2.2.3, 3.2 and 4).
 //!
 //! ```text
-//!  modules ─▶ transit mailbox ─▶ Outbound: levels, quotas, pacing ═ UDP ═▶ Inbound: gaps, duplicates, reassembly ─▶ mailboxes
+//!  modules ─▶ transit mailbox ─▶ Outbound: levels, quotas, pace ═ UDP ═▶ Inbound: gaps, duplicates, order ─▶ mailbox
 //!                                  │ undeliverable: an error to its sender   │ no such mailbox, full: the same
 //!  Clock ◀═ synchronisation, calibration ═▶ Clock of the master      writes the node's page of system time
 //! ```
@@ -13,8 +13,8 @@
 //!
 //! # Reading order
 //!
-//! 1. `frame`: a datagram, checked once. `outbound`, `queue`, `fragment`: what leaves, and when. `inbound`, `admission`:
-//!    what may enter. `security`: seals, challenge and response, before `inbound`.
+//! 1. `frame`: a datagram, checked once. `outbound`, `queue`, `fragment`: what leaves, and when. `inbound`,
+//!    `admission`: what may enter. `security`: seals, challenge and response, before `inbound`.
 //! 2. `time`: master, follower, election. `tdma`: the scheduler of time slots.
 //! 3. `session`, `tcp`: clients and server beyond the LAN. `shell`: threads and sockets of the LAN.
 //! 4. `stats`, `flows`, `report`: what is counted and reported. `impair`, `lab`: a bad network, nodes in namespaces.
