@@ -10,7 +10,7 @@ rohrpost_mailbox::causes! {
         /// Nobody hosts its mailbox.
         NoRoute = "no-route",
         /// Too much waited, and this was the least important and newest.
-        OverflowPolicy = "full",
+        Full = "full",
         /// Too much waited, of its sender more than of others.
         Share = "share",
         /// It was under way for too long.

@@ -15,7 +15,7 @@ rohrpost_mailbox::causes! {
         /// The kernel or the network card had no room.
         NoRoom = "no-room",
         /// So much waits already for its device that the kernel takes no more; nobody waits for that.
-        OverflowPolicy = "full",
+        Full = "full",
         /// Nobody is known there that it could be sealed to.
         Unacquainted = "unacquainted",
         /// Anything else.
