@@ -9,6 +9,11 @@
 //! [`Scene`] does not use mailboxes: its caller receives packages and calls one method for each. Only this crate uses
 //! Rerun.
 //!
+//! Rerun waits for its sink without end. So the module's thread only fills the store (one pending row for each
+//! entity, the newest wins), and the feeder alone calls Rerun. When a viewer stands still, its connection is cut: the
+//! call fails, Rerun's threads end, its memory is free. Each new stream gets the last value of everything from the
+//! store.
+//!
 //! **Invariants:** a viewer or a disk never makes the module's thread wait, not even when drawing is switched on or
 //! off: the supervisors' threads create and finish files. Only at its end the process waits some seconds for the
 //! drawing to finish. Memory is bounded: the store, one Rerun stream, and the store of a drawing that was switched off

@@ -1,11 +1,10 @@
-//! What modules are made of: the template, interfaces and proxies, subscriptions, output, and the modules that come
-//! with it.
+//! The module template, interfaces and proxies, calls, subscriptions, output, launch, and the built-in modules.
 //!
 //! ```text
 //! types, interfaces   what modules exchange            robot, builtin   modules that come with Rohrpost
-//! call                commands, once, and replies      runtime          the loop of a module's thread
-//! publish             subscribers of data               launch           starts, watches and stops a node's modules
-//! parameter           settings that may change         output           what modules say
+//! call                commands, at most once           runtime          the loop of a module's thread
+//! publish             subscribers of data              launch           starts, watches and stops a node's modules
+//! parameter           settings that may change         output           lines of output
 //! ```
 //!
 //! Module authors use it through the crate `rohrpost`.

@@ -103,7 +103,7 @@ fn told(test: &str, seed: u64, problem: &Problem) -> String {
     let Problem { promise, at_ns, text } = problem;
     let at_ms = at_ns / 1_000_000;
     format!(
-        "seed {seed}, at {at_ms} ms, {promise:?}: {text}\nreplay: ROHRPOST_SIM_SEED={seed} cargo test -p rohrpost-routers --test simulation {test} -- --nocapture"
+        "seed {seed}, at {at_ms} ms, {promise:?}: {text}\nreplay: ROHRPOST_SIM_SEED={seed} cargo test -p rohrpost-testbed --test simulation {test} -- --nocapture"
     )
 }
 
