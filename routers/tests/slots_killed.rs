@@ -47,7 +47,7 @@ struct Scene {
 impl Scene {
     fn new() -> Option<Self> {
         let mut segment = Segment::at_rest(None)?;
-        // By its time frames are repeated_on_stall, so its clock is the true one.
+        // By its time frames are checked, so its clock is the true one.
         segment.stations[usize::from(WITNESS)].skew = Default::default();
         let Segment { stations, lab, .. } = &mut segment;
         stations[usize::from(WITNESS)].start(lab);

@@ -112,7 +112,7 @@ fn a_refusal_waits_for_a_slot() {
         let mut crossed = capture.end();
         crossed.retain(|frame| frame.kind == Kind::Refusal);
         assert!(crossed.len() >= refusals);
-        let repeated_on_stall = validate(&crossed, &time);
-        assert!(repeated_on_stall.outside.is_empty(), "{repeated_on_stall:?}");
+        let kept = validate(&crossed, &time);
+        assert!(kept.outside.is_empty(), "{kept:?}");
     });
 }

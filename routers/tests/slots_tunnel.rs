@@ -162,8 +162,8 @@ fn late_percent(segment: &Segment, what: &str, mut is_done: impl FnMut() -> bool
     });
     come.all(&published);
     let crossed = capture.end();
-    let repeated_on_stall = validate(&crossed, &time);
-    assert_inside(what, &repeated_on_stall);
+    let kept = validate(&crossed, &time);
+    assert_inside(what, &kept);
     let bridge = Bridge::new(&crossed, &time);
     let percents = published.iter().zip(bounds_ns).enumerate().map(|(flow, (published, bound_ns))| {
         let seen = bridge.latencies(flow, published);

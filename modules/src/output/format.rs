@@ -144,7 +144,7 @@ mod tests {
         assert_eq!(format.long(&motor), "2024-02-29T00:00:05.006007Z warn  base/motor.0: is on");
         for (name, from) in [
             (Name::new(1, 150, 0, 0), "base/laser.0"),
-            (Name::new(1, 16, 5, 0), "command_server/tool.5"),
+            (Name::new(1, 16, 5, 0), "desk/tool.5"),
             (Name::new(1, 150, 9, 0), "?/laser.9"),
             (Name::new(1, 99, 9, 0), "?/99.9"),
         ] {

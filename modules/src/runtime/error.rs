@@ -29,7 +29,7 @@ pub enum StartError {
     #[error("{0}")]
     Mailbox(String),
     /// A endpoint without an interface.
-    #[error("`{0}` is a endpoint of `{1}`, but that program has no interface of class `{2}`")]
+    #[error("`{0}` is an alias of `{1}`, but that program has no interface of class `{2}`")]
     Endpoint(String, String, String),
     /// An interface without a name that it is reached by.
     #[error(
@@ -100,7 +100,7 @@ pub enum ContextError {
     TooMany,
     /// Data that no endpoint of this module publishes.
     #[error(
-        "this module has no endpoint of class `{0}`; add one to `endpoints` in the configuration, or to its `Interfaces`"
+        "this module has no name of class `{0}`; add one to `aliases` in the configuration, or to its `Interfaces`"
     )]
     NoName(&'static str),
     /// Data of an interface that the program does not serve under the name that has its class.

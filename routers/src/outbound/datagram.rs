@@ -16,13 +16,6 @@ const SAY_AGAIN_NS: u64 = 10_000_000;
 /// Where a fragment begins in its datagram.
 pub(super) const PART_START: usize = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
 
-/// Kind and receiver of a datagram that this router made, and what follows its head; where it is to be sealed it has no check yet.
-pub(crate) fn kind_of_own(datagram: &[u8]) -> Option<(Kind, NodeIndex, &[u8])> {
-    let (head, rest) = datagram.split_first_chunk::<{ frame::HEAD_BYTES }>()?;
-    let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == head[3])?;
-    Some((kind, head[6], rest))
-}
-
 impl Outbound {
     /// The bytes before the body of a package that leaves at once with this head.
     pub(super) fn direct(

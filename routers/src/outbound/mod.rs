@@ -23,17 +23,16 @@ use std::sync::Arc;
 
 mod datagram;
 mod flows;
+mod own;
 mod pace;
 mod slot;
 
-pub(crate) use datagram::kind_of_own;
 use flows::Aboard;
+pub(crate) use own::kind_of_own;
 use pace::Pace;
 
-/// Longest time from the publishing of a package to its leaving. The time to its mailbox is [`TRANSIT_MAX`] of "at most
-/// once" at most, so this leaves half a second for the wire and the other end.
-///
-/// [`TRANSIT_MAX`]: https://docs.rs/rohrpost-modules
+/// Longest time from the publishing of a package to its leaving. "At most once" allows 2 s to its mailbox, so this
+/// leaves half a second for the wire and the other end.
 pub const WAIT_MAX_NS: u64 = 1_500_000_000;
 /// Packages that cannot leave are searched for this often.
 const SWEEP_EVERY_NS: u64 = 100_000_000;

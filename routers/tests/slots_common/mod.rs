@@ -392,7 +392,7 @@ pub(crate) struct Judged {
 /// the slot before still holds: half of it, which is what a node's clock may be off.
 pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
     let table = Table::new(&table(), &MASTERS, 0, NODES, 28);
-    let mut repeated_on_stall = Judged { frames: crossed.len(), ..Judged::default() };
+    let mut kept = Judged { frames: crossed.len(), ..Judged::default() };
     let mut last = None;
     for frame in crossed {
         let at_ns = time.at(frame.at_ns).ns;
@@ -400,16 +400,16 @@ pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
         let owner = moments.into_iter().filter_map(|ns| table.owner(ns)).find(|owner| owner.node == frame.from);
         let Some(owner) = owner else {
             let in_cycle_us = at_ns % table.cycle_ns() / 1000;
-            repeated_on_stall.outside.push(Outside { from: frame.from, kind: frame.kind, in_cycle_us });
+            kept.outside.push(Outside { from: frame.from, kind: frame.kind, in_cycle_us });
             continue;
         };
         if last != Some((frame.from, owner.window)) {
             last = Some((frame.from, owner.window));
-            repeated_on_stall.starts_ns.push(at_ns.wrapping_sub(owner.window.begin_ns).cast_signed());
+            kept.starts_ns.push(at_ns.wrapping_sub(owner.window.begin_ns).cast_signed());
         }
     }
-    repeated_on_stall.starts_ns.sort_unstable();
-    repeated_on_stall
+    kept.starts_ns.sort_unstable();
+    kept
 }
 
 /// Of the frames, one and so many in a thousand may be outside of their sender's slots: the thread looks at the clock
@@ -417,18 +417,17 @@ pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
 /// that late on a computer that works.
 const OUTSIDE_PER_THOUSAND: usize = 3;
 
-fn tell(what: &str, repeated_on_stall: &Judged) {
+fn tell(what: &str, kept: &Judged) {
     let at = |per_thousand: usize| {
-        repeated_on_stall
-            .starts_ns
-            .get(repeated_on_stall.starts_ns.len().saturating_sub(1) * per_thousand / 1000)
+        kept.starts_ns
+            .get(kept.starts_ns.len().saturating_sub(1) * per_thousand / 1000)
             .map_or(f64::NAN, |ns| *ns as f64 / 1e3)
     };
     println!(
         "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us \
          after their nominal time",
-        repeated_on_stall.frames,
-        repeated_on_stall.outside.len(),
+        kept.frames,
+        kept.outside.len(),
         at(10),
         at(500),
         at(990),
@@ -438,14 +437,14 @@ fn tell(what: &str, repeated_on_stall: &Judged) {
 
 /// All but a few of these frames were in their senders' slots.
 pub(crate) fn assert_kept(what: &str, crossed: &[Crossed], time: &TimeRecord) {
-    let repeated_on_stall = validate(crossed, time);
-    tell(what, &repeated_on_stall);
-    assert!(repeated_on_stall.frames > 100, "{repeated_on_stall:?}");
-    assert_inside(what, &repeated_on_stall);
+    let kept = validate(crossed, time);
+    tell(what, &kept);
+    assert!(kept.frames > 100, "{kept:?}");
+    assert_inside(what, &kept);
 }
 
 /// All but a few were where they belong.
-pub(crate) fn assert_inside(what: &str, repeated_on_stall: &Judged) {
-    let most = 1 + repeated_on_stall.frames * OUTSIDE_PER_THOUSAND / 1000;
-    assert!(repeated_on_stall.outside.len() <= most, "{what}: {repeated_on_stall:?}");
+pub(crate) fn assert_inside(what: &str, kept: &Judged) {
+    let most = 1 + kept.frames * OUTSIDE_PER_THOUSAND / 1000;
+    assert!(kept.outside.len() <= most, "{what}: {kept:?}");
 }

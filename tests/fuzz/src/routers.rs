@@ -105,7 +105,7 @@ struct World {
     /// Datagrams that left; they arrive as the program says.
     wire: Vec<Vec<u8>>,
     next_id: u16,
-    /// The program made datagrams of its own: then only memory and accounts are repeated_on_stall.
+    /// The program made datagrams of its own: then only memory and accounts are checked.
     forged: bool,
 }
 

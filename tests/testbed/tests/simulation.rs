@@ -122,14 +122,14 @@ fn keep_promises(test: &str, seeds: u64, plan: fn(u64) -> Plan) -> BTreeMap<&'st
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     let mut broken = Vec::new();
     let first = number("ROHRPOST_SIM_FIRST").unwrap_or(0);
-    let repeated_on_stall = |seed| {
+    let judged = |seed| {
         let outcome = run(plan(seed), guard, false);
         let told = outcome.problems.first().map(|problem| told(test, seed, problem));
         // At once: thousands of networks take their time.
         told.iter().for_each(|told| eprintln!("{told}"));
         (told, outcome)
     };
-    for (told, outcome) in for_all(seeds, |seed| repeated_on_stall(first + seed)) {
+    for (told, outcome) in for_all(seeds, |seed| judged(first + seed)) {
         broken.extend(told);
         outcome.seen.iter().for_each(|(what, count)| *seen.entry(what).or_default() += count);
     }
@@ -422,7 +422,7 @@ fn every_mistake_in_time_slots_is_noticed() {
     all_are_noticed(&mistakes.collect::<Vec<_>>(), Plan::slotted);
 }
 
-/// Each promise of time slots is seen to be broken: what is repeated_on_stall first in some network is this.
+/// Each promise of time slots is seen to be broken: what is judged first in some network is this.
 #[test]
 fn every_promise_of_time_slots_can_be_broken() {
     let stubborn = Mistake::Time(time::Broken::Stubborn);
@@ -451,9 +451,8 @@ fn every_promise_of_sealed_time_slots_can_be_broken() {
 fn each_is_called_what_it_is(broken: &[(Mistake, Promise)], plan: fn(u64) -> Plan) {
     let found = for_all(broken.len() as u64, |index| {
         let (mistake, promise) = broken[index as usize];
-        let repeated_on_stall =
-            |seed| run_broken(plan(seed), guard, mistake).problems.first().map(|first| first.promise);
-        (mistake, promise, (0..PROMISE_SEEDS).find(|seed| repeated_on_stall(*seed) == Some(promise)))
+        let judged = |seed| run_broken(plan(seed), guard, mistake).problems.first().map(|first| first.promise);
+        (mistake, promise, (0..PROMISE_SEEDS).find(|seed| judged(*seed) == Some(promise)))
     });
     eprintln!("{found:?}");
     let missed: Vec<_> = found.iter().filter(|(_, _, found)| found.is_none()).collect();

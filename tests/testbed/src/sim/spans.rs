@@ -1,4 +1,4 @@
-//! Spans of time that plans are made of, and by which they are repeated_on_stall.
+//! Spans of time that plans are made of, and by which they are checked.
 
 use rohrpost_routers::inbound::REFUSE_EVERY_NS;
 use rohrpost_routers::link::REFUSED_FOR_NS;
