@@ -14,7 +14,7 @@ pub(crate) struct Endpoint<M> {
     pub(crate) offer: Offer<M>,
 }
 
-/// What a endpoint offers.
+/// What an endpoint offers.
 pub(crate) struct Offer<M> {
     /// Numbers of functions that may be run twice.
     pub(crate) idempotent: Vec<u16>,

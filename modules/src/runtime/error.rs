@@ -28,13 +28,13 @@ pub enum StartError {
     /// A mailbox, which the text names as the configuration does.
     #[error("{0}")]
     Mailbox(String),
-    /// A endpoint without an interface.
+    /// An alias without an interface.
     #[error("`{0}` is an alias of `{1}`, but that program has no interface of class `{2}`")]
     Endpoint(String, String, String),
     /// An interface without a name that it is reached by.
     #[error(
         "the program of `{module}` serves an interface of class `{interface}`, but the module is called {names}: nobody could call \
-         it, and its data could not be published; give the module a name or a endpoint of class `{interface}`, or run another program"
+         it, and its data could not be published; give the module a name or an alias of class `{interface}`, or run another program"
     )]
     Interface {
         /// The module.
