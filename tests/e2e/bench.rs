@@ -15,9 +15,9 @@ fn the_self_test_has_all_figures() {
     assert_eq!(lines.last().unwrap()["case"], "environment-after");
     for (case, floor) in CASES {
         for bytes in [64, 1024] {
-            let row = |who: &str| {
-                let is_it = |line: &&Value| line["case"] == case && line["bytes"] == bytes && line["who"] == who;
-                lines.iter().find(is_it).unwrap_or_else(|| panic!("no {case} {bytes} {who}: {lines:#?}"))
+            let row = |contender: &str| {
+                let is_it = |line: &&Value| line["case"] == case && line["bytes"] == bytes && line["contender"] == contender;
+                lines.iter().find(is_it).unwrap_or_else(|| panic!("no {case} {bytes} {contender}: {lines:#?}"))
             };
             for row in [row("rohrpost"), row(floor)] {
                 assert!(row["p50"].as_f64().unwrap() > 0.0 && row["unit"] == "us", "{row}");

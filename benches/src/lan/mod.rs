@@ -6,7 +6,7 @@
 //!  ping ─▶ futex   ─▶ relay  ══╬══ veth, bridge ╬══▶ relay  ─▶ futex   ─▶ pong       `chain`: what a router costs at least
 //!  ping ═══════════════════════╝                ╚══════════════════════▶ pong       `udp`: the network alone
 //! ```
-//! Every process is one of its own, and both relays of a node are, as the two threads of a router.
+//! Each drawn step is a process of its own; a node has two relays, like the two threads of a router.
 
 pub mod chain;
 pub mod ends;

@@ -2,11 +2,11 @@
 //!
 //! ```text
 //!  processor 0                                      processor 1
-//!  crowd: 1000 sessions, one thread ═══ TCP ══════▶ TCP router            how many, how quickly, beside whom
+//!  crowd: 1000 sessions, one thread ═══ TCP ══════▶ TCP router            throughput and delay, beside other load
 //!  ping ─▶ client of `near` ═══ TCP ══▶ TCP router ═══ TCP ══▶ client of `far` ─▶ pong     ours
 //!  ping ─▶ relay            ═══ TCP ══▶ relay      ═══ TCP ══▶ relay           ─▶ pong     `relays`: what that costs at least
 //! ```
-//! All over the loopback device. Everything that is timed runs at `SCHED_FIFO` 50; whoever disturbs it runs as any other process.
+//! All over the loopback device. Everything that is timed runs at `SCHED_FIFO` 50; disturbing programs run as any other process.
 
 pub mod crowd;
 mod door;

@@ -1,4 +1,4 @@
-//! A master that is killed, and what others do about it, as the capture and their pages show it.
+//! A killed master, and the reaction of the others, as the capture and their pages show it.
 
 use super::capture::{Capture, Crossed, FrameKind};
 use super::plan::Plan;
@@ -11,17 +11,17 @@ use rohrpost_routers::tdma::{Kind, Table, Window};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-/// So many cycles before and behind it are looked at.
+/// So many cycles before and after it are examined.
 const CYCLES: u32 = 20;
 const SYNCHRONISED_WITHIN: Duration = Duration::from_secs(10);
 const TAKEN_OVER_WITHIN: Duration = Duration::from_secs(10);
 /// How often pages are read meanwhile.
 const LOOK_EACH: Duration = Duration::from_micros(500);
 
-/// What became of it.
+/// The result.
 #[derive(Clone, Copy, Debug)]
 pub struct TakenOver {
-    /// Who was killed.
+    /// The killed node.
     pub dead: u8,
     /// From the last synchronisation of the old master to the first one in its place, cycles.
     pub replaced_cycles: f64,
@@ -33,7 +33,7 @@ pub struct TakenOver {
     pub step_us: f64,
 }
 
-/// Who synchronised last as the master.
+/// The node that synchronised last as the master.
 fn master(frames: &[Crossed]) -> Option<u8> {
     frames.iter().rev().find(|frame| frame.what == FrameKind::Sync).map(|frame| frame.from)
 }
@@ -44,16 +44,16 @@ pub fn changes_of_master(frames: &[Crossed]) -> usize {
     masters().zip(masters().skip(1)).filter(|(before, after)| before != after).count()
 }
 
-/// How many of so many cycles had no master's synchronisation, percent.
+/// Share of so many cycles without a master's synchronisation, percent.
 pub fn without_sync_percent(frames: &[Crossed], cycle: Duration, cycles: f64) -> f64 {
     let syncs = || frames.iter().filter(|frame| frame.what == FrameKind::Sync).map(|frame| frame.at_ns);
-    // Of one cycle are those that follow each other within half of one: each slave gets one.
+    // Frames within half a cycle belong to one cycle: each slave gets one.
     let half_ns = cycle.as_nanos() as u64 / 2;
     let begun = syncs().zip(syncs().skip(1)).filter(|(before, at)| at - before > half_ns).count() + 1;
     (cycles - begun as f64).max(0.0) * 100.0 / cycles
 }
 
-/// Kills the master after some part of a cycle, and waits until another reigns.
+/// Kills the master after some part of a cycle, and waits until another node is the master.
 ///
 /// # Errors
 /// When none takes its place.
@@ -103,7 +103,7 @@ pub fn kill_master(
     })
 }
 
-/// Until another than the dead master has synchronised as one for some cycles; all the time pages are read.
+/// Waits until another node than the dead master has synchronised as the master for some cycles; pages are read all the time.
 fn await_reign(
     capture: &mut Capture,
     first: usize,
@@ -127,7 +127,7 @@ fn await_reign(
     Ok(())
 }
 
-/// Slots of a node, those that begin in this part of system time, in which it sent nothing.
+/// Slots of a node that begin in this part of system time, in which it sent nothing.
 fn unused(frames: &[Crossed], table: &Table, time: &TimeRecord, of: &std::ops::Range<u64>) -> u64 {
     let its = frames.iter().filter(|frame| frame.from == table.own());
     let window = |frame: &Crossed| -> Option<Window> {
@@ -140,10 +140,10 @@ fn unused(frames: &[Crossed], table: &Table, time: &TimeRecord, of: &std::ops::R
     table.slots_between(of.start, of.end).saturating_sub(used.len() as u64)
 }
 
-/// The pages of those that live on, against the time of the one that does not.
+/// The pages of the living nodes, compared with the time of the dead one.
 struct Pages {
     time: TimeRecord,
-    /// Each with by how much it was ahead at first, ns.
+    /// Each with its initial lead, ns.
     pages: Vec<(SystemClock, i64)>,
     moved_ns: u64,
 }
@@ -163,7 +163,7 @@ impl Pages {
     }
 }
 
-/// By how much a page is ahead of a time.
+/// Lead of a page over a time.
 fn ahead_ns(clock: &SystemClock, time: &TimeRecord) -> Result<i64, Failure> {
     let record = clock.record().ok_or_else(|| Failure::Failed("a node has no time".into()))?;
     let now_ns = monotonic_ns();
