@@ -1,4 +1,4 @@
-//! What the sources must be, and no compiler asks of them: the files of a crate lie in layers, and a reader can hold each in mind.
+//! Rules for sources that no compiler checks: the files of a crate lie in layers, and a reader can keep each in mind.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -11,7 +11,7 @@ use sources::{Crate, find_crates};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Two files that name each other, and why that is right.
+/// Two files that name each other, and the reason.
 const PAIRS: &[(&str, &str, &str)] = &[
     (
         "config/src/installation.rs",
@@ -77,10 +77,10 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// Knots of more than two files that are still to be untied: a file of each, and how many there are.
+/// Cycles of more than two files that are still to be untied: a file of each, and their number.
 const KNOTS: &[(&str, usize)] = &[("gui-bridge/src/views.rs", 4), ("gui-bridge/src/scene.rs", 10)];
 
-/// Type names that several files of a crate use, each for a type of its own, and why that is right.
+/// Type names that several files of a crate use, each for a type of its own, and the reason.
 const SHARED_NAMES: &[(&str, &str, &str)] = &[
     ("cli/src", "Arguments", "each subcommand has its own, in a file of its name"),
     ("modules/src", "Settings", "each module has its own, as those of an author have"),
@@ -90,7 +90,7 @@ const SHARED_NAMES: &[(&str, &str, &str)] = &[
 /// Lines that a file may have.
 const LINES_MAX: usize = 400;
 
-/// Files that are longer, and are still to be divided; they may only become shorter. Those of loom hold its models, and mistakes
+/// Longer files that are still to be divided; they may only become shorter. Those of loom hold its models, and mistakes
 /// as edits of text.
 const LONG: &[(&str, usize)] = &[
     ("config/src/reader.rs", 403),

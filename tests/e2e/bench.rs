@@ -1,4 +1,4 @@
-//! `rohrpost bench local`. What its sentence says of other computers is tested beside its code, how it measures in `benches`.
+//! `rohrpost bench local`. Its sentence for other computers is tested beside its code, its measurements in `benches`.
 
 use crate::harness::{OUTPUT, Place, probe};
 use serde_json::Value;

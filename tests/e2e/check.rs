@@ -1,4 +1,4 @@
-//! `rohrpost check`, as a person or a program reads it.
+//! `rohrpost check`, for people and programs.
 
 use crate::harness::Place;
 
@@ -77,7 +77,7 @@ fn settings_of_builtin_modules_are_checked_before_anything_runs() {
     let expected: Vec<String> = SAID.iter().map(|line| format!("wrong.toml:{line}")).collect();
     let told = place.say(&["check", "wrong.toml"]).fails();
     assert_eq!(told.trim_end().lines().collect::<Vec<_>>(), expected);
-    // Launch says the same, and starts nothing.
+    // Launch reports the same, and starts nothing.
     assert_eq!(place.say(&["launch", "wrong.toml"]).fails(), told);
     place.assert_empty();
 
@@ -95,7 +95,7 @@ fn settings_of_builtin_modules_are_checked_before_anything_runs() {
 #[test]
 fn what_a_file_means_can_be_read_by_programs() {
     let place = Place::new();
-    // Every key there is; its settings are none that the builtin mapper knows.
+    // All keys; the builtin mapper does not know its settings.
     let full = include_str!("../../config/tests/full.toml").replace("builtin = \"mapper\"", "program = \"./mapper\"");
     std::fs::write(place.path("full.toml"), &full).unwrap();
     let json = place.say(&["check", "full.toml", "--json"]).json();
@@ -118,13 +118,13 @@ fn what_a_file_means_can_be_read_by_programs() {
     let system = installation["system"]["id"].as_u64().unwrap();
     assert_eq!(number(motor), system << 24 | motor["priority"].as_u64().unwrap() << 16);
     assert_eq!((&motor["required"], &motor["optional"]), (&true.into(), &false.into()));
-    // The opposite of what it says of itself.
+    // The opposite of its own declaration.
     std::fs::write(place.path("sealed.toml"), full.replace("security = \"none\"", "security = \"keys\"")).unwrap();
     let json_of_sealed = place.say(&["check", "sealed.toml", "--json"]).json();
     assert_eq!(json_of_sealed["installation"]["network"]["security"], "keys");
     let json = place.say(&["check", "full.toml", "--json", "--node", "desk"]).json();
     assert_eq!(json["installation"]["nodes"].as_array().unwrap().len(), 1, "one node only");
-    // Why a picture may wait is told to people and programs alike.
+    // People and programs get the same reason why a picture may wait.
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo.toml");
     let json = place.say(&["check", demo, "--json"]).json();
     let modules = json["installation"]["nodes"][0]["modules"].as_array().unwrap();

@@ -1,4 +1,4 @@
-//! What modules print becomes output, as far as they did not say it themselves.
+//! Printed text of modules becomes output, unless it already is.
 
 use crate::harness::{OUTPUT, Place, probe, signal, wait};
 use crate::output::{call, lines};
@@ -18,7 +18,7 @@ fn what_a_module_prints_is_a_line_of_its_own() {
     let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     call(&place, &["probe.0", "print", "stdout", "a greeting", "1"]);
     call(&place, &["probe.0", "print", "stderr", "a complaint", "1"]);
-    // Printed by its own output layer too, for launch to repeat; it must not come twice.
+    // Also printed by its own output layer, for launch to repeat; it must not come twice.
     call(&place, &["probe.0", "say", "error", "said and printed"]);
     call(&place, &["probe.0", "print", "stdout", "the end", "1"]);
     let all = wait("the last line", || {

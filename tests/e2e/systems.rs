@@ -38,7 +38,7 @@ pub(crate) struct Systems {
 }
 
 impl Systems {
-    /// None launched. None at all, and said so, where namespaces are not permitted.
+    /// Without any launch. None, with a report, where namespaces are not permitted.
     pub(crate) fn new(security: &str) -> Option<Self> {
         let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
         let lab = match Lab::new(&NODES.map(spec), 1500) {
@@ -89,7 +89,7 @@ impl Systems {
         std::fs::write(&config, text).unwrap();
     }
 
-    /// `arm`, of a system of its own, takes no part, and both it and the TCP router say why.
+    /// `arm`, of a system of its own, is refused, and both it and the TCP router report the reason.
     pub(crate) fn wait_refused(&self, here: &str, there: &str) {
         wait(format!("arm is refused: {here}"), || {
             let told = self.client("arm");
@@ -111,7 +111,7 @@ impl Systems {
         self.nodes.push((node, launch, robot));
     }
 
-    /// What `net` says of a node's client of the TCP router.
+    /// The output of `net` about a node's client of the TCP router.
     pub(crate) fn client(&self, node: &str) -> serde_json::Value {
         let said = self.says(node, &["net", "--json"]);
         let told: serde_json::Value = serde_json::from_str(said.out.trim()).unwrap_or_default();
@@ -122,7 +122,7 @@ impl Systems {
         wait(format!("{node} takes part"), || (self.client(node)["state"] == "up").then_some(()));
     }
 
-    /// A command of a person at a node.
+    /// A person's command at a node.
     pub(crate) fn says(&self, node: &str, arguments: &[&str]) -> Said {
         self.place.say_at(&self.config(node), node, arguments)
     }
@@ -153,7 +153,7 @@ impl Systems {
         &self.nodes.iter().find(|(known, ..)| *known == node).unwrap().2
     }
 
-    /// What counting at `south` brings, called from `north`.
+    /// The result of counting at `south`, called from `north`.
     pub(crate) fn count(&self, number: u32) -> Result<u64, CallError> {
         let north = self.robot("north");
         let mut tool = north.tool(Duration::from_secs(1));
@@ -185,7 +185,7 @@ pub(crate) fn configured(node: &str, id: u8, security: &str) -> String {
     )
 }
 
-/// What crosses, both ways.
+/// Traffic both ways.
 pub(crate) fn check_crossing(systems: &Systems) {
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "1"]).ok(), "1\n");
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "2"]).ok(), "2\n", "by another tool");

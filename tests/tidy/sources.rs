@@ -34,7 +34,7 @@ struct Module {
     children: BTreeSet<String>,
     /// Names brought by `use`, and where they lead.
     imports: BTreeMap<String, Place>,
-    /// Modules all of whose names are brought.
+    /// Modules with a glob import of all their names.
     globs: Vec<Place>,
     defined: BTreeSet<String>,
 }
