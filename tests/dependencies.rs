@@ -81,12 +81,12 @@ fn each_licence_may_be_used_and_nothing_comes_twice_without_a_reason() {
 }
 
 #[test]
-fn who_writes_a_module_compiles_no_tool() {
+fn the_author_of_a_module_compiles_no_tool() {
     for (package, unwanted) in [("rohrpost", &NOT_FOR_MODULES[..]), ("rohrpost-cli", &NOT_FOR_THE_COMMAND)] {
         let all = compiled_for(package);
         assert!(all.iter().any(|its| its.name == package));
         let found: Vec<&str> = all.iter().map(|its| its.name.as_str()).filter(|name| unwanted.contains(name)).collect();
-        assert!(found.is_empty(), "who compiles {package} compiles {found:?}");
+        assert!(found.is_empty(), "{package} also compiles {found:?}");
     }
 }
 

@@ -22,7 +22,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
     (
         "mailbox/src/doorbell.rs",
         "mailbox/src/node.rs",
-        "bells are in the node's page, and whoever finds a death there rings them",
+        "bells are in the node's page, and a process that finds a death there rings them",
     ),
     (
         "mailbox/src/hot.rs",

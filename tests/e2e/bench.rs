@@ -34,7 +34,7 @@ fn the_self_test_has_all_figures() {
 }
 
 #[test]
-fn a_robot_that_runs_is_not_disturbed_and_whoever_measures_is_told() {
+fn a_running_robot_is_not_disturbed_and_the_user_is_told() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     let pid = robot.pid("probe.0");

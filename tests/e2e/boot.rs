@@ -79,7 +79,7 @@ fn the_manager_hears_that_it_is_ready_alive_and_stopping() {
             wait(format!("ping {count}"), || (manager.pings() >= count).then_some(()));
         }
         place.say(&["stop", "probe.1"]).ok();
-        wait("it is told who does not run", || manager.has("STATUS=1 modules run, probe.1 stopped").then_some(()));
+        wait("the manager learns that a module is stopped", || manager.has("STATUS=1 modules run, probe.1 stopped").then_some(()));
         assert!(!manager.has("STOPPING=1"));
         drop(robot);
         launch.stop();
@@ -117,7 +117,7 @@ impl Held {
 }
 
 #[test]
-fn a_launch_whose_loop_hangs_is_silent_whatever_its_other_threads_do() {
+fn a_launch_with_a_hung_loop_is_silent_whatever_its_other_threads_do() {
     let place = Place::new();
     let path = place.path("notify");
     let mut manager = Manager::new(UnixDatagram::bind(&path).unwrap());
@@ -155,7 +155,7 @@ fn full_pipe() -> (PipeReader, PipeWriter) {
 }
 
 #[test]
-fn a_launch_whose_words_nobody_reads_goes_on_and_ends_in_order() {
+fn a_launch_with_unread_output_goes_on_and_ends_in_order() {
     let place = Place::new();
     let path = place.path("notify");
     let mut manager = Manager::new(UnixDatagram::bind(&path).unwrap());

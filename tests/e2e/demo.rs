@@ -93,7 +93,7 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
             assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
             assert_eq!(
                 beyond_of_kept, "0",
-                "whoever's slots were kept is in time: {kept} of at most {bound}:\n{flows}"
+                "a flow with kept slots is in time: {kept} of at most {bound}:\n{flows}"
             );
             let is_known = match flow {
                 "laser.0 → pilot.0 scan" => within == "10.00 ms",

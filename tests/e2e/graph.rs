@@ -31,7 +31,7 @@ fn data_in_a_mailbox_of_ones_own_are_named() {
 }
 
 #[test]
-fn graph_shows_who_sends_what_to_whom() {
+fn graph_shows_senders_receivers_and_data() {
     let place = Place::new();
     let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
     let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));

@@ -273,7 +273,7 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
 }
 
 #[test]
-fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
+fn net_shows_links_losses_and_the_master_of_time() {
     repeated_on_stall(Watched::Ordinary, || {
         let mut lan = Lan::launched();
         let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
@@ -332,7 +332,7 @@ fn net_shows_what_was_refused_and_what_to_do() {
     let IpAddr::V4(base_v4) = base else { panic!("{base}") };
     let [a, b, c, d] = base_v4.octets();
     let stranger = UdpSocket::bind((Ipv4Addr::new(a, b, c, d + 7), 0)).unwrap();
-    stranger.send_to(b"who is there?", (base, port)).unwrap();
+    stranger.send_to(b"is anybody there?", (base, port)).unwrap();
     let text = wait("all are counted", || {
         let text = lan.say(&["net"]).out;
         (text.contains("3 datagrams refused") && text.contains("1 datagram dropped")).then_some(text)

@@ -71,7 +71,7 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
 }
 
 #[test]
-fn who_says_lines_without_end_has_its_share_and_what_others_said_stays() {
+fn a_module_with_endless_lines_has_its_share_and_lines_of_others_stay() {
     let place = Place::new();
     let ring = format!("[output]\nring = {RING}\n");
     let (mut launch, robot) = place.launched(&[&ring, OUTPUT, &probe("probe.0", "", "")]);

@@ -40,7 +40,7 @@ fn file_of(robot: &Robot, name: &str) -> PathBuf {
 }
 
 #[test]
-fn a_full_mailbox_of_a_stopped_receiver_shows_who_fills_it_and_what_was_lost() {
+fn a_full_mailbox_of_a_stopped_receiver_shows_its_senders_and_losses() {
     let place = Place::new();
     let keys = "stop-within = \"200 ms\"\n[module.mailbox.commands]\nslots = 4\nmax-age = \"90 s\"";
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);

@@ -1,4 +1,4 @@
-//! The GUI bridge with Rerun's own command line: what is in a drawing, and what a viewer that misbehaves does to a robot.
+//! The GUI bridge with Rerun's own command line: the content of a drawing, and the effect of a faulty viewer on a robot.
 //!
 //! Behind the feature `rerun-tests`, since they need two programs that nobody else does; `cargo xtask test` brings both.
 

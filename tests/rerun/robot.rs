@@ -1,4 +1,4 @@
-//! A robot that measures itself: `source` sends beats, and all that a bridge draws; `sink` says how late the beats came.
+//! A robot that measures itself: `source` sends beats, and everything that a bridge draws; `sink` reports the delay of the beats.
 //!
 //! Both are this test program itself, started by launch with the one test [`module`] to run.
 
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// What takes longer does not come any more, however busy the computer is.
+/// Limit of all waits, long enough for a busy computer.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 const BEAT: Duration = Duration::from_millis(5);
 /// Rows of data that are sent in a beat while there is a flood.
@@ -35,7 +35,7 @@ fn module() {
     std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
 }
 
-/// Waits until there is something, and fails with what was waited for.
+/// Waits until there is a value, and fails with the name of what was awaited.
 #[track_caller]
 pub(crate) fn wait<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -48,13 +48,13 @@ pub(crate) fn wait<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-/// Something that happened, as an entity of its own in a drawing.
+/// An event, as an entity of its own in a drawing.
 #[rohrpost::data]
 #[derive(Clone, Debug)]
 pub(crate) enum Mark {
     /// The beginning.
     Begun(u64),
-    /// The viewer stood still for a while.
+    /// The viewer was frozen for a while.
     Frozen(u64),
     /// The viewer was killed and another one started.
     Killed(u64),
@@ -62,7 +62,7 @@ pub(crate) enum Mark {
     Flooded(u64),
 }
 
-/// How late beats came.
+/// Delays of beats.
 #[rohrpost::data]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Times {
@@ -108,7 +108,7 @@ pub(crate) trait Sending {
 /// Receives.
 #[rohrpost::interface(class = "sink")]
 pub(crate) trait Receiving {
-    /// What came since this was asked last.
+    /// Figures since the last question.
     #[command(16)]
     fn take(&mut self) -> Times;
 }
@@ -140,7 +140,7 @@ impl Module for Source {
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let Some(began_ns) = self.began_ns else {
-            // From here on beats are due: the first tick was late, and would be taken for the grid of all others.
+            // Beats are due from here on: the first tick was late, and would set the grid of all others.
             self.began_ns = Some(monotonic_ns());
             context.set_period(BEAT);
             return Ok(());
@@ -181,7 +181,7 @@ fn patch(number: u64) -> OccupancyGrid {
     OccupancyGrid { origin, resolution_m: 0.05, columns: 64, rows: 64, cells }
 }
 
-/// A call as one module would make it of another, with the patience of one.
+/// A call as a module would make it, with a module's timeout.
 fn ask(port: u16) {
     let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", port)) else { return };
     let _ = viewer.set_read_timeout(Some(4 * BEAT));
@@ -298,7 +298,7 @@ impl Robot {
     /// The median lateness of so many beats, ns.
     pub(crate) fn window(&mut self, beats: u64) -> u64 {
         self.take();
-        // A computer that stands still for a window brings no beat in it.
+        // A computer that stalls for a window brings no beat in it.
         for _ in 0..10 {
             // Not asked meanwhile: asking is work, too.
             std::thread::sleep(BEAT * u32::try_from(beats).unwrap());
@@ -323,7 +323,7 @@ impl Robot {
         self.node.participants().into_iter().find(|p| p.module == gui).unwrap().pid
     }
 
-    /// Time of the newest scan that was published, ns since 1970: whoever subscribed to each has been sent it.
+    /// Time of the newest published scan, ns since 1970: it has been sent to all subscribers of each scan.
     pub(crate) fn newest_scan_ns(&mut self) -> u64 {
         let (source, scan) = (self.name("source.0"), SendingInterface::SCAN.number);
         let write = |body: &mut Vec<u8>| append(body, &(scan,));
@@ -337,7 +337,7 @@ impl Robot {
         self.node.look_at(self.name("gui.0").with_local(local)).unwrap()
     }
 
-    /// Data that a module should have got and did not.
+    /// Data that a module missed.
     pub(crate) fn lost_by(&mut self, module: &str) -> u64 {
         let module = self.name(module);
         self.tool.status(module).unwrap().lost
@@ -363,12 +363,12 @@ impl Robot {
         assert_eq!((bridge.state, bridge.restarts), (Some(ModuleState::On), 0), "{}", self.said());
     }
 
-    /// What modules have said.
+    /// Lines of the modules.
     pub(crate) fn said(&self) -> String {
         self.say(&["log"])
     }
 
-    /// What a tool says of it.
+    /// A tool's output.
     pub(crate) fn say(&self, arguments: &[&str]) -> String {
         let mut tool = Command::new(env!("CARGO_BIN_EXE_rohrpost"));
         let output = tool.args(arguments).env("ROHRPOST_DIR", self.memory.path().join("nodes")).output().unwrap();
@@ -382,7 +382,7 @@ impl Robot {
 
 impl Drop for Robot {
     fn drop(&mut self) {
-        // It is asked to end, so that its modules do; then made to.
+        // Asked to end first, so that its modules end; then killed.
         let pid = nix::unistd::Pid::from_raw(self.launch.id() as i32);
         let _ = nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM);
         let start = Instant::now();
@@ -394,7 +394,7 @@ impl Drop for Robot {
     }
 }
 
-/// No scheduling in real time, so that it runs where that is not allowed, and what the bridge takes is felt.
+/// No real-time scheduling, so that it runs where that is not allowed, and so that the bridge's load has an effect.
 fn configuration(drawing: &str, settings: &str) -> String {
     let me = std::env::current_exe().unwrap();
     let program = format!("[{me:?}, \"--exact\", \"robot::module\", \"--nocapture\"]");

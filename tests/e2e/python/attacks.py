@@ -17,7 +17,7 @@ FOREVER = 0xFFFFFFFF
 
 
 def scan(range_m):
-    """A LaserScan of 181 beams that all end at once: whoever drives by it stops."""
+    """A LaserScan of 181 beams that all end at once: a module that drives by it stops."""
     beams = struct.pack("<f", range_m) * 181
     return struct.pack("<fff", -1.57, 0.01745, 8.0) + varint(181) + beams + b"\0"
 
@@ -30,7 +30,7 @@ def line(module, words, lost=0, ahead_s=0):
 class Attacks:
     """Each by its name: a package as (to, sender, kind, id, body, priority, options).
 
-    `own` are modules that the program may speak for; `laser` is the hash of the laser's interface, as it tells whoever asks.
+    `own` are modules that the program may speak for; `laser` is the hash of the laser's interface, as the laser tells any caller.
     """
 
     def __init__(self, own, laser):

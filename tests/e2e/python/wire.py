@@ -94,11 +94,11 @@ class Session:
             self.kept += piece
         return None, b""
 
-    def meet(self, ranges, who):
+    def meet(self, ranges, name):
         hello = struct.pack(
             "<4sBBBBQQQQQ", MAGIC, 1, self.own >> 24, 0, 0, *self.digests, self.life, 1, time.monotonic_ns()
         )
-        self.say(HELLO, hello + who.encode())
+        self.say(HELLO, hello + name.encode())
         kind, rest = self.frame()
         if kind == REFUSAL:
             raise SystemExit(f"refused, reason {rest[5]}: {rest[24:].decode()}")
