@@ -16,7 +16,8 @@ fn the_self_test_has_all_figures() {
     for (case, floor) in CASES {
         for bytes in [64, 1024] {
             let row = |contender: &str| {
-                let is_it = |line: &&Value| line["case"] == case && line["bytes"] == bytes && line["contender"] == contender;
+                let is_it =
+                    |line: &&Value| line["case"] == case && line["bytes"] == bytes && line["contender"] == contender;
                 lines.iter().find(is_it).unwrap_or_else(|| panic!("no {case} {bytes} {contender}: {lines:#?}"))
             };
             for row in [row("rohrpost"), row(floor)] {

@@ -79,7 +79,9 @@ fn the_manager_hears_that_it_is_ready_alive_and_stopping() {
             wait(format!("ping {count}"), || (manager.pings() >= count).then_some(()));
         }
         place.say(&["stop", "probe.1"]).ok();
-        wait("the manager learns that a module is stopped", || manager.has("STATUS=1 modules run, probe.1 stopped").then_some(()));
+        wait("the manager learns that a module is stopped", || {
+            manager.has("STATUS=1 modules run, probe.1 stopped").then_some(())
+        });
         assert!(!manager.has("STOPPING=1"));
         drop(robot);
         launch.stop();

@@ -91,10 +91,7 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
                 panic!("{row}")
             };
             assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
-            assert_eq!(
-                beyond_of_kept, "0",
-                "a flow with kept slots is in time: {kept} of at most {bound}:\n{flows}"
-            );
+            assert_eq!(beyond_of_kept, "0", "a flow with kept slots is in time: {kept} of at most {bound}:\n{flows}");
             let is_known = match flow {
                 "laser.0 → pilot.0 scan" => within == "10.00 ms",
                 "laser.0 → pilot.0 subscribe answered" => within == "900.00 ms",

@@ -59,7 +59,7 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
         assert!(send(&robot, &mut tool, from, &line));
     }
     let expected = RefusedLines { foreign_name: 2, other_system: 2, ahead: 1, losses: 1, ..RefusedLines::default() };
-    wait("all were repeated_on_stall", || (refused(&robot, &mut tool) == expected).then_some(()));
+    wait("all lines are checked", || (refused(&robot, &mut tool) == expected).then_some(()));
     let log = told(&place, "lines in the name of others were dropped");
     assert!(!log.contains("forged") && !log.contains("by another system"), "{log}");
     assert!(log.contains(": said in its own name"), "{log}");

@@ -222,7 +222,7 @@ fn looking_changes_nothing() {
         incarnation
     };
     place.say(&["call", "probe.0", "count", "1"]).ok();
-    let (before, life) = (all_counts(&robot), incarnation());
+    let (before, newest) = (all_counts(&robot), incarnation());
     // A tool that has come and gone has left nothing.
     assert_same(&all_counts(&robot), &before);
     let watching: Vec<Running> = [
@@ -247,7 +247,7 @@ fn looking_changes_nothing() {
     // Packages, losses, waits, flows, participants.
     assert_same(&all_counts(&robot), &before);
     // The first tool's calls have one as well.
-    assert_eq!(incarnation(), life + 2, "nobody joined meanwhile");
+    assert_eq!(incarnation(), newest + 2, "nobody joined meanwhile");
     let status = place.say(&["status", "--json"]).json();
     assert_eq!((&status[0]["subscribers"], &status[1]["subscribers"]), (&0.into(), &0.into()));
 }

@@ -122,7 +122,7 @@ fn duplicates_of_an_order_to_launch_restart_a_module_once() {
 }
 
 #[test]
-fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
+fn a_restarted_caller_begins_anew_and_its_earlier_incarnation_is_not_heard() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     let mut raw = Raw::new(&robot, "probe.0");
@@ -163,7 +163,7 @@ fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
 }
 
 #[test]
-fn a_restarted_server_runs_no_repeat_of_what_its_earlier_life_may_have_run() {
+fn a_restarted_server_runs_no_repeat_of_a_call_that_its_earlier_incarnation_may_have_run() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"50 ms\" }")]);
     let mut raw = Raw::new(&robot, "probe.0");

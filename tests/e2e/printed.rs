@@ -16,7 +16,7 @@ fn texts(lines: &[Value], level: &str) -> Vec<String> {
 fn what_a_module_prints_is_a_line_of_its_own() {
     let place = Place::new();
     let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
-    call(&place, &["probe.0", "print", "stdout", "a greeting", "1"]);
+    call(&place, &["probe.0", "print", "stdout", "a remark", "1"]);
     call(&place, &["probe.0", "print", "stderr", "a complaint", "1"]);
     // Also printed by its own output layer, for launch to repeat; it must not come twice.
     call(&place, &["probe.0", "say", "error", "said and printed"]);
@@ -26,7 +26,7 @@ fn what_a_module_prints_is_a_line_of_its_own() {
         texts(&all, "info").contains(&"the end 0".into()).then_some(all)
     });
     let info = texts(&all, "info");
-    assert!(info.contains(&"a greeting 0".into()), "{all:#?}");
+    assert!(info.contains(&"a remark 0".into()), "{all:#?}");
     assert_eq!(texts(&all, "warn"), ["a complaint 0"], "{all:#?}");
     assert_eq!(texts(&all, "error"), ["said and printed"], "{all:#?}");
 }

@@ -26,7 +26,7 @@ pub struct TakenOver {
     /// From the last synchronisation of the old master to the first one in its place, cycles.
     pub replaced_cycles: f64,
     /// To the first one of the new master.
-    pub reigns_cycles: f64,
+    pub new_master_cycles: f64,
     /// Slots of the others that went by without a frame.
     pub slots_lost: u64,
     /// How much a page has moved against the old master's time, µs.
@@ -97,7 +97,7 @@ pub fn kill_master(
     Ok(TakenOver {
         dead,
         replaced_cycles: cycles_until(&[FrameKind::Sync, FrameKind::Replacement]).ok_or_else(never)?,
-        reigns_cycles: cycles_until(&[FrameKind::Sync]).ok_or_else(never)?,
+        new_master_cycles: cycles_until(&[FrameKind::Sync]).ok_or_else(never)?,
         slots_lost,
         step_us: pages.moved_ns as f64 / 1000.0,
     })

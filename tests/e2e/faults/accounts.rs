@@ -52,7 +52,7 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
         assert!(accounts.datagrams_lost - accounts.wire <= accounts.datagrams_other, "{accounts:?}");
         assert!(peer.copies > 0 && peer.overtaken > 0, "{peer:?}");
         let late = accounts.arm.lost.iter().find(|loss| loss.cause == "late").map_or(0, |loss| loss.packages);
-        assert!(late > 0, "what was overtaken is not delivered: {accounts:?}");
+        assert!(late > 0, "reordered datagrams are not delivered: {accounts:?}");
 
         // Each has three tries: with 10 % lost on the way there or back, hardly any is lost three times.
         assert!(last >= 20 && calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);

@@ -5,7 +5,7 @@ use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 
 #[test]
-fn a_link_that_is_cut_is_told_at_both_ends_and_once_mended_carries_as_before() {
+fn a_cut_link_is_reported_at_both_ends_and_carries_as_before_once_it_is_fixed() {
     let Some(field) = Field::launched() else { return };
     for round in 1..=2 {
         field.lab.cut("arm").unwrap();

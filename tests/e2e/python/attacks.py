@@ -35,7 +35,7 @@ class Attacks:
 
     def __init__(self, own, laser):
         self.own, self.laser, self.sequence = own, laser, itertools.count(1)
-        self.life = int(time.time()) & 0xFFFFFFFF
+        self.incarnation = int(time.time()) & 0xFFFFFFFF
 
     def all(self):
         return {
@@ -65,7 +65,7 @@ class Attacks:
 
     def call(self, to, sender, function, interface, valid_us, arguments):
         sequence = next(self.sequence)
-        body = command(interface, self.life, sequence, valid_us, arguments)
+        body = command(interface, self.incarnation, sequence, valid_us, arguments)
         return (to, sender | 1, function, sequence & 0xFFFF, body, 255, 0)
 
     def lease(self, sender):

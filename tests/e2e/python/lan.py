@@ -78,7 +78,7 @@ def derived(secret, purpose, system, sender, receiver, of_sender=0, of_receiver=
 
 class Peer:
     def __init__(self):
-        self.challenge, self.life, self.key, self.hellos, self.sequence = 1, 0, b"", 0, 0
+        self.challenge, self.incarnation, self.key, self.hellos, self.sequence = 1, 0, b"", 0, 0
 
 
 class Node:
@@ -88,7 +88,7 @@ class Node:
         check_rfc()
         self.digest, self.system, self.own, self.port = digest, system, own, port
         self.addresses, self.key_id, self.secret = addresses, key_id, secret
-        self.life = int.from_bytes(os.urandom(8), "little") | 1
+        self.incarnation = int.from_bytes(os.urandom(8), "little") | 1
         self.peers = {at: Peer() for at in range(len(addresses)) if at != own}
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind((addresses[own], port))
@@ -97,7 +97,7 @@ class Node:
     def datagram(self, kind, to, sequence, rest, key, nonce):
         head = struct.pack(
             "<2sBBBBBBQQQ",
-            b"Rp", 1, kind, self.system, self.own, to, self.key_id, self.digest, self.life, sequence,
+            b"Rp", 1, kind, self.system, self.own, to, self.key_id, self.digest, self.incarnation, sequence,
         )  # fmt: skip
         sealed = cipher(key, nonce, rest)
         sealed += tag(key, nonce, head, sealed)
@@ -113,12 +113,12 @@ class Node:
         peer = self.peers[to]
         peer.hellos += 1
         key = derived(self.secret, FOR_HELLO, self.system, self.own, to)
-        nonce = struct.pack("<QI", self.life, peer.hellos)
+        nonce = struct.pack("<QI", self.incarnation, peer.hellos)
         rest = struct.pack("<QQQQ", challenge, answer, peer.sequence, 0)
         self.emit(to, self.datagram(HELLO, to, peer.hellos, rest, key, nonce))
 
     def seal(self, to, kind, rest):
-        """A datagram that this life seals to the peer's."""
+        """A datagram that this incarnation seals to the peer's."""
         peer = self.peers[to]
         peer.sequence += 1
         sequence = peer.sequence - 1
@@ -136,32 +136,32 @@ class Node:
             except (BlockingIOError, TimeoutError):
                 continue
             if len(datagram) == 84 and datagram[3] == HELLO and address in self.addresses:
-                self.greet(datagram)
+                self.handshake(datagram)
 
-    def greet(self, datagram):
-        sender, life, number = datagram[5], *struct.unpack("<QQ", datagram[16:32])
+    def handshake(self, datagram):
+        sender, incarnation, number = datagram[5], *struct.unpack("<QQ", datagram[16:32])
         peer = self.peers[sender]
         key = derived(self.secret, FOR_HELLO, self.system, sender, self.own)
-        nonce = struct.pack("<QI", life, number)
+        nonce = struct.pack("<QI", incarnation, number)
         sealed = datagram[36:-16]
         assert tag(key, nonce, datagram[:32], sealed) == datagram[-16:], "a hello of another key"
         challenge, answer, _, _ = struct.unpack("<QQQQ", cipher(key, nonce, sealed))
         if answer == peer.challenge:
             peer.challenge = int.from_bytes(os.urandom(8), "little") | 1
-            if peer.life != life:
-                peer.life, peer.sequence = life, 0
-                peer.key = derived(self.secret, FOR_PACKAGES, self.system, self.own, sender, self.life, life)
+            if peer.incarnation != incarnation:
+                peer.incarnation, peer.sequence = incarnation, 0
+                peer.key = derived(self.secret, FOR_PACKAGES, self.system, self.own, sender, self.incarnation, incarnation)
         if challenge:
             self.hello(sender, 0 if answer else peer.challenge, challenge)
 
     def alive(self, to):
         """Says that it is there and hears."""
-        self.emit(to, self.seal(to, ALIVE, struct.pack("<QQQ", self.peers[to].life, 0, 0)))
+        self.emit(to, self.seal(to, ALIVE, struct.pack("<QQQ", self.peers[to].incarnation, 0, 0)))
 
     def meet(self, to):
         """Until the peer has shown that it lives, for ten seconds at most."""
         until = time.monotonic() + 10
-        while not self.peers[to].life:
+        while not self.peers[to].incarnation:
             assert time.monotonic() < until, f"node {to} does not answer"
             self.hello(to, self.peers[to].challenge, 0)
             self.listen(0.2)

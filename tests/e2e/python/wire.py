@@ -68,7 +68,7 @@ class Session:
     def __init__(self, stream, own, digests, order):
         self.stream, self.own, self.digests = stream, own, digests
         self.order, self.kept, self.asked = (">" if order == "big" else "<"), b"", 0.0
-        self.life = self.incarnation = int(time.time() * 1000) & 0xFFFFFFFF
+        self.incarnation = int(time.time() * 1000) & 0xFFFFFFFF
         self.sequence = 0
 
     def say(self, kind, rest):
@@ -96,7 +96,7 @@ class Session:
 
     def meet(self, ranges, name):
         hello = struct.pack(
-            "<4sBBBBQQQQQ", MAGIC, 1, self.own >> 24, 0, 0, *self.digests, self.life, 1, time.monotonic_ns()
+            "<4sBBBBQQQQQ", MAGIC, 1, self.own >> 24, 0, 0, *self.digests, self.incarnation, 1, time.monotonic_ns()
         )
         self.say(HELLO, hello + name.encode())
         kind, rest = self.frame()

@@ -35,7 +35,8 @@ const GOLDEN: f64 = 0.618_034;
 const DEAD: [&str; 2] = ["the first dies", "the second dies"];
 
 const REPLACED: [Goal; 2] = [Goal { name: "must 2 cycles", most: 2.0 }, Goal { name: "hoped 1, and 1 ms", most: 1.2 }];
-const REIGNS: [Goal; 2] = [Goal { name: "must 4 cycles", most: 4.0 }, Goal { name: "hoped 3, and 1 ms", most: 3.2 }];
+const NEW_MASTER: [Goal; 2] =
+    [Goal { name: "must 4 cycles", most: 4.0 }, Goal { name: "hoped 3, and 1 ms", most: 3.2 }];
 const LOST: [Goal; 1] = [Goal { name: "hoped none", most: 0.0 }];
 const STEP: [Goal; 1] = [Goal { name: "hoped 5 us", most: 5.0 }];
 const FALSE: [Goal; 2] = [Goal { name: "must 1", most: 1.0 }, Goal { name: "hoped none", most: 0.0 }];
@@ -131,7 +132,7 @@ impl Found {
             ));
         };
         told("replacement", "cycles", &REPLACED, |kill| kill.replaced_cycles);
-        told("new master", "cycles", &REIGNS, |kill| kill.reigns_cycles);
+        told("new master", "cycles", &NEW_MASTER, |kill| kill.new_master_cycles);
         told("slots lost", "slots", &LOST, |kill| kill.slots_lost as f64);
         told("time step", "us", &STEP, |kill| kill.step_us);
         rows
@@ -168,7 +169,7 @@ mod tests {
 
     #[test]
     fn what_nobody_saw_is_no_good_figure() {
-        let kill = |dead| TakenOver { dead, replaced_cycles: 1.0, reigns_cycles: 3.0, slots_lost: 0, step_us: 1.0 };
+        let kill = |dead| TakenOver { dead, replaced_cycles: 1.0, new_master_cycles: 3.0, slots_lost: 0, step_us: 1.0 };
         let cases = |killed: &[u8], without_sync| {
             let killed = killed.iter().map(|dead| kill(*dead)).collect();
             let rows =
