@@ -1,5 +1,5 @@
-//! Third-party crates: none of a tool for the author of a module, no licence that asks for more than attribution, and none in
-//! two versions without a reason.
+//! Third-party crates: none of a tool for the author of a module, no licence that asks for more than attribution, and
+//! none in two versions without a reason.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

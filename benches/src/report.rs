@@ -22,8 +22,8 @@ impl Report {
     }
 }
 
-/// Measures the cases that the settings select, and passes every line or table to `say`. If `say` returns false, the run ends:
-/// nobody reads. Meanwhile terminating signals end only this run, and its files are removed.
+/// Measures the cases that the settings select, and passes every line or table to `say`. If `say` returns false, the
+/// run ends: nobody reads. Meanwhile terminating signals end only this run, and its files are removed.
 ///
 /// The calling process must have no other thread.
 ///

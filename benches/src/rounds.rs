@@ -121,8 +121,8 @@ pub struct Subject {
     pub unit: &'static str,
 }
 
-/// Measures all contenders, interleaved, and compares the first one, which is ours, with each of `versus`. Rows: ours, once for
-/// each comparison (once without, if there is none), then the others.
+/// Measures all contenders, interleaved, and compares the first one, which is ours, with each of `versus`. Rows: ours,
+/// once for each comparison (once without, if there is none), then the others.
 pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender], versus: &[Versus]) -> Vec<Row> {
     let turns = interleave(settings, contenders);
     let row = |at: usize, versus: Option<&Versus>| {

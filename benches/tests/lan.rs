@@ -63,7 +63,8 @@ fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
             3,
             "{clock:?}"
         );
-        // A network between two nodes of an idle computer loses nothing; the kernel's buffers may lose unpaced datagrams.
+        // A network between two nodes of an idle computer loses nothing; the kernel's buffers may lose unpaced
+        // datagrams.
         for row in rows.iter().filter(|row| row["unit"] == "%" && row["contender"] != "udp") {
             assert_eq!(row["p50"], 0.0, "{row:?}");
         }

@@ -1,4 +1,5 @@
-//! All cases, run small: every contender delivers what it should, every line says what it has to, and nothing is left behind.
+//! All cases, run small: every contender delivers what it should, every line says what it has to, and nothing is left
+//! behind.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

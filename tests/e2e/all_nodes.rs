@@ -187,8 +187,9 @@ fn a_user_without_rights_launches_all_nodes() {
     let config = place.config_of("test", &format!("{NODES}{NETWORK}"), &[&format!("{OUTPUT}node = \"arm\"\n")]);
     let launch = place.command(&["launch", config.to_str().unwrap(), "--all"]);
     let program = place.path("rohrpost");
-    // Copied by a process of its own: a file that this process has open for writing is also held by a child that another test forks just then,
-    // until the child executes its program; until then the copy cannot be executed ("text file busy").
+    // Copied by a process of its own: a file that this process has open for writing is also held by a child that
+    // another test forks just then, until the child executes its program; until then the copy cannot be executed ("text
+    // file busy").
     assert!(Command::new("cp").arg(launch.get_program()).arg(&program).status().unwrap().success());
     for path in [place.memory(), config.parent().unwrap()] {
         chown(path, Some(NOBODY), Some(NOBODY)).unwrap();

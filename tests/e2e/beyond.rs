@@ -1,5 +1,5 @@
-//! Traffic through a TCP router, between systems and to each node of a LAN, and the cost of a killed TCP router. Refused programs:
-//! `beyond_strangers`.
+//! Traffic through a TCP router, between systems and to each node of a LAN, and the cost of a killed TCP router.
+//! Refused programs: `beyond_strangers`.
 
 use crate::harness::{halt, probe, signal, wait};
 use crate::systems::{OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
@@ -8,7 +8,8 @@ use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Each system lists what the other hosts, whichever runs the TCP router; without the TCP router the list says that it is unknown.
+/// Each system lists what the other hosts, whichever runs the TCP router; without the TCP router the list says that it
+/// is unknown.
 fn check_lists(systems: &Systems) {
     for (node, module, by) in
         [("north", "2.probe.0", "node south of south"), ("south", "1.probe.0", "node north of north")]

@@ -56,13 +56,15 @@ show = [
 "#;
 
 const SAID: [&str; 11] = [
-    "13: module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, laser",
+    "13: module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, \
+     laser",
     "17: module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
      `laser-noise-m`, `odometry-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
     "21: module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz",
     "28: module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`",
     "34: module `pilot.1`: settings: `laser` is `odometry.0`, but must be of class `laser`, whose functions it calls",
-    "35: module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean `motor`?",
+    "35: module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean \
+     `motor`?",
     "40: module `mapper.0`: settings: `resolution-m` is 5; use 0.005 to 1",
     "40: module `mapper.0`: settings: `laser` is `laser.7`, which no [[module]] defines; add one, or name another",
     "44: module `pilot.2`: settings: missing field `laser`",

@@ -7,7 +7,8 @@ use std::process::Command;
 pub(crate) fn offered(place: &Place, words: &[&str]) -> Vec<String> {
     let [before @ .., last] = words else { panic!("no words") };
     let list = words.iter().map(|word| format!("'{word}'")).collect::<Vec<_>>().join(" ");
-    // As bash itself does at the key: sets the words, and calls the function with the command, the word and the one before.
+    // As bash itself does at the key: sets the words, and calls the function with the command, the word and the one
+    // before.
     let script = format!(
         "set -e; source <(\"$ROHRPOST\" completions bash); complete -p rohrpost >/dev/null
          COMP_WORDS=({list}); COMP_CWORD={}; COMP_TYPE=9
@@ -86,7 +87,8 @@ fn without_a_node_the_named_configuration_is_asked() {
     place.config_of(
         "arm",
         &format!(
-            "[nodes.base]\naddress = \"127.0.0.1\"\ntools = [0, 1]\n[nodes.desk]\naddress = \"127.0.0.2\"\ntools = [2, 3]\n{NETWORK}"
+            "[nodes.base]\naddress = \"127.0.0.1\"\ntools = [0, 1]\n[nodes.desk]\naddress = \"127.0.0.2\"\n\
+             tools = [2, 3]\n{NETWORK}"
         ),
         &["[[module]]\nname = \"probe.7\"\nnode = \"desk\"\nprogram = \"nowhere\"\n"],
     );

@@ -80,7 +80,8 @@ fn the_security_of_a_configuration_is_told() {
         };
         let text = node("base", 1, "[0, 3]") + &node("arm", 2, "[4, 7]");
         format!(
-            "{text}[network]\nsecurity = \"{security}\"\n[tcp]\naddress = \"127.251.8.1\"\n{tcp}\n[time]\nsource = \"master\"\n"
+            "{text}[network]\nsecurity = \"{security}\"\n[tcp]\naddress = \"127.251.8.1\"\n{tcp}\n[time]\n\
+             source = \"master\"\n"
         )
     };
     let module = probe("probe.0", "", "node = \"arm\"");

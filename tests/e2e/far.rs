@@ -1,5 +1,5 @@
-//! Nodes that only the TCP router reaches, such as a robot's laptop: all nodes of the file in namespaces of their own, `base` and `arm` on
-//! a LAN, `far` on a link of its own to `base`.
+//! Nodes that only the TCP router reaches, such as a robot's laptop: all nodes of the file in namespaces of their own,
+//! `base` and `arm` on a LAN, `far` on a link of its own to `base`.
 
 use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, signal, wait};
 use crate::process::{Running, Said};
@@ -10,7 +10,8 @@ use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::path::PathBuf;
 
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";
-const TWO: &str = "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\ntools = [16, 31]\n\
+const TWO: &str = "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\n\
+    tools = [16, 31]\n\
                    [time]\nsource = \"master\"\n";
 const OPEN: &str = "[network]\nsecurity = \"none\"\n[tcp]\nsecurity = \"none\"\n";
 const SEALED: &str = "[network]\nsecurity = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertificates = \"certificates\"\n";
@@ -23,8 +24,8 @@ struct Field {
 }
 
 impl Field {
-    /// probe.0 on `base`, which follows far's, probe.1 on `arm` if it is there, probe.2 on `far`, which follows base's. None where namespaces are
-    /// not permitted.
+    /// probe.0 on `base`, which follows far's, probe.1 on `arm` if it is there, probe.2 on `far`, which follows base's.
+    /// None where namespaces are not permitted.
     fn launched(nodes: &[&'static str], lan: &str, security: &str) -> Option<Self> {
         let place = Place::new();
         let mut modules = vec![
@@ -35,7 +36,8 @@ impl Field {
             modules.push(probe("probe.1", "", "node = \"arm\""));
         }
         let text = format!(
-            "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n{CLASSES}{FAR}{lan}{security}address = \"192.168.7.1\"\nserver = \
+            "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n\
+             {CLASSES}{FAR}{lan}{security}address = \"192.168.7.1\"\nserver = \
              \"base\"\n{}",
             modules.concat()
         );

@@ -1,8 +1,8 @@
-//! The demo's robot, while a hostile node of its LAN, with the key, and a hostile teammate, with a certificate, attack it: it drives as before, each
-//! attempt is counted by cause, and no process takes more memory.
+//! The demo's robot, while a hostile node of its LAN, with the key, and a hostile teammate, with a certificate, attack
+//! it: it drives as before, each attempt is counted by cause, and no process takes more memory.
 //!
-//! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the whole minute:
-//! `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
+//! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the
+//! whole minute: `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
 
 use crate::harness::{PATIENCE, Place, Robot, skipped};
 use crate::process::{Running, Said};
@@ -20,8 +20,10 @@ const NODES: [(&str, &str); 4] =
     [("base", "10.77.0.1"), ("brain", "10.77.0.2"), ("desk", "10.77.0.3"), ("away", "10.77.0.9")];
 /// Running processes of the robot; `desk` is the hostile node's place.
 const RUNNING: [&str; 2] = ["base", "brain"];
-const SECURITY: &str = "security = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertificates = \"certificates\"\naddress = \"10.77.0.1\"\n\
-                        server = \"base\"\n[access]\nmotor = [\"pilot\"]\nodometry = [\"pilot\", \"mapper\", \"tool\"]\n\
+const SECURITY: &str = "security = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertificates = \"certificates\"\n\
+    address = \"10.77.0.1\"\n\
+                        server = \"base\"\n[access]\nmotor = [\"pilot\"]\n\
+                        odometry = [\"pilot\", \"mapper\", \"tool\"]\n\
                         laser = [\"pilot\", \"mapper\", \"tool\"]\n";
 /// Allowed growth of a process: its bounded queues and tables.
 const GROWTH_KIB_MAX: u64 = 16 << 10;
@@ -141,7 +143,8 @@ fn resident_kib(pid: u32) -> u64 {
     line.trim().trim_end_matches(" kB").parse().unwrap()
 }
 
-/// The demo's robot on three nodes, sealed, with a TCP router; without drawing, and with its lines collected on a running node.
+/// The demo's robot on three nodes, sealed, with a TCP router; without drawing, and with its lines collected on a
+/// running node.
 fn robot() -> String {
     let text = include_str!("../../config/demo-nodes.toml");
     let (text, _) = text.split_once("# A program of its own").unwrap();

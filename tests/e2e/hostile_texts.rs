@@ -1,4 +1,5 @@
-//! Foreign texts in each tool: names, texts, units, values, faults and lines of a module that tries to control the terminal.
+//! Foreign texts in each tool: names, texts, units, values, faults and lines of a module that tries to control the
+//! terminal.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, wait};
 use rohrpost::interface::{Interface, Serve};

@@ -1,5 +1,5 @@
-//! Two nodes of one system on this computer, each with its router, at addresses of the loopback device: packages between them, and
-//! messages about failures.
+//! Two nodes of one system on this computer, each with its router, at addresses of the loopback device: packages
+//! between them, and messages about failures.
 
 use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::ProbingInterface;
@@ -38,7 +38,8 @@ pub(crate) fn addresses() -> [String; 2] {
 fn configured(place: &Place, name: &str, addresses: &[String; 2], further: &str) -> PathBuf {
     let [base, arm] = addresses;
     let nodes = format!(
-        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}{further}"
+        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n\
+         {NETWORK}{further}"
     );
     let modules = [probe("probe.0", "", "node = \"base\""), probe("probe.1", "rate-hz = 20.0", "node = \"arm\"")];
     place.config_of(name, &nodes, &[&modules[0], &modules[1]])
@@ -59,7 +60,8 @@ impl Lan {
             let started = lan.start(node, environment);
             lan.nodes.push(started);
         }
-        // A router is silent about packages in its first half second: they may be duplicates of what its predecessor has delivered.
+        // A router is silent about packages in its first half second: they may be duplicates of what its predecessor
+        // has delivered.
         wait("routers that answer", || {
             let routers = lan.nodes.iter().zip(["router.0", "router.1"]);
             let mut began_ns = routers.filter_map(|((_, robot), router)| Some(robot.process(router)?.joined_ns));

@@ -21,7 +21,8 @@ impl Two {
         let place = Place::new();
         let [base, arm] = addresses();
         let nodes = format!(
-            "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}"
+            "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n\
+             {NETWORK}"
         );
         let modules = [
             format!("{OUTPUT}node = \"base\"\n"),
@@ -111,8 +112,8 @@ fn all_nodes_are_listed_from_each_of_them() {
         );
         assert!(far["uptime_s"].as_f64() < Some(600.0), "{far}");
         let rate = far["sends_to"].as_array().unwrap().iter().find(|peer| peer["module"] == "probe.0").unwrap();
-        // It receives each beat twice, in two mailboxes: a hundred a second, fewer on a busy computer. If they were counted again at
-        // delivery, there would be more.
+        // It receives each beat twice, in two mailboxes: a hundred a second, fewer on a busy computer. If they were
+        // counted again at delivery, there would be more.
         let per_s = rate["packages_per_s"].as_f64().unwrap();
         assert!((10.0..130.0).contains(&per_s), "counted once, where they are sent: {per_s}");
         assert_eq!(two.say(&["status", "--json"]).json().as_array().unwrap().len(), 5, "with both routers");

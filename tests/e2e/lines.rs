@@ -27,7 +27,8 @@ fn send(robot: &Robot, tool: &mut ToolLink, from: Name, line: &OutputLine) -> bo
     tool.link.send(robot.name("output.0").with_local(LINES), &label, &[&body]).is_ok()
 }
 
-/// The log as soon as it contains this: `output` reports a refusal by a line of its own, which takes the path of all lines.
+/// The log as soon as it contains this: `output` reports a refusal by a line of its own, which takes the path of all
+/// lines.
 fn told(place: &Place, words: &str) -> String {
     wait(words, || {
         let log = place.say(&["log"]).ok();

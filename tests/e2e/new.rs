@@ -6,8 +6,8 @@ use std::process::Command;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// Cargo in the new project, without the network. It builds into the folder and by the profile of this workspace, so that
-/// nothing is compiled twice.
+/// Cargo in the new project, without the network. It builds into the folder and by the profile of this workspace, so
+/// that nothing is compiled twice.
 fn cargo(project: &Path, command: &str) -> Command {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     // The target folder is reached as `target`, so that robot.toml finds the program where it looks for it.

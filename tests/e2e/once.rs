@@ -131,8 +131,8 @@ fn a_restarted_caller_begins_anew_and_its_earlier_incarnation_is_not_heard() {
         let (envelope, result) = raw.answer();
         assert_eq!((envelope, result), (ReplyEnvelope { incarnation, sequence }, Ok(u64::from(number))));
     }
-    // Late packages of the earlier incarnation: one that ran, and one that arrives for the first time. If the sender is no earlier incarnation, but a
-    // program after its clock was set back, it learns why it is refused.
+    // Late packages of the earlier incarnation: one that ran, and one that arrives for the first time. If the sender is
+    // no earlier incarnation, but a program after its clock was set back, it learns why it is refused.
     for (sequence, age_us, number) in [(2, 500, 5), (3, 0, 6)] {
         raw.send(COUNT, Raw::envelope(7, sequence, age_us), number);
         let refused = (ReplyEnvelope { incarnation: 7, sequence }, Err(Fault::EarlierIncarnation));
@@ -267,7 +267,8 @@ fn callers_in_a_crowd_before_a_small_mailbox_and_a_halting_server_never_run_twic
     let keys = "[module.mailbox.commands]\nslots = 6\nfull = \"reject\"";
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);
     let pid = robot.pid("probe.0");
-    // Time enough for an answer when the server runs, too little when it is stopped: repeats, expiry and time-outs happen.
+    // Time enough for an answer when the server runs, too little when it is stopped: repeats, expiry and time-outs
+    // happen.
     let (callers, each, timeout) = (6, 60, Duration::from_millis(60));
     let work = |caller: u32| {
         let mut tool = robot.tool(timeout);

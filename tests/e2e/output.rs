@@ -17,8 +17,9 @@ pub(crate) fn call(place: &Place, arguments: &[&str]) {
     place.say(&[&["call", "--timeout", "60"], arguments].concat()).ok();
 }
 
-/// Whether a line is a module's own, and not one that a test asked a probe for: the report that it is on, and the output of the test program
-/// as which a probe runs. Launch forwards the latter a moment after it was printed, so at any time.
+/// Whether a line is a module's own, and not one that a test asked a probe for: the report that it is on, and the
+/// output of the test program as which a probe runs. Launch forwards the latter a moment after it was printed, so at
+/// any time.
 pub(crate) fn is_own(text: &str) -> bool {
     ["is on", "running 1 test"].contains(&text)
 }

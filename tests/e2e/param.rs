@@ -49,8 +49,8 @@ fn parameters_are_listed_with_unit_range_and_text() {
     let one = place.say(&["param", "get", "probe.0", "near-m"]).ok();
     assert_eq!(one.lines().count(), 2, "{one}");
     let json = place.say(&["param", "get", "probe.0", "far-m", "--json"]).json();
-    let expected = serde_json::json!([{ "module": "probe.0", "parameter": "far-m", "value": 9, "unit": "m", "type": "u16",
-        "min": 0, "max": 100, "text": "Farthest thing that counts." }]);
+    let expected = serde_json::json!([{ "module": "probe.0", "parameter": "far-m", "value": 9, "unit": "m",
+        "type": "u16", "min": 0, "max": 100, "text": "Farthest thing that counts." }]);
     assert_eq!(json, expected);
     let all = place.say(&["param", "list"]).ok();
     assert!(all.contains("\nprobe.0  gain"), "{all}");

@@ -75,7 +75,8 @@ impl Printed {
 pub(crate) fn without_real_time(command: &mut Command) {
     const CAP_SYS_NICE: nix::libc::c_ulong = 23;
     let give_up = || {
-        // SAFETY: a system call with a number; it touches no memory. Without root there is no such right, and the call fails.
+        // SAFETY: a system call with a number; it touches no memory. Without root there is no such right, and the call
+        // fails.
         unsafe { nix::libc::prctl(nix::libc::PR_CAPBSET_DROP, CAP_SYS_NICE, 0, 0, 0) };
         setrlimit(Resource::RLIMIT_RTPRIO, 0, 0)?;
         Ok(())

@@ -1,5 +1,5 @@
-//! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south` (system 2) reaches it.
-//! Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
+//! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south`
+//! (system 2) reaches it. Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
 
 use crate::harness::{NETWORK, Place, Robot, probe, skipped, wait};
 use crate::probe::ProbingInterface;
@@ -81,7 +81,8 @@ impl Systems {
         let text = std::fs::read_to_string(&config).unwrap();
         let [(_, north), _, (_, arm)] = NODES;
         let nodes = format!(
-            "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}[tcp]"
+            "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\n\
+             tools = [16, 31]\n{NETWORK}[tcp]"
         );
         let text = text.replace("[nodes.north]\n[tcp]", &nodes)
             + "node = \"north\"\n"
@@ -179,7 +180,8 @@ pub(crate) fn configured(node: &str, id: u8, security: &str) -> String {
     // South's module follows north's.
     let hears = if id == 2 { ", hears = \"1.probe.0.0\"" } else { "" };
     format!(
-        "installation = \"test\"\n[system]\nname = \"{node}\"\nid = {id}\n{CLASSES}[nodes.{node}]\n[tcp]\n{security}\naddress = \"{address}\"\n\
+        "installation = \"test\"\n[system]\nname = \"{node}\"\nid = {id}\n{CLASSES}[nodes.{node}]\n[tcp]\n{security}\n\
+         address = \"{address}\"\n\
          {server}{}",
         probe("probe.0", &format!("rate-hz = 20.0{hears}"), "")
     )

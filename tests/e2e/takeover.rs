@@ -1,4 +1,5 @@
-//! The demo in time slots with its master's router killed: it is reported, and almost no package of a declared flow is lost.
+//! The demo in time slots with its master's router killed: it is reported, and almost no package of a declared flow is
+//! lost.
 
 use crate::harness::{Place, Robot, lacks_namespaces, signal, wait};
 use crate::process::{Running, Said};
@@ -24,14 +25,16 @@ fn kills() -> usize {
     std::env::var("ROHRPOST_KILLS").ok().map_or(3, |kills| kills.parse().unwrap())
 }
 
-/// A package that waits for longer than a second is dropped, and packages for an absent router are too old after 400 ms. A router that is
-/// killed is back in its slots long before, but not where most slots are omitted: with 28 % taken by the hypervisor, 40 to 75 % are.
+/// A package that waits for longer than a second is dropped, and packages for an absent router are too old after 400
+/// ms. A router that is killed is back in its slots long before, but not where most slots are omitted: with 28 % taken
+/// by the hypervisor, 40 to 75 % are.
 const LEFT_OUT_MAX: f64 = 0.33;
 
 /// After so many cycles the others have a new master.
 const CYCLES_MAX: u64 = 4;
 
-/// Packages that a router has taken for a slot are lost when it dies: it holds them for less than a thousandth of the time.
+/// Packages that a router has taken for a slot are lost when it dies: it holds them for less than a thousandth of the
+/// time.
 fn assert_kept(said: &str, kills: usize) {
     let lost: u64 = losses(said).sum();
     if is_starved(said) {
@@ -41,8 +44,8 @@ fn assert_kept(said: &str, kills: usize) {
     assert!(lost <= kills as u64 / 20, "{lost} lost by {kills} kills:\n{said}");
 }
 
-/// Packages sealed to the dead incarnation are lost, and nothing can be sealed to the next before it has joined: of each flow at most one in
-/// so many.
+/// Packages sealed to the dead incarnation are lost, and nothing can be sealed to the next before it has joined: of
+/// each flow at most one in so many.
 fn assert_lost_of(said: &str, part: u64) {
     for row in flows(said) {
         let figure = |text: &str| text.parse::<u64>().unwrap();
@@ -145,7 +148,8 @@ fn killed_again_and_again_the_master_costs_no_package_of_a_declared_flow() {
         let said = said.out;
         let events = said.lines().filter(|line| line.contains("not by this command); there again ")).count();
         assert_eq!(events, kills(), "{said}");
-        // Where slots are omitted, masters change by themselves, so that the killed node may not be the master any more.
+        // Where slots are omitted, masters change by themselves, so that the killed node may not be the master any
+        // more.
         let masters = said.lines().filter(|line| line.contains("It was the master. ")).count();
         assert!(if is_starved(&said) { masters > 0 } else { masters == kills() }, "{masters} masters:\n{said}");
         assert!(

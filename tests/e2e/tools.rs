@@ -7,7 +7,8 @@ use std::process::{Command, Stdio};
 /// All subcommands, as the command itself lists them.
 pub(crate) fn commands(place: &Place) -> Vec<String> {
     let help = place.say(&["--help"]).ok();
-    // In groups, each under a head; a name is indented by two, and its text may go on in lines that are indented further.
+    // In groups, each under a head; a name is indented by two, and its text may go on in lines that are indented
+    // further.
     let listed = help.lines().take_while(|line| *line != "Options:").filter_map(|line| line.strip_prefix("  "));
     let named = listed.filter(|line| line.starts_with(|letter: char| letter.is_ascii_lowercase()));
     let all: Vec<String> = named.filter_map(|line| line.split(' ').next()).map(str::to_owned).collect();

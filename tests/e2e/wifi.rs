@@ -1,5 +1,5 @@
-//! A robot's laptop, `far`, by a bad Wi-Fi: the robot publishes more than the link carries, and the laptop follows in a mailbox that keeps
-//! the newest only.
+//! A robot's laptop, `far`, by a bad Wi-Fi: the robot publishes more than the link carries, and the laptop follows in a
+//! mailbox that keeps the newest only.
 
 use crate::harness::{PATIENCE, Place, Robot, probe, skipped, wait};
 use crate::probe::{COUNT, ProbingInterface};

@@ -131,8 +131,8 @@ fn time_slots_and_flows_are_drawn() {
     });
 }
 
-/// The GUI is not on the robot's LAN, and the TCP router, by which alone it is reached, is killed in the middle: that costs a gap, which is seen,
-/// and nothing else.
+/// The GUI is not on the robot's LAN, and the TCP router, by which alone it is reached, is killed in the middle: that
+/// costs a gap, which is seen, and nothing else.
 #[test]
 fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
     repeated_on_stall(Watched::Ordinary, || {
@@ -183,8 +183,8 @@ fn a_log_is_drawn() {
         assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
         assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);
         assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
-        // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that come together
-        // after the computer had no time, the newest alone are drawn.
+        // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that
+        // come together after the computer had no time, the newest alone are drawn.
         drawing.has("/world/scan/laser.0", 5..=22);
         drawing.has("/world/robot/mapper.0", 5..=24);
         drawing.has("/world/map/mapper.0", 4..=2000);

@@ -1,8 +1,8 @@
 //! One processor for a robot that is measured, which is never idle.
 //!
-//! Where the kernel puts which process, and how deep a processor sleeps, changes latencies more than any bridge does; a robot is even
-//! faster with more load from others, because it then finds processors awake. So the measured modules share one
-//! processor, which also has idle-priority work all the time.
+//! Where the kernel puts which process, and how deep a processor sleeps, changes latencies more than any bridge does; a
+//! robot is even faster with more load from others, because it then finds processors awake. So the measured modules
+//! share one processor, which also has idle-priority work all the time.
 
 use nix::libc;
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};

@@ -1,4 +1,5 @@
-//! A robot that measures itself: `source` sends beats, and everything that a bridge draws; `sink` reports the delay of the beats.
+//! A robot that measures itself: `source` sends beats, and everything that a bridge draws; `sink` reports the delay of
+//! the beats.
 //!
 //! Both are this test program itself, started by launch with the one test [`module`] to run.
 

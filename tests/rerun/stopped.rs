@@ -12,7 +12,8 @@ const SCAN: &str = "/world/scan/source.0";
 const NEWEST: u8 = 3;
 /// Patches of the source's map.
 const PATCHES: usize = 64;
-/// Patches that arrive while the bridge is stopped: for a second, which is less than the lifetime of a subscription without renewal.
+/// Patches that arrive while the bridge is stopped: for a second, which is less than the lifetime of a subscription
+/// without renewal.
 const WAITING: u32 = 10;
 
 fn is_stopped(pid: u32) -> bool {

@@ -1,4 +1,5 @@
-//! The bridge is switched off and on, killed and started again: earlier recordings stay, and the new drawing is complete.
+//! The bridge is switched off and on, killed and started again: earlier recordings stay, and the new drawing is
+//! complete.
 
 use super::launched::Launched;
 use super::programs::{bridge, ok, rerun, rows, rrd};
@@ -104,7 +105,8 @@ fn a_drawing_that_is_switched_on_again_is_whole_and_the_last_one_is_kept() {
     let (file, old) = (folder.path().join("map.rrd"), folder.path().join("map.old.rrd"));
     std::fs::write(folder.path().join("map.toml"), configuration(r#"file = "map.rrd""#)).unwrap();
     let launch = Launched::start(folder.path(), "map.toml");
-    // States and charts come each half second, some twenty rows. After several times as long the map has come, too: it is requested at once.
+    // States and charts come each half second, some twenty rows. After several times as long the map has come, too: it
+    // is requested at once.
     let enough = |launch: &Launched| wait("something is drawn", || (launch.count("drawn")? > 100).then_some(()));
     enough(&launch);
     ok("off", &launch.tool(&["call", "gui.0", "off"]));

@@ -2,15 +2,15 @@
 //!
 //! The robot has one processor, which is never idle ([`Load`]); bridge and viewer run wherever the kernel puts them.
 //!
-//! The figure is the lower quartile of the median delay of beats in short windows: other load of the computer only adds to it,
-//! and comes and goes; the effect of a fault stays. Faults are interleaved with two kinds of peace: a viewer that is `well`, which costs
-//! the computer more than one that does nothing; and none at all, `absent`, which costs it less. With a fault the robot must be no
-//! slower than with either. How many windows there are does not depend on what they say: only when peace itself is noisy
-//! is their number doubled, once, and all count.
+//! The figure is the lower quartile of the median delay of beats in short windows: other load of the computer only adds
+//! to it, and comes and goes; the effect of a fault stays. Faults are interleaved with two kinds of peace: a viewer
+//! that is `well`, which costs the computer more than one that does nothing; and none at all, `absent`, which costs it
+//! less. With a fault the robot must be no slower than with either. How many windows there are does not depend on what
+//! they say: only when peace itself is noisy is their number doubled, once, and all count.
 //!
 //! A few rounds on a shared computer distinguish a robot that waits for its viewer from one that does not, but show no
-//! difference of 10 %: they have a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` repeats each fault that often, and
-//! applies the narrow one.
+//! difference of 10 %: they have a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` repeats each fault that
+//! often, and applies the narrow one.
 
 use super::load::{Load, on_one_processor};
 use super::robot::{Mark, Robot};
@@ -266,8 +266,8 @@ fn a_robot_that_waits_for_its_viewer_is_found_out() {
     });
 }
 
-/// Rerun makes threads of its own; they inherit what the bridge has. Class 40 has nice 8; the thread that waits for signals is
-/// older than that, and does nothing.
+/// Rerun makes threads of its own; they inherit what the bridge has. Class 40 has nice 8; the thread that waits for
+/// signals is older than that, and does nothing.
 fn threads_are_nice(robot: &Robot) -> bool {
     let threads = std::fs::read_dir(format!("/proc/{}/task", robot.bridge_pid())).unwrap();
     let mut all = threads.map(|thread| {

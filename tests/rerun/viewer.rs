@@ -1,6 +1,7 @@
 //! A viewer with faults, and the data that it received.
 //!
-//! It is Rerun's proxy: the server that is also inside of each viewer, and what a bridge connects to, without the window.
+//! It is Rerun's proxy: the server that is also inside of each viewer, and what a bridge connects to, without the
+//! window.
 
 use super::programs::{rerun, rows};
 use super::robot::{PATIENCE, wait};

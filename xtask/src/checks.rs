@@ -55,8 +55,8 @@ pub(crate) fn ci() -> Result<ExitCode, Failure> {
     test()
 }
 
-/// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the compiler of
-/// the workspace's own crates, clippy takes Rerun as it was built: 10 seconds.
+/// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the
+/// compiler of the workspace's own crates, clippy takes Rerun as it was built: 10 seconds.
 fn bridge_clippy() -> Command {
     let mut command = cargo(&["build", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--all-targets"]);
     // The flags of `cargo clippy -- --deny warnings` for its driver.

@@ -1,5 +1,5 @@
-//! `cargo xtask fuzz`: builds the fuzz targets with the compiler's coverage counters, which the stable compiler has, too, and
-//! lets libFuzzer run them.
+//! `cargo xtask fuzz`: builds the fuzz targets with the compiler's coverage counters, which the stable compiler has,
+//! too, and lets libFuzzer run them.
 //!
 //! Inputs with new coverage are kept below `target/fuzz/found`, as a start for longer runs. An input that breaks a
 //! promise is a file in `target/fuzz`, and goes into `tests/fuzz/corpus` once the mistake is fixed.
@@ -24,7 +24,8 @@ const MEGABYTES_MAX: u32 = 1024;
 /// An input of this length holds a whole small configuration.
 const INPUT_BYTES_MAX: u32 = 4096;
 
-/// `cargo xtask fuzz [TARGET...] [--seconds N]`: long runs, each beginning where the last one ended. `--short`: as in CI.
+/// `cargo xtask fuzz [TARGET...] [--seconds N]`: long runs, each beginning where the last one ended. `--short`: as in
+/// CI.
 pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     if args == ["--short"] {
         return short().map(|()| ExitCode::SUCCESS);

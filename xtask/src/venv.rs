@@ -14,7 +14,8 @@ const PACKAGE: &str = "rerun-sdk==0.36.3";
 pub(crate) struct Venv {
     /// The interpreter.
     pub(crate) python: PathBuf,
-    /// The viewer and command line. Not the script of the same name, which would leave the viewer running when it is killed.
+    /// The viewer and command line. Not the script of the same name, which would leave the viewer running when it is
+    /// killed.
     pub(crate) rerun: PathBuf,
 }
 

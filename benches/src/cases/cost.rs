@@ -1,7 +1,7 @@
 //! What one send costs its sender while the receiver is awake, on another processor.
 //!
-//! The receiver has taken everything before the clock starts, and polls for more. Only the sends are timed; the time of the clock reading
-//! itself is measured before and subtracted.
+//! The receiver has taken everything before the clock starts, and polls for more. Only the sends are timed; the time of
+//! the clock reading itself is measured before and subtracted.
 
 use super::case::Case;
 use crate::floors::ring::DEPTH;
@@ -24,7 +24,8 @@ const PATIENCE: Duration = Duration::from_secs(15);
 
 /// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    // The floor of one send includes what any queue with a sleeping receiver needs; the floor of many is the bare queue.
+    // The floor of one send includes what any queue with a sleeping receiver needs; the floor of many is the bare
+    // queue.
     let single = Versus { name: "Vyukov, wakeable", p50: Some(Target::AtMost(1.3)), p99: None };
     let many = Versus { name: "Vyukov", p50: Some(Target::AtMost(2.0)), p99: None };
     vec![Box::new(Cost { burst: 1, versus: single }), Box::new(Cost { burst: 16, versus: many })]

@@ -6,8 +6,8 @@
 //!                                             ├─▶ receiver: urgent first, works 5 µs on each
 //!  urgent, FIFO 60: one each ms, while full ──┘
 //! ```
-//! The flooder pauses for 2 ms in 20, so that the receiver sleeps now and then and the kernel's fair server stays out. Only
-//! what was sent while the mailbox was full counts: from before the send until it has been copied out.
+//! The flooder pauses for 2 ms in 20, so that the receiver sleeps now and then and the kernel's fair server stays out.
+//! Only what was sent while the mailbox was full counts: from before the send until it has been copied out.
 
 use super::case::Case;
 use crate::floors::ring::DEPTH;
@@ -50,7 +50,8 @@ impl Case for Flood {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let urgent = settings.count(1_000);
-        // Where the urgent can be refused, as they are by no means under `displace` and `latest`, their sender tries again.
+        // Where the urgent can be refused, as they are by no means under `displace` and `latest`, their sender tries
+        // again.
         let ours = |full, states, room: Option<u64>| {
             move || {
                 let ground = OwnNode::new(DEPTH, BYTES, full)?;

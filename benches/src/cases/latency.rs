@@ -1,7 +1,7 @@
 //! How long a package is on its way, one at a time: to a receiver that sleeps, one that spins, one on the same core.
 //!
-//! All echo; one way is half of the round trip. Everything is copied in and out, except where it is loaned: there 16 bytes are
-//! written and read at each end, whatever the size.
+//! All echo; one way is half of the round trip. Everything is copied in and out, except where it is loaned: there 16
+//! bytes are written and read at each end, whatever the size.
 
 use super::case::Case;
 use super::rivals::Rival;

@@ -1,7 +1,8 @@
 //! System calls and heap uses of a send to a receiver that is awake: none. Counted, not timed.
 //!
-//! One thread sends some packages and then receives them, so its receiver never sleeps. A tracer counts system calls between two
-//! marks, which are system calls themselves. Beside it stands a contender that is known to use what is counted.
+//! One thread sends some packages and then receives them, so its receiver never sleeps. A tracer counts system calls
+//! between two marks, which are system calls themselves. Beside it stands a contender that is known to use what is
+//! counted.
 
 use super::case::Case;
 use crate::counting::heap_uses;
@@ -150,7 +151,8 @@ fn mark() {
     unsafe { libc::syscall(MARK) };
 }
 
-/// Runs `body`, which returns the number of its sends, in a traced child. Returns system calls per send between its marks.
+/// Runs `body`, which returns the number of its sends, in a traced child. Returns system calls per send between its
+/// marks.
 fn traced(body: impl FnOnce() -> Result<usize, Failure>) -> Result<f64, Failure> {
     // SAFETY: this process has one thread.
     match unsafe { fork() }.map_err(|error| Failure::of("fork", error))? {

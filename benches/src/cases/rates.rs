@@ -16,7 +16,8 @@ use std::time::Duration;
 
 /// Long enough for some hundred thousand packages, short enough that the kernel's fair server stays out.
 const TURN: Duration = Duration::from_millis(500);
-/// Turns of an empty loop before a refused sender tries again: about the time that the receiver needs for some packages.
+/// Turns of an empty loop before a refused sender tries again: about the time that the receiver needs for some
+/// packages.
 const RETRY: Retry = Retry::Spin(64);
 const PRIORITIES: [u8; 4] = [20, 50, 80, 110];
 

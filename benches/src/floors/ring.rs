@@ -1,6 +1,7 @@
 //! A ring for one sender and one receiver: the best rate between two processors, in order and without duplicates.
 //!
-//! It has no priorities, no second sender and no recovery from death. [`BareRing`] spins when it is empty or full, [`Futex`] sleeps.
+//! It has no priorities, no second sender and no recovery from death. [`BareRing`] spins when it is empty or full,
+//! [`Futex`] sleeps.
 
 use crate::Failure;
 use crate::harness::Zeroable;
@@ -26,7 +27,8 @@ pub struct RingMemory {
     slots: CacheLine<UnsafeCell<[u8; DEPTH * BYTES_MAX]>>,
 }
 
-// SAFETY: the sender writes a slot's bytes before it advances `produced`, and the receiver reads them before it advances `consumed`.
+// SAFETY: the sender writes a slot's bytes before it advances `produced`, and the receiver reads them before it
+// advances `consumed`.
 unsafe impl Sync for RingMemory {}
 // SAFETY: atomics and an `UnsafeCell` of bytes; zeroes are an empty ring.
 unsafe impl Zeroable for RingMemory {}
@@ -49,7 +51,8 @@ impl Bell {
     /// Sleeps unless `found` is true after the announcement of the sleep.
     pub fn sleep_unless(&self, found: impl Fn() -> bool) {
         let word = &self.0.0;
-        // ORDERING: SeqCst, as are the sender's store of what `found` looks at and its load of the word: one side sees the other's store.
+        // ORDERING: SeqCst, as are the sender's store of what `found` looks at and its load of the word: one side sees
+        // the other's store.
         word.store(1, Ordering::SeqCst);
         if found() {
             word.store(0, Ordering::Relaxed);

@@ -1,8 +1,9 @@
-//! Vyukov's bounded queue for any number of senders: a sender takes a number, and each slot shows the number that has its turn.
+//! Vyukov's bounded queue for any number of senders: a sender takes a number, and each slot shows the number that has
+//! its turn.
 //!
-//! [`Vyukov`] never wakes anybody. A queue with a sleeping receiver needs a fence after each message and a check whether it sleeps;
-//! with `FENCED` that is done too, though here the receiver never sleeps. It has no priorities. A sender that dies with a
-//! number blocks it for ever.
+//! [`Vyukov`] never wakes anybody. A queue with a sleeping receiver needs a fence after each message and a check
+//! whether it sleeps; with `FENCED` that is done too, though here the receiver never sleeps. It has no priorities. A
+//! sender that dies with a number blocks it for ever.
 
 use super::ring::{BYTES_MAX, CacheLine, DEPTH};
 use crate::Failure;

@@ -11,7 +11,8 @@ const LOOK_EACH: Duration = Duration::from_millis(50);
 
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From now on a terminating signal only sets [`interrupted`]. The processes of a turn inherit that: their parent ends them.
+/// From now on a terminating signal only sets [`interrupted`]. The processes of a turn inherit that: their parent ends
+/// them.
 pub fn heed() {
     let flag = INTERRUPTED.get_or_init(Arc::default);
     for signal in [SIGHUP, SIGINT, SIGTERM] {

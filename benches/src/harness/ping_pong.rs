@@ -52,8 +52,8 @@ pub struct Cell {
     pub scheduling: Scheduling,
     /// Sleep before each message; none: one after the other.
     pub pace: Option<Duration>,
-    /// Ends the turn with the samples so far; a quarter of it ends the warm-up. Below 0.9 s for spinning contenders: the kernel's fair server stops a real-time
-    /// process that keeps others from running for 50 ms in each second.
+    /// Ends the turn with the samples so far; a quarter of it ends the warm-up. Below 0.9 s for spinning contenders:
+    /// the kernel's fair server stops a real-time process that keeps others from running for 50 ms in each second.
     pub cap: Duration,
 }
 
@@ -61,7 +61,8 @@ impl Cell {
     /// Round trips of a turn over a network.
     pub const HOP_MESSAGES: usize = 10_000;
 
-    /// Over a network: a core for each end, real-time scheduling, one message after the other. All sleep, so the kernel's fair server stays out.
+    /// Over a network: a core for each end, real-time scheduling, one message after the other. All sleep, so the
+    /// kernel's fair server stays out.
     pub fn hop(bytes: usize, messages: usize) -> Self {
         Self {
             bytes,

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 /// What may lie in [`Shared`] memory.
 ///
 /// # Safety
-/// Zeroes are a valid value; everything in it is an atomic or an `UnsafeCell`, so that other processes may write it; it has no
-/// pointer and need not be dropped.
+/// Zeroes are a valid value; everything in it is an atomic or an `UnsafeCell`, so that other processes may write it; it
+/// has no pointer and need not be dropped.
 pub unsafe trait Zeroable: Sync {}
 
 /// One `T` in anonymous memory, zeroed and resident before any timing. Freed with the last process that has it.
@@ -38,14 +38,16 @@ impl<T: Zeroable> Deref for Shared<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        // SAFETY: mapped until drop, aligned to pages (no T asks for more), and a `Zeroable` is valid whatever others write.
+        // SAFETY: mapped until drop, aligned to pages (no T asks for more), and a `Zeroable` is valid whatever others
+        // write.
         unsafe { self.at.as_ref() }
     }
 }
 
 impl<T: Zeroable> Drop for Shared<T> {
     fn drop(&mut self) {
-        // SAFETY: mapped in `new` with this length; the borrow checker saw the last use. It cannot fail for such a mapping.
+        // SAFETY: mapped in `new` with this length; the borrow checker saw the last use. It cannot fail for such a
+        // mapping.
         let _ = unsafe { nix::sys::mman::munmap(self.at.cast(), size_of::<T>().max(1)) };
     }
 }

@@ -5,8 +5,8 @@
 //!  ping ◀── relay ◀══UDP══ relay ◀── pong
 //! ```
 //! Each relay is a process and carries one direction, so that none ever waits for two things at once. No relay inspects
-//! messages. [`time_chain`] hands over by one slot and a futex, [`time_mailbox_chain`] by mailboxes: what a router costs beyond that is
-//! its own.
+//! messages. [`time_chain`] hands over by one slot and a futex, [`time_mailbox_chain`] by mailboxes: what a router
+//! costs beyond that is its own.
 
 use super::Wire;
 use super::udp::Datagrams;

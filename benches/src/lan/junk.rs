@@ -25,8 +25,9 @@ unsafe impl Zeroable for JunkCounts {}
 
 /// A stream of junk to a node, until it is ended or dropped.
 ///
-/// The sender shares the near processor: with two processors there is no third for it. The cost of a datagram until it is dropped
-/// or in a socket is also spent on that processor, since the network of namespaces carries each datagram in the thread that sends it.
+/// The sender shares the near processor: with two processors there is no third for it. The cost of a datagram until it
+/// is dropped or in a socket is also spent on that processor, since the network of namespaces carries each datagram in
+/// the thread that sends it.
 pub struct Junk {
     counts: Shared<JunkCounts>,
     child: Child,

@@ -3,7 +3,7 @@
 //! ```text
 //!  processor 0, namespace `near`                      processor 1, namespace `far`
 //!  ping ─▶ mailbox ─▶ router ══╗                ╔══▶ router ─▶ mailbox ─▶ pong       ours
-//!  ping ─▶ futex   ─▶ relay  ══╬══ veth, bridge ╬══▶ relay  ─▶ futex   ─▶ pong       `chain`: what a router costs at least
+//!  ping ─▶ futex   ─▶ relay  ══╬══ veth, bridge ╬══▶ relay  ─▶ futex   ─▶ pong       `chain`: least cost of a router
 //!  ping ═══════════════════════╝                ╚══════════════════════▶ pong       `udp`: the network alone
 //! ```
 //! Each drawn step is a process of its own; a node has two relays, like the two threads of a router.

@@ -92,7 +92,8 @@ fn index(end: End) -> u8 {
     u8::from(end == End::Pong)
 }
 
-/// The mailbox of a timed module at this end. Each turn has one of its own, so that it holds nothing of an earlier turn.
+/// The mailbox of a timed module at this end. Each turn has one of its own, so that it holds nothing of an earlier
+/// turn.
 pub fn bench(end: End, turn: u8) -> Name {
     Name::new(SYSTEM, BENCH.0, index(end), turn)
 }

@@ -1,7 +1,7 @@
 //! Error of a slave's time by RTnet's formula (RTnet's TDMA revision 2.1a): a broadcast each cycle, and no filter.
 //!
 //! ```text
-//!  slave   ── request ──▶ master ── reply ──▶ slave        100 times, once at the start: the mean is what one way takes
+//!  slave   ── request ──▶ master ── reply ──▶ slave        100 times, once at the start: the mean is one way
 //!  master  ── synchronisation, each cycle, with the time at which it was handed to the network ──▶ slave
 //!  offset = time in it + one way − the kernel's receive stamp
 //! ```

@@ -56,7 +56,8 @@ impl Wire {
 /// The third computer.
 const STRANGER: &str = "stranger";
 
-/// Lets this process make such networks, also without root. Call it first in `main`; if it is refused, the cases say so.
+/// Lets this process make such networks, also without root. Call it first in `main`; if it is refused, the cases say
+/// so.
 pub fn prepare() {
     let _ = become_able();
 }

@@ -1,7 +1,7 @@
 //! Many sessions in one process: one thread with one epoll, like the TCP router at the other end.
 //!
-//! Each sends to the session that is half of the crowd further, all together so many packages a second, evenly. The delay of a package counts from when it was
-//! due: a delay of this process is part of the figure.
+//! Each sends to the session that is half of the crowd further, all together so many packages a second, evenly. The
+//! delay of a package counts from when it was due: a delay of this process is part of the figure.
 
 use super::guest::{Guest, House};
 use super::pace::{Pace, ticks};
@@ -252,7 +252,8 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Sends what is due: each guest in turn to the one that is half of the crowd further, and some of them to the stalled session.
+    /// Sends what is due: each guest in turn to the one that is half of the crowd further, and some of them to the
+    /// stalled session.
     fn send(&mut self) -> Result<(), Failure> {
         let all = self.guests.len();
         while let Some((number, due_ns)) = self.packages.next_due(monotonic_ns()) {

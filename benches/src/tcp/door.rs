@@ -18,8 +18,8 @@ const RELAY: Name = Name::new(1, 2, 0, 0);
 
 /// Between a relay and its module.
 pub(super) trait Door {
-    /// Sleeps until the module has sent something or the socket is readable, and hands on what the module has sent. Returns whether the
-    /// socket is readable.
+    /// Sleeps until the module has sent something or the socket is readable, and hands on what the module has sent.
+    /// Returns whether the socket is readable.
     ///
     /// # Errors
     /// When that fails.

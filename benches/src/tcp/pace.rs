@@ -20,7 +20,8 @@ impl Pace {
         Self { began_ns, each_ns, done: 0 }
     }
 
-    /// Number of the next event, from 0, and the beginning of its tick, if that has come. The event then counts as done.
+    /// Number of the next event, from 0, and the beginning of its tick, if that has come. The event then counts as
+    /// done.
     pub(super) fn next_due(&mut self, now_ns: u64) -> Option<(u64, u64)> {
         let due_ns = self.began_ns.saturating_add(self.done * self.each_ns / TICK_NS * TICK_NS);
         (due_ns <= now_ns).then(|| {

@@ -4,8 +4,8 @@
 //!  ping ──pipe──▶ relay ══TCP══▶ relay ══TCP══▶ relay ──futex──▶ pong
 //!  ping ◀─futex── relay ◀══TCP══ relay ◀══TCP══ relay ◀──pipe─── pong
 //! ```
-//! As the client of a node, an outer relay sleeps on its module's messages and on its socket at once, so a module wakes it by a
-//! pipe; the middle one sleeps in epoll.
+//! As the client of a node, an outer relay sleeps on its module's messages and on its socket at once, so a module wakes
+//! it by a pipe; the middle one sleeps in epoll.
 
 use super::door::{Door, Hall, MailboxDoor};
 use super::systems::free_address;
@@ -31,7 +31,8 @@ pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
     time(cell, |end, _| hall(end).door(), |end| hall(end).module())
 }
 
-/// The same with our mailboxes between modules and relays: what the TCP router and its clients cost beyond that is their own.
+/// The same with our mailboxes between modules and relays: what the TCP router and its clients cost beyond that is
+/// their own.
 ///
 /// # Errors
 /// As [`time_relays`].

@@ -206,7 +206,8 @@ pub fn bench(end: End, turn: u8) -> Name {
     Name::new(system_of(end), BENCH.0, 0, turn)
 }
 
-/// The mailbox of a session of the crowd, all of which belong to the second system. No name of its module, since those belong to its node.
+/// The mailbox of a session of the crowd, all of which belong to the second system. No name of its module, since those
+/// belong to its node.
 pub fn guest(index: u16) -> Name {
     let [instance, local] = (index + 256).to_be_bytes();
     Name::new(system_of(End::Pong), BENCH.0, instance, local)
@@ -220,7 +221,8 @@ fn config(scratch: &Scratch, end: End) -> PathBuf {
     Path::new(&scratch.directory()).join(format!("{}.toml", name_of(end)))
 }
 
-/// A free port of a loopback address of this process alone: nobody else connects from there, and so takes the port meanwhile.
+/// A free port of a loopback address of this process alone: nobody else connects from there, and so takes the port
+/// meanwhile.
 pub(super) fn free_address() -> Result<SocketAddr, Failure> {
     let [_, high, middle, low] = std::process::id().to_be_bytes();
     // 127.128.0.0/9 without its first and last addresses; a PID has 22 bits.

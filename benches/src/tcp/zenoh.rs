@@ -1,4 +1,5 @@
-//! zenoh through its router, as a peer. Its programs are a package of their own (`benches/zenoh`), so that zenoh is only compiled on demand.
+//! zenoh through its router, as a peer. Its programs are a package of their own (`benches/zenoh`), so that zenoh is
+//! only compiled on demand.
 
 use super::systems::free_address;
 use crate::harness::{Cell, Child, Failure, Scratch, interrupted};

@@ -1,7 +1,8 @@
-//! The floor of time slots: threads that wake up for them as routers do, and send nothing. No router can be earlier than these.
+//! The floor of time slots: threads that wake up for them as routers do, and send nothing. No router can be earlier
+//! than these.
 //!
-//! A master that is silent in three cycles in a row has a successor. So a master that misses all windows of three cycles is
-//! taken for dead, even if it runs.
+//! A master that is silent in three cycles in a row has a successor. So a master that misses all windows of three
+//! cycles is taken for dead, even if it runs.
 
 use super::plan::Plan;
 use super::stage::{NODES, Stage};
@@ -83,7 +84,8 @@ impl BareThreads {
     }
 }
 
-/// The monotonic clock is system time here: the phase of a slot in the cycle is arbitrary, but not its distance from others.
+/// The monotonic clock is system time here: the phase of a slot in the cycle is arbitrary, but not its distance from
+/// others.
 fn wake_up(plan: &Plan, own: u8, ready: &Gate, said: &Said) -> Result<(), Failure> {
     let table = plan.table(own)?;
     let period_ns = table.cycle_ns();

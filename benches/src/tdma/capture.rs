@@ -232,7 +232,8 @@ fn arrive(seen: &CaptureMemory, at_ns: u64, from: u8, sender: Name, end: &[u8]) 
     }
 }
 
-/// By how much the clock of stamps is ahead of the monotonic one, ns: from the readings that were closest to each other.
+/// By how much the clock of stamps is ahead of the monotonic one, ns: from the readings that were closest to each
+/// other.
 fn realtime_ahead_ns() -> i64 {
     let read = |_| {
         let (before, real, after) = (monotonic_ns(), realtime_ns(), monotonic_ns());

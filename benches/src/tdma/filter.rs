@@ -13,8 +13,8 @@ pub const HEADS_BYTES: usize = 14 + 20 + 8;
 /// Receive buffer.
 const RECEIVE_BYTES: usize = 64 << 20;
 
-/// Each datagram to one of these ports that comes in at the calling thread's place, with the kernel's stamp. A wait for one ends after
-/// `patience`.
+/// Each datagram to one of these ports that comes in at the calling thread's place, with the kernel's stamp. A wait for
+/// one ends after `patience`.
 ///
 /// # Errors
 /// When the system refuses it.
@@ -31,7 +31,8 @@ pub fn open(ports: [u16; 2], patience: Duration) -> Result<OwnedFd, Failure> {
     Ok(socket)
 }
 
-/// Accepts IPv4 without options, UDP, to one of these ports, as a port of the bridge receives it, and not as a port forwards it.
+/// Accepts IPv4 without options, UDP, to one of these ports, as a port of the bridge receives it, and not as a port
+/// forwards it.
 fn program(ports: [u16; 2]) -> [sock_filter; 11] {
     const PACKET_TYPE: i32 = libc::SKF_AD_OFF + libc::SKF_AD_PKTTYPE;
     /// As `packet(7)` has it.
@@ -62,7 +63,8 @@ fn program(ports: [u16; 2]) -> [sock_filter; 11] {
 fn attach(socket: &OwnedFd, program: &mut [sock_filter]) -> io::Result<()> {
     let attached = sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
     let (at, bytes) = ((&raw const attached).cast(), size_of::<sock_fprog>() as libc::socklen_t);
-    // SAFETY: the kernel reads so many bytes there, and the instructions that they point to; all outlive the call, and the kernel keeps no pointer.
+    // SAFETY: the kernel reads so many bytes there, and the instructions that they point to; all outlive the call, and
+    // the kernel keeps no pointer.
     match unsafe { libc::setsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, libc::SO_ATTACH_FILTER, at, bytes) } {
         0 => Ok(()),
         _ => Err(io::Error::last_os_error()),

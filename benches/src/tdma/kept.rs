@@ -22,9 +22,9 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// A frame is its sender's if it begins in a window of the sender or in the guard behind, or so little before that the guard of the slot
-    /// before still covers it. Any other is outside. Its offset is that from the nearest slot of its sender, if it could be the first of that.
-    /// `tables`: as each node reads them.
+    /// A frame is its sender's if it begins in a window of the sender or in the guard behind, or so little before that
+    /// the guard of the slot before still covers it. Any other is outside. Its offset is that from the nearest slot of
+    /// its sender, if it could be the first of that. `tables`: as each node reads them.
     pub fn of(frames: &[Crossed], tables: &[Table], time: &TimeRecord) -> Self {
         let mut kept = Self { frames: frames.len(), ..Self::default() };
         let mut nodes: [Sender; NODES as usize] = Default::default();
@@ -71,7 +71,8 @@ struct Sender {
 }
 
 impl Sender {
-    /// Offset of a frame from the beginning of its slot, µs; negative if before. None if it is not the first, or is in no slot.
+    /// Offset of a frame from the beginning of its slot, µs; negative if before. None if it is not the first, or is in
+    /// no slot.
     fn first_in(&mut self, window: Window, at_ns: u64) -> Option<f64> {
         let is_first = self.last.replace(window) != Some(window) && matches!(window.kind, Kind::Slot { .. });
         is_first.then(|| at_ns.wrapping_sub(window.begin_ns).cast_signed() as f64 / 1000.0)
@@ -129,7 +130,8 @@ mod tests {
     #[test]
     fn what_is_in_nobodys_time_is_far_off_and_its_slot_has_no_other_first_frame() {
         let tables = plans::LOADED.tables().unwrap();
-        // Behind the last slot, which ends at 2290 us: 1000 us and more behind node 2's beginning; and before the next cycle's.
+        // Behind the last slot, which ends at 2290 us: 1000 us and more behind node 2's beginning; and before the next
+        // cycle's.
         let late = Kept::of(&frames(&[(2, 2_860), (2, 2_900), (2, 6_400), (2, 6_860)]), &tables, &TIME);
         assert_eq!((late.outside, late.in_anothers), (3, 1));
         assert_eq!(late.off_us, [1_000.0, 460.0]);

@@ -6,9 +6,9 @@
 //!  n2: feeder ─▶ router ═══╝      │     ╚═══ swamp ◀─┘
 //!                                 └─▶ capture: the kernel's stamp of each frame of a router
 //! ```
-//! All have this computer's clock, so a stamp of the capture and the master's time page show how long after the beginning of
-//! its slot a frame really came. Routers are the real ones ([`routers`]); where clocks must be wrong, they are threads of a child
-//! process ([`shells`]).
+//! All have this computer's clock, so a stamp of the capture and the master's time page show how long after the
+//! beginning of its slot a frame really came. Routers are the real ones ([`routers`]); where clocks must be wrong, they
+//! are threads of a child process ([`shells`]).
 
 pub mod bare;
 pub mod capture;

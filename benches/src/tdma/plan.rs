@@ -170,7 +170,8 @@ masters = [{masters}]
                 let to = (node + hop) % NODES;
                 text += &module(class, node, &format!("calls = [\"ear.{to}\"]\n"));
                 text += &format!(
-                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = \"{bytes} B\"\nperiod = \"{period_us} us\"\n"
+                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = \"{bytes} B\"\n\
+                     period = \"{period_us} us\"\n"
                 );
             }
         }

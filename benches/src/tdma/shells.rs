@@ -1,4 +1,5 @@
-//! Routers of three nodes as threads of one process. Their clocks are wrong on purpose, so that the true error of each is known.
+//! Routers of three nodes as threads of one process. Their clocks are wrong on purpose, so that the true error of each
+//! is known.
 
 use super::plan::Plan;
 use super::stage::{NODES, Place, Stage};
@@ -51,7 +52,8 @@ impl Shells {
         Ok(Self { members: members.collect::<Result<_, _>>()? })
     }
 
-    /// Waits until all others follow one master (the first one, or its successor after a standstill) and have measured enough. Returns the master.
+    /// Waits until all others follow one master (the first one, or its successor after a standstill) and have measured
+    /// enough. Returns the master.
     ///
     /// # Errors
     /// What they show, if one does not.
@@ -114,7 +116,8 @@ impl Member {
         } else {
             Skew { begin_ns: monotonic_ns(), offset_ns: u64::from(own) * SKEW.offset_ns, ..SKEW }
         };
-        // A page is written and read by this computer's clock, which differs from the node's clock here: so nobody writes it.
+        // A page is written and read by this computer's clock, which differs from the node's clock here: so nobody
+        // writes it.
         let clock = ClockParts::new(&settings, installation, &node);
         let clock = clock.map(|parts| ClockParts { skew: Some(skew), node: None, ..parts });
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);

@@ -103,7 +103,8 @@ pub fn kill_master(
     })
 }
 
-/// Waits until another node than the dead master has synchronised as the master for some cycles; pages are read all the time.
+/// Waits until another node than the dead master has synchronised as the master for some cycles; pages are read all the
+/// time.
 fn await_reign(
     capture: &mut Capture,
     first: usize,

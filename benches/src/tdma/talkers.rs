@@ -1,7 +1,7 @@
 //! Modules of declared flows, on each node: one process that publishes, and one that takes the packages of others.
 //!
-//! Each package is due somewhat later than its flow allows, and each flow drifts through the cycle at its own rate. So each flow is published
-//! at all moments of the cycle, and sometimes all flows at once.
+//! Each package is due somewhat later than its flow allows, and each flow drifts through the cycle at its own rate. So
+//! each flow is published at all moments of the cycle, and sometimes all flows at once.
 
 use super::capture::{STAMP_BYTES, STAMPED};
 use super::plan::{Declared, Plan, ear};
@@ -140,7 +140,8 @@ fn talk(directory: &Path, node: u8, plan: &Plan, counts: &TalkerCounts) -> Resul
     while over.load(Ordering::Acquire) == 0 {
         let Some(next) = flows.iter_mut().min_by_key(|due| due.at_ns) else { break };
         std::thread::sleep(Duration::from_nanos(next.at_ns.saturating_sub(monotonic_ns())));
-        // Counted before, so that no package is taken before it is counted. A package that the router's mailbox refuses is lost.
+        // Counted before, so that no package is taken before it is counted. A package that the router's mailbox refuses
+        // is lost.
         counts.published.fetch_add(1, Ordering::AcqRel);
         next.publish()?;
     }

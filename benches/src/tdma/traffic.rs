@@ -1,4 +1,5 @@
-//! Modules that always have packages for others, on each node: one process that floods the next node, and takes what it is flooded with.
+//! Modules that always have packages for others, on each node: one process that floods the next node, and takes what it
+//! is flooded with.
 
 use super::plan::flood;
 use super::routers::Routers;

@@ -20,7 +20,8 @@ pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
     command
 }
 
-/// The rows of a run, each checked, after an end without failure: a message that is damaged, missing or out of order would be one.
+/// The rows of a run, each checked, after an end without failure: a message that is damaged, missing or out of order
+/// would be one.
 pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
     let text = String::from_utf8_lossy(&output.stdout);
     // Failures come last in long output.

@@ -23,7 +23,8 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
         field.launch(&["base", "arm"], &[("ROHRPOST_IMPAIR", IMPAIR)]);
         let mut sink = Sink::new(field.robot("arm"), "arm");
         let mut source = Source::new(field.robot("base"), "base", "arm", PLAIN);
-        // A younger server cannot tell whether its predecessor has run a repeated call, and answers that the outcome is unknown.
+        // A younger server cannot tell whether its predecessor has run a repeated call, and answers that the outcome is
+        // unknown.
         let (probe, old) = (field.robot("base").name("probe.1"), (CALL + TRANSIT_MAX).as_millis() as u64);
         wait("probe.1 is old enough", || {
             let mut tool = field.robot("base").tool(CALL);

@@ -26,7 +26,8 @@ fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_afte
         let mut sink = Sink::new(field.robot("arm"), "arm");
         let mut flood = Source::new(field.robot("base"), "base", "arm", PLAIN);
         let router = field.router("arm");
-        // Datagrams of the base before the arm listened count as lost; the first one that the arm receives, at either port, shows that it listens.
+        // Datagrams of the base before the arm listened count as lost; the first one that the arm receives, at either
+        // port, shows that it listens.
         field.wait_for_state("arm", "base", LinkState::Alive);
         wait("the first of the flow", || {
             flood.send();

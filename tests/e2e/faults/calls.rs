@@ -72,7 +72,8 @@ impl Calls {
     }
 }
 
-/// The server's record and the callers' answers agree: no number was counted twice, and each answer has the position of its number.
+/// The server's record and the callers' answers agree: no number was counted twice, and each answer has the position of
+/// its number.
 pub(super) fn assert_once(field: &Field, module: &str, answers: &[(u32, Result<u64, CallError>)]) {
     let counted = field.counted(module);
     let once: BTreeSet<u32> = counted.iter().copied().collect();

@@ -7,7 +7,8 @@ use rohrpost::{Class, Priority};
 use rohrpost_mailbox::{Label, Loss, Participant, Receiver, SendError, Sender, Shape, Type, local};
 use std::time::Duration;
 
-/// Classes that only flows have, so that they have accounts of their own. None is above the class of probes, between which they pass.
+/// Classes that only flows have, so that they have accounts of their own. None is above the class of probes, between
+/// which they pass.
 pub(super) const PLAIN: Class = Class(60);
 pub(super) const URGENT: Class = Class(90);
 /// Less important than the calls of tools, and not real time.
@@ -109,8 +110,8 @@ pub(super) struct Accounts {
     pub(super) arm: ClassCarried,
 }
 
-/// Waits until nothing of a class is in flight, and checks that every package is accounted for: sent packages are those received and those that
-/// a station on the way counts as lost.
+/// Waits until nothing of a class is in flight, and checks that every package is accounted for: sent packages are those
+/// received and those that a station on the way counts as lost.
 pub(super) fn balance(field: &Field, source: &Source, sink: &mut Sink, class: Class) -> Accounts {
     let (base, arm) = (field.robot("base"), field.robot("arm"));
     let transit = base.name(&router_of("base")).with_local(local::TRANSIT);

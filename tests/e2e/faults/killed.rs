@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Calls are answered again within this time after a router was killed: launch waits 100 ms, the router starts, and they take some
-/// milliseconds; the rest is for a computer so busy that a call must be repeated.
+/// Calls are answered again within this time after a router was killed: launch waits 100 ms, the router starts, and
+/// they take some milliseconds; the rest is for a computer so busy that a call must be repeated.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(20);
 /// A call answered within this time was sent once: a call is repeated after a third of its timeout.
 const ONE_TRY: Duration = Duration::from_secs(10);
@@ -31,8 +31,8 @@ fn rounds() -> u32 {
     std::env::var("ROHRPOST_FAULT_ROUNDS").ok().map_or(10, |rounds| rounds.parse().unwrap())
 }
 
-/// Numbered data from node to node, a thousand a second, all the time. They fill the mailbox of a dead router, and give way
-/// there to more important packages.
+/// Numbered data from node to node, a thousand a second, all the time. They fill the mailbox of a dead router, and give
+/// way there to more important packages.
 struct Traffic {
     ends: Arc<AtomicBool>,
     thread: JoinHandle<Vec<u64>>,

@@ -1,7 +1,8 @@
 //! A network with every fault: real routers and modules in network namespaces; what is reported, lost, counted and run.
 //!
-//! Each file is a fault. The nodes are `base` (probe.0 and the collector of lines), `arm` (probe.1) and, where three are needed, `desk`
-//! (probe.2); the test takes part on each as a tool. One lab at a time: each has its own processes, and the computer may be busy.
+//! Each file is a fault. The nodes are `base` (probe.0 and the collector of lines), `arm` (probe.1) and, where three
+//! are needed, `desk` (probe.2); the test takes part on each as a tool. One lab at a time: each has its own processes,
+//! and the computer may be busy.
 
 mod accounts;
 mod buffer;
@@ -53,7 +54,8 @@ struct Field {
 }
 
 impl Field {
-    /// So many nodes, none of them launched, with further keys of `[network]`. None, with a report, where namespaces are not permitted.
+    /// So many nodes, none of them launched, with further keys of `[network]`. None, with a report, where namespaces
+    /// are not permitted.
     fn new(nodes: usize, network: &str) -> Option<Self> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let spec = |(name, address, _): &(&str, &str, &str)| NodeSpec {
@@ -81,7 +83,8 @@ impl Field {
         Some(field)
     }
 
-    /// Launches nodes, all at once, with this in their environment, and waits until all modules are on and the routers hear each other.
+    /// Launches nodes, all at once, with this in their environment, and waits until all modules are on and the routers
+    /// hear each other.
     fn launch(&mut self, nodes: &[&'static str], environment: &[(&str, &str)]) {
         let config = self.config.clone();
         self.launch_from(&config, nodes, environment);
@@ -240,7 +243,8 @@ fn lines(log: &Path, module: &str, words: &[&str]) -> Vec<String> {
     text.lines().filter(has).map(str::to_owned).collect()
 }
 
-/// A mailbox of the test's own on a node, beside those of its probe: packages between two of them may have the class of probes.
+/// A mailbox of the test's own on a node, beside those of its probe: packages between two of them may have the class of
+/// probes.
 fn mailbox_on(node: &str) -> Name {
     let index = NODES.iter().position(|(name, ..)| *name == node).unwrap() as u8;
     Name::new(1, 96, index, 200)

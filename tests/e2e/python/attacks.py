@@ -1,6 +1,7 @@
-"""What a hostile program tries against the robot of the demo, as packages: whatever brings them there.
+"""What a hostile program tries against the robot of the demo, as packages, for any transport.
 
-Classes are those of the demo: router 250, motor 200, laser 150, mapper 96, tcp 64, output 32, tool 16; its pilot is 1.140.0.
+Classes are those of the demo: router 250, motor 200, laser 150, mapper 96, tcp 64, output 32, tool 16; its pilot is
+1.140.0.
 """
 
 import itertools
@@ -30,7 +31,8 @@ def line(module, words, lost=0, ahead_s=0):
 class Attacks:
     """Each by its name: a package as (to, sender, kind, id, body, priority, options).
 
-    `own` are modules that the program may speak for; `laser` is the hash of the laser's interface, as the laser tells any caller.
+    `own` are modules that the program may speak for; `laser` is the hash of the
+    laser's interface, which the laser tells any caller.
     """
 
     def __init__(self, own, laser):

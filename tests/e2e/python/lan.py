@@ -63,7 +63,8 @@ def check_rfc():
     """The example of RFC 8439, 2.8.2."""
     key, nonce = bytes(range(0x80, 0xA0)), bytes.fromhex("070000004041424344454647")
     text = (
-        b"Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, sunscreen would be it."
+        b"Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, "
+        b"sunscreen would be it."
     )
     signed = bytes.fromhex("50515253c0c1c2c3c4c5c6c7")
     assert tag(key, nonce, signed, cipher(key, nonce, text)).hex() == "1ae10b594f09e26a7e902ecbd0600691"
@@ -82,7 +83,7 @@ class Peer:
 
 
 class Node:
-    """One node among others, without modules: it knows the key of the installation, meets the others, and seals what it is told to."""
+    """One node without modules: it has the installation's key, takes part, and seals the given datagrams."""
 
     def __init__(self, digest, system, own, addresses, port, key_id, secret):
         check_rfc()
@@ -150,7 +151,8 @@ class Node:
             peer.challenge = int.from_bytes(os.urandom(8), "little") | 1
             if peer.incarnation != incarnation:
                 peer.incarnation, peer.sequence = incarnation, 0
-                peer.key = derived(self.secret, FOR_PACKAGES, self.system, self.own, sender, self.incarnation, incarnation)
+                ends = self.system, self.own, sender
+                peer.key = derived(self.secret, FOR_PACKAGES, *ends, self.incarnation, incarnation)
         if challenge:
             self.hello(sender, 0 if answer else peer.challenge, challenge)
 

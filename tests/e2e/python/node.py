@@ -1,7 +1,7 @@
-"""A node of the LAN with the key, and with harm in mind: it runs in the place of `desk` of the demo, for so many seconds.
+"""A hostile node of the LAN with the key: it runs in the place of `desk` of the demo, for so many seconds.
 
-Arguments: seconds, digest of the LAN (hex), port, the file of keys, the hash of the laser's interface, its own place among the nodes, and the addresses of
-all nodes in their order. Prints what it tried, as one JSON object.
+Arguments: seconds, digest of the LAN (hex), port, the file of keys, the hash of the laser's interface, its own place
+among the nodes, and the addresses of all nodes in their order. Prints its attempts, as one JSON object.
 """
 
 import collections

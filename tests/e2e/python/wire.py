@@ -1,4 +1,5 @@
-"""What `docs/src/wire.md` says of names, packages and sessions, with the standard library alone: for programs that are no nodes."""
+"""Names, packages and sessions by `docs/src/wire.md`, with the standard library alone: for programs that are no
+nodes."""
 
 import os
 import socket

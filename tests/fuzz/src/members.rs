@@ -1,5 +1,5 @@
-//! A TCP router and connections that send any frames at any time: accounts balance, memory and places are bounded, a name has
-//! one host at most, and the digests decide which connections are accepted.
+//! A TCP router and connections that send any frames at any time: accounts balance, memory and places are bounded, a
+//! name has one host at most, and the digests decide which connections are accepted.
 
 use crate::sessions::{BEGIN_NS, Deaf, MS, server};
 use crate::split::Bytes;

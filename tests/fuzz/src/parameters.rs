@@ -1,5 +1,5 @@
-//! Files of saved parameters (`param save`, `param load`) for the demonstration's installation: values with their lines,
-//! or mistakes, line by line; and a value that a parameter accepts reads back as the same.
+//! Files of saved parameters (`param save`, `param load`) for the demonstration's installation: values with their
+//! lines, or mistakes, line by line; and a value that a parameter accepts reads back as the same.
 
 use crate::config::validate;
 use crate::split;

@@ -1,5 +1,6 @@
-//! Two routers that seal, and a wire that keeps all datagrams and has any faults: an opened datagram was sealed by the present incarnation of one for the present
-//! incarnation of the other, is unchanged, and opens once; and an incarnation begins only by datagrams sent since the last one began.
+//! Two routers that seal, and a wire that keeps all datagrams and has any faults: an opened datagram was sealed by the
+//! present incarnation of one for the present incarnation of the other, is unchanged, and opens once; and an
+//! incarnation begins only by datagrams sent since the last one began.
 
 use crate::frames::checked;
 use crate::split::Bytes;

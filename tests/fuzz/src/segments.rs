@@ -1,5 +1,6 @@
-//! A node's files as another process may leave them: any bytes in a mailbox, in the table of participants, in a table of traffic, in
-//! the time page and in owners' descriptions of themselves; before they are opened, and while they are in use.
+//! A node's files as another process may leave them: any bytes in a mailbox, in the table of participants, in a table
+//! of traffic, in the time page and in owners' descriptions of themselves; before they are opened, and while they are
+//! in use.
 //!
 //! The input is a program: what to do next, and which bytes to change before. Every second byte or so of it is an
 //! instruction, so that a fuzzer can put programs together.

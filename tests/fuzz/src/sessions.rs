@@ -1,5 +1,5 @@
-//! Frames of sessions: a stream from anybody, to a TCP router and to a client. Frames are written again as they were read, byte for byte, however
-//! the stream is split, and announced bytes take no memory before they arrive.
+//! Frames of sessions: a stream from anybody, to a TCP router and to a client. Frames are written again as they were
+//! read, byte for byte, however the stream is split, and announced bytes take no memory before they arrive.
 
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;

@@ -1,4 +1,5 @@
-//! How long a package takes from a module on one node to a module on another, one at a time; every waiting process sleeps.
+//! How long a package takes from a module on one node to a module on another, one at a time; every waiting process
+//! sleeps.
 
 use super::ground::{ETHERNET, LanSegment, WHOLE};
 use crate::cases::Case;

@@ -1,13 +1,14 @@
-//! A package now and then from node to node, while 500 000 foreign datagrams a second arrive at each port of the far node: how much later the package
-//! arrives than without them.
+//! A package now and then from node to node, while 500 000 foreign datagrams a second arrive at each port of the far
+//! node: how much later the package arrives than without them.
 //!
 //! ```text
 //!  processor 0                                processor 1
 //!  ping ─▶ router ═══════════════════════════▶ router ─▶ pong
 //!  junk ══════════════════════════════════════▶ both of its ports
 //! ```
-//! `junk`: from an address that no node has; `junk of a peer`: from the address of the near node, as an attacker may forge it. The floor of each: a
-//! bare hop by UDP under the same junk, to ports that nobody reads. It shows what the junk costs the computer that carries it.
+//! `junk`: from an address that no node has; `junk of a peer`: from the address of the near node, as an attacker may
+//! forge it. The floor of each: a bare hop by UDP under the same junk, to ports that nobody reads. It shows what the
+//! junk costs the computer that carries it.
 
 use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;

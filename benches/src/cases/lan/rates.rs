@@ -6,10 +6,11 @@
 //! ```text
 //!  processor 0                  processor 1
 //!  raw sender ═══════════════▶ raw receiver
-//!  sending router ═══════════▶ receiving router ─▶ receiving module;  sending module, which hands over a window at a time
+//!  sending router ═══════════▶ receiving router ─▶ receiving module;  sending module, a window at a time
 //! ```
-//! Two nodes share two processors here. So the sending router has a processor for itself, as the raw sender has. With the sending module on
-//! that processor, too, and below its router as launch schedules it, each package costs two process switches: a row of its own shows that.
+//! Two nodes share two processors here. So the sending router has a processor for itself, as the raw sender has. With
+//! the sending module on that processor, too, and below its router as launch schedules it, each package costs two
+//! process switches: a row of its own shows that.
 
 use super::ground::{LanSegment, WHOLE};
 use crate::cases::Case;

@@ -6,15 +6,18 @@
 //!                            ├▶ router ═▶ router┤
 //!  flooder (processor 1) ────┘      ◀═          └─▶ swamp (processor 0): takes what comes of the flood
 //! ```
-//! `urgent`: the routers send at the rate of an Ethernet of 100 Mbit/s, which two processors sustain. `urgent-saturated`: at
-//! the default rate, which they do not sustain: then the path of the flood lacks processor time, not that of the urgent packages.
+//! `urgent`: the routers send at the rate of an Ethernet of 100 Mbit/s, which two processors sustain.
+//! `urgent-saturated`: at the default rate, which they do not sustain: then the path of the flood lacks processor time,
+//! not that of the urgent packages.
 //!
 //! The flooder offers more than may leave: the router's mailbox is full of its packages, and so is
 //! its quota of the queue; the excess is refused or lost there. No urgent package may be. Flooder and swamp run at
-//! FIFO 10, above other programs and below all that is timed, each on the processor that the router of its node does not use. The flooder pauses
-//! for 2 ms in 20, so that the kernel's fair server stays out; the queue outlasts the pause.
+//! FIFO 10, above other programs and below all that is timed, each on the processor that the router of its node does
+//! not use. The flooder pauses for 2 ms in 20, so that the kernel's fair server stays out; the queue outlasts the
+//! pause.
 //!
-//! The floor, `udp`: sockets in the modules themselves, with a separate socket pair for the flood, at the rate of the routers.
+//! The floor, `udp`: sockets in the modules themselves, with a separate socket pair for the flood, at the rate of the
+//! routers.
 
 use super::ground::LanSegment;
 use crate::cases::Case;

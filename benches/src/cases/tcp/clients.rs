@@ -1,5 +1,5 @@
-//! A thousand clients at once: throughput and delay; and whether a client that reads nothing, or a hostile program, affects the
-//! others.
+//! A thousand clients at once: throughput and delay; and whether a client that reads nothing, or a hostile program,
+//! affects the others.
 
 use crate::cases::Case;
 use crate::harness::{Failure, Machine};
@@ -18,8 +18,8 @@ const GUESTS_QUICK: u16 = 40;
 const BYTES: usize = 64;
 /// Packages a second that a thousand clients send: the rate that must be reached.
 const PER_S: u64 = 50_000;
-/// Packages a second where a case asks whether clients feel a disturbance or TLS: both processors have reserves, so that the figures do not show a full
-/// processor.
+/// Packages a second where a case asks whether clients feel a disturbance or TLS: both processors have reserves, so
+/// that the figures do not show a full processor.
 const PER_S_BESIDE: u64 = 20_000;
 const PER_S_QUICK: u64 = 1_000;
 /// The router has reserves, so that the kernel's fair server stays out.

@@ -1,4 +1,5 @@
-//! How long a package takes from a module through the TCP router to a module of another system, one at a time; every waiting process sleeps.
+//! How long a package takes from a module through the TCP router to a module of another system, one at a time; every
+//! waiting process sleeps.
 
 use crate::cases::Case;
 use crate::harness::{Cell, End, Failure, time_two_processes};

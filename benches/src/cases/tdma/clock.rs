@@ -1,8 +1,8 @@
 //! How far a slave's system time is off the master's in time slots, under load; and how far a second after the last
 //! master fell silent.
 //!
-//! The routers are threads of one process. Their clocks are wrong by a known offset, 30 ppm, and a varying half ppm; so the
-//! true error of each reading is known, and the reading's own bound must contain it.
+//! The routers are threads of one process. Their clocks are wrong by a known offset, 30 ppm, and a varying half ppm; so
+//! the true error of each reading is known, and the reading's own bound must contain it.
 
 use super::goals::{Goal, figure};
 use super::plans::LOADED;

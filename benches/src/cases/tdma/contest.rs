@@ -56,7 +56,8 @@ pub(super) const ALWAYS: [Figure; 4] = [
 /// The floor: threads that wake up for the slots of the first contender, under the same load, and send nothing.
 pub(super) const BARE: &str = "bare threads";
 const OMITTED: &str = "omitted";
-/// A router that omits more slots than threads that do nothing else has an error. A round omits few slots, so the two differ by chance.
+/// A router that omits more slots than threads that do nothing else has an error. A round omits few slots, so the two
+/// differ by chance.
 const OF_BARE: [Goal; 1] = [Goal { name: "hoped 1.5", most: 1.5 }];
 
 /// What was seen of a contender, round after round.

@@ -1,5 +1,5 @@
-//! Declared flows, while every node floods with a lower class: how late their packages are, beside the bounds that `rohrpost check` computes
-//! for this very configuration.
+//! Declared flows, while every node floods with a lower class: how late their packages are, beside the bounds that
+//! `rohrpost check` computes for this very configuration.
 
 use super::contest::BARE;
 use super::goals::{Goal, NONE, figure, spread};

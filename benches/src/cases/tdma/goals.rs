@@ -15,8 +15,8 @@ pub(super) struct Goal {
 /// Where nothing at all is allowed.
 pub(super) const NONE: [Goal; 1] = [Goal { name: "must none", most: 0.0 }];
 
-/// A figure that is there once in a round, beside each of its goals, which its worst round must meet; without goals, alone. None without
-/// any round.
+/// A figure that is there once in a round, beside each of its goals, which its worst round must meet; without goals,
+/// alone. None without any round.
 pub(super) fn figure(subject: &Subject, contender: &'static str, rounds: &[f64], goals: &[Goal]) -> Vec<Row> {
     let Some(middle) = median(rounds.iter().copied()) else { return Vec::new() };
     let row = |goal: Option<&Goal>| {

@@ -1,7 +1,8 @@
-//! Slots that are omitted while 500 000 foreign datagrams a second arrive at each port of a node, from an address that no node has; and without.
+//! Slots that are omitted while 500 000 foreign datagrams a second arrive at each port of a node, from an address that
+//! no node has; and without.
 //!
-//! The junk goes to the node that is no master, in place of the load of the other cases. Its sender shares a processor with other processes. The floor: bare
-//! threads that wake up for the same slots beside the same junk.
+//! The junk goes to the node that is no master, in place of the load of the other cases. Its sender shares a processor
+//! with other processes. The floor: bare threads that wake up for the same slots beside the same junk.
 
 use super::contest::BARE;
 use super::goals::{Goal, figure};

@@ -1,5 +1,6 @@
-//! How short a slot for 1400 B can be, and how much of its end must be kept free: tables by the shortest slots that `check` lets pass, and
-//! how far into the guard the latest frame began. A table that was not kept is none that can be had.
+//! How short a slot for 1400 B can be, and how much of its end must be kept free: tables by the shortest slots that
+//! `check` lets pass, and how far into the guard the latest frame began. A table that was not kept is none that can be
+//! had.
 
 use super::contest::{ALWAYS, Contest, Figure, Held, WatchedContender};
 use super::goals::{Goal, NONE, figure};

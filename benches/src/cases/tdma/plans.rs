@@ -14,7 +14,8 @@ pub const LOADED: Plan = Plan {
     flows: &[],
 };
 
-/// The shortest slots for such a datagram with a guard of 150 µs: 50 µs late, six frames of routers and a datagram, 20 µs each.
+/// The shortest slots for such a datagram with a guard of 150 µs: 50 µs late, six frames of routers and a datagram, 20
+/// µs each.
 pub const WIDE_GUARD: Plan = Plan { pitch_us: 320, link: "1 Gbit/s", ..LOADED };
 
 /// RTnet's distance of slots, which leaves 80 µs for the guard.

@@ -1,4 +1,5 @@
-//! How far off their nominal begin slots start, under load, without load, and with routers without real-time scheduling.
+//! How far off their nominal begin slots start, under load, without load, and with routers without real-time
+//! scheduling.
 
 use super::contest::{ALWAYS, BARE, Contest, Figure, Held, ObservedRounds, WatchedContender};
 use super::goals::{Goal, figure};
@@ -118,7 +119,8 @@ type Far = fn(&Observed) -> (u64, u64);
 
 const NOT_KEPT: &str = "left out or over 250 us off";
 
-/// Slots that bare threads would omit, divided by slots that are not kept without real-time scheduling: no router is better.
+/// Slots that bare threads would omit, divided by slots that are not kept without real-time scheduling: no router is
+/// better.
 fn floor(bare: &BareThreads, ordinary: &Observed) -> f64 {
     let (some, all) = not_kept(ordinary);
     bare.omitted_percent() / 100.0 * all.max(1) as f64 / some.max(1) as f64
@@ -129,7 +131,8 @@ fn far_off(seen: &Observed) -> (u64, u64) {
     (seen.kept.further_off(FAR_US) as u64, seen.kept.off_us.len() as u64)
 }
 
-/// Of all slots. A late wake-up does not send. So without real-time scheduling most slots are omitted, and few begin late.
+/// Of all slots. A late wake-up does not send. So without real-time scheduling most slots are omitted, and few begin
+/// late.
 fn not_kept(seen: &Observed) -> (u64, u64) {
     (far_off(seen).0 + seen.counts.omitted(), seen.counts.all())
 }

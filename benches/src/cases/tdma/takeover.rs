@@ -1,4 +1,5 @@
-//! The master is killed again and again while all nodes send; then the master runs undisturbed for long, and must stay the master.
+//! The master is killed again and again while all nodes send; then the master runs undisturbed for long, and must stay
+//! the master.
 
 use super::contest::BARE;
 use super::goals::{Goal, figure, spread};
@@ -30,8 +31,9 @@ const QUIET_QUICK: Duration = Duration::from_secs(1);
 /// The step at which the moment of killing moves through the cycle.
 const GOLDEN: f64 = 0.618_034;
 
-/// The killed master. Each time the other takes its place and keeps it, so they alternate. Only a later one in the order of masters stands in for
-/// a silent master in the same cycle, since its window comes later. An earlier one does so in the next cycle.
+/// The killed master. Each time the other takes its place and keeps it, so they alternate. Only a later one in the
+/// order of masters stands in for a silent master in the same cycle, since its window comes later. An earlier one does
+/// so in the next cycle.
 const DEAD: [&str; 2] = ["the first dies", "the second dies"];
 
 const REPLACED: [Goal; 2] = [Goal { name: "must 2 cycles", most: 2.0 }, Goal { name: "hoped 1, and 1 ms", most: 1.2 }];
