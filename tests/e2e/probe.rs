@@ -149,8 +149,7 @@ pub(crate) struct Settings {
     hang_at_start: bool,
     /// Hears each beat of this probe twice: in its data mailbox, and in [`NEWEST`].
     hears: Option<String>,
-    /// Hears each beat and each blob of this probe in its data mailbox; in the other order if there is a file
-    /// [`SWAPPED`].
+    /// Hears each beat and each blob of this probe in its data mailbox; in the other order with a file [`SWAPPED`].
     mixes: Option<String>,
     /// Does nothing on any signal that asks it to end.
     ignore_stop: bool,

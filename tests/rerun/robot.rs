@@ -1,5 +1,4 @@
-//! A robot that measures itself: `source` sends beats, and everything that a bridge draws; `sink` reports the delay of
-//! the beats.
+//! A robot that measures itself: `source` sends beats, and everything that a bridge draws; `sink` reports their delay.
 //!
 //! Both are this test program itself, started by launch with the one test [`module`] to run.
 

@@ -31,8 +31,8 @@ def line(module, words, lost=0, ahead_s=0):
 class Attacks:
     """Each by its name: a package as (to, sender, kind, id, body, priority, options).
 
-    `own` are modules that the program may speak for; `laser` is the hash of the
-    laser's interface, which the laser tells any caller.
+    `own` are modules that the program may speak for; `laser` is the hash of the laser's interface,
+    which the laser tells any caller.
     """
 
     def __init__(self, own, laser):
