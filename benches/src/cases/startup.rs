@@ -1,7 +1,7 @@
 //! From exec of a program to the first package in its hand, beside the same program with POSIX queues.
 //!
 //! ```text
-//!  bench: takes the time ──exec──▶ program: main ─ opens, makes its mailbox ─ sends hello to hub ─ has the answer: time
+//!  bench: takes the time ──exec──▶ program: main ─ opens, makes its mailbox ─ sends hello to hub ─ has answer: time
 //!                                                                               hub (bench) opens the mailbox, answers
 //! ```
 //! `new` is as drawn: the mailbox is made, and its first package comes from a process that has to find it. `waiting` is

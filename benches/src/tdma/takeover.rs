@@ -80,7 +80,7 @@ pub fn kill_master(
     let mut pages = Pages::begin(clocks, time)?;
     let killed_ns = time.at(monotonic_ns()).ns;
     routers.kill(dead);
-    await_reign(capture, first, dead, cycle, &mut pages)?;
+    await_new_master(capture, first, dead, cycle, &mut pages)?;
     let frames = capture.since(first);
     let never = || Failure::Failed("nobody synchronised in a dead master's place".into());
     let last =
@@ -105,7 +105,7 @@ pub fn kill_master(
 
 /// Waits until another node than the dead master has synchronised as the master for some cycles; pages are read all the
 /// time.
-fn await_reign(
+fn await_new_master(
     capture: &mut Capture,
     first: usize,
     dead: u8,

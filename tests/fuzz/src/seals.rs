@@ -145,14 +145,14 @@ impl World {
                 router.opened.push(place);
                 None
             }
-            Ok(Opened::Hello(head, greeting)) => {
-                let greeted = router.handshake.greet(0, &head, &greeting, &mut room);
+            Ok(Opened::Hello(head, hello)) => {
+                let reply = router.handshake.greet(0, &head, &hello, &mut room);
                 router.handshake.begin();
-                if greeted.begins {
+                if reply.begins {
                     assert!(sent.step >= router.drawn, "an incarnation began by what was said before");
                     router.drawn = self.step;
                 }
-                greeted.reply_bytes
+                reply.reply_bytes
             }
             Err(_) => None,
         };
