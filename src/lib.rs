@@ -59,14 +59,14 @@ pub use rohrpost_mailbox::{
 pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;
-pub use rohrpost_modules::macro_support::serde;
 pub use rohrpost_modules::runtime::{
     BadRate, ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, Unreadable,
     describe, find_other_versions, find_running,
 };
+pub use rohrpost_modules::serde;
 pub use rohrpost_modules::{
     Module, ModuleError, choice, common, data, description, interface, interfaces, launch, launcher, output, parameter,
-    parameters, run, schema, survey, types,
+    parameters, run, schema, survey, types, wire,
 };
 
 /// What a module says: events become lines of output.

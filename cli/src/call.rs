@@ -112,7 +112,7 @@ fn get(module: Name, data: &str, tool: &mut ToolLink) -> Result<Value, Failure> 
         format!("no data `{data}`; it has: {}", names.join(", "))
     })?;
     let number = item.number;
-    let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(number,));
+    let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &(number,));
     let bytes = tool.call(module, common::GET_DATA, description.hash(), write, |bytes| Ok(bytes.to_vec()))?;
     let (_, value) = postcard_u64(&bytes).ok_or("the answer is too short")?;
     Ok(decode(&item.field.ty, value)?)

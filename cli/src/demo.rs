@@ -96,7 +96,7 @@ fn progress(launch: &mut Launch) -> Option<Progress> {
 
 /// The first function of a module's own, without arguments.
 fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interface: u32) -> Option<T> {
-    let read = |bytes: &[u8]| rohrpost::macro_support::from_bytes::<T>(bytes);
+    let read = |bytes: &[u8]| rohrpost::wire::from_bytes::<T>(bytes);
     launch.tool().call(module, FIRST_FUNCTION, interface, |_| Ok(()), read).ok()
 }
 

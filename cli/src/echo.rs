@@ -91,7 +91,7 @@ fn follow(
     let stop = rohrpost::launch::events()?;
     loop {
         if Instant::now() >= renew_at {
-            let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &wish);
+            let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &wish);
             tool.call(module, SUBSCRIBE, description.hash(), write, |_| Ok(()))?;
             renew_at = Instant::now() + LEASE / 3;
         }

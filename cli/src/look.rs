@@ -7,12 +7,13 @@ use crate::terminal::Failure;
 use rohrpost::ToolLink;
 use rohrpost::common::GET_DATA;
 use rohrpost::description::noted;
+use rohrpost::interface::DataPort;
 use rohrpost::interfaces::{BeyondHosts, BeyondState, LinkState, Links, RouterInterface, TcpInterface};
 use rohrpost::launcher::{SnapshotRequest, launcher_of};
-use rohrpost::macro_support::{DataPort, append, from_bytes};
 use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{InspectError, Name};
 
 impl Running {

@@ -181,7 +181,7 @@ impl Losses {
     /// Of these counts, in the order of [`Loss::ALL`].
     pub(super) fn new(counts: &[u64; Loss::ALL.len()]) -> Self {
         let missed = Loss::ALL.into_iter().filter(|cause| cause.is_missed() && counts[*cause as usize] > 0);
-        let lost_by_cause: BTreeMap<_, _> = missed.map(|cause| (cause.name(), counts[cause as usize])).collect();
+        let lost_by_cause: BTreeMap<_, _> = missed.map(|cause| (cause.word(), counts[cause as usize])).collect();
         Self {
             lost: saturating_sum(lost_by_cause.values().copied()),
             lost_by_cause,
@@ -195,7 +195,7 @@ pub(super) fn losses(lost: impl Fn(Loss) -> u64) -> String {
     let (missed, replaced): (Vec<Loss>, _) =
         Loss::ALL.into_iter().filter(|cause| lost(*cause) > 0).partition(|cause| cause.is_missed());
     let list =
-        |causes: &[Loss]| causes.iter().map(|c| format!("{} {}", lost(*c), c.name())).collect::<Vec<_>>().join(", ");
+        |causes: &[Loss]| causes.iter().map(|c| format!("{} {}", lost(*c), c.word())).collect::<Vec<_>>().join(", ");
     let missed = if missed.is_empty() { "none".into() } else { list(&missed) };
     if replaced.is_empty() { missed } else { format!("{missed} ({})", list(&replaced)) }
 }

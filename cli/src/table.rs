@@ -2,6 +2,8 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 use rohrpost::output::plain;
+use rohrpost::schema::{Schema, counters};
+use serde::Serialize;
 use std::time::Duration;
 
 /// A plain table: a line of heads, then rows; columns whose head begins with `>` stand to the right.
@@ -23,6 +25,13 @@ pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[&str], rows: impl IntoIter
         }
     }
     table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+}
+
+/// The counters of a value that counted something, in one cell: `3 lost, 1 damaged`.
+pub(super) fn counted<T: Schema + Serialize>(value: &T) -> String {
+    let counted = counters(value).into_iter().filter(|(_, count)| *count > 0);
+    let words: Vec<String> = counted.map(|(field, count)| format!("{count} {}", field.name)).collect();
+    if words.is_empty() { "none".into() } else { words.join(", ") }
 }
 
 /// A short time in the unit that suits it.

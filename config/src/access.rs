@@ -1,15 +1,15 @@
-//! Who may command whom, section `[access]`: by class.
+//! Permission of classes to command others, section `[access]`.
 
 use crate::classes::ClassTable;
 use crate::reader::{Item, Section};
 use rohrpost_mailbox::Class;
 
-/// Which classes may command the modules of a class. Of a class without such a rule all may.
+/// Which classes may command the modules of a class. Without such a rule all may.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Access {
-    /// Whose modules are commanded.
+    /// The commanded class.
     pub class: Class,
-    /// Those who may.
+    /// The permitted callers.
     pub callers: Vec<Class>,
     /// Line in the file.
     pub line: usize,

@@ -1,4 +1,4 @@
-//! What of an installation lies beyond the LAN: clients of the TCP router, and the names that go by it.
+//! The part of an installation beyond the LAN: clients of the TCP router, and the names that are reached through it.
 
 use crate::classes::TCP;
 use crate::installation::Installation;
@@ -7,7 +7,7 @@ use crate::tcp::{TCP_SERVER, Tcp};
 use rohrpost_mailbox::{ALL_SYSTEMS, Name, local};
 
 impl Installation {
-    /// What `check` and every start say of the security of LAN and TCP router, as far as there are any.
+    /// Security notes on LAN and TCP router, as far as there are any: `check` and every start print them.
     pub fn security_texts(&self) -> Vec<String> {
         self.security_text().into_iter().chain(self.tcp.as_ref().map(Tcp::security_text)).collect()
     }
@@ -24,14 +24,14 @@ impl Installation {
         Some(Name::new(self.system.id, class.0, TCP_SERVER, local::COMMANDS))
     }
 
-    /// The TCP router, if another system runs it: its name in all systems, since no configuration says in which.
+    /// The TCP router, if another system runs it: its name in all systems, since no configuration states the system.
     pub fn tcp_router_elsewhere(&self) -> Option<Name> {
         let class = self.classes.id(TCP).filter(|_| self.tcp.as_ref().is_some_and(|tcp| tcp.server.is_none()))?;
         Some(Name::new(ALL_SYSTEMS, class.0, TCP_SERVER, local::COMMANDS))
     }
 
-    /// The names that a node hosts, each range with all mailboxes in it: its modules, their aliases, and its tools. Sorted; none overlaps
-    /// another.
+    /// The names that a node hosts, each range with all mailboxes in it: its modules, their aliases, and its tools.
+    /// Sorted; none overlaps another.
     pub fn names_on(&self, node: &str) -> Vec<(Name, Name)> {
         let tool = |instance: u8| Name::new(self.system.id, self.classes.tool().0, instance, 0);
         let tools = self.node(node).map(|node| (tool(*node.tools.start()), tool(*node.tools.end())));
@@ -43,8 +43,9 @@ impl Installation {
         ranges
     }
 
-    /// The names of a node that are registered at the TCP router: all that it hosts, but for the mailboxes by which its routers carry packages.
-    /// What a router has in common with all modules is among them: so others may ask it how it is, and its lines of output arrive.
+    /// The names of a node that are registered at the TCP router: all that it hosts, except the mailboxes by which its
+    /// routers carry packages. The mailboxes that a router has in common with all modules are registered: others may
+    /// query it, and its lines of output arrive.
     pub fn names_registered(&self, node: &str) -> Vec<(Name, Name)> {
         let carries = |first: Name| {
             let module = self.modules_on(node).find(|module| module.names().any(|name| name == first));
@@ -57,7 +58,8 @@ impl Installation {
         self.names_on(node).into_iter().map(common).collect()
     }
 
-    /// The names for which packages go to the TCP router if neither this node nor its LAN has them: all but those that the node hosts itself.
+    /// The names with routes to the TCP router if neither this node nor its LAN has them: all that the node does not
+    /// host itself.
     pub fn names_beyond(&self, node: &str) -> Vec<(Name, Name)> {
         let (mut from, mut beyond) = (Name::new(1, 1, 0, 0).raw(), Vec::new());
         for (first, last) in self.names_on(node) {

@@ -1,4 +1,4 @@
-//! Whom a module sends commands to: the list `calls`.
+//! The list `calls`: the modules that a module sends commands to.
 
 use crate::directory::Directory;
 use crate::reader::Item;
@@ -10,7 +10,7 @@ pub(crate) struct Calls {
     pub(crate) names: Vec<Name>,
     /// Line of each name.
     pub(crate) lines: Vec<usize>,
-    /// The names that came with a reason, and it.
+    /// The names with a reason, and the reason.
     pub(crate) although: Vec<(Name, String)>,
 }
 
@@ -41,7 +41,7 @@ impl Calls {
     }
 }
 
-/// A name alone, or a table of a name and why it may be called.
+/// A name alone, or a table of a name and the reason why it may be called.
 fn entry<'d>(item: &Item<'d>, what: &str) -> Option<(&'d str, Option<&'d str>)> {
     if !item.is_table() {
         return Some((item.text_of_list("motor.0")?, None));
@@ -52,6 +52,6 @@ fn entry<'d>(item: &Item<'d>, what: &str) -> Option<(&'d str, Option<&'d str>)> 
     let although = section.required("although", &format!("although = \"{example}\""));
     let although = although.and_then(|item| item.text(example));
     section.finish();
-    // A reason that could not be read has its message, and excuses all the same.
+    // A reason that could not be read has its own message, and counts nevertheless.
     Some((to?, Some(although.unwrap_or_default())))
 }

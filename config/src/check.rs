@@ -15,10 +15,11 @@ use std::collections::btree_map::Entry;
 /// Tools that may be inside a module's command mailbox at the same time.
 const TOOLS: usize = 2;
 
-/// Most bytes a second that a flow may ask for: past it, somebody has mistaken a unit.
+/// Largest rate of a flow, bytes a second: a larger one is a mistaken unit.
 const FLOW_BYTES_MAX: u64 = 1 << 30;
 
-/// Judges all that takes more than one module to see; `lines` are those of the modules, `slots` those of the time slots.
+/// Validates rules that concern more than one module; `lines` are those of the modules, `slots` those of the time
+/// slots.
 pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option<&TdmaLines>, reader: &Reader<'_>) {
     claims(installation, lines, reader);
     for (module, lines) in installation.modules.iter().zip(lines) {
@@ -31,16 +32,16 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option
         self::flow(installation, flow, lines, reader);
     }
     carried_twice(installation, reader);
-    // What follows from other mistakes is not worth judging.
+    // Consequences of other mistakes are not reported.
     if let Some(slots) = slots.filter(|_| reader.is_content()) {
         tdma::validate(installation, slots, reader);
     }
 }
 
-/// Who waits for a less important module waits for all that goes before that one, too.
+/// A module that waits for a less important one also waits for all that runs before that one.
 fn importance(installation: &Installation, module: &Module, to: Name, line: usize, reader: &Reader<'_>) {
     let classes = &installation.classes;
-    // What the kernel and the mailboxes know is the class of the process, not of an alias.
+    // The kernel and the mailboxes know the class of the process, not of an alias.
     let Some(host) = installation.module(to) else { return };
     let (own, other) = (module.name.class(), host.name.class());
     let although = module.although.iter().any(|(name, _)| *name == to);
@@ -73,7 +74,7 @@ fn importance(installation: &Installation, module: &Module, to: Name, line: usiz
     }
 }
 
-/// A flow is one that can be: between two processes of which one calls the other, and into a mailbox that holds it.
+/// A flow must be possible: between two processes of which one calls the other, and into a mailbox that holds it.
 fn flow(installation: &Installation, flow: &Flow, lines: &[Lines], reader: &Reader<'_>) {
     let (Some(from), Some(to)) = (installation.module(flow.from), installation.module(flow.to)) else { return };
     let (from_text, to_text) = (installation.classes.format(flow.from), installation.classes.format(flow.to));
@@ -94,7 +95,7 @@ fn flow(installation: &Installation, flow: &Flow, lines: &[Lines], reader: &Read
             ),
         );
     }
-    // What was subscribed to comes into `data`, a command into `commands`. If each calls the other, it may be either.
+    // Subscribed data comes into `data`, a command into `commands`. If each calls the other, it may be either.
     let ways = [(calls(from, to), 0), (calls(to, from), 2)];
     let mut boxes =
         ways.iter().filter(|(way, _)| *way).map(|(_, index)| (to.mailboxes.each()[*index], *index)).peekable();
@@ -126,7 +127,7 @@ fn flow(installation: &Installation, flow: &Flow, lines: &[Lines], reader: &Read
     }
 }
 
-/// Of the flows between two modules each carries something else: a package is of one of them.
+/// Each flow between two modules carries something else: a package belongs to one of them.
 fn carried_twice(installation: &Installation, reader: &Reader<'_>) {
     let mut lines = BTreeMap::new();
     for flow in &installation.flows {
@@ -148,14 +149,14 @@ fn carried_twice(installation: &Installation, reader: &Reader<'_>) {
     }
 }
 
-/// Each mailbox has more slots than its participants may hold unfinished: else senders that were stopped close it.
+/// Each mailbox has more slots than its participants may hold unfinished: else stopped senders block it.
 fn claims(installation: &Installation, lines: &[Lines], reader: &Reader<'_>) {
     for (module, lines) in installation.modules.iter().zip(lines) {
         let mut callers = Senders::of(installation, module, |other| calls(other, module));
         // Tools on other nodes call every module, through the router.
         callers.router |= installation.router_of(&module.node).is_some() && module.is_in_file();
         let mut called = Senders::of(installation, module, |other| calls(module, other));
-        // Who is beyond the LAN calls every module, and may be called by each.
+        // Modules beyond the LAN may call every module, and be called by each.
         let beyond = installation.tcp.is_some() && module.is_in_file();
         (callers.beyond, called.beyond) = (beyond, beyond);
         for ((key, spec), line) in module.mailboxes.each().into_iter().zip(lines.mailboxes) {

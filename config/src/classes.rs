@@ -6,10 +6,10 @@ use rohrpost_mailbox::{Class, Name, local};
 /// Class of programs run by hand; every installation has it.
 pub const TOOL: &str = "tool";
 
-/// Class of the routers, which are there by themselves when there are several nodes.
+/// Class of the routers, which are implicit when there are several nodes.
 pub const ROUTER: &str = "router";
 
-/// Class of the TCP router and of its clients, which are there by themselves with `[tcp]`.
+/// Class of the TCP router and of its clients, which are implicit with `[tcp]`.
 pub const TCP: &str = "tcp";
 
 /// One class of an installation.
@@ -56,7 +56,7 @@ pub enum NameTextError {
     /// A part is no number from 0 to 255.
     #[error("`{0}`: {1} `{2}` is not a number from 0 to 255")]
     Byte(String, &'static str, String),
-    /// System or class zero means "none" or "own" and is nobody's name.
+    /// System or class zero means "none" or "own", and no name has it.
     #[error("`{0}`: {1} 0 is reserved; write 1 to 255")]
     Reserved(String, &'static str),
 }
@@ -157,7 +157,8 @@ impl ClassTable {
                 let free = (1..=255u8).rev().filter(|free| table.entry(Class(*free)).is_none());
                 let free = free.min_by_key(|free| free.abs_diff(id)).unwrap_or(1);
                 item.report(format!(
-                    "class `{name}` has id {id}, which is class `{other}`'s; ids are priorities and unique, {free} is free"
+                    "class `{name}` has id {id}, which is class `{other}`'s; ids are priorities and unique, {free} is \
+                     free"
                 ));
             }
             table.entries.push(ClassEntry { class: Class(id), name, text: text.into() });
@@ -233,7 +234,8 @@ mod tests {
         for (text, message) in [
             (
                 "laser",
-                "`laser` is no mailbox name; write class.instance (`laser.0`), with a local id `laser.0.2`, or `1.laser.0.2`",
+                "`laser` is no mailbox name; write class.instance (`laser.0`), with a local id `laser.0.2`, or \
+                 `1.laser.0.2`",
             ),
             ("lasr.0", "`lasr.0`: there is no class `lasr`; did you mean `laser`?"),
             ("pump.0", "`pump.0`: there is no class `pump`; the classes are motor, laser, tool"),

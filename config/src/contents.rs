@@ -1,12 +1,13 @@
-//! What a flow carries: packages of one kind, or of one number of a kind, as the interface of a module declares them.
+//! Contents of a flow: packages of one kind, or of one number of a kind, as the interface of a module declares them.
 //!
-//! Numbers, since a configuration knows no interface but those of built-in modules; tools that can ask a module show its names.
+//! Contents are numbers, since a configuration knows no interface but those of built-in modules; tools that can ask a
+//! module show names.
 
 use rohrpost_mailbox::{Kind, Type};
 use std::fmt;
 use std::str::FromStr;
 
-/// What a flow carries. Without a number: all of the kind.
+/// Contents of a flow. Without a number: all of the kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Contents {
     /// Commands, by the number of the receiver's function.
@@ -27,7 +28,8 @@ pub enum ContentsError {
     Kind(String),
     /// A number that no package of the kind has.
     #[error(
-        "`{number}` is no number of a {kind}; write {first} to {last}, such as \"{kind} {first}\", or \"{kind}\" for all of them"
+        "`{number}` is no number of a {kind}; write {first} to {last}, such as \"{kind} {first}\", or \"{kind}\" for \
+         all of them"
     )]
     Number {
         /// What stands in its place.

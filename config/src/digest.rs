@@ -1,7 +1,8 @@
 //! Digests by which routers and modules notice that they were started from different files.
 //!
-//! What is hashed is a canonical text of what must be equal, not the file: comments, order and spelling do not count.
-//! SipHash-2-4 under a fixed key gives the same on every node, compiler and release, which std's hasher does not promise.
+//! The hash is over a canonical text of what must be equal, not over the file: comments, order and spelling do not
+//! count. SipHash-2-4 with a fixed key gives the same on every node, compiler and release, which std's hasher does not
+//! promise.
 
 use crate::installation::Installation;
 use crate::network;
@@ -16,8 +17,8 @@ use std::hash::Hasher;
 pub struct Digest {
     /// Equal wherever packages are exchanged: the classes, by id and name.
     pub common: u64,
-    /// Equal inside a system: its nodes, which of them are on the LAN, their tool instances, which module is where, and what routers agree on: port, MTU, masters
-    /// of time and how often they synchronise, the time slots and their tunnel.
+    /// Equal inside a system: its nodes, which of them are on the LAN, their tool instances, the node of each module,
+    /// and the agreements of routers: port, MTU, masters of time and their interval, the time slots and their tunnel.
     pub system: u64,
 }
 

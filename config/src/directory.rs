@@ -1,4 +1,4 @@
-//! Who owns which module name: collected in a first pass, so that what a module refers to may stand below it.
+//! Which module owns which name: collected in a first pass, so that a module may refer to one further below.
 
 use crate::classes::{ClassTable, ROUTER, TCP, TOOL, class_of};
 use crate::reader::{Section, nearest};
@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 /// The names of all modules and aliases of a file.
 pub(crate) struct Directory<'d> {
     pub(crate) classes: &'d ClassTable,
-    /// By the text in the file. A name that is wrong in itself stays known: its own message is enough.
+    /// By the text in the file. A malformed name stays known: its own message is enough.
     owners: BTreeMap<String, Name>,
-    /// Classes of what is there though no `[[module]]` describes it.
+    /// Classes of implicit modules, without a `[[module]]`.
     reserved: Vec<&'static str>,
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Unknown {
 }
 
 impl Unknown {
-    /// What would be right: the nearest name, or a new module, or what the caller says.
+    /// The remedy: the nearest name, or a new module, or the caller's text.
     pub(crate) fn or(&self, otherwise: &str) -> String {
         match &self.nearest {
             Some(name) => format!("did you mean `{name}`? Otherwise add one, or {otherwise}"),
@@ -30,7 +30,7 @@ impl Unknown {
 }
 
 impl<'d> Directory<'d> {
-    /// `routers` are there by themselves.
+    /// `routers` are implicit.
     pub(crate) fn read(modules: &[Section<'d>], classes: &'d ClassTable, routers: &[Name]) -> Self {
         let owners = routers.iter().map(|name| (classes.format(*name), *name)).collect();
         let is_there = |class: &&str| routers.iter().any(|name| classes.name(name.class()) == Some(class));
@@ -70,14 +70,14 @@ impl<'d> Directory<'d> {
                 ),
             );
         }
-        let whose = match class_of(text) {
+        let owner = match class_of(text) {
             ROUTER => "for the routers, which are there by themselves when there are several nodes",
             _ => "for the TCP router and its clients, which are there by themselves with [tcp]",
         };
         if self.reserved.contains(&class_of(text)) {
             module.reader.report(
                 line,
-                format!("module `{text}`: class `{}` is {whose}; give the module a class of its own", class_of(text)),
+                format!("module `{text}`: class `{}` is {owner}; give the module a class of its own", class_of(text)),
             );
         }
         self.owners.insert(text.into(), name.unwrap_or_default());

@@ -1,4 +1,4 @@
-//! What is wrong with a configuration file: all of it at once, each with its line and what would be right.
+//! Mistakes in a configuration file: all of them at once, each with its line and its remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 pub struct Problem {
     /// Line in the file, counted from 1; none if the file could not be read at all.
     pub line: Option<usize>,
-    /// What is wrong and what would be right.
+    /// The mistake and its remedy.
     pub message: String,
 }
 

@@ -1,4 +1,4 @@
-//! Says in words what an installation means: the page that `rohrpost check` prints, readable at 100 columns.
+//! Explains an installation in words: the page that `rohrpost check` prints, readable at 100 columns.
 
 mod slots;
 mod timeline;
@@ -54,7 +54,7 @@ impl Page<'_> {
         self.text.push('\n');
     }
 
-    /// A line of a label and words, which go on below each other.
+    /// A label and words, with wrapped lines below each other.
     fn entry(&mut self, label: &str, words: &str) {
         let mut line = format!("  {label:<width$}", width = INDENT - 2);
         let mut first = true;
@@ -104,7 +104,7 @@ impl Page<'_> {
         self.entry("digest", &format!("{} (equal on every node, or the files differ)", self.installation.digest()));
     }
 
-    /// Whose clock counts.
+    /// The nodes that may be master of time.
     fn masters(&self, masters: &[u8], interval: Duration) -> String {
         let mut names = masters.iter().filter_map(|index| self.installation.nodes.get(usize::from(*index)));
         let first = names.next().map_or("", |node| &node.name);
@@ -130,8 +130,8 @@ impl Page<'_> {
         self.entry(
             "network",
             &format!(
-                "UDP ports {ports}; IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps {} \
-                 of each sender waiting",
+                "UDP ports {ports}; IP packets of at most {} B, so datagrams of {} B; each router sends {}, and keeps \
+                 {} of each sender waiting",
                 network.mtu,
                 network.datagram_bytes_max,
                 sends,
@@ -152,7 +152,8 @@ impl Page<'_> {
             None => "another installation runs it".into(),
         };
         let words = format!(
-            "TCP router at {}: what neither a node nor its LAN has goes there; {runs}; {} wait for a connection at most",
+            "TCP router at {}: what neither a node nor its LAN has goes there; {runs}; {} wait for a connection at \
+             most",
             tcp.address,
             size_text(tcp.quota_bytes as u64)
         );
@@ -337,7 +338,7 @@ fn starts(module: &Module) -> String {
     };
     let (ready, stop) = (duration_text(module.ready_within), duration_text(module.stop_within));
     let mut words = format!("{state}; must be ready within {ready}, has {stop} to stop");
-    // Those that are there by themselves have no such key.
+    // Implicit modules have no such key.
     if module.required && module.is_in_file() {
         words.push_str("; without it the node does not start");
     }

@@ -1,4 +1,4 @@
-//! Flows: what passes regularly between two modules, and how soon it must arrive. Routers plan their time slots by them.
+//! Flows: regular traffic between two modules, and its deadlines. Routers plan their time slots by them.
 
 use crate::contents::{Contents, ContentsError};
 use crate::directory::{Directory, Unknown};
@@ -14,7 +14,7 @@ pub struct Flow {
     pub from: Name,
     /// Module that receives.
     pub to: Name,
-    /// What it carries, if the file says so: by this, flows between the same modules are told apart.
+    /// Contents, if the file states them: they distinguish flows between the same modules.
     pub carries: Option<Contents>,
     /// Bytes of a body, at most.
     pub size: u32,

@@ -1,4 +1,4 @@
-//! What the GUI module draws.
+//! Contents of the GUI.
 
 use crate::directory::Directory;
 use crate::reader::{Item, Section};

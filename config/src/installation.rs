@@ -15,7 +15,7 @@ use rohrpost_mailbox::{Class, Name};
 use rohrpost_network::{Network, Tdma};
 use std::path::{Path, PathBuf};
 
-/// What one configuration file describes. It exists only if everything in the file is right.
+/// Content of one configuration file. It exists only if everything in the file is right.
 #[derive(Clone, Debug)]
 pub struct Installation {
     /// Its name.
@@ -32,15 +32,16 @@ pub struct Installation {
     pub system: System,
     /// The classes.
     pub classes: ClassTable,
-    /// The nodes, at least one: in the order of the file, but that those that are not on the LAN come behind the others.
+    /// The nodes, at least one: in the order of the file, but nodes that are not on the LAN come last.
     pub nodes: Vec<Node>,
-    /// The modules, in the order of their start: the routers, if there are several nodes, what `[tcp]` brings, then those of the file.
+    /// The modules, in the order of their start: the routers, if there are several nodes, the modules of `[tcp]`, then
+    /// those of the file.
     pub modules: Vec<Module>,
     /// How nodes reach each other; none if there is one only.
     pub network: Option<Network>,
-    /// The folder with the keys that seal what passes between nodes; none if nothing is sealed.
+    /// The folder with the keys that seal datagrams between nodes; none if nothing is sealed.
     pub keys: Option<PathBuf>,
-    /// When each node sends; none if each sends as packages come.
+    /// The time slots; none if each node sends as packages come.
     pub tdma: Option<Tdma>,
     /// The TCP router beyond the LAN; none if nothing goes there.
     pub tcp: Option<Tcp>,
@@ -52,7 +53,7 @@ pub struct Installation {
     pub output: Output,
     /// What the GUI draws.
     pub gui: Gui,
-    /// What passes regularly between modules.
+    /// Regular traffic between modules.
     pub flows: Vec<Flow>,
     /// Where values of parameters are saved, if anywhere.
     pub parameters: Option<PathBuf>,
@@ -62,7 +63,7 @@ pub struct Installation {
 }
 
 impl Installation {
-    /// The module that has a name, as its own or as an alias's. The name may be that of any of the module's mailboxes.
+    /// The module with a name, as its own or as an alias. The name may be that of any of the module's mailboxes.
     pub fn module(&self, name: Name) -> Option<&Module> {
         self.modules.iter().find(|module| module.names().any(|own| own == name.module()))
     }
@@ -89,20 +90,20 @@ impl Installation {
         self.module(name).map(|module| module.node.as_str()).or_else(|| Some(tools()?.name.as_str()))
     }
 
-    /// The name under which launch of a node speaks.
+    /// The name that launch of a node sends from.
     pub fn launch_of(&self, node: &Node) -> Name {
         Name::new(self.system.id, self.classes.tool().0, node.launch_instance(), 0)
     }
 
-    /// From which level on a module sends lines at its start; said of an alias, it is said of its module.
+    /// The level from which on a module sends lines at its start; an alias has the level of its module.
     pub fn output_level(&self, module: Name) -> Level {
         let names = |own: &Name| self.module(module).is_some_and(|module| module.names().any(|name| name == *own));
         let own = self.output.levels.iter().find(|(name, _)| *name == module.module() || names(name));
         own.map_or(self.output.level, |(_, level)| *level)
     }
 
-    /// The rule of `[access]` that keeps whoever has this name from commanding the other one, if there is one. Launch commands all that runs on
-    /// its node: it switches modules on and off, whoever else may.
+    /// The rule of `[access]` that forbids the owner of this name to command the other one, if there is one. Launch may
+    /// command all on its node: it switches modules on and off, whatever the rules say.
     pub fn access_against(&self, from: Name, to: Name) -> Option<&Access> {
         let rule = self.access.iter().find(|access| access.refuses(from.class(), to.class()))?;
         let is_launch = |node: &Node| self.launch_of(node) == from.module() && self.node_of(to) == Some(&node.name);
@@ -119,7 +120,7 @@ impl Installation {
         self.scheduling.real_time_from
     }
 
-    /// The UDP port of what is not real time, where that goes its own way. In time slots all goes by one port, by its level.
+    /// The UDP port of what is not real time, if that is separate. In time slots all goes through one port, by level.
     pub fn rest_port(&self) -> Option<u16> {
         self.network.filter(|_| self.tdma.is_none()).map(|network| network.rest_port())
     }

@@ -1,11 +1,11 @@
-//! The folder with an installation's keys, and the file in it with those that seal datagrams: the same on all its nodes, and readable by
-//! its owner alone.
+//! The folder with an installation's keys, and the file in it with those that seal datagrams: the same on all its
+//! nodes, and readable by its owner alone.
 //!
 //! ```text
 //! keys/udp.keys
 //! # Keys of a Rohrpost installation …
 //! key 2 7d2f…      64 digits; the newest first
-//! key 1 03c9…      while keys are changed: the one that goes
+//! key 1 03c9…      while keys are changed: the older one
 //! ```
 
 use std::fmt;
@@ -23,9 +23,9 @@ pub(crate) const FOLDER: &str = "keys";
 const FILE: &str = "udp.keys";
 /// Keys that are valid at a time.
 const KEYS_MAX: usize = 2;
-/// Longer is no such file; it is not read further.
+/// A longer file is no such file; it is not read further.
 const FILE_BYTES_MAX: u64 = 4096;
-/// Rights that others than the owner must not have.
+/// Permissions that others than the owner must not have.
 const OTHERS: u32 = 0o077;
 const PREAMBLE: &str = "\
 # Keys of a Rohrpost installation. All its nodes need this very file, and nobody else may read it.
@@ -35,7 +35,7 @@ const PREAMBLE: &str = "\
 /// A key and its number. Printed, it shows the number alone.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Key {
-    /// Goes before what is sealed with it.
+    /// Precedes the sealed content.
     pub id: NonZeroU8,
     /// The secret.
     pub bytes: [u8; KEY_BYTES],
@@ -50,7 +50,7 @@ impl fmt::Debug for Key {
 /// The keys that are valid: one, or two while they are changed.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Keys {
-    /// Which new incarnations of routers seal with first.
+    /// New incarnations of routers seal with it first.
     pub newest: Key,
     /// Still valid.
     pub older: Option<Key>,
@@ -60,10 +60,12 @@ pub struct Keys {
 #[derive(Debug, thiserror::Error)]
 pub enum KeysError {
     /// The file itself.
-    #[error("{path}: keys cannot be read ({1}); copy this folder from the first computer of the installation. On that one, and there alone, `rohrpost keys new {folder}` makes it", path = .0.display(), folder = folder_of(.0))]
+    #[error("{path}: keys cannot be read ({1}); copy this folder from the first computer of the installation. On that \
+             one, and there alone, `rohrpost keys new {folder}` makes it", path = .0.display(), folder = folder_of(.0))]
     Read(PathBuf, io::Error),
     /// Others may read it.
-    #[error("{path}: others than its owner may read these keys (mode {1:o}); run `chmod 600 {path}`, and if others could log in here, change the keys", path = .0.display())]
+    #[error("{path}: others than its owner may read these keys (mode {1:o}); run `chmod 600 {path}`, and if others \
+             could log in here, change the keys", path = .0.display())]
     Open(PathBuf, u32),
     /// What is in it.
     #[error("{}:{line}: {why}", path.display())]
@@ -78,8 +80,9 @@ pub enum KeysError {
     /// It could not be written.
     #[error("{path}: keys cannot be written ({1})", path = .0.display())]
     Write(PathBuf, io::Error),
-    /// Where they are written first, there is something.
-    #[error("{path}: this was left when keys were written and the computer stopped, or they are being written now; if not, remove it", path = .0.display())]
+    /// A temporary file from an earlier write exists.
+    #[error("{path}: this was left when keys were written and the computer stopped, or they are being written now; if \
+             not, remove it", path = .0.display())]
     Left(PathBuf),
     /// There is one already.
     #[error("{path}: there are keys already; `rohrpost keys rotate` changes them", path = .0.display())]
@@ -91,7 +94,7 @@ pub enum KeysError {
     Rotating {
         /// Of the newer one.
         newest: NonZeroU8,
-        /// Of the one that goes.
+        /// Number of the older one.
         older: NonZeroU8,
     },
     /// One is valid.
@@ -99,7 +102,7 @@ pub enum KeysError {
     NotRotating(NonZeroU8),
 }
 
-/// Whether nobody but its owner may read a file. It is that which was opened, since the name may lead elsewhere by now.
+/// Whether only its owner may read a file. The open file is checked, since the name may lead elsewhere by now.
 ///
 /// # Errors
 /// [`KeysError::Open`], and [`KeysError::Read`] if that cannot be known.
@@ -110,12 +113,12 @@ pub fn check_secret(path: &Path, file: &File) -> Result<(), KeysError> {
 }
 
 impl Keys {
-    /// Where they lie in a folder.
+    /// Their file in a folder.
     pub fn file(folder: &Path) -> PathBuf {
         folder.join(FILE)
     }
 
-    /// The first key of an installation. `bytes` come from a source of random numbers that is fit for keys.
+    /// The first key of an installation. `bytes` come from a cryptographic source of random numbers.
     pub fn first(bytes: [u8; KEY_BYTES]) -> Self {
         Self { newest: Key { id: NonZeroU8::MIN, bytes }, older: None }
     }
@@ -157,7 +160,7 @@ impl Keys {
         Self::parse(&text).map_err(|(line, why)| KeysError::Wrong { path: path.to_owned(), line, why })
     }
 
-    /// Writes a file that is not there yet, in one step, and its folder, if that is not there either.
+    /// Writes a file that does not exist yet, in one step, and its folder, if that does not exist either.
     ///
     /// # Errors
     /// [`KeysError::Exists`], [`KeysError::Left`] and [`KeysError::Write`]
@@ -166,13 +169,14 @@ impl Keys {
         let made = folder.map_or(Ok(()), |folder| DirBuilder::new().recursive(true).mode(0o700).create(folder));
         made.map_err(|error| KeysError::Write(path.to_owned(), error))?;
         self.put(path, |beside| {
-            // Unlike renaming, this takes no name that another has.
+            // Unlike a rename, this replaces no existing file.
             std::fs::hard_link(beside, path)?;
             std::fs::remove_file(beside)
         })
     }
 
-    /// Writes over a file, in one step: who reads it meanwhile gets the old keys or the new ones. What leads to it stays as it is.
+    /// Replaces a file in one step: a concurrent reader gets the old keys or the new ones. A symbolic link to it stays
+    /// as it is.
     ///
     /// # Errors
     /// [`KeysError::Left`] and [`KeysError::Write`]
@@ -181,7 +185,7 @@ impl Keys {
         self.put(&file, |beside| std::fs::rename(beside, &file))
     }
 
-    /// Writes them to a file beside another, and lets `name` give it that one's name.
+    /// Writes them to a temporary file beside another; `name` then gives it that one's name.
     fn put(&self, path: &Path, name: impl FnOnce(&Path) -> io::Result<()>) -> Result<(), KeysError> {
         let failed = |error: io::Error| match error.kind() {
             io::ErrorKind::AlreadyExists => KeysError::Exists(path.to_owned()),
@@ -191,7 +195,7 @@ impl Keys {
         beside.push(".new");
         let beside = PathBuf::from(beside);
         let mut file = new_file(&beside).map_err(|error| match error.kind() {
-            // It is not ours to remove.
+            // Another process made it: it must not be removed.
             io::ErrorKind::AlreadyExists => KeysError::Left(beside.clone()),
             _ => failed(error),
         })?;
@@ -205,7 +209,7 @@ impl Keys {
     }
 
     fn write(&self, file: &mut File) -> io::Result<()> {
-        // The mask of the process may have taken rights away, not given any.
+        // The umask may have removed permissions, not added any.
         file.set_permissions(Permissions::from_mode(0o600))?;
         file.write_all(self.text().as_bytes())?;
         file.sync_all()
@@ -257,7 +261,7 @@ fn folder_of(file: &Path) -> std::path::Display<'_> {
     file.parent().unwrap_or(file).display()
 }
 
-/// A file that was not there, for its owner alone from its first moment on.
+/// A new file, for its owner alone from its first moment on.
 fn new_file(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)
 }
@@ -271,7 +275,7 @@ fn key(line: &str) -> Option<Key> {
     let mut bytes = [0; KEY_BYTES];
     for (byte, at) in bytes.iter_mut().zip((0..).step_by(2)) {
         let two = &digits[at..at + 2];
-        // Else a sign would do as a digit.
+        // Else a sign would pass for a digit.
         *byte = two.bytes().all(|digit| digit.is_ascii_hexdigit()).then(|| u8::from_str_radix(two, 16).ok())??;
     }
     Some(Key { id: id.parse().ok()?, bytes })

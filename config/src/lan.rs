@@ -1,4 +1,4 @@
-//! The LAN of an installation: which node is which there, and which names lie where.
+//! The LAN of an installation: the nodes' places there, and the node of each name.
 
 use crate::classes::ROUTER;
 use crate::installation::Installation;
@@ -11,7 +11,7 @@ const UNPROTECTED: &str =
     "security = \"none\": packages between nodes are neither sealed nor signed; use a network that nobody else reaches";
 
 impl Installation {
-    /// What `check` and every start say of the security of the LAN; none if nothing goes over it.
+    /// The security note on the LAN, which `check` and every start print; none if nothing goes over it.
     pub fn security_text(&self) -> Option<String> {
         let network = self.network?;
         Some(match (network.security, &self.keys) {
@@ -25,12 +25,12 @@ impl Installation {
         })
     }
 
-    /// The place of a node in the file, from 0: what routers call it.
+    /// The place of a node in the file, from 0: its number among routers.
     pub fn node_index(&self, node: &str) -> Option<u8> {
         self.nodes.iter().position(|known| known.name == node).and_then(|index| u8::try_from(index).ok())
     }
 
-    /// The place of a node on the LAN, which is that among all nodes; none if it is not there.
+    /// The place of a node on the LAN, which is its place among all nodes; none if it is not there.
     pub fn lan_index(&self, node: &str) -> Option<u8> {
         self.node_index(node).filter(|index| usize::from(*index) < self.lan_nodes().len())
     }
@@ -41,8 +41,8 @@ impl Installation {
         self.lan_index(node).map(|index| Name::new(self.system.id, class.0, index, rohrpost_mailbox::local::COMMANDS))
     }
 
-    /// All names that lie on other nodes of the LAN than this one: their modules, aliases and tools, each with all its mailboxes. Sorted by name; no
-    /// two overlap.
+    /// All names that lie on other nodes of the LAN than this one: their modules, aliases and tools, each with all its
+    /// mailboxes. Sorted by name; no two overlap.
     pub fn routes_from(&self, node: &str) -> Vec<Route> {
         let mut routes = Vec::new();
         for (other, index) in self.lan_nodes().iter().zip(0..).filter(|(other, _)| other.name != node) {

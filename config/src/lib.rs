@@ -24,9 +24,13 @@
 //! let errors = Installation::parse(text, "small.toml".as_ref()).unwrap_err();
 //! assert_eq!(
 //!     errors.to_string(),
-//!     "small.toml:13: module `mapper.0` calls `laser.0`, which no [[module]] defines; add one, or drop it from `calls`"
+//!     "small.toml:13: module `mapper.0` calls `laser.0`, which no [[module]] defines; \
+//!      add one, or drop it from `calls`"
 //! );
 //! ```
+//!
+//! Each section has a file that reads and checks it and words its mistakes (`module`, `classes`, `flow`, `tdma` …);
+//! `errors` prints them, `reader` words wrong types and unknown keys. `config/tests/broken` has an example of each.
 //!
 //! Every key of the file is described in [`manual`].
 #![forbid(unsafe_code)]

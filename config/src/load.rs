@@ -44,7 +44,7 @@ impl Installation {
         for error in &syntax {
             reader.report_syntax(error);
         }
-        // What the parser made up in place of what it could not read is not worth judging.
+        // Values that the parser invented in place of unreadable ones are not validated.
         let read = if syntax.is_empty() { read(&reader, document.get_ref(), text, path) } else { None };
         let problems = reader.into_problems();
         match read {

@@ -1,4 +1,4 @@
-//! How large the mailboxes of a module are and what they do when full.
+//! Sizes of a module's mailboxes, and their behaviour when full.
 
 use crate::reader::Section;
 use rohrpost_mailbox::{BODY_BYTES_MAX, OverflowPolicy, Shape};
@@ -24,10 +24,10 @@ pub struct MailboxSpec {
     pub claims: u8,
 }
 
-/// The mailbox in which a router takes what goes to other nodes: slots for the largest body each. What has waited longer than its
-/// `max_age` is dropped, and its caller not told: only a stopped router leaves it there for so long, and the caller's next try gets through,
-/// where an answer would end its call. A participant has a sender into it, and so a claim, for
-/// each mailbox of another node that it sends to.
+/// The mailbox in which a router takes packages to other nodes: slots for the largest body each. A package that waited
+/// longer than `max_age` is dropped without a reply to its caller: only a stopped router leaves it there for so long.
+/// The caller's next try gets through, where a reply would end its call. A participant has a sender into it, and so a
+/// claim, for each mailbox of another node that it sends to.
 pub const TRANSIT: MailboxSpec = MailboxSpec {
     slots: 64,
     size: BODY_BYTES_MAX as u32,
@@ -51,7 +51,7 @@ pub struct Mailboxes {
     pub commands: MailboxSpec,
     /// Takes the replies to the module's own commands (local id 1).
     pub replies: MailboxSpec,
-    /// Takes what the module subscribed to (local id 2).
+    /// Takes the module's subscribed data (local id 2).
     pub data: MailboxSpec,
 }
 
@@ -62,7 +62,7 @@ impl Default for Mailboxes {
     }
 }
 
-/// Lines at which a mailbox of a module stands, or the module if nothing is said of the mailbox.
+/// Lines of a module's mailboxes, or the line of the module for a mailbox without a section.
 #[derive(Clone, Copy)]
 pub(crate) struct SpecLines {
     pub(crate) slots: usize,
@@ -72,7 +72,7 @@ pub(crate) struct SpecLines {
 /// Lines of the three, for checks across modules.
 pub(crate) type MailboxLines = [SpecLines; 3];
 
-/// The lines of mailboxes of which the file says nothing: those of their module.
+/// Lines of mailboxes without a section: that of their module.
 pub(crate) fn lines_at(line: usize) -> MailboxLines {
     [SpecLines { slots: line, size: line }; 3]
 }
@@ -100,7 +100,8 @@ impl Mailboxes {
 }
 
 impl MailboxSpec {
-    /// Changes what the section says and keeps the rest. `latest`: whether a newer package may make an older one useless here.
+    /// Changes the keys of the section and keeps the rest. `latest`: whether a newer package may replace an older one
+    /// here.
     fn read(&mut self, section: Section<'_>, line: &mut SpecLines, latest: bool) {
         if let Some(item) = section.get("slots") {
             line.slots = item.line;
@@ -113,7 +114,8 @@ impl MailboxSpec {
         let full = section.get("full").and_then(|item| {
             if !latest && item.is(OverflowPolicy::Latest.name()) {
                 item.report(
-                    "`full` is \"latest\"; write \"displace\" or \"reject\": each command has an id of its own, so none replaces another",
+                    "`full` is \"latest\"; write \"displace\" or \"reject\": each command has an id of its own, so \
+                     none replaces another",
                 );
                 return None;
             }

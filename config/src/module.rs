@@ -26,7 +26,7 @@ pub enum Program {
     Command(Vec<String>),
 }
 
-/// Longest time that a module may look for packages awake before it sleeps: longer than that nobody is about to come.
+/// Longest busy wait of a module for packages before it sleeps: after that none is likely to come soon.
 pub const SPIN_MAX: Duration = Duration::from_millis(1);
 
 /// See [`Module::busy_after`].
@@ -90,11 +90,11 @@ pub struct Module {
     pub program: Program,
     /// Whether it is left out with a notice when its program does not exist.
     pub optional: bool,
-    /// Whether its node does not start without it. Without one that is not, the others run.
+    /// Whether its node does not start without it. Without an optional one the others run.
     pub required: bool,
     /// Modules and aliases it sends commands to; subscribing is a command too.
     pub calls: Vec<Name>,
-    /// Those of [`calls`](Self::calls) that are of a less important class, and why they may be, in the file's words.
+    /// The members of [`calls`](Self::calls) with a less important class, and the file's reasons for them.
     pub although: Vec<(Name, String)>,
     /// Settings of its own; [`Installation::settings_as`](crate::Installation::settings_as) gives them a type.
     pub settings: toml::Table,
@@ -106,15 +106,15 @@ pub struct Module {
     pub ready_within: Duration,
     /// Time from being told to end until it is killed.
     pub stop_within: Duration,
-    /// A part of its code that runs for so long without coming back is told: it is busy.
+    /// Code of it that runs for this long without a return is reported: the module is busy.
     pub busy_after: Duration,
-    /// Time for which it looks for packages awake before it sleeps.
+    /// Busy wait for packages before it sleeps.
     pub spin: Duration,
     /// Its mailboxes.
     pub mailboxes: Mailboxes,
     /// Line of its `[[module]]` in the file.
     pub line: usize,
-    /// Which `[[module]]` of the file it is, counted from 0; none for what is there by itself.
+    /// The index of its `[[module]]` in the file, from 0; none for an implicit one.
     pub(crate) index: Option<usize>,
 }
 
@@ -124,13 +124,13 @@ impl Module {
         std::iter::once(self.name).chain(self.aliases.iter().copied())
     }
 
-    /// Whether it is one `[[module]]` of the file. Routers are not: they are there by themselves when there are several nodes; nor is what
-    /// `[tcp]` brings along.
+    /// Whether it is a `[[module]]` of the file. Routers are implicit when there are several nodes, and so are the
+    /// modules of `[tcp]`.
     pub fn is_in_file(&self) -> bool {
         self.index.is_some()
     }
 
-    /// One that is there by itself, with what is true of all of these.
+    /// An implicit module, with the defaults of all of these.
     pub(crate) fn by_itself(name: Name, node: &Node, builtin: &str, restart: Restart) -> (Self, Lines) {
         let module = Self {
             name,
@@ -138,7 +138,7 @@ impl Module {
             node: node.name.clone(),
             program: Program::Builtin(builtin.into()),
             optional: false,
-            // What goes beyond the LAN is no reason to keep a robot from starting: its certificates may be missing, or its link.
+            // A robot starts even if its certificates or its link beyond the LAN are missing.
             required: ![TCP_CLIENT, TCP_ROUTER].contains(&builtin),
             calls: Vec::new(),
             although: Vec::new(),
@@ -176,14 +176,14 @@ pub(crate) struct Lines {
     pub(crate) calls: Vec<usize>,
 }
 
-/// What a module refers to, looked up.
+/// Context for the names that a module refers to.
 pub(crate) struct Context<'d> {
     pub(crate) directory: &'d Directory<'d>,
     pub(crate) nodes: &'d [Node],
 }
 
 impl Context<'_> {
-    /// Reads a module; none if what no default can stand in for is missing. The reader knows why then.
+    /// Reads a module; none if a key without a default is missing. The reader has reported it then.
     pub(crate) fn read(&self, section: Section<'_>, index: usize) -> Option<(Module, Lines)> {
         let name_text = section.get("name").and_then(|item| item.value.get_ref().as_str());
         let what = name_text.map_or("[[module]]".into(), |name| format!("module `{name}`"));
@@ -229,7 +229,7 @@ impl Context<'_> {
         Some((module, Lines { mailboxes: mailbox_lines, calls: calls.lines }))
     }
 
-    /// The directory has read and judged the texts already.
+    /// The directory has read and validated the texts already.
     fn aliases(&self, item: &Item<'_>) -> Vec<Name> {
         let texts = item.value.get_ref().as_array().into_iter().flatten().filter_map(|alias| alias.get_ref().as_str());
         texts.filter_map(|text| self.directory.find(text).ok()).collect()
@@ -294,10 +294,11 @@ fn program(section: &Section<'_>) -> Option<Program> {
 fn command(item: &Item<'_>) -> Option<Vec<String>> {
     let example = "[\"./compass\", \"--port\", \"/dev/ttyS0\"]";
     if let Some(text) = item.value.get_ref().as_str() {
-        // No shell reads it, so that nobody has to know which quotes it would take.
+        // No shell parses it, so quotes need no escapes.
         if text.trim().is_empty() || text.contains(char::is_whitespace) {
             item.report(format!(
-                "`program` \"{text}\" is no single program; write program and arguments as a list, `program = {example}`"
+                "`program` \"{text}\" is no single program; write program and arguments as a list, `program = \
+                 {example}`"
             ));
             return None;
         }
@@ -317,8 +318,8 @@ fn required(section: &Section<'_>, optional: bool) -> bool {
     let required = item.flag().unwrap_or(false);
     if required && optional {
         item.report(
-            "`required` and `optional` are both true; a module without which the node does not start cannot be left out, \
-             drop one of them",
+            "`required` and `optional` are both true; a module without which the node does not start cannot be left \
+             out, drop one of them",
         );
     }
     required
@@ -331,7 +332,8 @@ fn spin(item: &Item<'_>) -> Option<Duration> {
     }
     let (spin, most) = (duration_text(spin), duration_text(SPIN_MAX));
     item.report(format!(
-        "`spin` is \"{spin}\"; write at most \"{most}\", such as `spin = \"20 us\"`: it keeps a processor busy all that time"
+        "`spin` is \"{spin}\"; write at most \"{most}\", such as `spin = \"20 us\"`: it keeps a processor busy all \
+         that time"
     ));
     None
 }

@@ -1,7 +1,7 @@
-//! The network between the nodes of a system, section `[network]`: how routers send, and which name lies on which node.
+//! The network between the nodes of a system, section `[network]`: how routers send, and the node of each name.
 //!
-//! It is there exactly when there are several nodes. Then each node has a router, a module that no `[[module]]` describes: `router.0`
-//! on the first node of the file, `router.1` on the second, and so on.
+//! It exists exactly when there are several nodes. Then each node has a router, a module without a `[[module]]`:
+//! `router.0` on the first node of the file, `router.1` on the second, and so on.
 
 use crate::classes::{ClassTable, ROUTER};
 use crate::keys;
@@ -15,16 +15,17 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What a file with several nodes must say.
-const CHOICES: &str = "write `security = \"keys\"` (what passes between nodes is sealed; `rohrpost keys new` makes what it takes), or \
-                       `security = \"none\"` (it is neither sealed nor signed, and anyone on the network may read and send)";
+/// Required choice of a file with several nodes.
+const CHOICES: &str = "write `security = \"keys\"` (what passes between nodes is sealed; `rohrpost keys new` makes \
+                       what it takes), or `security = \"none\"` (it is neither sealed nor signed, and anyone on the \
+                       network may read and send)";
 const PORT: u16 = 21_117;
 const MTU: i64 = 1500;
 const MTUS: RangeInclusive<i64> = 576..=65_535;
-/// Every link that carries IPv6 carries datagrams so large (RFC 8200).
+/// Every link with IPv6 carries datagrams of this size (RFC 8200).
 const MTU_V6_MIN: i64 = 1280;
 const RATE: u64 = 100 << 20;
-/// A largest package at the least takes a second, two thirds of what a package may wait.
+/// At the least rate a largest package takes a second, two thirds of the longest wait of a package.
 const RATES: RangeInclusive<u64> = 64 << 10..=64 << 30;
 const QUOTA: u64 = 256 << 10;
 /// Two largest packages, so that a sender's second one does not push the first out.
@@ -43,7 +44,7 @@ pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) ->
     let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
     let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
     let mtu = section.get("mtu").and_then(|item| item.whole(least..=*MTUS.end(), MTU)).unwrap_or(MTU) as usize;
-    // Whoever reads the slots has judged it, and whoever looks for the keys their folder.
+    // The readers of the slots and of the keys' folder validate these.
     let _ = (section.get("mode"), section.get("keys"));
     let rate = section.get("rate").and_then(|item| match tdma {
         None => item.size(RATES, "100 MiB"),
@@ -70,13 +71,13 @@ pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) ->
     }
 }
 
-/// What must be equal at both ends of the wire.
+/// The part that must be equal at both ends of the wire.
 pub(crate) fn lan_text(network: &Network) -> String {
     let sealed = if network.security == Security::Keys { " sealed" } else { "" };
     format!("port {} mtu {}{sealed}", network.port, network.mtu)
 }
 
-/// It must be said. What would be right is not known: so an error names both.
+/// A required key without a likely value: so an error names both.
 fn read_security(section: &Section<'_>) -> Security {
     let Some(item) = section.get("security") else {
         section.report(format!("`security` is missing; {CHOICES}"));
@@ -98,7 +99,8 @@ pub(crate) fn keys_folder(file: &Section<'_>, security: Security, folder: &Path)
     named.map(|path| folder.join(path))
 }
 
-/// Judges what several nodes of a LAN need beside `[network]`: addresses that can reach each other, and the class of routers.
+/// Validates what several nodes of a LAN need beside `[network]`: addresses that can reach each other, and the class of
+/// routers.
 pub(crate) fn validate(file: &Section<'_>, nodes: &[Node], classes: &ClassTable) {
     if nodes.len() < 2 {
         return;
@@ -119,11 +121,11 @@ pub(crate) fn validate(file: &Section<'_>, nodes: &[Node], classes: &ClassTable)
     }
 }
 
-/// The routers of the nodes of a LAN, which no `[[module]]` describes; their messages name the line of the node.
+/// The routers of the nodes of a LAN, which have no `[[module]]`; their messages name the line of the node.
 pub(crate) fn routers(nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(Module, Lines)> {
     let Some(class) = classes.id(ROUTER).filter(|_| nodes.len() > 1) else { return Vec::new() };
-    // Without it the node is cut off, so it is never given up: pauses grow, so that so many in a second cannot be. The first is short,
-    // since what peers send meanwhile soon is too old.
+    // Without it the node is cut off, so launch never gives it up: the pauses grow, so that the limit is never reached.
+    // The first pause is short, since packages that peers send meanwhile soon are too old.
     let restart = Restart {
         policy: RestartPolicy::Always,
         backoff: Duration::from_millis(10),

@@ -1,4 +1,4 @@
-//! The system and its nodes: which computers there are, and which tool instances each may hand out.
+//! The system and its nodes: its computers, and the tool instances of each.
 
 use crate::reader::{Item, Section, is_word};
 use std::net::IpAddr;
@@ -24,7 +24,8 @@ pub struct Node {
     pub address: Option<IpAddr>,
     /// Permission bits of its shared-memory directory.
     pub mode: u32,
-    /// Instances of class `tool` on this node, at least two: the first is launch's, programs run by hand take the others.
+    /// Instances of class `tool` on this node, at least two: the first is launch's, programs run by hand take the
+    /// others.
     pub tools: RangeInclusive<u8>,
     /// Line in the file.
     pub line: usize,
@@ -39,7 +40,7 @@ pub enum Reach {
     Tcp,
 }
 
-/// How the key `network` of a node says it.
+/// Value of the key `network` of a node.
 const LAN: &str = "lan";
 const TCP: &str = "tcp";
 
@@ -104,15 +105,17 @@ impl Node {
         let address = match (section.get("address"), reach) {
             (Some(item), Reach::Tcp) => {
                 item.report(
-                    "`address` is where others on the LAN reach a node, and with `network = \"tcp\"` nobody does; drop one of both",
+                    "`address` is where others on the LAN reach a node, and with `network = \"tcp\"` nobody does; drop \
+                     one of both",
                 );
                 None
             }
             (Some(item), Reach::Lan) => read_address(&item, earlier),
             (None, Reach::Lan) if !alone.on_lan => {
                 section.report(format!(
-                    "`address` is missing: with several nodes the others must know where this one is; write for example \
-                     `address = \"10.77.0.{}\"`, or `network = \"tcp\"` if it reaches them through the TCP router alone",
+                    "`address` is missing: with several nodes the others must know where this one is; write for \
+                     example `address = \"10.77.0.{}\"`, or `network = \"tcp\"` if it reaches them through the TCP \
+                     router alone",
                     earlier.len() + 1
                 ));
                 None
@@ -136,7 +139,7 @@ impl Node {
     }
 }
 
-/// What a node needs not say, since nobody asks.
+/// Keys that a node may leave out, since nothing uses them.
 #[derive(Clone, Copy)]
 struct Alone {
     /// No other node is on its LAN.
@@ -150,19 +153,20 @@ fn read_mode(item: &Item<'_>) -> Option<u32> {
     let mode = u32::from_str_radix(text, 8).ok().filter(|mode| *mode <= 0o777 && mode & 0o700 == 0o700);
     if mode.is_none() {
         item.report(format!(
-            "`mode` \"{text}\" would lock its owner out or is not octal; write \"0700\" (only this user) or \"0770\" (its group)"
+            "`mode` \"{text}\" would lock its owner out or is not octal; write \"0700\" (only this user) or \"0770\" \
+             (its group)"
         ));
     }
     mode
 }
 
-/// An address that the others reach: of one computer alone, of the same kind as theirs.
+/// An address that the others reach: of one computer alone, of the same family as theirs.
 fn read_address(item: &Item<'_>, earlier: &[Node]) -> Option<IpAddr> {
     let text = item.text("192.168.0.1")?;
     let Ok(address) = text.parse::<IpAddr>() else {
         item.report(format!(
-            "`address` \"{text}\" is no IP address; write numbers, such as `address = \"192.168.0.1\"` or \"fd00::1\": a robot must not \
-             wait for a name server"
+            "`address` \"{text}\" is no IP address; write numbers, such as `address = \"192.168.0.1\"` or \"fd00::1\": \
+             a robot must not wait for a name server"
         ));
         return None;
     };
@@ -185,7 +189,8 @@ fn read_address(item: &Item<'_>, earlier: &[Node]) -> Option<IpAddr> {
     if let Some(other) = earlier.iter().find(differs) {
         let (own, theirs) = if address.is_ipv4() { ("IPv4", "IPv6") } else { ("IPv6", "IPv4") };
         item.report(format!(
-            "`address` \"{text}\" is {own} and that of node `{}` {theirs}, which cannot reach each other; take one kind for all",
+            "`address` \"{text}\" is {own} and that of node `{}` {theirs}, which cannot reach each other; take one \
+             kind for all",
             other.name
         ));
     }

@@ -1,4 +1,4 @@
-//! What the output service keeps, and from which level on.
+//! Settings of the output service: what it keeps, and from which level on.
 
 use crate::directory::Directory;
 use crate::reader::Section;
@@ -38,7 +38,7 @@ pub enum LineFormat {
     Json,
 }
 
-/// A file of less would hold no more than a few lines.
+/// A smaller file would hold only a few lines.
 const FILE_SIZE: RangeInclusive<u64> = 4096..=1 << 40;
 const FORMATS: [(&str, LineFormat); 2] = [("text", LineFormat::Text), ("json", LineFormat::Json)];
 
@@ -49,7 +49,7 @@ pub struct Output {
     pub level: Level,
     /// Modules with a level of their own.
     pub levels: Vec<(Name, Level)>,
-    /// Lines a second that a module may send; those of level error are counted for themselves.
+    /// Lines a second that a module may send; those of level error are counted separately.
     pub rate: u32,
     /// Lines that a module which was silent before may send at once.
     pub burst: u32,
@@ -57,9 +57,9 @@ pub struct Output {
     pub ring: u32,
     /// File that lines are written to as well, from the configuration file's folder.
     pub file: Option<PathBuf>,
-    /// Bytes at which the file is put aside and a new one begun.
+    /// Size at which the file is rotated.
     pub file_size: u64,
-    /// Files put aside that are kept.
+    /// Rotated files that are kept.
     pub files: u32,
     /// How lines stand in the file.
     pub format: LineFormat,
@@ -122,7 +122,7 @@ impl Output {
         output
     }
 
-    /// What is said of the file has no meaning without one.
+    /// Keys of the file have no meaning without one.
     fn read_file_keys(&mut self, section: &Section<'_>) {
         let size = section.get("file-size");
         let files = section.get("files");

@@ -1,16 +1,17 @@
-//! What an installation asks of its time slots, as the analysis of the network takes it.
+//! Requirements of an installation on its time slots, as input of the network's analysis.
 
 use crate::flow::Flow;
 use crate::installation::Installation;
 use rohrpost_network::{FlowBound, Link, Plan, PlannedFlow, Tdma};
 
-/// The bounds of all flows between different nodes of the LAN, by their places in [`Installation::flows`]; none if nodes send as packages come.
+/// The bounds of all flows between different nodes of the LAN, by their places in [`Installation::flows`]; none if
+/// nodes send as packages come.
 pub fn bounds(installation: &Installation) -> Vec<FlowBound> {
     let tdma = installation.tdma.as_ref();
     tdma.and_then(|tdma| Some(plan(installation, tdma)?.bounds(tdma))).unwrap_or_default()
 }
 
-/// What its nodes and modules ask of a table.
+/// Requirements of its nodes and modules on a table.
 pub(crate) fn plan(installation: &Installation, tdma: &Tdma) -> Option<Plan> {
     let (nodes, network) = (installation.lan_nodes(), installation.network?);
     let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());

@@ -1,10 +1,10 @@
-//! Whose share of something bounded a name uses.
+//! Principals: which of them a name's use of bounded resources is counted for.
 
 use crate::installation::Installation;
 use rohrpost_mailbox::Name;
 
-/// Uses what is bounded: places for callers and subscriptions, lines of output. Each has a share of its own, under however many names
-/// it sends.
+/// A user of bounded resources: places for callers and subscriptions, lines of output. Each has one share, under
+/// however many names it sends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Principal {
     /// A module of the file, under any of its names.
@@ -15,12 +15,12 @@ pub enum Principal {
     Tools(usize),
     /// All names of the own system that the file does not know.
     Unknown,
-    /// All names of another system: a certificate speaks for a system.
+    /// All names of another system: a certificate stands for a system.
     System(u8),
 }
 
 impl Installation {
-    /// Whose share the sender of this name uses.
+    /// The principal of a sender's name.
     pub fn principal(&self, name: Name) -> Principal {
         if name.system() != self.system.id {
             return Principal::System(name.system());
@@ -36,8 +36,8 @@ impl Installation {
         }
     }
 
-    /// Who always finds a place as a caller of this name: the modules that name it in `calls`, launch of its node, and the programs run by
-    /// hand there.
+    /// Principals with a reserved place as a caller of this name: the modules that name it in `calls`, launch of its
+    /// node, and the programs run by hand there.
     pub fn callers(&self, name: Name) -> Vec<Principal> {
         let called = |other: &&crate::Module| other.calls.contains(&name.module());
         let modules = self.modules.iter().filter(called).map(|module| Principal::Module(module.name));

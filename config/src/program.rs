@@ -1,4 +1,4 @@
-//! Where the program of a module is on this computer. Only the node that runs a module asks.
+//! Location of a module's program on this computer. Only the node that runs a module looks it up.
 
 use crate::installation::Installation;
 use crate::module::Program;
@@ -7,7 +7,7 @@ use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// A module whose program is not on this computer.
+/// A module without its program on this computer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MissingProgram {
     /// The module.
@@ -26,8 +26,8 @@ impl std::fmt::Display for MissingProgram {
     }
 }
 
-/// Finds a module's program: with a slash it is a path from `folder`, the configuration file's; a bare name is looked for
-/// in `beside`, the folder of our own executable, and then on PATH.
+/// Finds a module's program. With a slash it is a path from `folder`, the configuration file's. A bare name is searched
+/// in `beside`, the folder of the running executable, and then on PATH.
 pub fn find_program(program: &str, folder: &Path, beside: &Path) -> Option<PathBuf> {
     find(program, folder, beside, std::env::var_os("PATH").as_deref())
 }
@@ -51,8 +51,8 @@ fn is_program(path: &Path) -> bool {
 }
 
 impl Installation {
-    /// The modules of a node whose programs are not on this computer, in the order of the file. `beside` is the folder of
-    /// our own executable.
+    /// The modules of a node without their programs on this computer, in the order of the file. `beside` is the folder
+    /// of the running executable.
     pub fn missing_programs(&self, node: &str, beside: &Path) -> Vec<MissingProgram> {
         let mut missing = Vec::new();
         for module in self.modules_on(node) {

@@ -1,8 +1,6 @@
 //! Walks the parsed TOML with its places in the file, and collects every problem instead of stopping at the first.
 //!
-//! A [`Section`] is asked for its keys one by one; the keys asked for are the known ones, so that [`Section::finish`] can
-//! name any other. A wrong value is reported and read as missing: the defaults that then stand in never leave this
-//! crate, since a file with problems gives no installation.
+//! Keys that a [`Section`] was asked for are known: [`Section::finish`] reports others. Wrong ones read as missing.
 
 use crate::errors::Problem;
 use crate::units;
@@ -12,10 +10,10 @@ use std::time::Duration;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// No duration in a file is longer: past it, somebody has mistaken the unit.
+/// Longest duration in a file: a longer one is a mistaken unit.
 const DURATION_MAX: Duration = Duration::from_secs(24 * 3600);
 
-/// The file being read and what was found wrong so far.
+/// The file, and its mistakes so far.
 pub(crate) struct Reader<'d> {
     text: &'d str,
     problems: RefCell<Vec<Problem>>,
@@ -40,13 +38,13 @@ impl<'d> Reader<'d> {
         self.problems.borrow().is_empty()
     }
 
-    /// What the parser says of a text that is no TOML.
+    /// The parser's error for a text that is no TOML.
     pub(crate) fn report_syntax(&self, error: &toml::de::Error) {
         let span = error.span().unwrap_or(0..0);
         let there = self.text.get(span.clone()).unwrap_or_default();
         let line = self.line(span.clone());
         let open = bracket_left_open(self.text).map(|(at, bracket)| (line_of(self.text, at), bracket));
-        // The parser reads on, and stumbles over what cannot stand inside.
+        // The parser continues, and reports an error inside.
         if let Some((opened, bracket)) =
             open.filter(|(opened, _)| *opened <= line && error.message() != "duplicate key")
         {
@@ -68,7 +66,7 @@ impl<'d> Reader<'d> {
     }
 }
 
-/// The first bracket that nothing closes, and where it is; strings and comments are passed over.
+/// The first bracket without a closing one, and its place; strings and comments are skipped.
 fn bracket_left_open(text: &str) -> Option<(usize, char)> {
     let mut open: Vec<(usize, char)> = Vec::new();
     let mut at = 0;
@@ -90,7 +88,8 @@ fn bracket_left_open(text: &str) -> Option<(usize, char)> {
     open.first().copied()
 }
 
-/// Bytes of the string that the text begins with: to its end, or that of its line; of one in three quotes to the end of all.
+/// Bytes of the string that the text begins with: to its end, or that of its line; of one in three quotes to the end of
+/// all.
 fn string_bytes(text: &str, quote: char) -> usize {
     let long = [quote; 3].iter().collect::<String>();
     let end = if text.starts_with(&long) { long } else { quote.to_string() };
@@ -108,7 +107,7 @@ fn string_bytes(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// Line of a byte of the text, counted from 1. A place past the end is the last line that says something.
+/// Line of a byte of the text, counted from 1. A place past the end is the last line with content.
 pub(crate) fn line_of(text: &str, offset: usize) -> usize {
     let text = text.trim_end();
     let before = &text.as_bytes()[..offset.min(text.len())];
@@ -118,7 +117,7 @@ pub(crate) fn line_of(text: &str, offset: usize) -> usize {
 /// A table of the file.
 pub(crate) struct Section<'d> {
     pub(crate) reader: &'d Reader<'d>,
-    /// How messages call it: `[system]`, "module `arm.0`". Empty for the file itself.
+    /// Its name in messages: `[system]`, "module `arm.0`". Empty for the file itself.
     pub(crate) what: String,
     pub(crate) line: usize,
     table: &'d DeTable<'d>,
@@ -130,12 +129,12 @@ impl<'d> Section<'d> {
         Self { reader, what: what.into(), line, table, asked: RefCell::default() }
     }
 
-    /// The same section under the name that messages should call it from now on.
+    /// The same section under another name in messages.
     pub(crate) fn called(self, what: &str) -> Self {
         Self { what: what.into(), ..self }
     }
 
-    /// The value of a key. Whoever asks for a key makes it known.
+    /// The value of a key. The key counts as known from now on.
     pub(crate) fn get(&self, key: &'static str) -> Option<Item<'d>> {
         if !self.asked.borrow().contains(&key) {
             self.asked.borrow_mut().push(key);
@@ -153,7 +152,7 @@ impl<'d> Section<'d> {
         item
     }
 
-    /// All entries of a table whose keys are free, in the order of the file.
+    /// All entries of a table with arbitrary keys, in the order of the file.
     pub(crate) fn entries(&self) -> Vec<Item<'d>> {
         let mut entries: Vec<_> = self.table.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);
@@ -165,7 +164,7 @@ impl<'d> Section<'d> {
         self.get(key)?.section(what)
     }
 
-    /// Names every key that was not asked for.
+    /// Reports every key that was not asked for.
     pub(crate) fn finish(self) {
         let asked = self.asked.borrow();
         for item in self.entries() {
@@ -348,7 +347,7 @@ impl<'d> Item<'d> {
         text.or_else(|| self.wrong(&format!("a list of texts, such as `{} = [\"{example}\"]`", self.key)))
     }
 
-    /// Whether it is a table in which a key is this word. Nobody takes that for reading the key.
+    /// Whether it is a table in which a key is this word. The key does not count as known by this.
     pub(crate) fn has(&self, key: &str, word: &str) -> bool {
         let table = self.value.get_ref().as_table();
         table.and_then(|table| table.get(key)).is_some_and(|value| value.get_ref().as_str() == Some(word))
@@ -385,9 +384,10 @@ fn shown(value: &DeValue<'_>) -> String {
     }
 }
 
-/// The candidate that is most like `word`, if one is like it at all: what messages ask back.
+/// The candidate most like `word`, if one is like it at all: messages suggest it.
 pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
-    // Both measures: edits for slips of the finger, Jaro-Winkler for words begun right (`max` for `max-age`).
+    // Both measures: edit distance for typing errors, Jaro-Winkler for words with a right beginning (`max` for
+    // `max-age`).
     let likeness = |candidate: &str| {
         let edits = strsim::normalized_damerau_levenshtein(word, candidate);
         edits.max(strsim::jaro_winkler(word, candidate) - 0.2)

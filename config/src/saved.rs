@@ -1,4 +1,4 @@
-//! Values of parameters that were saved: they go before the settings of the same names.
+//! Saved values of parameters: they override the settings of the same names.
 
 use crate::errors::{Errors, Problem, SettingsError};
 use crate::installation::Installation;
@@ -10,15 +10,15 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
-/// A file of saved values, a table for each module: `["pilot.0"]`, and below it `cruise-m-s = 0.4`. Types and ranges are
-/// the modules' to check.
+/// A file of saved values, a table for each module: `["pilot.0"]`, and below it `cruise-m-s = 0.4`. The modules check
+/// types and ranges.
 #[derive(Clone, Debug)]
 pub struct Saved {
     /// The file.
     pub path: PathBuf,
     /// Its text; empty, if there is no such file yet.
     text: String,
-    /// Modules that it has values of, and their keys in the file.
+    /// Modules with values in it, and their keys in the file.
     modules: Vec<(Name, String)>,
 }
 
@@ -73,7 +73,7 @@ impl Saved {
         }
     }
 
-    /// Modules that it has values of, in the order of their names.
+    /// Modules with values in it, in the order of their names.
     pub fn modules(&self) -> impl Iterator<Item = Name> {
         self.modules.iter().map(|(name, _)| *name)
     }
@@ -102,7 +102,7 @@ impl Saved {
         Ok(values.into_iter().map(|(_, value)| value).collect())
     }
 
-    /// Refuses values of what is no parameter of the module.
+    /// Refuses values for names that are no parameter of the module.
     ///
     /// # Errors
     /// The first of them, with its line.
@@ -129,7 +129,7 @@ impl Saved {
         }
     }
 
-    /// The settings of a module with its saved values in place of those of the same names, and the place of these.
+    /// The settings of a module with its saved values in place of those of the same names, and the places of these.
     pub(crate) fn over<'a>(&'a self, module: Name, settings: &Spanned<DeValue<'a>>) -> Option<Spanned<DeValue<'a>>> {
         let saved = self.table(module)?;
         let mut merged = settings.get_ref().as_table().cloned().unwrap_or_default();
@@ -150,7 +150,7 @@ impl Saved {
         }
     }
 
-    /// The table of a module; the text is read again, since only it knows the places.
+    /// The table of a module; the text is parsed again for the places.
     fn table(&self, module: Name) -> Option<Spanned<DeTable<'_>>> {
         let (_, key) = self.modules.iter().find(|(name, _)| *name == module)?;
         let document = DeTable::parse(&self.text).ok()?.into_inner();
@@ -159,7 +159,7 @@ impl Saved {
     }
 }
 
-/// The module whose values these are; none if something is wrong, which the reader knows then.
+/// The module of these values; none after an error that was reported.
 fn owner(item: &Item<'_>, installation: &Installation) -> Option<Name> {
     let text = item.key.as_str();
     let own: Vec<String> = installation.modules.iter().map(|module| installation.classes.format(module.name)).collect();

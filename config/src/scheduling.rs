@@ -1,11 +1,11 @@
-//! Where a class becomes what the kernel schedules by: the one place that maps class to SCHED_FIFO and nice.
+//! Mapping from class to the kernel's scheduling: the one place that maps class to SCHED_FIFO and nice.
 //!
 //! ```text
 //!  class  1 ...... nice-below ........ real-time-from ............ 255
 //!          nice 19 .. 1   |    nice 0        |   SCHED_FIFO 1 .. 60
 //! ```
 //!
-//! FIFO 61 and above stay free for the timing threads of routers, which go above every module.
+//! FIFO 61 and above stay free for the timing threads of routers, which run above every module.
 
 use crate::reader::Section;
 use rohrpost_mailbox::Class;
@@ -64,7 +64,7 @@ impl SchedulingRule {
         Self { real_time_from, nice_below }
     }
 
-    /// What processes of a class run as. A higher class never gets less than a lower one.
+    /// Scheduling of a class. A higher class never gets less than a lower one.
     pub(crate) fn of(self, class: Class) -> Scheduling {
         let class = u16::from(class.0);
         if class >= self.real_time_from {

@@ -9,8 +9,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 impl Installation {
-    /// Turns a module's settings into a type, best one with `#[serde(deny_unknown_fields)]`. An error names the line of the
-    /// very setting. Saved values of parameters go before the settings, which must be complete without them.
+    /// Turns a module's settings into a type, preferably one with `#[serde(deny_unknown_fields)]`. An error names the
+    /// line of the setting. Saved values of parameters override the settings, which must be complete without them.
     ///
     /// Paths in settings start from the file's folder: see [`resolve`](Self::resolve).
     pub fn settings_as<T: DeserializeOwned>(&self, module: &Module) -> Result<T, SettingsError> {
@@ -20,14 +20,14 @@ impl Installation {
         let merged = saved.and_then(|saved| Some((saved, saved.over(module.name, &settings(&document, module))?)));
         let Some((saved, merged)) = merged else { return Ok(configured) };
         let place = merged.span();
-        // What is wrong only now is wrong with the saved values, and so are the places.
+        // A new error comes from the saved values, and so do the places.
         T::deserialize(ValueDeserializer::from(merged)).map_err(|error| {
             let at = error.span().unwrap_or(place).start;
             saved.wrong(self, module.name, at, error.message())
         })
     }
 
-    /// The same, as if nothing had been saved.
+    /// The same, without saved values.
     pub fn settings_without_saved<T: DeserializeOwned>(&self, module: &Module) -> Result<T, SettingsError> {
         let document = self.document();
         let settings = settings(&document, module);
@@ -49,7 +49,7 @@ impl Installation {
         place.map_or(module.line, |place| line_of(&self.text, place.start))
     }
 
-    /// The text is read again, since only it knows the places.
+    /// The text is parsed again for the places.
     fn document(&self) -> DeTable<'_> {
         DeTable::parse(&self.text).map(Spanned::into_inner).unwrap_or_default()
     }

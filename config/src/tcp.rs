@@ -1,8 +1,8 @@
-//! The TCP router, section `[tcp]`: what neither a node nor its LAN can deliver goes through one server (seed 002, 3.2).
+//! The TCP router, section `[tcp]`: packages that neither a node nor its LAN can deliver go through one server.
 //!
-//! With the section each node has a client of the server, a module that no `[[module]]` describes: `tcp.0` on the first node of the file,
-//! `tcp.1` on the second, and so on. The server itself, `tcp.255`, runs on the node that `server` names; if none does, another installation
-//! runs it.
+//! With the section each node has a client of the server, a module without a `[[module]]`: `tcp.0` on the first node of
+//! the file, `tcp.1` on the second, and so on. The server itself, `tcp.255`, runs on the node that `server` names; if
+//! none does, another installation runs it.
 
 use crate::classes::{ClassTable, TCP};
 use crate::module::{Lines, Module, Restart, RestartPolicy, TCP_CLIENT, TCP_ROUTER};
@@ -23,7 +23,7 @@ const QUOTA: u64 = 1 << 20;
 /// Two largest packages, so that the second does not push the first out.
 const QUOTAS: RangeInclusive<u64> = 128 << 10..=64 << 20;
 const BULK_BELOW: u8 = 16;
-/// Networks of computers beside each other are mostly no smaller.
+/// Usual smallest size of a LAN, in prefix bits.
 const LAN_BITS_V4: u32 = 24;
 const LAN_BITS_V6: u32 = 64;
 /// Letters of a part of a domain name (RFC 1035).
@@ -31,16 +31,16 @@ const LABEL_MAX: usize = 63;
 /// Instance of the TCP router: above the clients of the nodes, of which there are at most 64.
 pub const TCP_SERVER: u8 = u8::MAX;
 
-/// Where the TCP router is, and what it grants.
+/// Address of the TCP router, and its limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tcp {
     /// Where clients reach it.
     pub address: SocketAddr,
-    /// The folder of certificates, from that of the file on; none: nothing is sealed.
+    /// The folder of certificates, relative to the file's; none: nothing is sealed.
     pub certificates: Option<PathBuf>,
     /// The node of this system that it runs on; none: another installation runs it.
     pub server: Option<String>,
-    /// Clients that may take part at a time.
+    /// Clients at a time.
     pub clients: u16,
     /// Bytes of packages that wait for one connection.
     pub quota_bytes: usize,
@@ -49,11 +49,12 @@ pub struct Tcp {
 }
 
 impl Tcp {
-    /// What `check` says of it, and each start of a client or the server.
-    pub const UNPROTECTED: &str = "security = \"none\": packages to and from the TCP router are neither sealed nor signed, and whoever reaches its port may take part; use a \
+    /// Security note that `check` and each start of a client or the server print.
+    pub const UNPROTECTED: &str = "security = \"none\": packages to and from the TCP router are neither sealed nor \
+                                   signed, and any computer that reaches its port may take part; use a \
          network that nobody else reaches";
 
-    /// What `check` says of security.
+    /// Security note of `check`.
     pub fn security_text(&self) -> String {
         match &self.certificates {
             None => Self::UNPROTECTED.into(),
@@ -66,7 +67,7 @@ impl Tcp {
         }
     }
 
-    /// In which queue of a connection a package waits, as in the routers of the LAN: 0 goes first.
+    /// The level of a priority in a connection's queue, as in the routers of the LAN: 0 goes first.
     pub fn level(&self, priority: Priority) -> u8 {
         level(priority, self.bulk_below)
     }
@@ -78,11 +79,12 @@ impl Tcp {
         let certificates = certificates(&section, is_sealed);
         let address = section.required("address", "address = \"192.168.0.1\"").and_then(|item| {
             let text = item.text("192.168.0.1")?;
-            let address = text.parse::<IpAddr>().ok().filter(|address| !address.is_unspecified() && !address.is_multicast());
+            let address =
+                text.parse::<IpAddr>().ok().filter(|address| !address.is_unspecified() && !address.is_multicast());
             if address.is_none() {
                 item.report(format!(
-                    "`address` \"{text}\" is not the IP address of one computer; write numbers, such as `address = \"192.168.0.1\"`: a robot \
-                     must not wait for a name server"
+                    "`address` \"{text}\" is not the IP address of one computer; write numbers, such as `address = \
+                     \"192.168.0.1\"`: a robot must not wait for a name server"
                 ));
             }
             if let Some((address, tdma)) = address.zip(tdma).filter(|(address, _)| is_on_lan(*address, nodes)) {
@@ -97,8 +99,8 @@ impl Tcp {
             let known: Vec<String> = nodes.iter().map(|node| format!("`{}`", node.name)).collect();
             if !nodes.iter().any(|node| node.name == name) {
                 item.report(format!(
-                    "`server` is \"{name}\", and there is no such node; write one of {}, or drop `server` if another installation runs \
-                     the TCP router",
+                    "`server` is \"{name}\", and there is no such node; write one of {}, or drop `server` if another \
+                     installation runs the TCP router",
                     known.join(", ")
                 ));
             }
@@ -141,7 +143,8 @@ fn certificates(section: &Section<'_>, is_sealed: Option<bool>) -> Option<PathBu
     }
 }
 
-/// Whether an address lies among those of the nodes: in the smallest network that holds all of these, and is no larger than usual ones.
+/// Whether an address is among those of the nodes: in the smallest network that holds all of these, and is no larger
+/// than usual ones.
 fn is_on_lan(address: IpAddr, nodes: &[Node]) -> bool {
     let bits = |address: IpAddr| match address {
         IpAddr::V4(v4) => (u128::from(v4.to_bits()) << 96, LAN_BITS_V4),
@@ -155,11 +158,12 @@ fn is_on_lan(address: IpAddr, nodes: &[Node]) -> bool {
     (first ^ own).leading_zeros() >= shared.min(longest)
 }
 
-/// What is wrong with an address on a network with time slots, and what would be right.
+/// The mistake of an address on a network with time slots, and its remedy.
 fn beside_slots(tdma: &Tdma) -> String {
     let right = match &tdma.tunnel {
         Some(tunnel) => format!(
-            "write that of the TCP router's node in the tunnel of [tdma], {} for the first node of the file, or one on another network",
+            "write that of the TCP router's node in the tunnel of [tdma], {} for the first node of the file, or one on \
+             another network",
             tunnel.address(0)
         ),
         None => "give [tdma] a `tunnel` and write an address in it, or one on another network".into(),
@@ -167,7 +171,7 @@ fn beside_slots(tdma: &Tdma) -> String {
     format!("is on the network of the time slots, and what goes there outside of slots disturbs them; {right}")
 }
 
-/// Judges what `[tcp]` needs beside it: its class, which must not be real time, so that it never stands in the way of what is.
+/// Validates what `[tcp]` needs beside it: its class, which must not be real time, so that it never delays what is.
 pub(crate) fn validate(file: &Section<'_>, classes: &ClassTable, scheduling: SchedulingRule) {
     let line = file.get("classes").map_or(file.line, |classes| classes.line);
     match classes.id(TCP) {
@@ -179,8 +183,8 @@ pub(crate) fn validate(file: &Section<'_>, classes: &ClassTable, scheduling: Sch
         Some(class) if matches!(scheduling.of(class), Scheduling::Fifo { .. }) => file.reader.report(
             line,
             format!(
-                "[classes]: class `tcp` has id {}, which is real time, and what goes beyond the LAN must not keep the LAN waiting; \
-                 give it an id below {}",
+                "[classes]: class `tcp` has id {}, which is real time, and what goes beyond the LAN must not keep the \
+                 LAN waiting; give it an id below {}",
                 class.0, scheduling.real_time_from
             ),
         ),
@@ -188,15 +192,15 @@ pub(crate) fn validate(file: &Section<'_>, classes: &ClassTable, scheduling: Sch
     }
 }
 
-/// Judges what nodes need that are not on the LAN: a TCP router, and one that knows the time that they are to have.
+/// Validates the needs of nodes that are not on the LAN: a TCP router, and one that knows the time for them.
 pub(crate) fn validate_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
     let is_beyond = |node: &&Node| node.reach == Reach::Tcp;
     validate_names(file, tcp, nodes);
     let Some(node) = nodes.iter().find(is_beyond) else { return };
     let Some(tcp) = tcp else {
         let what = format!(
-            "node `{}`: `network = \"tcp\"`: the others are reached through the TCP router, and there is none; add `[tcp]`, or drop \
-             `network` and write an `address`",
+            "node `{}`: `network = \"tcp\"`: the others are reached through the TCP router, and there is none; add \
+             `[tcp]`, or drop `network` and write an `address`",
             node.name
         );
         return file.reader.report(node.line, what);
@@ -216,8 +220,8 @@ pub(crate) fn validate_nodes(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Nod
     file.reader.report(
         line,
         format!(
-            "[tcp]: `server` names no node that is there without the TCP router, and node `{}`, with `network = \"tcp\"`, has the time of \
-             that node; {right}",
+            "[tcp]: `server` names no node that is there without the TCP router, and node `{}`, with `network = \
+             \"tcp\"`, has the time of that node; {right}",
             node.name
         ),
     );
@@ -230,19 +234,19 @@ fn validate_names(file: &Section<'_>, tcp: Option<&Tcp>, nodes: &[Node]) {
     }
     for node in nodes.iter().filter(|node| node.name.len() > LABEL_MAX || node.name.ends_with('-')) {
         let what = format!(
-            "[nodes]: `{}` fits in no certificate, of which `security = \"tls\"` in [tcp] makes use; take a name of {LABEL_MAX} letters at most \
-             that does not end in `-`",
+            "[nodes]: `{}` fits in no certificate, of which `security = \"tls\"` in [tcp] makes use; take a name of \
+             {LABEL_MAX} letters at most that does not end in `-`",
             node.name
         );
         file.reader.report(node.line, what);
     }
 }
 
-/// The clients of all nodes and the server, which no `[[module]]` describes; their messages name the line of the node.
+/// The clients of all nodes and the server, which have no `[[module]]`; their messages name the line of the node.
 pub(crate) fn modules(tcp: Option<&Tcp>, nodes: &[Node], classes: &ClassTable, system: u8) -> Vec<(Module, Lines)> {
     let (Some(tcp), Some(class)) = (tcp, classes.id(TCP)) else { return Vec::new() };
     let name = |instance| Name::new(system, class.0, instance, local::COMMANDS);
-    // As routers, never given up: without it the node is cut off from what is beyond its LAN.
+    // As for routers, launch never gives it up: without it the node is cut off from what is beyond its LAN.
     let restart = Restart {
         policy: RestartPolicy::Always,
         backoff: Duration::from_millis(50),

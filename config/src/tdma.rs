@@ -12,14 +12,14 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 const CYCLE: Duration = Duration::from_millis(5);
-/// Below it a Linux computer wakes up too late too often; above it a package waits for longer than it may. What is above half a second, in which nodes take each
-/// other for silent, is told with what else is wrong with the table.
+/// With a shorter cycle a Linux computer often wakes up too late; with a longer one packages wait for too long. A cycle
+/// of more than half a second, in which nodes take each other for silent, is reported with other mistakes of the table.
 const CYCLES: RangeInclusive<Duration> = Duration::from_millis(1)..=Duration::from_secs(1);
 const SYNCHRONISATION: Duration = Duration::from_micros(500);
 const GUARD: Duration = Duration::from_micros(150);
 const LINK_BITS_S: u64 = 100_000_000;
 const LINKS: RangeInclusive<u64> = 1_000_000..=100_000_000_000;
-/// Cycles after which the table repeats itself, at most: what examines all of them must come to an end.
+/// Longest period of the table in cycles: checks of all of them must end.
 const PERIODS: RangeInclusive<i64> = 1..=64;
 /// A network of so many bits leaves addresses for a node at least, and for all at most.
 const PREFIXES: RangeInclusive<u8> = 8..=30;
@@ -57,10 +57,10 @@ fn read_tunnel(item: &Item<'_>, nodes: &[Node]) -> Option<Tunnel> {
     };
     if let Some(node) = nodes.iter().find(is_inside) {
         item.report(format!(
-                "`tunnel` \"{text}\" holds the address of node `{}`, where the slots themselves go; write a network of its own, \
-                 such as \"10.78.0.0/24\"",
-                node.name
-            ));
+            "`tunnel` \"{text}\" holds the address of node `{}`, where the slots themselves go; write a network of \
+                 its own, such as \"10.78.0.0/24\"",
+            node.name
+        ));
     }
     Some(Tunnel { network: begin, prefix })
 }
@@ -78,7 +78,7 @@ pub(crate) fn read(file: &Section<'_>, slots: Vec<Section<'_>>, nodes: &[Node]) 
     let mode = file.section("network", "[network]").and_then(|network| network.get("mode"));
     let is_tdma = mode.map_or(Some(false), |item| item.choice(&[("free", false), ("tdma", true)]));
     let section = file.section("tdma", "[tdma]");
-    // What follows from a word that is none is not worth judging.
+    // Consequences of a wrong word are not reported.
     if !is_tdma? {
         for unused in section.iter().chain(&slots) {
             unused.report("time slots go only with `mode = \"tdma\"` in [network]; write that there, or drop this");
@@ -87,9 +87,9 @@ pub(crate) fn read(file: &Section<'_>, slots: Vec<Section<'_>>, nodes: &[Node]) 
     }
     let Some(section) = section else {
         file.report(
-                "section `[tdma]` is missing; with `mode = \"tdma\"` add `[tdma]` with `cycle = \"5 ms\"` and `link = \"100 Mbit/s\"`, \
-                 and a `[[slot]]` for each node",
-            );
+            "section `[tdma]` is missing; with `mode = \"tdma\"` add `[tdma]` with `cycle = \"5 ms\"` and `link = \
+                 \"100 Mbit/s\"`, and a `[[slot]]` for each node",
+        );
         return None;
     };
     let cycle = section.required("cycle", "cycle = \"5 ms\"").and_then(|item| read_cycle(&item));
@@ -114,7 +114,7 @@ pub(crate) fn read(file: &Section<'_>, slots: Vec<Section<'_>>, nodes: &[Node]) 
     Some((tdma, lines))
 }
 
-/// What must be equal at both ends of the wire.
+/// The part that must be equal at both ends of the wire.
 pub(crate) fn lan_text(tdma: &Tdma) -> String {
     let slot = |slot: &TimeSlot| {
         let (offset, length) = (slot.offset.as_nanos(), slot.length.as_nanos());
@@ -150,10 +150,19 @@ fn read_slot(section: Section<'_>, nodes: &[Node]) -> Option<(TimeSlot, usize)> 
         && *read >= period
     {
         item.report(if period == 1 {
-                format!("`phase` {read} says in which of several cycles the slot is, but it is in each; write `period = {}` or more, or drop `phase`", read + 1)
-            } else {
-                format!("`phase` is {read}, but of {period} cycles the last is {}; write 0 to {}, or a longer `period`", period - 1, period - 1)
-            });
+            format!(
+                "`phase` {read} says in which of several cycles the slot is, but it is in each; write `period \
+                         = {}` or more, or drop `phase`",
+                read + 1
+            )
+        } else {
+            format!(
+                "`phase` is {read}, but of {period} cycles the last is {}; write 0 to {}, or a longer \
+                         `period`",
+                period - 1,
+                period - 1
+            )
+        });
     }
     let line = section.line;
     section.finish();

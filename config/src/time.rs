@@ -15,11 +15,11 @@ pub enum TimeSource {
     /// The computer's own clock.
     #[default]
     Local,
-    /// The clock of one node, which the routers bring to all: the only source that several nodes can share.
+    /// The clock of one node, which the routers distribute: the only source that several nodes can share.
     Master {
         /// Nodes that may be master, by their place in the file; the first that runs is. At least one.
         masters: Vec<u8>,
-        /// Time from one synchronisation to the next; where nodes send in time slots, the cycle.
+        /// Interval of synchronisation; with time slots, the cycle.
         interval: Duration,
     },
     /// The simulation; `speed` 2.0 lets time pass twice as fast.
@@ -32,7 +32,7 @@ pub enum TimeSource {
 }
 
 impl TimeSource {
-    /// Nodes that may be master, by their place in the file; the first that runs is. None if time is no node's.
+    /// Nodes that may be master, by their place in the file; the first that runs is. None if time is not from a node.
     pub fn masters(&self) -> &[u8] {
         match self {
             Self::Master { masters, .. } => masters,
@@ -40,7 +40,8 @@ impl TimeSource {
         }
     }
 
-    /// `file` is asked for the line of what is missing; `nodes` are all of them; `cycle` is that of the time slots, if there are any.
+    /// `file` gives the line of a missing key; `nodes` are all of them; `cycle` is that of the time slots, if there are
+    /// any.
     pub(crate) fn read(
         section: Option<Section<'_>>,
         file: &Section<'_>,
@@ -53,8 +54,8 @@ impl TimeSource {
         let Some(section) = section else {
             if several {
                 file.report(
-                    "section `[time]` is missing; with several nodes one of them is the master of time: add `[time]` with \
-                     `source = \"master\"`",
+                    "section `[time]` is missing; with several nodes one of them is the master of time: add `[time]` \
+                     with `source = \"master\"`",
                 );
             }
             return Self::default();
@@ -71,17 +72,21 @@ impl TimeSource {
         let is_master = matches!(source, Self::Master { .. });
         match &item {
             Some(item) if is_master && nodes.len() == 1 => {
-                item.report("`source` is \"master\", and there is one node on the LAN; write \"local\", or add the other nodes");
+                item.report(
+                    "`source` is \"master\", and there is one node on the LAN; write \"local\", or add the \
+                             other nodes",
+                );
             }
             Some(item) if several && !is_master => item.report(
-                "`source`: with several nodes one of them is the master of time, and no other source reaches all of them; write \
-                 `source = \"master\"`",
+                "`source`: with several nodes one of them is the master of time, and no other source reaches all of \
+                 them; write `source = \"master\"`",
             ),
             None if several => section.report("`source` is missing; with several nodes write `source = \"master\"`"),
             Some(item) if matches!(source, Self::Simulation { .. } | Self::Log) => {
                 if let Some(node) = beyond {
                     item.report(format!(
-                        "`source`: the time of node `{}` comes by TCP, in which only clocks of computers can be told; write \"local\"",
+                        "`source`: the time of node `{}` comes by TCP, in which only clocks of computers can be told; \
+                         write \"local\"",
                         node.name
                     ));
                 }
@@ -102,7 +107,8 @@ impl TimeSource {
                 (Some(cycle), None) => cycle,
                 (Some(cycle), Some(own)) => {
                     own.report(format!(
-                        "`interval`: with time slots the master synchronises once a cycle, {}, as `cycle` of [tdma] says; drop `interval`",
+                        "`interval`: with time slots the master synchronises once a cycle, {}, as `cycle` of [tdma] \
+                         says; drop `interval`",
                         duration_text(cycle)
                     ));
                     cycle
@@ -120,7 +126,7 @@ impl TimeSource {
         source
     }
 
-    /// What must be equal at both ends of the wire.
+    /// The part that must be equal at both ends of the wire.
     pub(crate) fn lan_text(&self) -> String {
         match self {
             Self::Master { masters, interval } => format!("masters {masters:?} every {} ns", interval.as_nanos()),

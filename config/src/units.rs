@@ -1,6 +1,7 @@
-//! Durations, sizes and rates of links as a file writes them: a number and its unit, `"200 ms"`, `"1 KiB"`, `"100 Mbit/s"`.
+//! Durations, sizes and rates of links as a file writes them, a number and its unit: `"200 ms"`, `"1 KiB"`, `"100
+//! Mbit/s"`.
 //!
-//! A bare number is refused: whether 200 means milliseconds or seconds is a mistake that moves robots.
+//! A bare number is refused: a mix-up of milliseconds and seconds moves robots.
 
 use std::time::Duration;
 

@@ -149,8 +149,8 @@ fn missing_programs_matter_where_they_should_run() {
     assert!(!missing[0].optional);
     let line = 1 + FULL.lines().position(|line| line == "[[module]]").unwrap();
     let expected = format!(
-        "{}:{line}: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or correct \
-         `program`",
+        "{}:{line}: module `motor.0`: `./drivers/base` is no program at {}/drivers/base; build or install it, or \
+         correct `program`",
         path.display(),
         folder.path().display()
     );
@@ -175,8 +175,8 @@ fn one_node_is_explained_alone() {
     assert!(explain(&full, Some("roof")).contains("There is no node `roof`; the nodes are base, desk."));
 }
 
-/// Half a file, a file without one of its lines, and a file with two lines in one: errors perhaps, but no panic, and each
-/// error in a line that exists.
+/// Half a file, a file without one of its lines, and a file with two lines in one: errors perhaps, but no panic, and
+/// each error in an existing line.
 #[test]
 fn damaged_files_give_errors_and_nothing_worse() {
     let lines: Vec<&str> = FULL.lines().collect();

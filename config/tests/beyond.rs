@@ -1,4 +1,4 @@
-//! What a node means that is reached through the TCP router alone.
+//! Meaning of a node that is reached through the TCP router alone.
 
 use rohrpost_config::{Installation, Reach, TimeSource, bounds};
 use rohrpost_mailbox::Name;

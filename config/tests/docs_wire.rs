@@ -1,4 +1,4 @@
-//! The digests of `docs/src/wire.md` are what the code makes of the texts there.
+//! The digests of `docs/src/wire.md` match the code's digests of the texts there.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -25,8 +25,9 @@ fn hash(text: &str) -> u64 {
 #[test]
 fn the_common_digest_is_of_the_documented_text() {
     // The order in the file does not count, nor do texts.
-    let file = "installation = \"page\"\n[system]\nname = \"page\"\nid = 1\n[classes]\nmotor = { id = 200, text = \"Drives\" }\n\
-                tool = { id = 16 }\npilot = { id = 140 }\noutput = { id = 32 }\n[nodes.main]\n[[module]]\nname = \"motor.0\"\nprogram = \"motor\"\n";
+    let file = "installation = \"page\"\n[system]\nname = \"page\"\nid = 1\n[classes]\nmotor = { id = 200, text = \
+                \"Drives\" }\ntool = { id = 16 }\npilot = { id = 140 }\noutput = { id = 32 \
+                }\n[nodes.main]\n[[module]]\nname = \"motor.0\"\nprogram = \"motor\"\n";
     let file = Installation::parse(file, Path::new("page.toml")).unwrap_or_else(|errors| panic!("{errors}"));
     let common = file.digest().common;
     assert_eq!(hash(block("digest-common")), common);

@@ -1,6 +1,7 @@
-//! What the crate says, word for word: every mistake in `tests/broken`, and what the shipped files mean.
+//! All texts of the crate, word for word: every mistake in `tests/broken`, and the meaning of the shipped files.
 //!
-//! `UPDATE_GOLDEN=1 cargo test -p rohrpost-config` writes the expected texts anew; read the difference before you commit.
+//! `UPDATE_GOLDEN=1 cargo test -p rohrpost-config` writes the expected texts anew; read the difference before you
+//! commit.
 
 use rohrpost_config::{Installation, explain};
 use std::fs;
@@ -64,7 +65,7 @@ fn files_that_ship_load_and_explain_themselves() {
     }
 }
 
-/// A program that is not here is an error on the node that runs it, and on no other.
+/// A missing program is an error on the node that runs it, and on no other.
 #[test]
 fn programs_that_are_not_here_are_named_for_their_node() {
     let text = fs::read_to_string(folder().join("tests/programs.toml")).unwrap();

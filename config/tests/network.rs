@@ -15,10 +15,10 @@ fn parse(text: &str) -> Installation {
 /// The least that two nodes need.
 fn two(nodes: [&str; 2], network: &str) -> Installation {
     parse(&format!(
-        "installation = \"two\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nrouter = {{ id = 250 }}\nlaser = {{ id = 150 }}\n\
-         tool = {{ id = 16 }}\n[nodes.base]\naddress = \"{}\"\ntools = [0, 3]\n[nodes.desk]\naddress = \"{}\"\ntools = [4, 7]\n\
-         [network]\nsecurity = \"none\"\n{network}\n[time]\nsource = \"master\"\n[[module]]\nname = \"laser.0\"\nnode = \"desk\"\n\
-         builtin = \"sim\"\n",
+        "installation = \"two\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nrouter = {{ id = 250 }}\nlaser = {{ id \
+         = 150 }}\ntool = {{ id = 16 }}\n[nodes.base]\naddress = \"{}\"\ntools = [0, 3]\n[nodes.desk]\naddress = \
+         \"{}\"\ntools = [4, 7]\n[network]\nsecurity = \"none\"\n{network}\n[time]\nsource = \
+         \"master\"\n[[module]]\nname = \"laser.0\"\nnode = \"desk\"\nbuiltin = \"sim\"\n",
         nodes[0], nodes[1]
     ))
 }

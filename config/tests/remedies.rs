@@ -1,4 +1,4 @@
-//! What a message about a broken slot table tells people to write is right.
+//! The remedies in messages about a broken slot table are right.
 
 use rohrpost_config::Installation;
 use std::collections::BTreeSet;
@@ -13,7 +13,7 @@ fn read(file: &str) -> String {
     fs::read_to_string(folder().join(format!("slots-{file}.toml"))).expect("a file of the tests")
 }
 
-/// All that is said of a text; nothing if it is accepted.
+/// All messages for a text; empty if it is accepted.
 fn messages(text: &str) -> String {
     Installation::parse(text, Path::new("robot.toml")).err().map_or_else(String::new, |errors| errors.to_string())
 }
@@ -50,7 +50,7 @@ fn write(text: &str, at: At, assignment: &str) -> String {
 
 type Changes = &'static [(At, &'static str)];
 
-/// Files of `tests/broken`, and what their messages say to write, word for word: all of it, or one of what is offered.
+/// Files of `tests/broken`, and the remedies of their messages, word for word: all of it, or one of several offered.
 const WRITTEN: &[(&str, Changes)] = &[
     ("all-guard", &[(Line(38), "length = \"410 us\"")]),
     (
@@ -105,7 +105,7 @@ const WRITTEN: &[(&str, Changes)] = &[
     ("too-short", &[(Line(38), "length = \"410 us\"")]),
 ];
 
-/// What is said in other words, and what it means.
+/// Remedies in other words, and their meaning.
 const MEANT: &[(&str, &str, Changes)] = &[
     (
         "flow-not-real-time",
@@ -129,7 +129,8 @@ const MEANT: &[(&str, &str, Changes)] = &[
     ),
 ];
 
-/// Does what is said. Of a table that is right now, deadlines are judged for the first time: they alone may be too short.
+/// Applies the remedy. In a table without other mistakes deadlines are checked for the first time: they alone may be
+/// too short.
 fn check(file: &str, said: &str, changes: Changes) {
     let right = changes.iter().fold(read(file), |text, (at, assignment)| write(&text, *at, assignment));
     let after = messages(&right);
@@ -163,7 +164,7 @@ fn no_broken_table_is_left_out() {
     assert_eq!(tried.map(String::from).collect::<BTreeSet<_>>(), all);
 }
 
-/// A table as somebody could write it who does not know the rules.
+/// A random table by an author without knowledge of the rules.
 fn random_table(mut random: impl FnMut(u64) -> u64) -> String {
     let (head, _) = include_str!("tdma.toml").split_once("[[slot]]").expect("slots");
     let mut pick = |of: &[u64]| of[random(of.len() as u64) as usize];
@@ -188,7 +189,7 @@ fn random_table(mut random: impl FnMut(u64) -> u64) -> String {
     text + "[[module]]\nname = \"motor.0\"\nnode = \"base\"\nprogram = \"./motor\"\n"
 }
 
-/// What a message says to write, the first of what it offers, and where; none if it leaves that to people.
+/// The first remedy that a message offers, and its place; none if the message leaves that to people.
 fn remedy(message: &str) -> Option<Vec<(At, String)>> {
     let line = |text: &str| text.split([':', ')']).next().and_then(|number| number.parse().ok());
     let (_, right) = message.rsplit_once("; ")?;
@@ -205,7 +206,7 @@ fn remedy(message: &str) -> Option<Vec<(At, String)>> {
     (!changes.is_empty()).then_some(changes)
 }
 
-/// One remedy is not in the way of another, nor of a rule.
+/// Remedies conflict neither with each other nor with a rule.
 #[test]
 fn all_that_is_said_of_a_table_can_be_done_at_once() {
     let mut state = 1_u64;

@@ -1,4 +1,4 @@
-//! Saved values of parameters: what a file may say, and what goes before what.
+//! Saved values of parameters: contents of a file, and what overrides what.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -59,7 +59,7 @@ fn what_is_wrong_with_a_saved_value_is_told_with_its_own_file_and_line() {
         let said = pilot(&with(text)).unwrap_err();
         assert!(said.starts_with(says), "{text}\n  says: {said}\n  should say: {says}");
     }
-    // Settings must be complete and right by themselves: then they are what is told.
+    // Settings must be complete and right by themselves: then the saved values are to blame.
     let wrong = DEMO.replace("cruise-m-s = 0.6", "cruise-m-s = \"x\"");
     let line = 1 + wrong.lines().position(|line| line.contains("cruise-m-s")).unwrap();
     let mut demo = Installation::parse(&wrong, Path::new("demo.toml")).unwrap();

@@ -1,4 +1,4 @@
-//! What a file of time slots means for routers.
+//! Meaning of a file with time slots for routers.
 
 use rohrpost_config::{Installation, TimeSource, bounds, duration_text, parse_duration};
 use rohrpost_network::{TimeSlot, Tunnel};
@@ -29,7 +29,7 @@ fn every_key_arrives() {
     assert_eq!(installation.network.unwrap().rate_bytes_s, 12_500_000, "the link's");
 }
 
-/// What seals takes its part of each slot, and with it of each bound.
+/// A seal takes a part of each slot, and so of each bound.
 #[test]
 fn what_leaves_in_slots_may_be_sealed_and_takes_longer() {
     let open = include_str!("../demo-tdma.toml");
@@ -37,7 +37,7 @@ fn what_leaves_in_slots_may_be_sealed_and_takes_longer() {
     let worst =
         |text: &str| -> Duration { bounds(&parse(text)).into_iter().map(|bound| bound.latency.unwrap().latency).sum() };
     assert!(sealed != open && worst(&sealed) > worst(open));
-    assert_ne!(parse(&sealed).digest(), parse(open).digest(), "who seals has nothing to do with who does not");
+    assert_ne!(parse(&sealed).digest(), parse(open).digest(), "a node that seals does not talk to one that does not");
 }
 
 #[test]
@@ -123,16 +123,17 @@ fn bounds_are_what_the_book_derives() {
     assert_eq!((scan.flow, drive.flow, scan.level, drive.level), (0, 1, 14, 14), "both at the pilot's class, 140");
     let ns = |us: &[u64]| Duration::from_nanos(us.iter().sum());
 
-    // Published just after a slot took what it sends, 100 us before its beginning, the scan waits a cycle and these 100 us; bent by 0.125 % a cycle is 6.25 us longer. Two frames of time,
-    // one "still there" and a refusal take 20 us each to hand over. Of its 2048 bytes 1404 go first, in a datagram of 1472, with heads 1538 B,
-    // 123.04 us; then 644 in one of 712, 778 B, 62.24 us. The slot may have begun 50 us late. A switch passes the last one on.
+    // Published just after a slot's packages were taken, 100 us before its beginning, the scan waits a cycle and these
+    // 100 us; a slew of 0.125 % a cycle is 6.25 us longer. Two frames of time, one keep-alive and a refusal take 20 us
+    // each to hand over. Of its 2048 bytes 1404 go first, in a datagram of 1472, with headers 1538 B, 123.04 us; then
+    // 644 in one of 712, 778 B, 62.24 us. The slot may have begun 50 us late. A switch forwards the last one.
     let bound = scan.latency.unwrap();
     assert_eq!((bound.waits, bound.slots, bound.said), (ns(&[5_106_250]), 1, ns(&[80_000])));
     assert_eq!((bound.datagrams, bound.own, bound.forward), (2, ns(&[123_040, 62_240]), ns(&[62_240])));
     assert_eq!(bound.latency, ns(&[5_106_250, 50_000, 80_000, 123_040, 62_240, 62_240]));
 
-    // The command may catch the slot at 3 ms or, in each other cycle, that at 2 ms; just after the one at 3 ms of a cycle without the other it
-    // waits longest. Others may follow it in its datagram, to 1538 B.
+    // The command may catch the slot at 3 ms or, in each other cycle, that at 2 ms. Just after the one at 3 ms of a
+    // cycle without the other it waits longest. Others may follow it in its datagram, to 1538 B.
     let bound = drive.latency.unwrap();
     assert_eq!(
         (bound.waits, installation.tdma.as_ref().unwrap().slots[bound.slot].offset),
@@ -147,7 +148,7 @@ fn without_slots_there_are_no_bounds() {
     assert_eq!(bounds(&parse(free)), []);
 }
 
-/// Nothing of this is what anybody needs: it is refused with words, or has bounds, but nothing overflows or goes on for ever.
+/// Useless tables: each is refused with a message, or has bounds, but nothing overflows or loops forever.
 #[test]
 fn absurd_flows_are_judged_in_time() {
     let flow = SLOTS
@@ -176,7 +177,7 @@ fn absurd_flows_are_judged_in_time() {
     assert_eq!(accepted, [("24 h", "24 h", "1 B"), ("24 h", "24 h", "65519 B")]);
 }
 
-/// What waits for a slot waits in the mailbox of the node's router, which has its size.
+/// Packages wait for a slot in the mailbox of the node's router, which has its size.
 #[test]
 fn no_more_flows_of_a_node_are_declared_than_its_router_has_room_for() {
     let (head, _) = SLOTS.split_once("[[flow]]").unwrap();
@@ -188,7 +189,8 @@ fn no_more_flows_of_a_node_are_declared_than_its_router_has_room_for() {
         };
         let flow = |n| {
             format!(
-                "[[flow]]\nfrom = \"laser.0\"\nto = \"pilot.{n}\"\nsize = \"8 B\"\nperiod = \"400 ms\"\ndeadline = \"400 ms\"\n"
+                "[[flow]]\nfrom = \"laser.0\"\nto = \"pilot.{n}\"\nsize = \"8 B\"\nperiod = \"400 ms\"\ndeadline = \
+                 \"400 ms\"\n"
             )
         };
         let subscribers: String = (1..=count).map(subscriber).collect();

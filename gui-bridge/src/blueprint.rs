@@ -13,7 +13,7 @@
 //! ```
 
 use crate::palette;
-use crate::scene::ROBOT_TIME;
+use crate::timelines::ROBOT_TIME;
 use rerun::blueprint::components::{BackgroundKind, Corner2D, PanelState, PlayState};
 use rerun::blueprint::{
     Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial2DView,
@@ -112,7 +112,7 @@ impl Draft {
     fn plane(&mut self, name: &str, contents: &[String]) -> ContainerLike {
         let [red, green, blue] = palette::GROUND;
         let ground = Background::new(BackgroundKind::SolidColor).with_color([red, green, blue, 255]);
-        // The view's origin lies above `world`, whose own transform turns y up.
+        // The view's origin lies above `world`, which has a transform that turns y up.
         let view = Spatial2DView::new(name).with_origin("/").with_contents(contents.iter().map(String::as_str));
         self.property(view, "Background", ground)
     }
@@ -180,8 +180,8 @@ impl Draft {
     }
 }
 
-/// Sends the layout and makes it the active one. As a mere default it would lose against the layout that a viewer guesses
-/// when rows come before it does, and against what it has kept from an earlier run.
+/// Sends the layout and makes it the active one. As a mere default it would lose against the layout that a viewer
+/// guesses when rows come before it does, and against what it has kept from an earlier run.
 pub(crate) fn send(stream: &RecordingStream, layout: &Layout) -> RecordingStreamResult<()> {
     let mut views = Draft::default();
     let blueprint = views.all(layout);

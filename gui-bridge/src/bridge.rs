@@ -1,14 +1,14 @@
 //! The bridge as a module: hears what the configuration names, and draws it.
 //!
-//! Its one thread never waits for Rerun: it turns packages into rows of the scene, whose store takes them at once. So its
-//! mailboxes are empty soon, whatever a viewer does; and if they were not, it would be the bridge that misses something, and
-//! never a sender that waits.
+//! Its one thread never waits for Rerun: it turns packages into rows of the scene, and the store takes them at once. So
+//! its mailboxes are soon empty, whatever a viewer does. If they were not, the bridge would lose packages, and never a
+//! sender that waits.
 
 use crate::nodes::Nodes;
-use crate::pen::{self, Pen, Turn};
 use crate::sink::CloseError;
 use crate::store::DrawingCounts;
 use crate::subjects::{NEWEST, Subjects};
+use crate::supervisor::{self, StreamSupervisor, Turn};
 use crate::view::Views;
 use crate::{RATE_HZ, RATE_HZ_MIN, Scene, Sink, views};
 use rohrpost::interface::{Interface, Proxy};
@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
 /// What comes of other nodes, page by page, is taken so often.
 const COLLECT_PERIOD: Duration = Duration::from_millis(25);
-/// Data whose newest values may wait while the bridge stands still; of more, the least important go missing.
+/// Data with a newest value that may wait while the bridge is stopped. Of more data, the least important are lost.
 const NEWEST_SLOTS: u16 = 64;
 /// The collector answers within this time, or its earlier lines are not drawn.
 const PATIENCE: Duration = Duration::from_millis(300);
@@ -76,9 +76,9 @@ pub struct Bridge<V> {
     /// None while switched off.
     scene: Option<Scene>,
     /// Drawings that were switched off and are being ended.
-    ending: Vec<Pen>,
+    ending: Vec<StreamSupervisor>,
     turn: Turn,
-    /// Who collects lines, once it is heard.
+    /// The module that collects lines, once it is known.
     collector: Option<Name>,
     /// Lines were said that the scene does not know.
     lines_wanted: bool,
@@ -152,7 +152,7 @@ impl<V: Views> Module for Bridge<V> {
     }
 
     fn off(&mut self, _: &mut Context) {
-        self.ending.retain(|pen| !pen.has_ended());
+        self.ending.retain(|supervisor| !supervisor.has_ended());
         self.ending.extend(self.scene.take().and_then(Scene::leave));
     }
 
@@ -195,9 +195,9 @@ impl<V: Views> Drawing for Bridge<V> {
 impl<V> Drop for Bridge<V> {
     /// The process is about to end, and the drawings with it.
     fn drop(&mut self) {
-        let deadline = Instant::now() + pen::LAST;
-        for pen in self.ending.drain(..) {
-            if let Err(error @ CloseError::Stuck) = pen.close_by(deadline) {
+        let deadline = Instant::now() + supervisor::LAST;
+        for supervisor in self.ending.drain(..) {
+            if let Err(error @ CloseError::Stuck) = supervisor.close_by(deadline) {
                 tracing::warn!("{error}");
             }
         }

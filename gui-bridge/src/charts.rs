@@ -2,29 +2,8 @@
 
 use crate::palette;
 use crate::scene::{Scene, entity};
+use crate::state::ChartClass;
 use rerun::{Scalars, SeriesLines};
-use std::collections::{HashMap, HashSet};
-
-/// Classes in the order in which they came: it is their colour.
-#[derive(Default)]
-pub(crate) struct Charts {
-    classes: HashMap<String, Class>,
-    drawn: HashSet<String>,
-}
-
-impl Charts {
-    /// Whether it is asked for the first time in this scene: then what never changes is to be drawn.
-    pub(crate) fn is_first(&mut self, what: &str) -> bool {
-        !self.drawn.contains(what) && self.drawn.insert(what.into())
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Class {
-    index: usize,
-    flows: bool,
-    times: bool,
-}
 
 impl Scene {
     /// Packages of `class` a second, and how many were lost since the start.
@@ -52,9 +31,9 @@ impl Scene {
         self.log(entity(&["latency", class, "p99"]), &Scalars::single(p99_us));
     }
 
-    fn class(&mut self, class: &str) -> &mut Class {
+    fn class(&mut self, class: &str) -> &mut ChartClass {
         let index = self.charts.classes.len();
-        self.charts.classes.entry(class.into()).or_insert(Class { index, flows: false, times: false })
+        self.charts.classes.entry(class.into()).or_insert(ChartClass { index, flows: false, times: false })
     }
 
     /// How a curve looks.
@@ -66,11 +45,11 @@ impl Scene {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::Drawing;
+    use crate::testing::TestScene;
 
     #[test]
     fn a_class_is_styled_once_and_drawn_each_time() {
-        let mut drawing = Drawing::new();
+        let mut drawing = TestScene::new();
         for second in 0..10 {
             drawing.at_s(second);
             drawing.scene.traffic("laser", 40.0, second);

@@ -1,13 +1,14 @@
 //! The one thread that calls Rerun, and so the one that may get stuck there.
 //!
-//! It takes what is due from the store and hands it to a stream of its own, until it is given up or the store is closed.
-//! Others see from outside whether it is in a call, and for how long; and whether the stream's own threads move.
+//! It takes what is due from the store and hands it to a stream of its own, until it is given up or the store is
+//! closed. Others see from outside whether it is in a call, and for how long; and whether the stream's own threads
+//! move.
 //!
-//! Rerun's thread that writes a file ends at the first error, as when the disk is full, and takes rows ever after without
-//! a word. Only who flushes hears of it. So a file is flushed as often as it is written anyway.
+//! Rerun's thread that writes a file ends at the first error, as when the disk is full, and takes rows ever after
+//! without a word. Only a flush reports it. So a file is flushed as often as it is written anyway.
 
 use crate::blueprint;
-use crate::sink::{self, Canvas, CloseError, OpenError, Surface};
+use crate::sink::{self, CloseError, OpenError, StreamConfig, StreamTarget};
 use crate::store::{Order, Store};
 use rerun::RecordingStream;
 use rerun::log::PendingRow;
@@ -24,8 +25,8 @@ const FLUSH: Duration = Duration::from_secs(5);
 /// A file is flushed so often; as [`sink::open`] has it written.
 const FLUSH_PERIOD: Duration = Duration::from_secs(2);
 
-/// What a feeder and those who watch it share. Times are ns since `began`, plus one, so that 0 is none.
-struct Shared {
+/// State that a feeder shares with its supervisor. Times are ns since `began`, plus one, so that 0 is none.
+struct FeederState {
     began: Instant,
     /// Since when it is in a call of Rerun.
     in_call: AtomicU64,
@@ -61,7 +62,7 @@ impl FeedError {
         }
     }
 
-    /// The same for whoever closes the drawing.
+    /// The same for the caller that closes the drawing.
     pub(crate) fn into_close(self) -> CloseError {
         match self {
             Self::Layout(error) => error.into(),
@@ -73,18 +74,18 @@ impl FeedError {
 
 /// See the module's text.
 pub(crate) struct Feeder {
-    shared: Arc<Shared>,
+    shared: Arc<FeederState>,
     thread: JoinHandle<()>,
 }
 
 impl Feeder {
-    /// Begins to draw on `canvas`. `may_begin` is asked until it says yes: before, nothing is taken from the store.
+    /// Begins to draw on `config`. `may_begin` is asked until it says yes: before, nothing is taken from the store.
     pub(crate) fn begin(
-        canvas: Canvas,
+        config: StreamConfig,
         store: Arc<Store>,
         may_begin: impl Fn() -> bool + Send + 'static,
     ) -> std::io::Result<Self> {
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(FeederState {
             began: Instant::now(),
             in_call: AtomicU64::new(0),
             pulse_asked: AtomicU64::new(0),
@@ -95,7 +96,7 @@ impl Feeder {
         });
         let own = shared.clone();
         let run = move || {
-            if let Err(error) = own.run(&canvas, &store, may_begin) {
+            if let Err(error) = own.run(&config, &store, may_begin) {
                 *own.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
             }
         };
@@ -134,14 +135,19 @@ impl Feeder {
     }
 }
 
-impl Shared {
-    fn run(self: &Arc<Self>, canvas: &Canvas, store: &Store, may_begin: impl Fn() -> bool) -> Result<(), FeedError> {
-        let stream = self.call(|| sink::open(canvas))?;
+impl FeederState {
+    fn run(
+        self: &Arc<Self>,
+        config: &StreamConfig,
+        store: &Store,
+        may_begin: impl Fn() -> bool,
+    ) -> Result<(), FeedError> {
+        let stream = self.call(|| sink::open(config))?;
         let stop = || self.stop.load(Ordering::Relaxed);
         while !may_begin() && !stop() {
             std::thread::sleep(Duration::from_millis(10));
         }
-        let drawn = self.draw_all(&stream, canvas, store, stop);
+        let drawn = self.draw_all(&stream, config, store, stop);
         let hurry = self.hurry.load(Ordering::Relaxed);
         let closed = self.call(|| if hurry { Ok(()) } else { drawn.and_then(|()| close(&stream, store)) });
         // Dropping it waits until all is written, too.
@@ -152,11 +158,11 @@ impl Shared {
     fn draw_all(
         self: &Arc<Self>,
         stream: &RecordingStream,
-        canvas: &Canvas,
+        config: &StreamConfig,
         store: &Store,
         stop: impl Fn() -> bool,
     ) -> Result<(), FeedError> {
-        let is_file = matches!(canvas.surface, Surface::File { .. });
+        let is_file = matches!(config.target, StreamTarget::File { .. });
         let (mut pulse_at, mut flush_at) = (Instant::now(), Instant::now());
         while let Some(order) = store.next(&stop) {
             self.call(|| draw(stream, order))?;
@@ -205,8 +211,8 @@ fn draw(stream: &RecordingStream, order: Order) -> Result<(), FeedError> {
     Ok(())
 }
 
-/// Writes all. The layout comes once more, at the end: a view takes its bounds from what is loaded when it first appears,
-/// and the views of the layout at the beginning may have seen but a part of it.
+/// Writes all. The layout comes once more, at the end: a view takes its bounds from what is loaded when it first
+/// appears, and the views of the layout at the beginning may have seen but a part of it.
 fn close(stream: &RecordingStream, store: &Store) -> Result<(), FeedError> {
     if let Some(layout) = store.layout() {
         blueprint::send(stream, &layout)?;
@@ -215,7 +221,7 @@ fn close(stream: &RecordingStream, store: &Store) -> Result<(), FeedError> {
     Ok(())
 }
 
-/// Writes what Rerun has; false if that takes long: who stands still has not failed.
+/// Writes what Rerun has; false if that takes long: a stalled sink has not failed.
 fn flush(stream: &RecordingStream) -> Result<bool, SinkFlushError> {
     match stream.flush_with_timeout(FLUSH) {
         Ok(()) => Ok(true),

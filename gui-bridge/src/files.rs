@@ -6,9 +6,9 @@ use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// A file that was torn, because the disk was full, is put aside if it is larger than this, in place of the older one. A
-/// smaller one holds little but what the next begins with, and is written over: one attempt after the other must not push
-/// out what is worth something.
+/// A file that was torn, because the disk was full, is put aside if it is larger than this, in place of the older one.
+/// A smaller one holds little but what the next begins with, and is written over: one attempt after the other must not
+/// push out what is worth something.
 pub(crate) const WORTH: u64 = 8 * 1024 * 1024;
 
 /// Where it is put aside.
@@ -58,8 +58,8 @@ impl<'a> Room<'a> {
         Self { path, bytes_max, first: Cell::new(None) }
     }
 
-    /// Whether it is full. One that holds little but what each begins with is not, or the next one would be full at once,
-    /// and the one after that: it has to become twice as large first.
+    /// Whether it is full. One that holds little but what each begins with is not, or the next one would be full at
+    /// once, and the one after that: it has to become twice as large first.
     pub(crate) fn is_full(&self, has_repeated: bool) -> bool {
         let Ok(bytes) = self.path.metadata().map(|file| file.len()) else { return false };
         if self.first.get().is_none() && has_repeated {

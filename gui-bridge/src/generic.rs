@@ -4,7 +4,6 @@ use crate::scene::Scene;
 use crate::states::cut;
 use rerun::{EntityPath, EntityPathPart, Scalars, TextLog};
 use rohrpost::schema::Value;
-use std::collections::HashMap;
 use std::fmt::Write;
 
 /// A list longer than this is described, not plotted.
@@ -23,12 +22,6 @@ pub struct Flat {
     pub curves: Vec<(Vec<String>, f64)>,
     /// The rest, a line for each: `way: value`.
     pub text: String,
-}
-
-/// The last text of each datum, by its entity: a datum that says the same again says nothing.
-#[derive(Default)]
-pub(crate) struct Texts {
-    last: HashMap<EntityPath, String>,
 }
 
 impl Scene {

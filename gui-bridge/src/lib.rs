@@ -1,54 +1,63 @@
 //! Draws a robot in Rerun: the world from above, what its modules are doing, what they say, and how packages flow.
 //!
 //! ```text
-//!   packages ──▶ Bridge ──▶ View ──▶ Scene ──▶ Store ──▶ Feeder ──▶ Rerun ──▶ a file, or a Line to a viewer
-//!   (a module's thread, which waits for nobody)      │   (a thread of its own, watched and cut off by the Pen)
+//!   packages ──▶ Bridge ──▶ View ──▶ Scene ──▶ Store ──▶ Feeder ──▶ Rerun ──▶ a file, or a ViewerProxy
+//!   (a module's thread, which never waits)           │   (a separate thread; the StreamSupervisor can stop it)
 //! ```
 //!
-//! A [`View`] says what is drawn of modules of a class; [`run_with`] makes a bridge with views of one's own. A [`Scene`]
-//! knows nothing of mailboxes: who receives packages calls one of its methods for each. This is the only crate that knows
+//! A [`View`] says what is drawn of modules of a class; [`run_with`] makes a bridge with views of one's own. A
+//! [`Scene`] does not use mailboxes: its caller receives packages and calls one method for each. Only this crate uses
 //! Rerun.
 //!
-//! **Invariants:** nothing that a viewer or a disk does makes the module's thread wait, also when it is switched on or off:
-//! files are made and ended by the pen's threads. At its end alone the process waits for the end of the drawing, for
-//! some seconds. And the bridge holds a bounded amount however long it runs: what the store holds, one stream of Rerun's,
-//! and, while a drawing that was switched off does not end, that one's store.
+//! Rerun waits for its sink without end. So the module's thread only fills the store (one pending row for each
+//! entity, the newest wins), and the feeder alone calls Rerun. When a viewer stands still, its connection is cut: the
+//! call fails, Rerun's threads end, its memory is free. Each new stream gets the last value of everything from the
+//! store.
+//!
+//! **Invariants:** a viewer or a disk never makes the module's thread wait, not even when drawing is switched on or
+//! off: the supervisors' threads create and finish files. Only at its end the process waits some seconds for the
+//! drawing to finish. Memory is bounded: the store, one Rerun stream, and the store of a drawing that was switched off
+//! but has not ended.
 #![forbid(unsafe_code)]
 
-mod asking;
-mod beyond;
 mod blueprint;
 mod bridge;
 mod charts;
+mod description_request;
+mod error;
 mod feeder;
 mod files;
 pub mod generic;
-mod line;
 mod network;
 mod nodes;
 mod palette;
-mod pen;
 mod scene;
 mod sink;
 mod slots;
+mod state;
 mod states;
 mod store;
 mod subjects;
-mod trail;
+mod supervisor;
+mod tcp_links;
+mod timelines;
+mod trajectory;
 mod view;
+mod viewer_proxy;
 mod views;
 mod world;
 
 pub use blueprint::{Layout, Tab};
 pub use bridge::{Bridge, Drawing, DrawingInterface, DrawingProxy};
+pub use error::{DrawError, TILES_MAX};
 /// The version of Rerun that the bridge is made with: archetypes for [`Scene::log`], and blueprints for [`Tab::own`].
 pub use rerun;
-pub use scene::{DrawError, RATE_HZ, RATE_HZ_MIN, Scene, entity};
+pub use scene::{RATE_HZ, RATE_HZ_MIN, Scene, entity};
 pub use sink::{CloseError, OpenError, Sink};
 pub use states::Level;
 pub use store::{BYTES_MAX, DrawingCounts, ENTITIES_MAX, LINE_BYTES_MAX, LINES_MAX};
 pub use view::{Datum, View, Views, Wish};
-pub use world::{MAP_CELLS_MAX, TILES_MAX};
+pub use world::MAP_CELLS_MAX;
 
 /// Runs a bridge with views of one's own, which are asked before those that are built in: the whole of its `main`.
 pub fn run_with<V: Views>() -> std::process::ExitCode {

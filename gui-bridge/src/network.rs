@@ -1,23 +1,23 @@
 //! Nodes, the links between them, and their clocks: what routers tell, drawn as a graph and as charts.
 //!
 //! ```text
-//!   network/graph            nodes on a circle; on each link, in each direction, how it is: state, packages a second, lost
-//!   network/packages/A → B   packages a second        network/lost/A → B    packages lost on the wire so far
+//!   network/graph            nodes on a circle; on each link, in each direction: state, packages a second, lost
+//!   network/packages/A → B   packages a second        network/counters/…    what each node counts of its peers
 //!   network/clock/NODE       error bound, µs          network/offset/NODE   offset at the last exchange, µs
 //!   network/latency/…        by class and hop, µs: until the router has it, until it is delivered, until it is taken
 //! ```
 
 use crate::blueprint::Tab;
-use crate::nodes::APART;
+use crate::error::DrawError;
+use crate::nodes::RATE_INTERVAL_MIN;
 use crate::palette;
-use crate::scene::{DrawError, Scene, entity};
-use crate::view::{Datum, View};
-use crate::views::is;
+use crate::scene::{Scene, entity};
+use crate::view::{Datum, View, is};
 use rerun::blueprint::{ContainerLike, GraphView, Horizontal, TimeSeriesView, Vertical};
 use rerun::{AsComponents, GraphEdges, GraphNodes, Scalars, SerializedComponentBatch};
 use rohrpost::Class;
 use rohrpost::interfaces::{ClockState, LinkState, Links, PeerLink};
-use rohrpost::schema::{DataItem, Description};
+use rohrpost::schema::{DataItem, Description, counters};
 use rohrpost_config::Installation;
 use std::collections::{BTreeMap, HashMap};
 use std::f32::consts::TAU;
@@ -38,7 +38,7 @@ pub(crate) fn tab() -> Tab {
             |name: &str, origin: &str| -> ContainerLike { TimeSeriesView::new(name).with_origin(origin).into() };
         let charts = Vertical::new([
             chart("Packages per second, by link", "network/packages"),
-            chart("Lost on the wire since start", "network/lost"),
+            chart("Counted of links since start", "network/counters"),
             chart("Clock error bound, µs", "network/clock"),
             chart("Waits by class and hop, µs: 99 of 100", "network/latency"),
         ]);
@@ -75,8 +75,10 @@ impl View for Network {
             let name = format!("{} → {}", links.node, peer.node);
             let per_s = self.rates.get(&(links.node.clone(), peer.node.clone())).copied().unwrap_or(0.0);
             scene.curve(&["network", "packages", &name], per_s);
-            // Who receives knows what is missing; it is drawn as the loss of the way to it.
-            scene.curve(&["network", "lost", &format!("{} → {}", peer.node, links.node)], peer.lost as f64);
+            for (counter, count) in counters(&peer.counters) {
+                let name = format!("{}, of {}", links.node, peer.node);
+                scene.curve(&["network", "counters", &counter.name, &name], count as f64);
+            }
         }
         for class in &links.classes {
             let Some(age) = class.age else { continue };
@@ -96,8 +98,8 @@ impl View for Network {
     }
 }
 
-/// When the graph is drawn that this word of a router changes. Several routers tell of it, and what one tells is overtaken by what another
-/// told later; an entity's rows go on in time, unless time itself went back.
+/// When the graph is drawn that this report of a router changes. Several routers report it, and one report is overtaken
+/// by what another told later; an entity's rows go on in time, unless time itself went back.
 fn onward(drawn_ns: u64, told_ns: u64) -> u64 {
     let went_back = u128::from(drawn_ns.saturating_sub(told_ns)) > OLD.as_nanos();
     if went_back { told_ns } else { told_ns.max(drawn_ns) }
@@ -105,7 +107,7 @@ fn onward(drawn_ns: u64, told_ns: u64) -> u64 {
 
 /// None when the router began anew in between, or told both at nearly the same time.
 fn sent_per_s(before: &Links, now: &Links, peer: &PeerLink) -> Option<f64> {
-    let apart_ms = APART.as_millis() as u64;
+    let apart_ms = RATE_INTERVAL_MIN.as_millis() as u64;
     let seconds = now.uptime_ms.checked_sub(before.uptime_ms).filter(|ms| *ms >= apart_ms)? as f64 / 1e3;
     let known = before.peers.iter().find(|known| known.node == peer.node)?;
     Some(peer.sent.packages.checked_sub(known.sent.packages)? as f64 / seconds)
@@ -193,7 +195,7 @@ fn words(peer: &PeerLink, per_s: f64) -> String {
         LinkState::Unheard => "does not hear, ",
         LinkState::Refused => "refused, ",
     };
-    format!("{state}{per_s:.0}/s, {} lost", peer.missed)
+    format!("{state}{per_s:.0}/s, {} lost", peer.counters.missed)
 }
 
 fn colour(state: LinkState) -> palette::Rgb {
@@ -238,7 +240,8 @@ impl Scene {
         self.log(entity(parts), &Scalars::single(number));
     }
 
-    /// How long packages of a class waited until their router took them, and until those took them that they were for, µs: 99 of 100.
+    /// How long packages of a class waited, µs, 99th percentile: until their router took them, and until their
+    /// receivers took them.
     pub(crate) fn hops(&mut self, class: &str, transit_us: Option<f64>, end_us: Option<f64>) {
         for (hop, us) in [("to router", transit_us), ("at its end", end_us)] {
             if let Some(us) = us {
@@ -251,11 +254,11 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost::interfaces::Carried;
+    use rohrpost::interfaces::{Carried, LinkCounters};
 
     fn links(node: &str, peer: &str, uptime_ms: u64, packages: u64) -> Links {
-        let sent = Carried { packages, datagrams: packages, bytes: 0, parts: 0 };
-        let received = Carried { packages: 0, datagrams: 0, bytes: 0, parts: 0 };
+        let sent = Carried { packages, datagrams: packages, bytes: 0, fragments: 0 };
+        let received = Carried { packages: 0, datagrams: 0, bytes: 0, fragments: 0 };
         let peer = PeerLink {
             node: peer.into(),
             address: "127.0.0.1".into(),
@@ -264,14 +267,7 @@ mod tests {
             heard_ms: Some(1),
             sent,
             received,
-            unsent: 0,
-            lost: 3,
-            missed: 4,
-            copies: 0,
-            damaged: 0,
-            refused: 0,
-            overtaken: 0,
-            restarts: 0,
+            counters: LinkCounters { lost: 3, missed: 4, ..LinkCounters::default() },
         };
         Links {
             node: node.into(),

@@ -1,4 +1,4 @@
-//! What runs on all nodes: the own one is looked at, the others are shown by their launches. Nobody is waited for.
+//! What runs on all nodes. The own node is read directly; launch reports the others. Nothing here waits.
 
 use rohrpost::launcher::{Look, launcher_of};
 use rohrpost::survey::{Distant, Scope, Seen, Survey};
@@ -15,24 +15,24 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// See the module's text.
 pub(crate) struct Nodes {
     node: Arc<Node>,
-    own: Looks,
-    others: Vec<Other>,
+    own: NodeSurveys,
+    others: Vec<RemoteNode>,
 }
 
-/// Two looks are at least so far apart, or no rate is made of them: a few packages in a few milliseconds would be thousands a second, and
-/// flatten the rest of the curve.
-pub(crate) const APART: Duration = Duration::from_millis(250);
+/// Shortest time between two surveys that give a rate. A few packages in a few milliseconds would be thousands a
+/// second, and flatten the rest of the curve.
+pub(crate) const RATE_INTERVAL_MIN: Duration = Duration::from_millis(250);
 
-/// Another node.
-struct Other {
-    looks: Looks,
+/// A node other than the own one.
+struct RemoteNode {
+    looks: NodeSurveys,
     launcher: Name,
     look: Option<Distant>,
     silent: bool,
 }
 
-/// The last two looks at a node.
-struct Looks {
+/// The last two surveys of a node.
+struct NodeSurveys {
     node: String,
     earlier: Option<Survey>,
     now: Option<Survey>,
@@ -50,13 +50,13 @@ pub(crate) struct ClassFigures {
     pub(crate) in_transit: Latency,
 }
 
-impl Looks {
+impl NodeSurveys {
     fn of(node: &str) -> Self {
         Self { node: node.into(), earlier: None, now: None }
     }
 
     fn take(&mut self, survey: Survey) {
-        let is_apart = |now: &Survey| survey.at_ns.saturating_sub(now.at_ns) >= APART.as_nanos() as u64;
+        let is_apart = |now: &Survey| survey.at_ns.saturating_sub(now.at_ns) >= RATE_INTERVAL_MIN.as_nanos() as u64;
         if self.now.as_ref().is_some_and(is_apart) {
             self.earlier = self.now.take();
         }
@@ -69,13 +69,13 @@ impl Nodes {
     pub(crate) fn new(node: Arc<Node>, name: &str, installation: &Installation) -> Self {
         let other = |config: &rohrpost_config::Node| {
             let launcher = launcher_of(installation, &config.name)?;
-            Some(Other { looks: Looks::of(&config.name), launcher, look: None, silent: true })
+            Some(RemoteNode { looks: NodeSurveys::of(&config.name), launcher, look: None, silent: true })
         };
         let others = installation.nodes.iter().filter(|config| config.name != name).filter_map(other).collect();
-        Self { node, own: Looks::of(name), others }
+        Self { node, own: NodeSurveys::of(name), others }
     }
 
-    /// Looks anew: at the own node at once, and asks for the others, which [`Nodes::collect`] takes.
+    /// NodeSurveys anew: at the own node at once, and asks for the others, which [`Nodes::collect`] takes.
     pub(crate) fn look(&mut self, context: &Context) -> Result<(), NodeError> {
         self.own.take(Survey::new(&self.node, context.installation(), &self.own.node)?);
         let count = self.others.len();
@@ -108,7 +108,7 @@ impl Nodes {
 
     /// All nodes as one; of those that are silent, the modules that they should have.
     pub(crate) fn survey(&self, installation: &Installation) -> Survey {
-        let (silent, heard): (Vec<&Other>, Vec<&Other>) = self.others.iter().partition(|other| other.silent);
+        let (silent, heard): (Vec<&RemoteNode>, Vec<&RemoteNode>) = self.others.iter().partition(|other| other.silent);
         let silent: Vec<&str> = silent.iter().map(|other| other.looks.node.as_str()).collect();
         let seen = self.own.now.iter().chain(heard.iter().filter_map(|other| other.looks.now.as_ref()));
         Survey::joined(seen.cloned().collect(), &silent, installation)
@@ -153,9 +153,9 @@ mod tests {
     }
 
     #[test]
-    fn no_rate_is_made_of_looks_that_follow_each_other_at_once() {
-        let mut looks = Looks::of("main");
-        let apart_ms = APART.as_millis() as u64;
+    fn no_rate_is_made_of_surveys_that_follow_each_other_at_once() {
+        let mut looks = NodeSurveys::of("main");
+        let apart_ms = RATE_INTERVAL_MIN.as_millis() as u64;
         for (at_ms, between_ms, why) in [
             (1000, None, "one look alone"),
             (1003, None, "the second follows at once"),

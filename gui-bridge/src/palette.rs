@@ -1,4 +1,4 @@
-//! Colours that are told apart on a dark ground, also by those who see few of them.
+//! Colours that are distinct on a dark background, for colour-blind viewers as well.
 
 /// Red, green, blue.
 pub(crate) type Rgb = [u8; 3];

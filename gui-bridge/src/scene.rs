@@ -1,9 +1,11 @@
 //! A drawing in Rerun: opened once, told the time, then told what happens. Nothing here waits for Rerun.
 
-use crate::pen::{self, Pen, Turn};
+use crate::blueprint::Layout;
 use crate::sink::{CloseError, OpenError, Sink};
+use crate::state::{Charts, ModuleStates, Texts, World};
 use crate::store::{DrawingCounts, Row, Store};
-use crate::{blueprint::Layout, charts::Charts, generic::Texts, states::States, world::World};
+use crate::supervisor::{self, StreamSupervisor, Turn};
+use crate::timelines::{ROBOT_TIME, SYSTEM_TIME};
 use rerun::{ApplicationId, AsComponents, EntityPath, EntityPathPart, TimeCell, TimePoint};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,52 +16,14 @@ pub const RATE_HZ: f64 = 20.0;
 /// The lowest limit: once in a hundred seconds.
 pub const RATE_HZ_MIN: f64 = 0.01;
 
-/// The timeline of system time: nanoseconds since 1970, as all nodes of an installation agree on it.
-pub(crate) const SYSTEM_TIME: &str = "system_time";
-/// The timeline that begins with the scene.
-pub(crate) const ROBOT_TIME: &str = "robot_time";
-
-/// Why something could not be drawn. The scene goes on; only this one thing is missing.
-#[derive(Debug, thiserror::Error)]
-pub enum DrawError {
-    /// A map says that it has other cells than it brings.
-    #[error("map of {module}: {columns} x {rows} cells announced, {cells} there; its sender is at fault")]
-    Shape {
-        /// Who sent it.
-        module: String,
-        /// Cells in a row, as announced.
-        columns: u32,
-        /// Rows, as announced.
-        rows: u32,
-        /// Cells that came.
-        cells: usize,
-    },
-    /// A map's place or its cells' size are not finite, or its cells have no size.
-    #[error("map of {0}: its origin or its resolution is not a usable number; its sender is at fault")]
-    Place(String),
-    /// A map came in more tiles than a scene keeps.
-    #[error("map of {0}: more than {max} tiles; send larger ones", max = crate::TILES_MAX)]
-    Tiles(String),
-    /// What came is not what its description says.
-    #[error("{data} of {module} cannot be read: {cause}; its sender is at fault")]
-    Unreadable {
-        /// Who sent it.
-        module: String,
-        /// Which of its data.
-        data: String,
-        /// What is wrong with it.
-        cause: String,
-    },
-}
-
 /// Where a scene's rows go: the store, or a test's list.
-pub(crate) trait Paper {
+pub(crate) trait RowSink {
     fn put(&self, entity: EntityPath, row: Row);
     fn line(&self, entity: EntityPath, row: Row);
     fn arrange(&self, layout: Layout);
 }
 
-impl Paper for Store {
+impl RowSink for Store {
     fn put(&self, entity: EntityPath, row: Row) {
         Store::put(self, entity, row);
     }
@@ -75,7 +39,8 @@ impl Paper for Store {
 
 /// A drawing of one installation.
 ///
-/// Drawing never waits: what comes faster than the sink takes it, or than an entity's rate, is replaced by what comes next.
+/// Drawing never waits: what comes faster than the sink takes it, or than an entity's rate, is replaced by what comes
+/// next.
 ///
 /// ```
 /// use rohrpost_gui_bridge::{RATE_HZ, Scene, Sink};
@@ -90,23 +55,23 @@ impl Paper for Store {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Scene {
-    paper: Arc<dyn Paper>,
+    rows: Arc<dyn RowSink>,
     /// None in tests.
-    drawing: Option<(Arc<Store>, Pen)>,
+    drawing: Option<(Arc<Store>, StreamSupervisor)>,
     start_ns: u64,
     /// When what is drawn happens, and the same for Rerun.
     pub(crate) time_ns: u64,
     time: TimePoint,
     pub(crate) world: World,
-    pub(crate) states: States,
+    pub(crate) states: ModuleStates,
     pub(crate) charts: Charts,
     pub(crate) texts: Texts,
 }
 
 impl Scene {
-    /// Opens a drawing of `installation` in `sink`; robot time 0 is `system_time_ns`. No entity is drawn more often than
-    /// `rate_hz`; 0 is no limit, and what is less than [`RATE_HZ_MIN`] is taken for that. Neither a viewer need be there yet,
-    /// nor a disk: [`Scene::failure`] tells of a file that cannot be made.
+    /// Opens a drawing of `installation` in `sink`; robot time 0 is `system_time_ns`. No entity is drawn more often
+    /// than `rate_hz`; 0 is no limit, and what is less than [`RATE_HZ_MIN`] is taken for that. Neither a viewer need be
+    /// there yet, nor a disk: [`Scene::failure`] tells of a file that cannot be made.
     ///
     /// # Errors
     /// When the address is none.
@@ -127,22 +92,22 @@ impl Scene {
         let limit = rate_hz > 0.0;
         let period = if limit { Duration::from_secs_f64(1.0 / rate_hz.max(RATE_HZ_MIN)) } else { Duration::ZERO };
         let store = Arc::new(Store::new(period));
-        let pen = Pen::begin(sink, application, store.clone(), turn)?;
+        let supervisor = StreamSupervisor::begin(sink, application, store.clone(), turn)?;
         let mut scene = Self::over(store.clone(), system_time_ns);
-        scene.drawing = Some((store, pen));
+        scene.drawing = Some((store, supervisor));
         Ok(scene)
     }
 
     /// The same over anything that takes rows.
-    pub(crate) fn over(paper: Arc<dyn Paper>, system_time_ns: u64) -> Self {
+    pub(crate) fn over(rows: Arc<dyn RowSink>, system_time_ns: u64) -> Self {
         let mut scene = Self {
-            paper,
+            rows,
             drawing: None,
             start_ns: system_time_ns,
             time_ns: 0,
             time: TimePoint::default(),
             world: World::default(),
-            states: States::default(),
+            states: ModuleStates::default(),
             charts: Charts::default(),
             texts: Texts::default(),
         };
@@ -165,7 +130,7 @@ impl Scene {
 
     /// Why nothing is drawn any more, if so. A viewer that is away is no such reason: it is waited for.
     pub fn failure(&self) -> Option<String> {
-        self.drawing.as_ref().and_then(|(_, pen)| pen.failure())
+        self.drawing.as_ref().and_then(|(_, supervisor)| supervisor.failure())
     }
 
     /// What became of all that was drawn.
@@ -173,8 +138,8 @@ impl Scene {
         self.drawing.as_ref().map(|(store, _)| store.counts()).unwrap_or_default()
     }
 
-    /// Waits until Rerun has taken all that was drawn, at most so long; tells whether it has. For programs that draw what is
-    /// not happening now, and want all of it: a module never needs this.
+    /// Waits until Rerun has taken all that was drawn, at most so long; tells whether it has. For programs that draw
+    /// what is not happening now, and want all of it: a module never needs this.
     pub fn settle(&self, patience: Duration) -> bool {
         let Some((store, _)) = &self.drawing else { return true };
         let deadline = Instant::now() + patience;
@@ -189,7 +154,7 @@ impl Scene {
 
     /// How the viewer arranges it.
     pub fn arrange(&mut self, layout: Layout) {
-        self.paper.arrange(layout);
+        self.rows.arrange(layout);
     }
 
     /// Draws what waits, within some seconds, and closes the drawing; a file gets its footer.
@@ -197,38 +162,38 @@ impl Scene {
     /// # Errors
     /// When the last of it did not arrive.
     pub fn close(mut self) -> Result<(), CloseError> {
-        self.drawing.take().map_or(Ok(()), |(_, pen)| pen.close_by(Instant::now() + pen::LAST))
+        self.drawing.take().map_or(Ok(()), |(_, supervisor)| supervisor.close_by(Instant::now() + supervisor::LAST))
     }
 
-    /// Ends it without waiting: its pen draws what waits, and ends by itself.
-    pub(crate) fn leave(mut self) -> Option<Pen> {
-        let (_, pen) = self.drawing.take()?;
-        pen.leave();
-        Some(pen)
+    /// Ends it without waiting: its supervisor draws what waits, and ends by itself.
+    pub(crate) fn leave(mut self) -> Option<StreamSupervisor> {
+        let (_, supervisor) = self.drawing.take()?;
+        supervisor.leave();
+        Some(supervisor)
     }
 
     /// Draws at the present time: any of Rerun's archetypes.
     pub fn log(&mut self, entity: EntityPath, what: &dyn AsComponents) {
-        self.paper.put(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
+        self.rows.put(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
     }
 
     /// Draws for all times.
     pub fn log_static(&mut self, entity: EntityPath, what: &dyn AsComponents) {
-        self.paper.put(entity, Row { time: None, components: what.as_serialized_batches() });
+        self.rows.put(entity, Row { time: None, components: what.as_serialized_batches() });
     }
 
-    /// Draws what happens now and is no state: the next one does not replace it. For small things, such as lines of text: what
-    /// has more than [`crate::LINE_BYTES_MAX`] is dropped and counted.
+    /// Draws what happens now and is no state: the next one does not replace it. For small things, such as lines of
+    /// text: what has more than [`crate::LINE_BYTES_MAX`] is dropped and counted.
     pub fn log_event(&mut self, entity: EntityPath, what: &dyn AsComponents) {
-        self.paper.line(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
+        self.rows.line(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
     }
 }
 
 impl Drop for Scene {
     fn drop(&mut self) {
-        if let Some((_, pen)) = self.drawing.take() {
-            // Who wants to know closes it.
-            let _ = pen.close_by(Instant::now() + pen::LAST);
+        if let Some((_, supervisor)) = self.drawing.take() {
+            // A caller that needs the result calls `close`.
+            let _ = supervisor.close_by(Instant::now() + supervisor::LAST);
         }
     }
 }

@@ -15,13 +15,13 @@ const BYTES_IN_FLIGHT: u64 = 8 * 1024 * 1024;
 /// Where a drawing goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Sink {
-    /// A new `.rrd` file, to be opened with `rerun FILE`. Whole only after the scene was closed. One that is there already
-    /// becomes `NAME.old.rrd`.
+    /// A new `.rrd` file, to be opened with `rerun FILE`. Whole only after the scene was closed. One that is there
+    /// already becomes `NAME.old.rrd`.
     File {
         /// Where it is.
         path: PathBuf,
-        /// When it has this size, it becomes `NAME.old.rrd` in place of the one before, and a new one is begun with all that
-        /// is on the screen then.
+        /// When it has this size, it becomes `NAME.old.rrd` in place of the one before, and a new one is begun with all
+        /// that is on the screen then.
         bytes_max: u64,
     },
     /// A viewer that runs, or will run: `rerun+http://127.0.0.1:9876/proxy`.
@@ -141,41 +141,41 @@ impl Address {
 
 /// What one stream is made of.
 #[derive(Clone)]
-pub(crate) struct Canvas {
+pub(crate) struct StreamConfig {
     pub(crate) application: ApplicationId,
     /// The same for all streams of a scene: a viewer that was away for a while goes on with the recording it has.
     pub(crate) recording: RecordingId,
-    pub(crate) surface: Surface,
+    pub(crate) target: StreamTarget,
 }
 
 /// Where one stream goes.
 #[derive(Clone)]
-pub(crate) enum Surface {
+pub(crate) enum StreamTarget {
     /// What is there is put aside if it has so many bytes.
     File { path: PathBuf, aside_from: u64 },
-    /// The near end of a [`crate::line::Line`].
-    Line(String),
+    /// The near end of a [`crate::viewer_proxy::ViewerProxy`].
+    Viewer(String),
 }
 
 /// A stream without a layout yet.
-pub(crate) fn open(canvas: &Canvas) -> Result<RecordingStream, OpenError> {
-    // A chunk costs more than a kilobyte besides its rows. So a file gets large ones, and a crash of the bridge loses two
-    // seconds; a viewer is shown changes within a blink.
-    let flush_tick = Duration::from_millis(match canvas.surface {
-        Surface::File { .. } => 2000,
-        Surface::Line(_) => 40,
+pub(crate) fn open(config: &StreamConfig) -> Result<RecordingStream, OpenError> {
+    // A chunk costs more than a kilobyte besides its rows. So a file gets large ones, and a crash of the bridge loses
+    // two seconds; a viewer is shown changes within a blink.
+    let flush_tick = Duration::from_millis(match config.target {
+        StreamTarget::File { .. } => 2000,
+        StreamTarget::Viewer(_) => 40,
     });
     let batching =
         ChunkBatcherConfig { flush_tick, max_bytes_in_flight: BYTES_IN_FLIGHT, ..ChunkBatcherConfig::DEFAULT };
-    let builder = RecordingStreamBuilder::new(canvas.application.clone())
-        .recording_id(canvas.recording.clone())
+    let builder = RecordingStreamBuilder::new(config.application.clone())
+        .recording_id(config.recording.clone())
         .batcher_config(batching);
-    match &canvas.surface {
-        Surface::File { path, aside_from } => {
+    match &config.target {
+        StreamTarget::File { path, aside_from } => {
             files::begin(path, *aside_from)?;
             builder.save(path).map_err(OpenError::Save)
         }
-        Surface::Line(url) => builder.connect_grpc_opts(url.as_str()).map_err(OpenError::Connect),
+        StreamTarget::Viewer(url) => builder.connect_grpc_opts(url.as_str()).map_err(OpenError::Connect),
     }
 }
 
@@ -229,8 +229,8 @@ mod tests {
         fn exit(&self, _: &Id) {}
     }
 
-    /// Rows of different modules do not come in the order of their time stamps, which Rerun tells its developers: as a warning, if `re_log`
-    /// is built with debug assertions. Then each drawing would have one.
+    /// Rows of different modules do not come in the order of their time stamps, which Rerun tells its developers: as a
+    /// warning, if `re_log` is built with debug assertions. Then each drawing would have one.
     #[test]
     fn what_rerun_tells_its_developers_is_no_warning() {
         let levels = Levels::default();

@@ -1,17 +1,17 @@
 //! Time slots and declared flows: what routers tell of them, beside what was planned.
 //!
 //! ```text
-//!   slots/plan            a lane for each node over the position in the cycle: its slots and synchronisation windows, guards dim
-//!   slots/sent/NODE       first frames of the last ones that were used, where they went onto the wire; the newest lowest
+//!   slots/plan            a lane for each node over the cycle: its slots and synchronisation windows, guards dim
+//!   slots/sent/NODE       first frames of the last used slots, when they were sent; the newest lowest
 //!   slots/off/NODE        the farthest that one of them was off since told last, µs
 //!   slots/flows/NODE n/…  a flow of the node: its slowest package so far, and its bound (dim), ms
 //! ```
 
 use crate::blueprint::Tab;
+use crate::error::DrawError;
 use crate::palette;
-use crate::scene::{DrawError, Scene, entity};
-use crate::view::{Datum, View};
-use crate::views::is;
+use crate::scene::{Scene, entity};
+use crate::view::{Datum, View, is};
 use rerun::blueprint::{ContainerLike, Spatial2DView, TimeSeriesView, Vertical};
 use rerun::{Boxes2D, LineStrips2D, Points2D};
 use rohrpost::interfaces::{FlowState, FlowStates, SlotState, SlotUse};
@@ -209,10 +209,10 @@ fn colour(installation: &Installation, flow: &FlowState) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Drawing;
+    use crate::testing::TestScene;
     use rohrpost::interface::Interface;
     use rohrpost::interfaces::RouterInterface;
-    use rohrpost::macro_support::append;
+    use rohrpost::wire::append;
     use std::path::Path;
 
     const US: u64 = 1_000;
@@ -229,7 +229,7 @@ mod tests {
     }
 
     /// Draws what the router of a node tells.
-    fn draw<T: serde::Serialize>(drawing: &mut Drawing, view: &mut dyn View, data: &str, told: &T) {
+    fn draw<T: serde::Serialize>(drawing: &mut TestScene, view: &mut dyn View, data: &str, told: &T) {
         let installation = demo();
         let (mut bytes, description) = (Vec::new(), RouterInterface::description());
         append(&mut bytes, told).unwrap();
@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn the_plan_is_drawn_once_and_what_was_told_before_is_no_news() {
-        let (mut drawing, mut view) = (Drawing::new(), Slots::default());
+        let (mut drawing, mut view) = (TestScene::new(), Slots::default());
         let first = vec![used(None, 0, 3), used(Some(1), 2_200, -20)];
         draw(&mut drawing, &mut view, "slots", &slots(first.clone()));
         draw(&mut drawing, &mut view, "slots", &slots(first));
@@ -324,7 +324,7 @@ mod tests {
         };
         let told =
             FlowStates { node: "base".into(), flows: vec![flow(3, Some(5_500_000)), flow(0, None), flow(3, None)] };
-        let mut drawing = Drawing::new();
+        let mut drawing = TestScene::new();
         (0..2).for_each(|_| draw(&mut drawing, &mut Flows, "flows", &told));
         let rows = drawing.rows();
         let of = |entity: &str| rows.get(&format!(r"/slots/flows/{entity}")).copied().unwrap_or(0);

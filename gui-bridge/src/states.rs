@@ -49,16 +49,6 @@ impl Level {
     }
 }
 
-/// The last state of each module.
-#[derive(Default)]
-pub(crate) struct States {
-    last: BTreeMap<String, String>,
-    /// System time of the table that was drawn last, ns.
-    table_ns: u64,
-    /// It does not say all.
-    table_is_old: bool,
-}
-
 impl From<OutputLevel> for Level {
     fn from(level: OutputLevel) -> Self {
         match level {
@@ -70,23 +60,21 @@ impl From<OutputLevel> for Level {
     }
 }
 
-impl States {
-    /// All of them at one glance. The lanes alone do not give that: their view keeps the span of time that was there
-    /// when it was opened, so that a live one shows the past only.
-    fn table(&self) -> TextDocument {
-        let mut table = String::from("| module | state |\n| --- | --- |\n");
-        for (module, state) in &self.last {
-            let state = if state == "on" { state.clone() } else { format!("**{state}**") };
-            // Writing to a String cannot fail.
-            let _ = writeln!(table, "| {module} | {state} |");
-        }
-        TextDocument::from_markdown(table)
+/// The states of all modules as a table. A view of lanes shows only the time span that existed when it was opened; a
+/// live view needs the table for the present.
+fn table(states: &BTreeMap<String, String>) -> TextDocument {
+    let mut table = String::from("| module | state |\n| --- | --- |\n");
+    for (module, state) in states {
+        let state = if state == "on" { state.clone() } else { format!("**{state}**") };
+        // Writing to a String cannot fail.
+        let _ = writeln!(table, "| {module} | {state} |");
     }
+    TextDocument::from_markdown(table)
 }
 
 impl Scene {
-    /// `module` stands so. Said again it changes nothing, so it may come with every poll. `text` says why, and becomes a line of
-    /// output; leave it empty if there is nothing to say.
+    /// Sets the state of `module`. Repeating a state changes nothing, so each poll may call this. `text` says why, and
+    /// becomes a line of output; leave it empty if there is nothing to say.
     pub fn module_state(&mut self, module: &str, state: Standing, text: &str) {
         let lane = entity(&["modules", module]);
         let told = state.to_string();
@@ -113,7 +101,8 @@ impl Scene {
         self.output_line(module, level, text);
     }
 
-    /// What is no module has a lane beside those that are: from now on it is in this state. Each change is drawn, however soon the next comes.
+    /// Gives something other than a module a lane: from now on it is in this state. Draws each change, however soon the
+    /// next one comes.
     pub(crate) fn lane(&mut self, name: &str, state: Standing) {
         let lane = entity(&["modules", name]);
         if self.states.last.insert(name.into(), state.to_string()).is_none() {
@@ -129,7 +118,7 @@ impl Scene {
         self.states.table_is_old = (1..STEPPED_BACK_NS).contains(&behind_ns);
         if !self.states.table_is_old {
             self.states.table_ns = self.time_ns;
-            let table = self.states.table();
+            let table = table(&self.states.last);
             self.log(entity(&["modules now"]), &table);
         }
     }
@@ -154,11 +143,11 @@ pub(crate) fn cut(text: &str, max: usize) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Drawing;
+    use crate::testing::TestScene;
 
     #[test]
     fn a_state_said_again_draws_nothing() {
-        let mut drawing = Drawing::new();
+        let mut drawing = TestScene::new();
         let failed = (Standing::Failed, "was killed by signal 9");
         for (state, text) in [(Standing::Starting, ""), (Standing::On, ""), (Standing::On, "still on"), failed] {
             drawing.scene.module_state("laser.0", state, text);

@@ -1,4 +1,5 @@
-//! What is to be drawn, between the module's thread, which must never wait, and the feeder, which may be stuck in Rerun.
+//! What is to be drawn, between the module's thread, which must never wait, and the feeder, which may be stuck in
+//! Rerun.
 //!
 //! ```text
 //!   module's thread ──put──▶ entity: pending │ last   ──next──▶ feeder ──▶ Rerun
@@ -6,18 +7,23 @@
 //!                            layout          ▲──────── again ──────┘ a new stream gets the last of everything
 //! ```
 //!
-//! An entity has one pending row: a newer one replaces it, component by component, and is taken when the entity's time has
-//! come. Lines of text are things that happen, so they wait in a ring that drops the oldest. Whatever comes in, and
+//! An entity has one pending row: a newer one replaces it, component by component, and is taken when the entity's time
+//! has come. Lines of text are things that happen, so they wait in a ring that drops the oldest. Whatever comes in, and
 //! whatever the feeder does, no more than [`BYTES_MAX`] is held: lines and paths are counted, too.
 //!
-//! When there is no room, the newest still wins: an entity that is known gives up what was drawn of it for what is to be
-//! drawn, so it can always change. Entities that are new find less room than those that are known.
+//! When there is no room, the newest still wins: an entity that is known gives up what was drawn of it for what is to
+//! be drawn, so it can always change. Entities that are new find less room than those that are known.
 
 use crate::blueprint::Layout;
-use rerun::{EntityPath, SerializedComponentBatch, TimePoint};
+use rerun::EntityPath;
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+
+mod entity;
+
+pub(crate) use entity::Row;
+use entity::{Entity, EntityRows, line_bytes};
 
 /// Entities that a drawing has at most: a map of 4096 tiles, and room for all else.
 pub const ENTITIES_MAX: usize = 16_384;
@@ -31,64 +37,8 @@ const LINES_BYTES_MAX: usize = 8 * 1024 * 1024;
 const ENTITIES_BYTES_MAX: usize = BYTES_MAX - LINES_BYTES_MAX;
 /// Room into which an entity may grow, but no new one may come.
 const RESERVE: usize = 8 * 1024 * 1024;
-/// A row besides its arrays: its time on two timelines, a tree.
-const ROW_BYTES: usize = 512;
-/// An entity besides its rows and its name: its places in index and queue, with the room that those leave empty.
-const ENTITY_BYTES: usize = 2 * size_of::<Entity>() + 256;
-
 /// A line is no longer than this.
 pub const LINE_BYTES_MAX: usize = 16 * 1024;
-
-/// What an entity shows at one time.
-#[derive(Clone)]
-pub(crate) struct Row {
-    /// None: at all times.
-    pub(crate) time: Option<TimePoint>,
-    pub(crate) components: Vec<SerializedComponentBatch>,
-}
-
-impl Row {
-    fn bytes(&self) -> usize {
-        ROW_BYTES + self.components.iter().map(batch_bytes).sum::<usize>()
-    }
-
-    /// What it holds of components that the other speaks of, too.
-    fn bytes_shared_with(&self, other: &Self) -> usize {
-        let spoken_of = |batch: &&SerializedComponentBatch| {
-            other.components.iter().any(|component| component.descriptor == batch.descriptor)
-        };
-        self.components.iter().filter(spoken_of).map(batch_bytes).sum()
-    }
-
-    fn speaks_of(&self, other: &Self) -> bool {
-        let same = |batch: &SerializedComponentBatch| other.components.iter().any(|b| b.descriptor == batch.descriptor);
-        self.components.iter().any(same)
-    }
-
-    /// Takes over what is newer, and keeps what that does not speak of.
-    fn replace_by(&mut self, newer: Self) {
-        self.time = newer.time;
-        for batch in newer.components {
-            match self.components.iter_mut().find(|old| old.descriptor == batch.descriptor) {
-                Some(old) => *old = batch,
-                None => self.components.push(batch),
-            }
-        }
-    }
-}
-
-fn batch_bytes(batch: &SerializedComponentBatch) -> usize {
-    size_of::<SerializedComponentBatch>() + batch.array.get_array_memory_size()
-}
-
-/// Its parts are among Rerun's names, too.
-fn path_bytes(path: &EntityPath) -> usize {
-    path.iter().map(|part| 64 + 2 * part.unescaped_str().len()).sum()
-}
-
-fn line_bytes((path, row): &(EntityPath, Row)) -> usize {
-    path_bytes(path) + row.bytes()
-}
 
 /// What the feeder does next.
 pub(crate) enum Order {
@@ -110,43 +60,6 @@ pub struct DrawingCounts {
     pub rebuilt: u64,
     /// Times that the viewer or the disk stood still, or that the disk took no more.
     pub stuck: u64,
-}
-
-/// The two halves of an entity: what holds for all times, and what is true now.
-#[derive(Default)]
-struct Half {
-    pending: Option<Row>,
-    last: Option<Row>,
-}
-
-impl Half {
-    fn bytes(&self) -> usize {
-        [&self.pending, &self.last].into_iter().flatten().map(Row::bytes).sum()
-    }
-
-    /// What it holds when `row` has come.
-    fn bytes_with(&self, row: &Row) -> usize {
-        let replaced = self.pending.as_ref().map_or(0, |pending| ROW_BYTES + pending.bytes_shared_with(row));
-        self.bytes() + row.bytes() - replaced
-    }
-
-    /// What was drawn and what is to be drawn become one row, that is to be drawn.
-    fn fold(&mut self) {
-        let Some(mut row) = self.last.take() else { return };
-        if let Some(newer) = self.pending.take() {
-            row.replace_by(newer);
-        }
-        self.pending = Some(row);
-    }
-}
-
-struct Entity {
-    path: EntityPath,
-    fixed: Half,
-    moving: Half,
-    /// When it is in the queue, and under which key.
-    due: Option<(Instant, u64)>,
-    drawn: Option<Instant>,
 }
 
 struct Inner {
@@ -200,7 +113,7 @@ impl Store {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
-        // Nothing in here panics half way; and a drawing is worth less than the module that makes it.
+        // Nothing in here panics rows way; and a drawing is worth less than the module that makes it.
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -317,12 +230,6 @@ impl Store {
     }
 }
 
-impl Entity {
-    fn bytes(&self) -> usize {
-        ENTITY_BYTES + path_bytes(&self.path) + self.fixed.bytes() + self.moving.bytes()
-    }
-}
-
 impl Inner {
     fn put(&mut self, path: EntityPath, row: Row, period: Duration) {
         let known = self.index.get(&path).copied();
@@ -331,17 +238,17 @@ impl Inner {
             return;
         };
         let entity = &mut self.entities[at];
-        let half = if row.time.is_none() { &mut entity.fixed } else { &mut entity.moving };
-        let mut before = half.bytes();
-        if self.bytes - before + half.bytes_with(&row) > ENTITIES_BYTES_MAX {
-            half.fold();
-            self.bytes = self.bytes - before + half.bytes();
-            before = half.bytes();
+        let rows = if row.time.is_none() { &mut entity.fixed } else { &mut entity.moving };
+        let mut before = rows.bytes();
+        if self.bytes - before + rows.bytes_with(&row) > ENTITIES_BYTES_MAX {
+            rows.fold();
+            self.bytes = self.bytes - before + rows.bytes();
+            before = rows.bytes();
         }
-        if self.bytes - before + half.bytes_with(&row) > ENTITIES_BYTES_MAX {
+        if self.bytes - before + rows.bytes_with(&row) > ENTITIES_BYTES_MAX {
             self.counts.dropped += 1;
         } else {
-            match &mut half.pending {
+            match &mut rows.pending {
                 Some(pending) => {
                     // Another component, such as the place of a picture, replaces nothing.
                     self.counts.replaced += u64::from(pending.speaks_of(&row));
@@ -349,14 +256,14 @@ impl Inner {
                 }
                 none => *none = Some(row),
             }
-            self.bytes = self.bytes - before + half.bytes();
+            self.bytes = self.bytes - before + rows.bytes();
         }
         self.queue(at, period);
     }
 
     /// Makes room for an entity that comes with its first row, if there is some.
     fn begin_entity(&mut self, path: EntityPath, row: &Row) -> Option<usize> {
-        let (fixed, moving) = (Half::default(), Half::default());
+        let (fixed, moving) = (EntityRows::default(), EntityRows::default());
         let entity = Entity { path: path.clone(), fixed, moving, due: None, drawn: None };
         let bytes = entity.bytes();
         let at = self.entities.len();
@@ -431,15 +338,15 @@ impl Inner {
         let entity = &mut self.entities[at];
         let before = entity.bytes();
         (entity.due, entity.drawn) = (None, Some(now));
-        let half = if entity.fixed.pending.is_some() { &mut entity.fixed } else { &mut entity.moving };
-        let row = half.pending.take()?;
-        match &mut half.last {
+        let rows = if entity.fixed.pending.is_some() { &mut entity.fixed } else { &mut entity.moving };
+        let row = rows.pending.take()?;
+        match &mut rows.last {
             Some(last) => last.replace_by(row.clone()),
             none => *none = Some(row.clone()),
         }
         self.bytes = self.bytes + entity.bytes() - before;
         let path = entity.path.clone();
-        // Its other half may be waiting still; for a new stream it is a part of what was known.
+        // Its other rows may be waiting still; for a new stream it is a part of what was known.
         let turns = self.turns;
         self.queue(at, Duration::ZERO);
         if turn <= self.repeated_at.0 && self.turns > turns {

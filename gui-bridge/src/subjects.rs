@@ -1,7 +1,7 @@
 //! What the bridge draws of which module: wanted by the configuration, described by the module, drawn by a view.
 
-use crate::asking::Asking;
 use crate::blueprint::{Layout, Tab};
+use crate::description_request::DescriptionRequest;
 use crate::view::{Datum, View};
 use crate::{Scene, views};
 use rohrpost::description::noted;
@@ -14,8 +14,8 @@ use rohrpost_config::Show;
 use rohrpost_mailbox::{Node, local};
 use std::time::{Duration, Instant};
 
-/// The mailbox for what tells how things are now: while the bridge stands still, a newer package takes an older one's place. Its
-/// data mailbox has all that must come in order and without gaps.
+/// The mailbox for what tells how things are now: while the bridge stands still, a newer package takes an older one's
+/// place. Its data mailbox has all that must come in order and without gaps.
 pub(crate) const NEWEST: u8 = 3;
 /// A module is asked at most so often to send everything once more.
 const REPAIR: Duration = Duration::from_secs(5);
@@ -30,7 +30,7 @@ struct Entry {
     /// Its module has described itself.
     answered: bool,
     /// It is on another node, and being asked.
-    asking: Option<Asking>,
+    asking: Option<DescriptionRequest>,
 }
 
 /// Data that are subscribed to.
@@ -110,8 +110,9 @@ impl Subjects {
         Self { views, entries, subjects: Vec::new() }
     }
 
-    /// Reads the descriptions that are missing of modules that run, and subscribes to what they tell; whether there is more than
-    /// before. Modules note their descriptions beside their mailboxes; those of other nodes are asked. Nobody is waited for.
+    /// Reads the descriptions that are missing of modules that run, and subscribes to what they tell; whether there is
+    /// more than before. Modules note their descriptions beside their mailboxes; those of other nodes are asked. Nobody
+    /// is waited for.
     pub(crate) fn find(
         &mut self,
         context: &mut Context,
@@ -189,7 +190,7 @@ impl Subjects {
         }
     }
 
-    /// Asks those of whom a part was lost for everything once more. Waits for nobody.
+    /// Asks modules that lost a part on the way to send everything again. Does not wait.
     pub(crate) fn repair(&mut self, context: &Context) {
         for subject in &mut self.subjects {
             let Some(repair) = subject.repair.as_mut().filter(|repair| repair.wanted) else { continue };
@@ -207,8 +208,8 @@ impl Subjects {
 }
 
 impl Entry {
-    /// The data of a module that are wanted; those that only the last view, which wants all, would draw are not worth it
-    /// unless they are all that there is.
+    /// The data of a module that are wanted; those that only the last view, which wants all, would draw are not worth
+    /// it unless they are all that there is.
     fn items(&self, description: &Description, views: &[Box<dyn View>]) -> Vec<DataItem> {
         let Some(name) = &self.data else {
             let special = &views[..views.len().saturating_sub(1)];

@@ -2,7 +2,7 @@
 
 use crate::Scene;
 use crate::blueprint::Layout;
-use crate::scene::Paper;
+use crate::scene::RowSink;
 use crate::store::Row;
 use rerun::EntityPath;
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 #[derive(Default)]
 struct List(Mutex<Vec<EntityPath>>);
 
-impl Paper for List {
+impl RowSink for List {
     fn put(&self, entity: EntityPath, _: Row) {
         self.0.lock().unwrap().push(entity);
     }
@@ -23,12 +23,12 @@ impl Paper for List {
     fn arrange(&self, _: Layout) {}
 }
 
-pub(crate) struct Drawing {
+pub(crate) struct TestScene {
     pub(crate) scene: Scene,
     list: Arc<List>,
 }
 
-impl Drawing {
+impl TestScene {
     pub(crate) fn new() -> Self {
         let list = Arc::new(List::default());
         Self { scene: Scene::over(list.clone(), 0), list }

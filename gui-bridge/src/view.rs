@@ -1,8 +1,9 @@
 //! Views: what is drawn of a module, chosen by how the module describes itself.
 
 use crate::blueprint::Tab;
-use crate::scene::{DrawError, RATE_HZ, Scene};
-use rohrpost::schema::{Data, DataItem, Description, Value, decode};
+use crate::error::DrawError;
+use crate::scene::{RATE_HZ, Scene};
+use rohrpost::schema::{Data, DataItem, Description, Schema, Value, decode};
 use rohrpost::{Name, Rate};
 use rohrpost_config::Installation;
 use std::time::Duration;
@@ -30,11 +31,16 @@ pub trait View {
         Vec::new()
     }
 
-    /// The number of a function without arguments by which a module sends everything once more: it is called when a part was
-    /// lost on the way, if the view wants each.
+    /// The number of a function without arguments by which a module sends everything once more: it is called when a
+    /// part was lost on the way, if the view wants each.
     fn repair(&self, _module: &Description) -> Option<u16> {
         None
     }
+}
+
+/// Whether a datum has the type `T`.
+pub(crate) fn is<T: Schema>(item: &DataItem) -> bool {
+    item.field.ty.is::<T>()
 }
 
 /// Which values of a datum a view wants. A `rate` in the configuration says how often instead of this.
@@ -45,14 +51,14 @@ pub struct Wish {
 }
 
 impl Wish {
-    /// The newest, [`RATE_HZ`] times a second: for all that tells how things are now, such as a pose, a scan, a number. A bridge
-    /// that stood still for a while goes on with what is true then.
+    /// The newest, [`RATE_HZ`] times a second: for all that tells how things are now, such as a pose, a scan, a number.
+    /// A bridge that stood still for a while goes on with what is true then.
     pub fn newest() -> Self {
         Self { rate: Rate::Every(Duration::from_secs_f64(1.0 / RATE_HZ)), each: false }
     }
 
-    /// Each, in order: for what is a part of something larger, such as the patches of a map, and for what happens, such as lines
-    /// of text. They wait in the bridge's data mailbox; what finds no room there is lost.
+    /// Each, in order: for what is a part of something larger, such as the patches of a map, and for what happens, such
+    /// as lines of text. They wait in the bridge's data mailbox; what finds no room there is lost.
     pub fn each() -> Self {
         Self { rate: Rate::Each, each: true }
     }
@@ -64,7 +70,7 @@ impl Wish {
     }
 }
 
-/// One value, and whose it is.
+/// One value and its sender.
 pub struct Datum<'a> {
     /// The module, or alias, that sent it.
     pub from: Name,
@@ -83,7 +89,7 @@ impl Datum<'_> {
     /// # Errors
     /// When the sender does not keep to its description.
     pub fn read<T: Data>(&self) -> Result<T, DrawError> {
-        rohrpost::macro_support::from_bytes(self.bytes).map_err(|error| self.unreadable(&error))
+        rohrpost::wire::from_bytes(self.bytes).map_err(|error| self.unreadable(&error))
     }
 
     /// The value, by its description alone.

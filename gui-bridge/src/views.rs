@@ -1,16 +1,18 @@
-//! The views that are built in: a scan is a scan, whoever sends it, and what nobody knows is drawn by its description.
+//! The built-in views. Each selects data by type, from any sender; data of an unknown type are drawn by their
+//! description.
 
-use crate::beyond::Beyond;
 use crate::blueprint::Tab;
+use crate::error::DrawError;
 use crate::network::{Clocks, Network};
-use crate::scene::{DrawError, Scene};
+use crate::scene::Scene;
 use crate::slots::{Flows, Slots};
 use crate::states::Level;
-use crate::view::{Datum, View, Wish};
+use crate::tcp_links::TcpLinks;
+use crate::view::{Datum, View, Wish, is};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CartographerInterface;
 use rohrpost::output::OutputLine;
-use rohrpost::schema::{DataItem, Description, Schema};
+use rohrpost::schema::{DataItem, Description};
 use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose};
 
 /// All of them; the last wants everything.
@@ -23,18 +25,14 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
         Box::new(Output),
         Box::new(Network::default()),
         Box::new(Clocks),
-        Box::new(Beyond::default()),
+        Box::new(TcpLinks::default()),
         Box::new(Slots::default()),
         Box::new(Flows),
-        Box::new(Other),
+        Box::new(OtherData),
     ]
 }
 
-pub(crate) fn is<T: Schema>(item: &DataItem) -> bool {
-    item.field.ty.is::<T>()
-}
-
-/// Scans, from where their scanner stood, or on the robot whose odometry came first.
+/// Scans, from where their scanner stood, or on the robot with the odometry that came first.
 struct Laser;
 
 impl View for Laser {
@@ -94,7 +92,7 @@ impl View for Mapper {
     }
 
     fn tabs(&self) -> Vec<Tab> {
-        vec![Tab::plane("Map", &["/world/map/**", "/world/trail/**", "/world/robot/**"])]
+        vec![Tab::plane("Map", &["/world/map/**", "/world/trajectory/**", "/world/robot/**"])]
     }
 
     fn repair(&self, module: &Description) -> Option<u16> {
@@ -104,7 +102,7 @@ impl View for Mapper {
     }
 }
 
-/// Poses, from whoever knows best where the robot is.
+/// Poses, from the modules with the best estimate of the robot's place.
 struct Localisation;
 
 impl View for Localisation {
@@ -144,9 +142,9 @@ pub(crate) fn draw_line(scene: &mut Scene, installation: &rohrpost_config::Insta
 }
 
 /// Everything else: numbers as curves, the rest as text.
-pub(crate) struct Other;
+pub(crate) struct OtherData;
 
-impl View for Other {
+impl View for OtherData {
     fn wants(&self, _: &Description, _: &DataItem) -> bool {
         true
     }

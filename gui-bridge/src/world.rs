@@ -1,62 +1,43 @@
-//! The world from above: robots and their ways, scans, maps.
+//! The world from above: robots and their trajectories, scans, maps.
 //!
 //! All of it is flat and drawn in a 2D view. That one shows the whole map upright and fits it to the window by itself;
-//! a 3D view would show it from a corner. Entities, below `world`, whose transform turns y up:
+//! a 3D view would show it from a corner. Entities, below `world`, with a transform that turns y up:
 //!
 //! ```text
 //!   map/MODULE/TILE      one entity for each tile, cropped to the squares that are known
 //!   frame                a margin around all of it, and a scale
-//!   trail/MODULE/CHUNK   see `trail`
+//!   trajectory/MODULE/CHUNK   see `trajectory`
 //!   scan/MODULE          the last sweep, in the world's frame
 //!   robot/MODULE         where this module believes the robot to be
 //! ```
 
+use crate::error::{DrawError, TILES_MAX};
 use crate::palette::{self, Rgb};
-use crate::scene::{DrawError, Scene, entity};
-use crate::trail::{CHUNKS_MAX, Change, Trail};
+use crate::scene::{Scene, entity};
+use crate::trajectory::{CHUNKS_MAX, Change};
 use nalgebra::{Isometry2, Point2};
 use rerun::{Arrows2D, LineStrips2D, Points2D, Radius, RotationAxisAngle, Scalars, SegmentationImage, Transform3D};
 use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
-use std::collections::{HashMap, HashSet};
 
-mod extent;
+pub(crate) mod extent;
 mod tile;
 
 use extent::Extent;
 pub use tile::MAP_CELLS_MAX;
 
-/// Tiles of one module's map.
-pub const TILES_MAX: usize = 4096;
-
 /// Beams this much longer than most do not make the world larger: glass and open doors let single ones through.
 const TRUSTED_BEAMS: f64 = 0.97;
 
-/// What the scene remembers of the world.
-#[derive(Default)]
-pub(crate) struct World {
-    robots: HashMap<String, Robot>,
-    tiles: HashMap<String, HashSet<(i64, i64)>>,
-    extent: Extent,
-    carrier: String,
-}
-
-/// A believed place, and the way to it.
-#[derive(Default)]
-struct Robot {
-    pose: Pose,
-    trail: Trail,
-}
-
 /// How a robot is drawn: the better a place is known, the more it catches the eye.
-struct Look {
+struct RobotStyle {
     colour: Rgb,
     body_m: f32,
     line: f32,
     order: f32,
 }
 
-const BEST: Look = Look { colour: palette::ROBOT, body_m: 0.28, line: 2.0, order: 30.0 };
-const ODOMETRY: Look = Look { colour: palette::ODOMETRY, body_m: 0.2, line: 1.25, order: 20.0 };
+const BEST: RobotStyle = RobotStyle { colour: palette::ROBOT, body_m: 0.28, line: 2.0, order: 30.0 };
+const ODOMETRY: RobotStyle = RobotStyle { colour: palette::ODOMETRY, body_m: 0.2, line: 1.25, order: 20.0 };
 
 impl Scene {
     /// Draws what never changes.
@@ -86,56 +67,56 @@ impl Scene {
         }
     }
 
-    fn robot(&mut self, module: &str, pose: &Pose, look: &Look) {
+    fn robot(&mut self, module: &str, pose: &Pose, style: &RobotStyle) {
         let at = [pose.x_m as f32, pose.y_m as f32];
         let known = self.world.robots.contains_key(module);
         let robot = self.world.robots.entry(module.into()).or_default();
         robot.pose = *pose;
-        let change = robot.trail.push(at);
+        let change = robot.trajectory.push(at);
         self.world.extent.include(at);
         if !known {
-            self.body(module, look);
+            self.body(module, style);
         }
         self.log(entity(&["world", "robot", module]), &placed(pose, 1.0));
         match change {
             Change::None => {}
-            Change::Chunk(chunk) => self.trail(module, chunk, look),
-            Change::All => (0..CHUNKS_MAX).for_each(|chunk| self.trail(module, chunk, look)),
+            Change::Chunk(chunk) => self.trajectory(module, chunk, style),
+            Change::All => (0..CHUNKS_MAX).for_each(|chunk| self.trajectory(module, chunk, style)),
         }
         self.frame();
     }
 
     /// A disc and an arrow ahead. On a map of a whole building the disc would be lost, but for a dot of fixed size.
-    fn body(&mut self, module: &str, look: &Look) {
+    fn body(&mut self, module: &str, style: &RobotStyle) {
         let body = Points2D::new([[0.0f32, 0.0]])
-            .with_radii([Radius::new_scene_units(look.body_m)])
-            .with_colors([look.colour])
-            .with_draw_order(look.order);
-        let heading = Arrows2D::from_vectors([[look.body_m * 3.5, 0.0]])
-            .with_radii([Radius::new_ui_points(look.line)])
-            .with_colors([look.colour])
-            .with_draw_order(look.order);
+            .with_radii([Radius::new_scene_units(style.body_m)])
+            .with_colors([style.colour])
+            .with_draw_order(style.order);
+        let heading = Arrows2D::from_vectors([[style.body_m * 3.5, 0.0]])
+            .with_radii([Radius::new_ui_points(style.line)])
+            .with_colors([style.colour])
+            .with_draw_order(style.order);
         self.log_static(entity(&["world", "robot", module, "body"]), &body);
         self.log_static(entity(&["world", "robot", module, "heading"]), &heading);
     }
 
-    fn trail(&mut self, module: &str, chunk: usize, look: &Look) {
-        let points = self.world.robots.get(module).map_or(&[][..], |robot| robot.trail.chunk(chunk));
+    fn trajectory(&mut self, module: &str, chunk: usize, style: &RobotStyle) {
+        let points = self.world.robots.get(module).map_or(&[][..], |robot| robot.trajectory.chunk(chunk));
         let strips = if points.len() < 2 { vec![] } else { vec![points.to_vec()] };
         let line = LineStrips2D::new(strips)
-            .with_radii([Radius::new_ui_points(look.line)])
-            .with_colors([palette::muted(look.colour)])
-            .with_draw_order(look.order - 1.0);
-        self.log(entity(&["world", "trail", module, &chunk.to_string()]), &line);
+            .with_radii([Radius::new_ui_points(style.line)])
+            .with_colors([palette::muted(style.colour)])
+            .with_draw_order(style.order - 1.0);
+        self.log(entity(&["world", "trajectory", module, &chunk.to_string()]), &line);
     }
 
-    /// Whose odometry was drawn first: it carries scanners that do not know their own place.
+    /// The module with the odometry that was drawn first: it carries scanners that send no pose.
     pub fn carrier(&self) -> &str {
         &self.world.carrier
     }
 
     /// A sweep of the scanner `module`. It is drawn where the scan says that its scanner stood; else `mount` on the
-    /// robot, whose place is the last one drawn for `carrier`.
+    /// robot, at the last pose drawn for `carrier`.
     pub fn scan(&mut self, module: &str, scan: &LaserScan, carrier: &str, mount: &Pose) {
         let carried = || {
             let robot = self.world.robots.get(carrier).map(|robot| robot.pose).unwrap_or_default();

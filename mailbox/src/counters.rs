@@ -18,44 +18,27 @@ const FIRST_OCTAVE: u32 = 8;
 const USED: u32 = 0x100;
 const REST: u32 = 0x200;
 
-/// Why a package was lost.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(usize)]
-pub enum Loss {
-    /// Accepted, then pushed out by a more important one.
-    Displaced,
-    /// Not accepted: the mailbox was full. Its sender was told.
-    Refused,
-    /// Older than the mailbox's `max-age` when its turn came.
-    Stale,
-    /// Its receiver died with it in hand, twice.
-    Poison,
-    /// Accepted, then the mailbox was closed or replaced by one of another shape before it was received.
-    Closed,
-    /// Not accepted: its sender died while it wrote.
-    Unfinished,
-    /// Accepted, then its own sender's newer one took its place, as the policy `latest` is for. No reason to worry.
-    Replaced,
+crate::causes! {
+    /// Why a package was lost.
+    pub enum Loss {
+        /// Accepted, then pushed out by a more important one.
+        Displaced = "displaced",
+        /// Not accepted: the mailbox was full. Its sender was told.
+        Refused = "refused",
+        /// Older than the mailbox's `max-age` when its turn came.
+        Stale = "stale",
+        /// Its receiver died with it in hand, twice.
+        Poison = "poison",
+        /// Accepted, then the mailbox was closed or replaced by one of another shape before it was received.
+        Closed = "closed",
+        /// Not accepted: its sender died while it wrote.
+        Unfinished = "unfinished",
+        /// Accepted, then its own sender's newer one took its place, as the policy `latest` is for. No reason to worry.
+        Replaced = "replaced",
+    }
 }
 
 impl Loss {
-    /// All causes, in the order of the counters.
-    pub const ALL: [Self; 7] =
-        [Self::Displaced, Self::Refused, Self::Stale, Self::Poison, Self::Closed, Self::Unfinished, Self::Replaced];
-
-    /// One word for tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Displaced => "displaced",
-            Self::Refused => "refused",
-            Self::Stale => "stale",
-            Self::Poison => "poison",
-            Self::Closed => "closed",
-            Self::Unfinished => "unfinished",
-            Self::Replaced => "replaced",
-        }
-    }
-
     /// Whether somebody misses the package. Nobody misses one that was replaced by a newer.
     pub const fn is_missed(self) -> bool {
         !matches!(self, Self::Replaced)

@@ -14,6 +14,13 @@ use std::str::FromStr;
 
 /// Importance of a package or a module, 0..=255; 255 is the most urgent. It is the class id, there is no other key for it.
 ///
+/// ```
+/// use rohrpost_mailbox::Priority;
+///
+/// assert!(Priority(200).outranks(Priority(150)));
+/// assert_eq!(Priority(200).at_most(Priority(150)), Priority(150));
+/// ```
+///
 /// Deliberately not `Ord`: half the world counts the other way round, so comparisons are spelled out.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct Priority(pub u8);
@@ -57,6 +64,14 @@ pub mod local {
 pub const ALL_SYSTEMS: u8 = 255;
 
 /// A mailbox name. System 0 and class 0 are reserved ("own", "none"); instance 0 is the first of its class.
+///
+/// ```
+/// use rohrpost_mailbox::{Name, local};
+///
+/// let laser = Name::new(1, 150, 0, local::DATA);
+/// assert_eq!(laser.to_string(), "1.150.0.2");
+/// assert_eq!(laser.module(), Name::new(1, 150, 0, local::COMMANDS));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct Name(u32);
 

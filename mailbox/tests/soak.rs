@@ -103,7 +103,7 @@ fn soak(ground: &Ground, shape: Shape, way: WaitMode, time: Duration) -> u64 {
     board.end();
     processes.into_iter().for_each(Actor::finish);
     threads.into_iter().for_each(|thread| thread.join().unwrap());
-    let all: Vec<String> = Loss::ALL.iter().map(|cause| format!("{} {}", lost(&info, *cause), cause.name())).collect();
+    let all: Vec<String> = Loss::ALL.iter().map(|cause| format!("{} {}", lost(&info, *cause), cause.word())).collect();
     let (name, slots) = (shape.full.name(), shape.slots);
     tell(format_args!(
         "{name}, {slots} slots, {way:?}: {} sent, {} received, {}",

@@ -296,7 +296,7 @@ impl Storm {
         let (received, gone) = (infos.iter().map(received).sum::<u64>(), lost(cause));
         let adoptions: u32 = infos.iter().map(|info| info.adoptions).sum();
         let [unfinished, poison] = [Loss::Unfinished, Loss::Poison].map(lost);
-        let (cause, too_many) = (cause.name(), self.check_accounts());
+        let (cause, too_many) = (cause.word(), self.check_accounts());
         tell(format_args!(
             "{self}, {adoptions} adoptions since the last: {received} received, {gone} {cause}, {unfinished} unfinished, {poison} \
              poison; {too_many} counted too many"

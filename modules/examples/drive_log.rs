@@ -42,7 +42,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             let pose = format!("{:.4} {:.4} {:.4}", truth.x_m, truth.y_m, truth.heading_rad);
             writeln!(out, " {pose} {place} {stamp_s:.2} simulated {stamp_s:.2}")?;
-            // What the Intel log has after each scan: the same place again with a stamp next to 0, and a remark of its filter.
+            // What the Intel log has after each scan: the same place again with a stamp next to 0, and a remark of its
+            // filter.
             writeln!(out, "ODOM {place} 0 0 0 6.95e-62 simulated 6.95e-62\nNEFF 15")?;
         }
     }

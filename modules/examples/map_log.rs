@@ -1,4 +1,5 @@
-//! Maps a CARMEN log with the poses it holds: `cargo run -p rohrpost-modules --example map_log -- FILE OUT.pgm [CELL_M]`.
+//! Maps a CARMEN log with the poses it holds: `cargo run -p rohrpost-modules --example map_log -- FILE OUT.pgm
+//! [CELL_M]`.
 
 use rohrpost_modules::robot::{carmen, grid, playback};
 use std::error::Error;

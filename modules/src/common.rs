@@ -57,7 +57,8 @@ pub struct Status {
     pub uptime_ms: u64,
     /// Subscriptions to its data at present.
     pub subscribers: u32,
-    /// Periods of subscriptions in which nothing could be delivered, and packages that found a subscriber's mailbox full.
+    /// Periods of subscriptions in which nothing could be delivered, and packages that found a subscriber's mailbox
+    /// full.
     pub missed: u64,
     /// Packages that it should have received by its own subscriptions and did not (gaps in their numbers).
     pub lost: u64,
@@ -151,7 +152,8 @@ pub struct TimeReport {
     pub epoch: u64,
     /// How far off it is at most, ns.
     pub error_ns: u64,
-    /// Where it comes from: `local`, `master`, `simulation`, `log`. Of several nodes, those have one clock that have the master's.
+    /// Where it comes from: `local`, `master`, `simulation`, `log`. Of several nodes, those have one clock that have
+    /// the master's.
     pub source: String,
 }
 
@@ -176,8 +178,8 @@ pub struct Exchange {
     pub packages: u64,
     /// Commands that were sent again, since the answer was long in coming.
     pub repeated: u64,
-    /// Packages of data that should have come and did not (gaps in their numbers), or calls to which the other one gave no answer:
-    /// not in their time, and (of the last 64 that were given up) not until now.
+    /// Packages of data that should have come and did not (gaps in their numbers), or calls to which the other one gave
+    /// no answer: not in their time, and (of the last 64 that were given up) not until now.
     pub lost: u64,
     /// Calls that were given up, and answered when their time was over. None of data.
     pub late: u64,
@@ -258,8 +260,8 @@ pub struct DataHead {
     pub sequence: u32,
     /// Periods so far in which nothing could be delivered, and packages that found the mailbox full.
     pub missed: u32,
-    /// Of the subscriber, as the envelope of its request had it: a later incarnation of the subscriber takes no data that an earlier one asked
-    /// for. 0 for data that nobody asked for, such as lines of output.
+    /// Of the subscriber, as the envelope of its request had it: a later incarnation of the subscriber takes no data that an
+    /// earlier one asked for. 0 for data that nobody asked for, such as lines of output.
     pub incarnation: u32,
 }
 

@@ -15,7 +15,8 @@ pub trait Interface {
     fn description() -> Description;
 }
 
-/// An interface that a module of type `M` serves. Implemented by the `interface` attribute for all that implement the trait.
+/// An interface that a module of type `M` serves. Implemented by the `interface` attribute for all that implement the
+/// trait.
 pub trait Serve<M>: Interface {
     /// Runs a function: arguments and result are postcard; the result is appended to `reply`.
     ///

@@ -5,8 +5,9 @@ mod router;
 mod tcp;
 
 pub use router::{
-    Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkState,
-    Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure, TunnelState,
+    Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkCounters,
+    LinkState, Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure,
+    TunnelState,
 };
 
 pub use tcp::{
@@ -34,8 +35,8 @@ pub enum DriveError {
 /// Drives a robot in the plane.
 #[interface(class = "motor", crate = crate::macro_support)]
 pub trait Motor {
-    /// Sets speed (m/s, forward) and turn rate (rad/s, counter-clockwise), within what the motor can do. It stops by itself
-    /// when no command came for its dead-man time.
+    /// Sets speed (m/s, forward) and turn rate (rad/s, counter-clockwise), within what the motor can do. It stops by
+    /// itself when no command came for its dead-man time.
     #[command(16)]
     fn drive(&mut self, speed_m_s: f64, turn_rate_rad_s: f64) -> Result<(), DriveError>;
 
@@ -73,7 +74,7 @@ pub struct MapCounts {
     pub odometries: u64,
     /// Scans that went into the map.
     pub mapped: u64,
-    /// Scans for whose time no pose was known.
+    /// Scans without a known pose at their time.
     pub without_pose: u64,
     /// Cells seen free.
     pub free: u64,
@@ -88,7 +89,7 @@ pub trait Cartographer {
     #[command(16, idempotent)]
     fn counts(&mut self) -> MapCounts;
 
-    /// Publishes the whole map once more, for those who came late.
+    /// Publishes the whole map once more, for late subscribers.
     #[command(17, idempotent)]
     fn publish_all(&mut self);
 

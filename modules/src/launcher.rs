@@ -128,7 +128,8 @@ pub enum Scope {
     Mailboxes,
     /// These and what everybody sends.
     All,
-    /// What there is of one module (its raw name): its mailboxes and those that it sends to, what it sends and what is sent to it.
+    /// What there is of one module (its raw name): its mailboxes and those that it sends to, what it sends and what is
+    /// sent to it.
     Module(u32),
 }
 
@@ -181,8 +182,8 @@ pub trait Launcher {
     #[command(16, idempotent)]
     fn children(&mut self, first: u16) -> Children;
 
-    /// Ends a module if it runs, and starts it; it is switched on again unless it was off. Not counted against its restart
-    /// policy. Answers at once: with the number of the process that is to come, counted from 1 (`lives`).
+    /// Ends a module if it runs, and starts it; it is switched on again unless it was off. Not counted against its
+    /// restart policy. Answers at once: with the number of the process that is to come, counted from 1 (`lives`).
     #[command(17)]
     fn restart(&mut self, module: String) -> Result<u32, ControlError>;
 
@@ -194,8 +195,8 @@ pub trait Launcher {
     #[command(19)]
     fn start(&mut self, module: String) -> Result<u32, ControlError>;
 
-    /// Looks at its node, keeps what it saw for a while, and answers with the first page of it. `form` is that of the looks that
-    /// the reader knows; no page is longer than `bytes_max`.
+    /// Looks at its node, keeps what it saw for a while, and answers with the first page of it. `form` is that of the
+    /// looks that the reader knows; no page is longer than `bytes_max`.
     #[command(20, idempotent)]
     fn look(&mut self, what: SnapshotRequest, form: u32, bytes_max: u16) -> Result<LookPage, LookError>;
 

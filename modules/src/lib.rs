@@ -1,10 +1,10 @@
-//! What modules are made of: the template, interfaces and proxies, subscriptions, output, and the modules that come with it.
+//! The module template, interfaces and proxies, calls, subscriptions, output, launch, and the built-in modules.
 //!
 //! ```text
 //! types, interfaces   what modules exchange            robot, builtin   modules that come with Rohrpost
-//! call                commands, once, and replies      runtime          the loop of a module's thread
-//! publish             who wants which data             launch           starts, watches and stops a node's modules
-//! parameter           settings that may change         output           what modules say
+//! call                commands, at most once           runtime          the loop of a module's thread
+//! publish             subscribers of data              launch           starts, watches and stops a node's modules
+//! parameter           settings that may change         output           lines of output
 //! ```
 //!
 //! Module authors use it through the crate `rohrpost`.
@@ -32,8 +32,11 @@ pub mod robot;
 pub mod runtime;
 pub mod survey;
 pub mod types;
+pub mod wire;
 
 pub use module::{Module, ModuleError};
 pub use rohrpost_macros::{choice, data, interface, parameters};
 pub use rohrpost_schema as schema;
 pub use runtime::run;
+/// The version of serde that the attributes derive with.
+pub use serde;

@@ -1,4 +1,5 @@
-//! What a module's author writes: a struct, its interface, and what it does when it is switched on, off, ticked or given data.
+//! What a module's author writes: a struct, its interface, and what it does when it is switched on, off, ticked or
+//! given data.
 
 use crate::interface::Interfaces;
 use crate::parameter::ParameterSet;
@@ -41,16 +42,17 @@ pub trait Module: Sized {
         Ok(())
     }
 
-    /// Its settings that may change while it runs: `Some(&mut self.settings)`, if their struct has [`crate::parameters`].
+    /// Its settings that may change while it runs: `Some(&mut self.settings)`, if their struct has
+    /// [`crate::parameters`].
     fn parameters(&mut self) -> Option<&mut dyn ParameterSet> {
         None
     }
 
-    /// These parameters have new values by now, on or off; what depends on them is changed here. All that one command sets
-    /// comes at once, and only what really differs.
+    /// These parameters have new values by now, on or off; what depends on them is changed here. All that one command
+    /// sets comes at once, and only what really differs.
     ///
     /// # Errors
-    /// The old values are put back, and whoever set them is told why. So check first, then act.
+    /// The old values are put back, and the caller gets the reason. So check first, then act.
     fn parameters_changed(&mut self, _context: &mut Context, _changed: &[&str]) -> Result<(), ModuleError> {
         Ok(())
     }
@@ -63,11 +65,11 @@ pub trait Module: Sized {
         Ok(())
     }
 
-    /// Takes what a descriptor brings that it watches ([`Context::watch`]), while it is on. It is called again as long as there is
-    /// something; so read what there is, and when that is the end, [`Context::unwatch`].
+    /// Takes what a descriptor brings that it watches ([`Context::watch`]), while it is on. It is called again as long
+    /// as there is something; so read what there is, and when that is the end, [`Context::unwatch`].
     ///
-    /// Whatever waits here keeps all else of the module waiting: read once, or make the descriptor non-blocking and read
-    /// until `WouldBlock`.
+    /// Whatever waits here keeps all else of the module waiting: read once, or make the descriptor non-blocking and
+    /// read until `WouldBlock`.
     ///
     /// # Errors
     /// The module is switched off and in error.
@@ -76,7 +78,16 @@ pub trait Module: Sized {
     }
 }
 
-/// Why a module cannot work, in words for its user. Any error becomes one with `?`.
+/// Why a module cannot work, in words for its user. `?` converts any error into it.
+///
+/// ```
+/// use rohrpost_modules::ModuleError;
+///
+/// fn parse(port: &str) -> Result<u16, ModuleError> {
+///     Ok(port.parse()?)
+/// }
+/// assert_eq!(parse("x").unwrap_err().to_string(), "invalid digit found in string");
+/// ```
 pub struct ModuleError(String);
 
 impl ModuleError {

@@ -1,11 +1,12 @@
-//! Places of something bounded, shared out by principal: who holds them decides who may take another. Knows no clock and no mailbox.
+//! Places of something bounded, shared out by principal: who holds them decides who may take another. Knows no clock
+//! and no mailbox.
 //!
 //! ```text
 //!  │ own places of each named principal │ open places: for all others, and for what the named hold beyond their own │
 //! ```
 //!
-//! Of the open places a principal gets another one only while it holds fewer of them than are free. So n principals that take all they can
-//! hold one part of n + 1 each, and as many places are free for whoever comes next.
+//! Of the open places a principal gets another one only while it holds fewer of them than are free. So n principals
+//! that take all they can hold one part of n + 1 each, and as many places are free for whoever comes next.
 
 use rohrpost_config::Principal;
 

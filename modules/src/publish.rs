@@ -1,4 +1,4 @@
-//! The publishing side of continuous data: who wants what, how often, and until when. Knows no clock and no mailbox.
+//! The publishing side of continuous data: subscribers, their rates and leases. Uses no clock and no mailbox.
 
 use crate::common::Subscribe;
 use crate::places::Places;
@@ -31,7 +31,7 @@ pub(crate) struct Newest {
 pub(crate) struct RequestOrigin {
     /// Reply mailbox of the subscriber.
     pub(crate) by: Name,
-    /// Whose share of places it uses.
+    /// The principal that is charged for its place.
     pub(crate) principal: Principal,
     /// The subscriber's incarnation, from the call's envelope.
     pub(crate) incarnation: u32,
@@ -111,7 +111,7 @@ impl Subscriptions {
             (known.endpoint, known.wish, known.asked) = (endpoint, wish, asked);
             return true;
         }
-        // One whose lease is over holds no place, whether or not it was dropped by now.
+        // One with an ended lease holds no place, whether or not it was dropped by now.
         let held = self.list.iter().filter(|s| s.ends_ns > now_ns).map(|s| s.asked.principal);
         if !self.places.allows(asked.principal, held) {
             return false;
@@ -150,7 +150,7 @@ impl Subscriptions {
         self.missed_before + self.list.iter().map(|s| u64::from(s.missed)).sum::<u64>()
     }
 
-    /// A new value: `deliver` it to those who want each.
+    /// A new value: `deliver` it to subscribers of each.
     pub(crate) fn published(&mut self, newest: &Newest, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
         let mut gone = false;
         for subscription in &mut self.list {
@@ -168,7 +168,7 @@ impl Subscriptions {
         }
     }
 
-    /// Delivers what is due and drops those whose lease has ended.
+    /// Delivers what is due and drops those with an ended lease.
     pub(crate) fn tick(&mut self, now_ns: u64, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
         if self.list.iter().any(|subscription| subscription.ends_ns <= now_ns) {
             self.retain(|subscription| subscription.ends_ns > now_ns);

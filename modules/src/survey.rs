@@ -5,10 +5,10 @@
 //!  another node:   shared memory ──▶ Survey ──form──▶ pages of its launch (`launch::look`) ──distant──▶ Survey
 //! ```
 //!
-//! A package that goes to another node is counted by its sender there, and once more by the router that delivers it here under
-//! the sender's name: such a flow is a *hop* ([`is_hop`]). Who adds up several nodes leaves hops out, but for those from nodes
-//! that do not answer. It is also received twice, first in the transit mailbox of its own node's router: of such mailboxes only
-//! the losses are in [`Survey::classes`].
+//! A package that goes to another node is counted by its sender there, and once more by the router that delivers it
+//! here under the sender's name: such a flow is a *hop* ([`is_hop`]). Who adds up several nodes leaves hops out, but
+//! for those from nodes that do not answer. It is also received twice, first in the transit mailbox of its own node's
+//! router: of such mailboxes only the losses are in [`Survey::classes`].
 
 mod distant;
 mod form;
@@ -149,8 +149,8 @@ impl Survey {
         self.modules.retain(|module| module.name == name || module.aliases.contains(&name));
     }
 
-    /// Several nodes as one, in this order; of each node of `silent`, which do not answer, the modules that the configuration
-    /// names. What routers delivered for nodes that answer is left out: it is among what these sent.
+    /// Several nodes as one, in this order; of each node of `silent`, which do not answer, the modules that the
+    /// configuration names. What routers delivered for nodes that answer is left out: it is among what these sent.
     pub fn joined(surveys: Vec<Self>, silent: &[&str], installation: &Installation) -> Self {
         let mut all = Self {
             node: surveys.first().map(|first| first.node.clone()).unwrap_or_default(),
@@ -178,8 +178,8 @@ impl Survey {
         all
     }
 
-    /// Asks the kernel what the processes take and how they are scheduled. On their own computer alone: elsewhere the numbers of
-    /// processes mean others.
+    /// Asks the kernel what the processes take and how they are scheduled. On their own computer alone: elsewhere the
+    /// numbers of processes mean others.
     pub fn ask_kernel(&mut self) {
         for module in &mut self.modules {
             let pid = module.process.as_ref().map(|process| process.pid);
@@ -273,13 +273,14 @@ fn is_of(installation: &Installation, name: Name, nodes: &[&str]) -> bool {
     node_of(installation, name).is_some_and(|node| nodes.contains(&node))
 }
 
-/// The node that a name is on: that of its module, or the one that hands out its instance of class `tool`. None for what is in
-/// no configuration.
+/// The node that a name is on: that of its module, or the one that hands out its instance of class `tool`. None for
+/// what is in no configuration.
 pub fn node_of(installation: &Installation, name: Name) -> Option<&str> {
     installation.node_of(name)
 }
 
-/// The same, but of packages in transit only those that were lost there: the others are received once more where they go.
+/// The same, but of packages in transit only those that were lost there: the others are received once more where they
+/// go.
 fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<ClassTraffic> {
     let routers = [ROUTER, TCP].map(|class| installation.classes.id(class));
     let mut mailboxes = mailboxes.to_vec();
@@ -292,8 +293,8 @@ fn sum_of_ends(installation: &Installation, mailboxes: &[MailboxInfo]) -> Vec<Cl
     sum(&mailboxes)
 }
 
-/// Whether a flow that was seen on this node is the last part of the way of packages that came from another one: a router sends them
-/// under the name of their sender, which counts them itself on its own node.
+/// Whether a flow that was seen on this node is the last part of the way of packages that came from another one: a
+/// router sends them under the name of their sender, which counts them itself on its own node.
 pub fn is_hop(installation: &Installation, node: &str, flow: &FlowInfo) -> bool {
     node_of(installation, flow.from).is_some_and(|origin| origin != node)
 }

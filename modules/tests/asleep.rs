@@ -1,4 +1,5 @@
-//! A caller that sleeps with its computer, played by a time namespace: what passed meanwhile counts as the age of its command.
+//! A caller that sleeps with its computer, played by a time namespace: what passed meanwhile counts as the age of its
+//! command.
 //!
 //! Without a test harness: only a process of one thread may enter a time namespace.
 
@@ -59,7 +60,7 @@ fn main() {
     let [age_us] = ages_us(&mut server)[..] else { panic!("sent again once") };
     assert!(age_us >= 3_600_000_000, "it is as old as the time that passed: {age_us} us");
 
-    // Who waits is told at once, however long it would have waited awake.
+    // A waiting caller is told at once, however long it would have waited awake.
     assert!(sleep_until(2 * HOUR));
     let waited = Instant::now();
     assert!(matches!(link.wait(long, |_| Ok(())), Err(CallError::Timeout(SERVER, _))));

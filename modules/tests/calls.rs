@@ -1,4 +1,5 @@
-//! The caller's side of calls, against a server that is played by the test: real mailboxes, one process, no waiting for luck.
+//! The caller's side of calls, against a server that is played by the test: real mailboxes, one process, no waiting for
+//! luck.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

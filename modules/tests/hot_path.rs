@@ -1,6 +1,6 @@
-//! A module's thread takes nothing from the heap, once it is warm, for: a command and its answer, publishing to subscribers,
-//! receiving data of a plain type, and reading from a descriptor that it watches. (Data with a `Vec` inside, such as scans, allocate that in decoding; output lines
-//! allocate their text.)
+//! A module's thread takes nothing from the heap, once it is warm, for: a command and its answer, publishing to
+//! subscribers, receiving data of a plain type, and reading from a descriptor that it watches. (Data with a `Vec`
+//! inside, such as scans, allocate that in decoding; output lines allocate their text.)
 //!
 //! The module runs on a thread of this process; only that thread counts. One test, as a process has one output.
 

@@ -126,7 +126,7 @@ fn ground(name: &str, manners: &[&str], more: &str) -> Ground {
     Ground { installation, traces, tell, events: Some(events), _directory: directory }
 }
 
-/// A program whose interpreter is not there: the kernel refuses to run it.
+/// A program with a missing interpreter: the kernel refuses to run it.
 fn script(folder: &Path) -> PathBuf {
     let path = folder.join("script");
     std::fs::write(&path, "#!/nowhere\n").unwrap();

@@ -112,7 +112,7 @@ fn lines_arrive_whole_or_are_counted() {
     tracing::info!(number = 7, "with fields");
     assert_eq!(next(&mut collector).text, "with fields number=7");
 
-    // A panic says why, whoever panicked.
+    // A panic is reported with its reason, in any thread.
     assert!(std::thread::spawn(|| panic!("the wheels came off")).join().is_err());
     let line = next(&mut collector);
     assert_eq!(line.level, OutputLevel::Error);

@@ -1,4 +1,5 @@
-//! A module in a process of its own waits for a pipe, as a driver for its serial port, beside its mailboxes and with one thread.
+//! A module in a process of its own waits for a pipe, as a driver for its serial port, beside its mailboxes and with
+//! one thread.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

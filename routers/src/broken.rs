@@ -23,17 +23,6 @@ macro_rules! broken {
 
 pub(crate) use broken;
 
-/// Runs something as a router does that lets its programs hurry as they like, if it `does_harm` and mistakes can be switched on.
-#[cfg(any(test, feature = "broken-variants"))]
-pub(crate) fn harmful<R>(does_harm: bool, run: impl FnOnce() -> R) -> R {
-    if does_harm { with(Broken::Hurries, run) } else { run() }
-}
-
-/// See there.
-#[cfg(not(any(test, feature = "broken-variants")))]
-pub(crate) fn harmful<R>(_: bool, run: impl FnOnce() -> R) -> R {
-    run()
-}
 #[cfg(any(test, feature = "broken-variants"))]
 pub(crate) use variants::is;
 

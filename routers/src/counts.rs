@@ -5,91 +5,47 @@
 //!
 //! ```text
 //! out.packages  =  out.passed + out.lost, all causes  + those that wait
-//! inn.packages  =  inn.passed + inn.lost, all causes  + those of which only parts have come
+//! inn.packages  =  inn.passed + inn.lost, all causes  + those of which only fragments have come
 //! ```
 
 use rohrpost_mailbox::Priority;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Why a package was lost in a router.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(usize)]
-pub enum Cause {
-    /// Outgoing: no node has its mailbox.
-    NoRoute,
-    /// Outgoing: its sender had more waiting than its quota, and this was the least important and newest.
-    Quota,
-    /// It was under way for too long.
-    Stale,
-    /// Outgoing: nothing is heard of the node.
-    Silent,
-    /// Outgoing: the node is heard, but does not hear us.
-    Unheard,
-    /// Outgoing: the node and we refuse each other.
-    Refused,
-    /// Outgoing: the socket did not take it.
-    Socket,
-    /// Incoming: a newer one of the same sender, receiver and priority had been delivered.
-    Late,
-    /// Incoming: parts of it never came.
-    Incomplete,
-    /// Incoming: nobody has its mailbox open.
-    NoMailbox,
-    /// Incoming: its mailbox was full.
-    MailboxFull,
-    /// Incoming: its mailbox has smaller slots.
-    TooLarge,
-    /// Incoming: the node that sent it does not have its sender.
-    ForeignName,
-    /// Incoming: a command of a class that may not command this one.
-    NotAllowed,
-    /// Incoming: from or for a mailbox by which routers carry packages.
-    RoutersOwn,
-    /// Incoming: no IP packet from the tunnel's address of the node that sent it to ours.
-    BadPacket,
-}
-
-impl Cause {
-    /// All, in their order.
-    pub const ALL: [Self; 16] = [
-        Self::NoRoute,
-        Self::Quota,
-        Self::Stale,
-        Self::Silent,
-        Self::Unheard,
-        Self::Refused,
-        Self::Socket,
-        Self::Late,
-        Self::Incomplete,
-        Self::NoMailbox,
-        Self::MailboxFull,
-        Self::TooLarge,
-        Self::ForeignName,
-        Self::NotAllowed,
-        Self::RoutersOwn,
-        Self::BadPacket,
-    ];
-
-    /// A word for people and programs.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::NoRoute => "no-route",
-            Self::Quota => "quota",
-            Self::Stale => "stale",
-            Self::Silent => "silent",
-            Self::Unheard => "unheard",
-            Self::Refused => "refused",
-            Self::Socket => "socket",
-            Self::Late => "late",
-            Self::Incomplete => "incomplete",
-            Self::NoMailbox => "no-mailbox",
-            Self::MailboxFull => "mailbox-full",
-            Self::TooLarge => "too-large",
-            Self::ForeignName => "foreign-name",
-            Self::NotAllowed => "not-allowed",
-            Self::RoutersOwn => "routers-own",
-            Self::BadPacket => "bad-packet",
-        }
+rohrpost_mailbox::causes! {
+    /// Why a package was lost in a router.
+    pub enum Cause {
+        /// Outgoing: no node has its mailbox.
+        NoRoute = "no-route",
+        /// Outgoing: its sender had more waiting than its quota, and this was the least important and newest.
+        Quota = "quota",
+        /// It was under way for too long.
+        Stale = "stale",
+        /// Outgoing: nothing is heard of the node.
+        Silent = "silent",
+        /// Outgoing: the node is heard, but does not hear us.
+        Unheard = "unheard",
+        /// Outgoing: the node and we refuse each other.
+        Refused = "refused",
+        /// Outgoing: the socket did not take it.
+        Socket = "socket",
+        /// Incoming: a newer one of the same sender, receiver and priority had been delivered.
+        Late = "late",
+        /// Incoming: fragments of it never came.
+        Incomplete = "incomplete",
+        /// Incoming: nobody has its mailbox open.
+        NoMailbox = "no-mailbox",
+        /// Incoming: its mailbox was full.
+        MailboxFull = "mailbox-full",
+        /// Incoming: its mailbox has smaller slots.
+        TooLarge = "too-large",
+        /// Incoming: the node that sent it does not have its sender.
+        ForeignName = "foreign-name",
+        /// Incoming: a command of a class that may not command this one.
+        NotAllowed = "not-allowed",
+        /// Incoming: from or for a mailbox by which routers carry packages.
+        RoutersOwn = "routers-own",
+        /// Incoming: no IP packet from the tunnel's address of the node that sent it to ours.
+        BadPacket = "bad-packet",
     }
 }
 
@@ -125,7 +81,7 @@ pub struct Side {
 /// Of one class.
 #[derive(Default, Debug)]
 pub struct ClassCounts {
-    /// Packages: taken from this node's senders; or come from other nodes, with those of which only parts came.
+    /// Packages: taken from this node's senders; or come from other nodes, with those of which only fragments came.
     pub packages: Count,
     /// Of these, sent; or delivered.
     pub passed: Count,
@@ -192,9 +148,9 @@ pub struct PeerSent {
     pub datagrams: Count,
     /// Their bytes, as UDP's payload.
     pub bytes: Count,
-    /// Packages sent whole or with their last part.
+    /// Packages sent whole, or with their last fragment.
     pub packages: Count,
-    /// Parts of packages.
+    /// Fragments of packages.
     pub fragments: Count,
     /// Datagrams that the socket did not take; they are among `datagrams`.
     pub unsent: Count,
@@ -208,20 +164,20 @@ pub struct PeerReceived {
     pub datagrams: Count,
     /// Their bytes, as UDP's payload.
     pub bytes: Count,
-    /// Packages that came whole, or with their last part.
+    /// Packages that came whole, or with their last fragment.
     pub packages: Count,
-    /// Parts of packages.
+    /// Fragments of packages.
     pub fragments: Count,
     /// Datagrams given up as lost on the wire.
     pub lost: Count,
     /// Datagrams given up, which then came nevertheless, and were taken.
     pub returned: Count,
     /// Datagrams that came before, or so late that it cannot be told; dropped.
-    pub copies: Count,
+    pub duplicates: Count,
     /// Datagrams of an earlier incarnation of the peer, or of one that is doubted; dropped.
     pub old: Count,
     /// Datagrams that came after later ones; taken.
-    pub overtaken: Count,
+    pub reordered: Count,
     /// Datagrams with its address that are wrong in themselves; dropped.
     pub damaged: Count,
     /// Datagrams of another version or digest, or of an address that is not its; dropped.
@@ -234,5 +190,19 @@ impl PeerReceived {
     /// Datagrams lost on the wire, as far as is known.
     pub fn missing(&self) -> u64 {
         self.lost.get().saturating_sub(self.returned.get())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Cause;
+
+    #[test]
+    fn the_book_lists_each_cause_with_its_text() {
+        let page = include_str!("../../docs/src/lan.md").lines();
+        let said: Vec<&str> = page.skip_while(|line| *line != "| cause | meaning |").skip(2).collect();
+        let said: Vec<&str> = said.into_iter().take_while(|line| line.starts_with('|')).collect();
+        let causes = Cause::ALL.map(|cause| format!("| `{}` | {} |", cause.word(), cause.text()));
+        assert_eq!(said, causes, "left: docs/src/lan.md, right: Cause");
     }
 }

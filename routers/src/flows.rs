@@ -1,12 +1,13 @@
-//! The declared flows that leave a node, and how late their packages were.
+//! Declared flows that leave a node, and the measured delays of their packages.
 //!
 //! ```text
-//!  published ──▶ transit mailbox ─▶ queue ─▶ slot ─▶ handed over ──▶ wire ──▶ switch ──▶ last bit at the other computer
+//!  published ──▶ transit mailbox ─▶ queue ─▶ slot ─▶ handed over ──▶ wire ──▶ switch ──▶ last bit at the receiver
 //!     └───────────── by the sender's clock ─────────────┘ └──── lead, bytes of the link ───┘
 //! ```
 //!
-//! What `check` computes a bound for, measured by the router that sends: so one clock suffices, and packages without a stamp, commands among
-//! them, are measured as well. Where nodes send as packages come, no link is known, and the time ends with handing over.
+//! The sending router measures the delay that `check` computes a bound for. So one clock suffices, and packages without
+//! a stamp, such as commands, are measured as well. Without time slots no link is known, and the time ends with the
+//! handover.
 
 use crate::counts::{Cause, Count};
 use crate::latencies::Latencies;
@@ -18,11 +19,11 @@ use std::time::Duration;
 /// A flow from a module of this node to one of another.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Flow {
-    /// The module that sends: the name that is declared, then the others of its process.
+    /// The sending module: the declared name first, then the others of its process.
     pub from: Vec<Name>,
-    /// The module that receives, in the same way.
+    /// The receiving module, in the same way.
     pub to: Vec<Name>,
-    /// What it carries, if that is said.
+    /// What it carries, if that is declared.
     pub carries: Option<Contents>,
     /// Bytes of a body, at most.
     pub size: u32,
@@ -30,18 +31,18 @@ pub struct Flow {
     pub period: Duration,
     /// Time within which a package has to arrive.
     pub deadline: Duration,
-    /// Time in which it arrives for sure; none where nothing is sure.
+    /// Guaranteed arrival; none without a guarantee.
     pub bound: Option<Duration>,
 }
 
 impl Flow {
-    /// All that leave a node, in their order in the file.
+    /// All flows that leave a node, in their order in the file.
     pub(crate) fn all_from(installation: &Installation, node: &str) -> Vec<Self> {
         let bounds = bounds(installation);
         let flow = |(index, flow): (usize, &rohrpost_config::Flow)| {
             let (from, to) = (installation.module(flow.from)?, installation.module(flow.to)?);
             let bound = bounds.iter().find(|bound| bound.flow == index);
-            // What goes through the TCP router never comes to this one.
+            // Traffic through the TCP router never comes to this one.
             let on_lan = installation.lan_index(&to.node).is_some();
             (from.node == node && to.node != node && on_lan).then(|| Self {
                 from: names(flow.from, from),
@@ -74,17 +75,17 @@ fn names(declared: Name, module: &Module) -> Vec<Name> {
     std::iter::once(declared).chain(module.names().filter(|name| *name != declared)).collect()
 }
 
-/// What became of a flow's packages. Counts are since the router began.
+/// Counters of a flow's packages since the router began.
 #[derive(Debug)]
 pub struct FlowCounts {
     deadline_ns: u64,
     bound_ns: u64,
     latency: Latencies,
-    /// The slowest of those whose slots were all kept, ns.
+    /// The slowest package with all slots kept, ns.
     kept_worst_ns: AtomicU64,
     /// Packages that took longer than the bound.
     pub over_bound: Count,
-    /// Of these, packages whose slots were all kept: there should be none.
+    /// Of these, packages with all slots kept: there should be none.
     pub kept_over_bound: Count,
     /// Packages that took longer than the deadline.
     pub over_deadline: Count,
@@ -105,12 +106,12 @@ impl FlowCounts {
         }
     }
 
-    /// How long packages took that were sent.
+    /// Delays of sent packages.
     pub fn latency(&self) -> Latency {
         self.latency.get()
     }
 
-    /// How long the slowest took of those whose slots were all kept: of which the bound says something.
+    /// Delay of the slowest package with all slots kept: the bound is about these.
     pub fn kept_worst(&self) -> Duration {
         Duration::from_nanos(self.kept_worst_ns.load(Ordering::Relaxed))
     }
@@ -120,7 +121,7 @@ impl FlowCounts {
         self.lost[cause as usize].get()
     }
 
-    /// Packages lost in this router for any.
+    /// Packages lost in this router for any cause.
     pub fn lost_in_all(&self) -> u64 {
         self.lost.iter().map(Count::get).sum()
     }
@@ -138,10 +139,10 @@ impl FlowCounts {
     }
 }
 
-/// All flows of a router, and which packages are of them.
+/// All flows of a router, and the assignment of packages to them.
 #[derive(Debug)]
 pub struct Flows {
-    /// By the names of both ends, then by what they carry (first those of which it is not said), size and period.
+    /// By the names of both ends, then by what they carry (undeclared first), size and period.
     entries: Box<[Entry]>,
     counts: Box<[FlowCounts]>,
 }
@@ -162,7 +163,7 @@ impl Flows {
         let entries = flows.iter().zip(0..).flat_map(|(flow, index)| flow.entries(index));
         let mut entries: Vec<Entry> = entries.collect();
         entries.sort_unstable();
-        // What a process sends by a name for which nothing is declared is of what is declared for its others.
+        // The other names of a process share the flows that are declared for it, unless they have their own.
         let declared: Vec<_> = entries.iter().filter(|entry| !entry.is_other).map(|entry| entry.ends).collect();
         entries.retain(|entry| !entry.is_other || declared.binary_search(&entry.ends).is_err());
         Self { entries: entries.into(), counts: flows.iter().map(FlowCounts::new).collect() }
@@ -173,9 +174,9 @@ impl Flows {
         &self.counts
     }
 
-    /// The flow of a package. Of several between the same modules it is the one that carries its type, then the one that carries its kind.
-    /// What none of them carries is of those of which it is not said: of the smallest that holds it; of those of one size replies are the
-    /// rarest, and all else is the most frequent.
+    /// The flow of a package. Among several between the same modules, the one that declares its type is chosen, then
+    /// the one that declares its kind. If none does, a flow without such a declaration: the smallest that holds the
+    /// package. Among those of one size, replies belong to the rarest, and all else to the most frequent.
     pub(crate) fn of(&self, head: &Head) -> Option<u16> {
         let ends = (head.from.module().raw(), head.to.module().raw());
         let behind = &self.entries[self.entries.partition_point(|entry| entry.ends < ends)..];
@@ -199,7 +200,7 @@ impl Flows {
     }
 }
 
-/// Of flows of which it is not said what they carry.
+/// Among flows without a declaration of what they carry.
 fn by_size<'a>(entries: &'a [Entry], head: &Head) -> Option<&'a Entry> {
     let largest = entries.last()?;
     let size = entries.iter().map(|entry| entry.size).find(|size| *size >= u32::from(head.len));

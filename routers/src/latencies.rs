@@ -1,4 +1,4 @@
-//! Times that one thread notes and any reads: the longest, the mean, and how many were how long.
+//! Durations that one thread notes and any reads: the longest, the mean, and a histogram.
 
 use rohrpost_mailbox::{LATENCY_BUCKETS, Latency};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -20,7 +20,7 @@ impl Default for Latencies {
 }
 
 impl Latencies {
-    /// Counts a time.
+    /// Counts a duration.
     pub(crate) fn note(&self, ns: u64) {
         let bucket = &self.buckets[Latency::bucket_of(Duration::from_nanos(ns))];
         bucket.store(bucket.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);

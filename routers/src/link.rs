@@ -1,73 +1,73 @@
-//! Whether a peer is there: what the receiving half finds out, and the sending half and everyone else reads.
+//! Whether a peer is reachable: the receiving half finds out; the sending half and others read.
 
 use crate::broken::broken;
 use crate::counts::Count;
 use crate::frame::{Alive, Reason};
 use crate::report::Mismatch;
 
-/// A peer to which nothing else goes is told "still there" this often.
+/// Keep-alive interval to a peer without other traffic.
 pub const ALIVE_EVERY_NS: u64 = 200_000_000;
-/// A busy peer is told what was heard of it this often.
+/// A busy peer gets a report on what was heard of it this often.
 pub const TELL_EVERY_NS: u64 = 500_000_000;
-/// A peer of which nothing came for so long is silent.
+/// A peer without a datagram for this long is silent.
 pub const SILENT_AFTER_NS: u64 = 1_000_000_000;
-/// A peer that says for so long that it does not hear us, does not: who has just begun is not heard at once.
+/// A peer that says for this long that it does not hear us is unheard. A router that has just begun is not heard at
+/// once.
 pub const DENIED_FOR_NS: u64 = 1_000_000_000;
-/// So long after a peer has heard us last it is unheard at the latest, if none of what it says is lost.
+/// A peer that stopped hearing us is unheard after this long at the latest, if none of its reports is lost.
 pub const UNHEARD_AFTER_NS: u64 = SILENT_AFTER_NS + TELL_EVERY_NS + DENIED_FOR_NS;
-/// A refusal holds for so long; whoever goes on refusing says so every second.
+/// A refusal holds for this long; a peer that goes on refusing says so every second.
 pub const REFUSED_FOR_NS: u64 = 3_000_000_000;
 
 /// Whether packages reach a peer, as far as is known.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum State {
-    /// Just begun: nothing heard yet, and no time to.
+    /// Just begun: nothing heard yet, and no time for it.
     Unknown,
-    /// Heard, and hears us or had no time yet to say.
+    /// Heard, and it hears us or had no time yet to say.
     Alive,
     /// Nothing heard for a second.
     Silent,
     /// Heard, but does not hear us.
     Unheard,
-    /// One of us takes nothing from the other.
+    /// One of the two refuses the other.
     Refused(Mismatch),
 }
 
-/// One peer. Written by the thread that receives.
+/// State of one peer. The receiving thread writes.
 #[derive(Default, Debug)]
 pub struct Link {
-    /// When something of it came last, ns of the monotonic clock; 0: never.
+    /// When its last datagram came, ns of the monotonic clock; 0: never.
     pub heard_ns: Count,
     /// Its incarnation; 0: none.
     pub incarnation: Count,
-    /// Sequence that is expected next.
+    /// The next expected sequence.
     pub next: Count,
-    /// When it said last that it hears us, ns; 0: never.
+    /// When it last said that it hears us, ns; 0: never.
     pub hears_us_ns: Count,
     /// When it began to say that it does not, ns; 0: it does not say so.
     pub denied_ns: Count,
-    /// When it was first heard after it was not, ns.
+    /// When it was first heard after a silence, ns.
     pub since_ns: Count,
-    /// Datagrams of ours that it misses, as it says.
+    /// Datagrams of ours that it misses, by its report.
     pub missed_by_it: Count,
-    /// When it refused us last since its configuration is another, ns; 0: never. And its digest.
+    /// When it last refused us because of the configuration, ns; 0: never. And its digest.
     pub refuses_us_ns: Count,
     /// See `refuses_us_ns`.
     pub refuses_us_digest: Count,
-    /// When it has shown last, by what was sealed, that it lives and has said what time it is by another configuration, ns; 0: never. And its
-    /// digest.
+    /// When it was last verified and sent time of another configuration, ns; 0: never. And its digest.
     pub tells_other_ns: Count,
     /// See `tells_other_ns`.
     pub tells_other_digest: Count,
-    /// When one of us refused the other last, ns; 0: never.
+    /// When one of the two last refused the other, ns; 0: never.
     refused_ns: Count,
-    /// What differs: version, reason, whether a digest is known; and that.
+    /// The difference: version, reason, whether a digest is known; and that.
     refused_why: Count,
     refused_digest: Count,
 }
 
 impl Link {
-    /// Whether packages reach it, as a router sees it that began at `started_ns`.
+    /// Whether packages reach it, for a router that began at `started_ns`.
     pub fn state(&self, started_ns: u64, now_ns: u64) -> State {
         let (heard_ns, refused_ns) = (self.heard_ns.get(), self.refused_ns.get());
         if refused_ns > 0 && refused_ns.saturating_add(REFUSED_FOR_NS) > now_ns {
@@ -84,7 +84,7 @@ impl Link {
         if is_unheard && !broken!(NeverUnheard) { State::Unheard } else { State::Alive }
     }
 
-    /// What to tell it of itself. `missing`: datagrams of its that never came.
+    /// The report for it. `missing`: its datagrams that never came.
     pub(crate) fn told(&self, now_ns: u64, missing: u64) -> Alive {
         if self.heard_ns.get().saturating_add(SILENT_AFTER_NS) <= now_ns {
             return Alive::default();
@@ -92,7 +92,7 @@ impl Link {
         Alive { heard_incarnation: self.incarnation.get(), heard_next: self.next.get(), heard_lost: missing }
     }
 
-    /// It says whether it hears us.
+    /// Its report on whether it hears us.
     pub(crate) fn hears_us(&self, now_ns: u64, hears: bool) {
         if hears {
             self.hears_us_ns.set(now_ns);
@@ -102,7 +102,7 @@ impl Link {
         }
     }
 
-    /// What it said of us is of another time: it is heard anew, or could not be heard.
+    /// Its earlier reports are void: it is heard anew, or could not be heard.
     pub(crate) fn begin(&self, now_ns: u64) {
         self.since_ns.set(now_ns);
         self.denied_ns.set(0);
@@ -115,19 +115,19 @@ impl Link {
         self.refused_ns.set(now_ns.max(1));
     }
 
-    /// It goes by another configuration, and says that it takes nothing from us.
+    /// It has another configuration, and says that it refuses us.
     pub(crate) fn refuses_us(&self, now_ns: u64, digest: u64) {
         self.refuses_us_digest.set(digest);
         self.refuses_us_ns.set(now_ns.max(1));
     }
 
-    /// It lives, goes by another configuration, and says what time it is.
+    /// It is verified, has another configuration, and sends time.
     pub(crate) fn tells_other(&self, now_ns: u64, digest: u64) {
         self.tells_other_digest.set(digest);
         self.tells_other_ns.set(now_ns.max(1));
     }
 
-    /// What comes from it now is of our version and digest.
+    /// Its present datagrams have our version and digest.
     pub(crate) fn accept(&self) {
         if self.refused_ns.get() != 0 {
             self.refused_ns.set(0);

@@ -1,12 +1,12 @@
-//! The few words of rtnetlink that are needed here: make a bridge and pairs of veth, set devices up or down, give addresses.
+//! The part of rtnetlink that is needed here: make a bridge and pairs of veth, set devices up or down, give addresses.
 //!
 //! ```text
 //!  nlmsghdr: length u32, type u16, flags u16, sequence u32, port u32
-//!  then what its type says (ifinfomsg, ifaddrmsg, rtmsg), then attributes: length u16, type u16, bytes, padded to 4
+//!  then by type ifinfomsg, ifaddrmsg or rtmsg, then attributes: length u16, type u16, bytes, padded to 4
 //! ```
 //!
-//! All of it in the order of this computer. Each request asks for an acknowledgement, an error number that is 0 if all is well. A socket
-//! speaks for the network namespace that its thread was in when it was made.
+//! All in native byte order. Each request asks for an acknowledgement, an error number that is 0 on success. A socket
+//! belongs to the network namespace of its thread when it was made.
 
 use nix::sys::socket::{
     AddressFamily, MsgFlags, SockFlag, SockProtocol, SockType, recv, send, setsockopt, socket, sockopt,
@@ -16,7 +16,7 @@ use std::io;
 use std::net::IpAddr;
 use std::os::fd::{AsRawFd, OwnedFd};
 
-/// By then the kernel has answered: it does so within the call that asks.
+/// Time for the kernel's answer; it answers within the call that asks.
 const PATIENCE: TimeVal = TimeVal::new(5, 0);
 const ANSWER_BYTES_MAX: usize = 32 << 10;
 
@@ -48,7 +48,7 @@ const RTA_GATEWAY: u16 = 5;
 const IFF_UP: u32 = 0x1;
 /// Up, with a carrier, and the kernel has noticed.
 const IFF_RUNNING: u32 = 0x40;
-/// The address is used at once, without asking whether somebody else has it.
+/// The address is used at once, without duplicate detection.
 const IFA_F_NODAD: u8 = 0x2;
 const RT_TABLE_MAIN: u8 = 254;
 const RTPROT_STATIC: u8 = 4;
@@ -59,13 +59,13 @@ const RTN_UNICAST: u8 = 1;
 /// A device of a namespace, by its number there.
 pub(crate) type Device = u32;
 
-/// A socket to the kernel of one namespace.
+/// A netlink socket of one namespace.
 pub(crate) struct Netlink {
     socket: OwnedFd,
     sequence: u32,
 }
 
-/// A request as it grows.
+/// A request under construction.
 struct Message {
     kind: u16,
     flags: u16,
@@ -189,7 +189,8 @@ impl Netlink {
         self.ask(Message::new(RTM_NEWLINK, 0, &link(device, 0, 0)).number(IFLA_MTU, mtu)).map(drop)
     }
 
-    /// Gives a device an address. The neighbours, those that share so many bits with it, are reached by the device; none: it has no neighbours.
+    /// Gives a device an address. Neighbours share `prefix` bits with it, and are reached by the device; none: it has
+    /// no neighbours.
     pub(crate) fn add_address(&mut self, device: Device, address: IpAddr, prefix: Option<u8>) -> io::Result<()> {
         let octets = octets(address);
         let prefix_bits = prefix.unwrap_or(8 * octets.len() as u8);
@@ -230,7 +231,7 @@ impl Netlink {
         Ok(u32::from_ne_bytes(flags.unwrap_or_default()) & IFF_RUNNING != 0)
     }
 
-    /// Sends a request; gives what was answered before its acknowledgement.
+    /// Sends a request; returns the answer before its acknowledgement.
     fn ask(&mut self, message: Message) -> io::Result<Vec<u8>> {
         self.sequence += 1;
         let message = Message { flags: message.flags | NLM_F_ACK, ..message }.finish(self.sequence);
@@ -259,7 +260,7 @@ impl Netlink {
     }
 }
 
-/// Kind, sequence and bytes of the first message, and what is behind it.
+/// Kind, sequence and bytes of the first message, and the rest.
 fn split(bytes: &[u8]) -> Option<(u16, u32, &[u8], &[u8])> {
     let head = bytes.first_chunk::<HEAD_BYTES>()?;
     let length = u32::from_ne_bytes([head[0], head[1], head[2], head[3]]) as usize;

@@ -16,6 +16,12 @@ pub trait Report {
     fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause);
 }
 
+impl<R: Report> Report for &mut R {
+    fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
+        (**self).lost(peer, head, body, cause);
+    }
+}
+
 /// Takes what came from other nodes.
 pub trait Deliver: Report {
     /// Puts a package into its mailbox. If that is not possible, [`Report::lost`] follows.

@@ -1,6 +1,6 @@
-//! What a router knows before the first datagram: who it is, who the others are, and how much of the wire is its.
+//! Settings of a router: its node, the other nodes, and its share of the wire.
 //!
-//! Comes from an installation and the name of a node; a test or a simulation makes one from plain values.
+//! They come from an installation and the name of a node; a test or a simulation makes them from plain values.
 
 use crate::admission::{Admission, ArrivalPath, capped};
 use crate::counts::Cause;
@@ -12,9 +12,9 @@ use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Head, Name};
 use rohrpost_network::{Network, Route, Security, Tdma};
 use std::net::IpAddr;
 
-/// Least that a sender may have waiting: two of the largest packages.
+/// Least quota of a sender: two of the largest packages.
 pub const QUOTA_BYTES_MIN: usize = 128 * 1024;
-/// The smallest datagram that a package of any size goes into, in parts.
+/// The smallest datagram that carries a package of any size in fragments.
 pub const DATAGRAM_BYTES_MIN: usize = 528;
 
 const _: () = {
@@ -29,35 +29,36 @@ const _: () = {
     );
 };
 
-/// One router, and the network that it is on.
+/// One router, and its network.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// First byte of the names of its mailboxes.
     pub system: u8,
-    /// Which of `nodes` it runs on.
+    /// Its node among `nodes`.
     pub own: NodeIndex,
     /// All nodes of the LAN, in the order of the configuration; [`NODES_MAX`](rohrpost_network::NODES_MAX) at most.
     pub nodes: Vec<NodeSettings>,
-    /// What must be equal on both ends of a wire.
+    /// Digest of the configuration; equal on all nodes.
     pub digest: u64,
-    /// Tells this incarnation of the router from its others; not 0, and never the same again.
+    /// Distinguishes this incarnation of the router from its others; not 0, and never reused.
     pub incarnation: u64,
     /// How it sends.
     pub network: Network,
-    /// When it sends; none: as packages come.
+    /// Time slots; none: it sends as packages come.
     pub tdma: Option<Tdma>,
-    /// Where names are that are not on this node; sorted, without overlap.
+    /// The node of each name that is not on this node; sorted, without overlap.
     pub routes: Vec<Route>,
-    /// The modules of this node: the names of a group have a quota together, and so have all other names.
+    /// The modules of this node: the names of a group share a quota, and so do all other names.
     pub senders: Vec<Vec<Name>>,
-    /// The names of this node, with all their mailboxes, as ranges that do not overlap: what others send to no other name is delivered.
+    /// The names of this node, with all their mailboxes, as ranges that do not overlap: packages from others to other
+    /// names are dropped.
     pub hosts: Vec<(Name, Name)>,
-    /// What is admitted of what comes from other nodes.
+    /// Rules for packages from other nodes.
     pub admission: Admission,
-    /// Declared flows that leave this node, to be measured.
+    /// Measured flows that leave this node.
     pub flows: Vec<Flow>,
-    /// Packages of lower priority are not real time: without time slots, threads that are scheduled as their modules carry them, by a port
-    /// of their own. 0: all are.
+    /// Packages of lower priority are not real time. Without time slots they have threads of their own, with the
+    /// modules' scheduling, and a port of their own. 0: all are real time.
     pub real_time_from: u16,
 }
 
@@ -66,7 +67,7 @@ pub struct Settings {
 pub struct NodeSettings {
     /// Its name in the configuration.
     pub name: String,
-    /// Where its datagrams come from and go to.
+    /// Source and destination of its datagrams.
     pub address: IpAddr,
 }
 
@@ -92,7 +93,7 @@ impl Settings {
             let known: Vec<_> = installation.lan_nodes().iter().map(|node| format!("`{}`", node.name)).collect();
             return Err(SettingsError::NoNode(node.into(), known.join(", ")));
         };
-        // Of several nodes on a LAN each has an address: configuration sees to it.
+        // Of several nodes on a LAN each has an address: configuration checks that.
         let address = |address: Option<IpAddr>| address.unwrap_or(IpAddr::V4(std::net::Ipv4Addr::UNSPECIFIED));
         let nodes = installation.lan_nodes().iter();
         Ok(Self {
@@ -112,29 +113,30 @@ impl Settings {
         })
     }
 
-    /// Bytes around each datagram, of IP and UDP and of what seals it; the rate counts them.
+    /// Bytes around each datagram: IP, UDP and the seal; the rate includes them.
     pub fn overhead_bytes(&self) -> usize {
         let is_v6 = self.nodes.iter().any(|node| node.address.is_ipv6());
         Network::around_bytes(is_v6, self.network.security)
     }
 
-    /// Whether what is not real time goes by threads and a port of its own. In time slots all goes through these, by its level.
+    /// Whether packages that are not real time have threads and a port of their own. In time slots all packages share
+    /// one path, by level.
     pub fn parts_rest(&self) -> bool {
         self.tdma.is_none() && self.real_time_from > 0
     }
 
-    /// Whether a package of this head goes that way.
+    /// Whether a package with this head takes that path.
     pub fn is_rest(&self, head: &Head) -> bool {
         self.parts_rest() && u16::from(capped(head).priority.0) < self.real_time_from
     }
 
-    /// Whether what passes between nodes is sealed.
+    /// Whether datagrams between nodes are sealed.
     pub fn is_sealed(&self) -> bool {
         self.network.security == Security::Keys
     }
 
-    /// The longest datagram that this node sends. Where it has time slots, it fits into each of them, also if the thread comes as late
-    /// as it may: so each of them serves whatever is most important.
+    /// The longest datagram of this node. It fits into each of its time slots, even if the thread is as late as
+    /// allowed: so each slot can carry the most important package.
     pub fn datagram_bytes(&self) -> usize {
         let Some(tdma) = &self.tdma else { return self.network.datagram_bytes_max };
         let wire = Wire::new(tdma, self.overhead_bytes());
@@ -147,15 +149,15 @@ impl Settings {
         smallest.min(self.network.datagram_bytes_max)
     }
 
-    /// The node that a name is on; none for names of this node and for those that nobody has.
+    /// The node of a name; none for names of this node and for unknown ones.
     pub fn node_of(&self, name: Name) -> Option<NodeIndex> {
         let after = self.routes.partition_point(|route| route.first <= name);
         let route = self.routes.get(after.checked_sub(1)?)?;
         (name <= route.last).then_some(route.node)
     }
 
-    /// Why a package of a node is not to be delivered, whatever its mailbox says. That a seal is right says which node has sent it, so a
-    /// node speaks for its own names alone; without seals anyone may say that.
+    /// Why a package of a node is refused, whatever its mailbox allows. A right seal proves the sending node, and a
+    /// node may send from its own names alone. Without seals anybody can claim to be any node.
     pub fn refuses(&self, node: NodeIndex, head: &Head, body: &[u8]) -> Option<Cause> {
         let is_its_name = !self.is_sealed() || self.node_of(head.from) == Some(node);
         self.admission.validate(ArrivalPath::Lan { node, is_its_name }, head, body).err().map(Cause::from)
@@ -166,7 +168,7 @@ impl Settings {
         (0..self.nodes.len() as NodeIndex).filter(|node| *node != self.own)
     }
 
-    /// Where datagrams of the others come from.
+    /// Source addresses of the others.
     pub fn peer_addresses(&self) -> Vec<IpAddr> {
         self.peers().map(|peer| self.nodes[usize::from(peer)].address).collect()
     }

@@ -47,7 +47,7 @@ pub struct Stats {
     knows: Option<Arc<Self>>,
 }
 
-/// After so long the wire holds no copy any more of what a router's incarnation before took.
+/// After so long the wire holds no duplicate any more of what a router's incarnation before took.
 ///
 /// Whether there was such an incarnation nobody can tell: a launch that ends takes the node's directory along, transit mailbox and all, and the
 /// next may begin at once, with no restart counted. So the first incarnation of a router is held to be young as well; what that costs is the

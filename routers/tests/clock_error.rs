@@ -1,10 +1,13 @@
-//! How far system time on two slaves is off the master's, between network namespaces joined by a bridge, and whether their bounds hold.
+//! How far system time on two slaves is off the master's, between network namespaces joined by a bridge, and whether
+//! their bounds hold.
 //!
-//! All clocks here are this computer's; those of the slaves are made wrong, by a known offset, 30 and 60 ppm, and half a ppm that comes
-//! and goes, so the true error of each reading is known. Beside it stands what RTnet's formula makes of the very same frames: the
-//! master's own stamp, the kernel's receive stamp, the mean of a hundred calibrations, nothing remembered.
+//! All clocks here are this computer's; those of the slaves are made wrong, by a known offset, 30 and 60 ppm, and half
+//! a ppm that comes and goes, so the true error of each reading is known. Beside it stands what RTnet's formula makes
+//! of the very same frames: the master's own stamp, the kernel's receive stamp, the mean of a hundred calibrations,
+//! nothing remembered.
 //!
-//! A few seconds as a test. As a measurement, with the load of TDMA.md (two threads that only work, 40 000 datagrams a second):
+//! A few seconds as a test. As a measurement, with the load of TDMA.md (two threads that only work, 40 000 datagrams a
+//! second):
 //! `ROHRPOST_CLOCK_SECONDS=60 ROHRPOST_CLOCK_LOAD=1 cargo test -p rohrpost-routers --test clock_error -- --nocapture`
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]

@@ -1,5 +1,6 @@
-//! A package on its way through a router takes nothing from the heap, and gives nothing back to it: at once or through the queue,
-//! packed or in parts, delivered or lost, in order or not. Only putting together the first large packages of a peer takes memory.
+//! A package on its way through a router takes nothing from the heap, and gives nothing back to it: at once or through
+//! the queue, packed or in parts, delivered or lost, in order or not. Only putting together the first large packages of
+//! a peer takes memory.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -299,7 +300,7 @@ fn a_clock_takes_nothing_from_the_heap() {
 }
 
 #[test]
-fn who_hosts_a_name_at_the_tcp_router_is_looked_up_without_the_heap() {
+fn the_host_of_a_name_at_the_tcp_router_is_looked_up_without_the_heap() {
     let mut table = Table::default();
     for client in 0..16 {
         let module = |index: usize| Range::module(Name::new(1 + client as u8, (index >> 8) as u8, index as u8, 0));

@@ -1,4 +1,5 @@
-//! Sealing and opening take nothing from the heap: neither what is taken, nor what is rejected, nor a hello that brings about nothing new.
+//! Sealing and opening take nothing from the heap: neither what is taken, nor what is rejected, nor a hello that brings
+//! about nothing new.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -9,7 +10,7 @@ use counting::{CountingHeap, heap_uses};
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
 use rohrpost_routers::security::{
     HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection,
-    Sealing, TAG_BYTES, Tally, Who,
+    RouterIdentity, Sealing, TAG_BYTES, Tally,
 };
 use std::num::NonZeroU8;
 use std::sync::Arc;
@@ -30,8 +31,8 @@ struct Router {
 
 impl Router {
     fn new(own: NodeIndex) -> Self {
-        let who = Who { system: 1, own, nodes: 2, digest: 7, incarnation: 100 + u64::from(own) };
-        let all = PeerSessions::new(who, KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &[3; 32]), None));
+        let router = RouterIdentity { system: 1, own, nodes: 2, digest: 7, incarnation: 100 + u64::from(own) };
+        let all = PeerSessions::new(router, KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &[3; 32]), None));
         Self {
             own,
             handshake: Handshake::new(&all, [own; 32]),

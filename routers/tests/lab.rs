@@ -1,4 +1,5 @@
-//! Labs as tests, the demo and the benches use them. Without the right to make network namespaces there is nothing to test here.
+//! Labs as tests, the demo and the benches use them. Without the right to make network namespaces there is nothing to
+//! test here.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -59,7 +60,7 @@ fn every_node_reaches_every_other_from_the_first_datagram_on() {
 }
 
 #[test]
-fn who_is_beyond_reaches_one_node_and_the_others_reach_that_one_at_the_same_address() {
+fn a_node_beyond_reaches_one_node_and_the_others_reach_that_one_at_the_same_address() {
     for (addresses, home) in [
         (["10.77.0.1", "10.77.0.2"], "192.168.7.1"),
         (["10.77.0.1", "10.77.0.2"], "10.77.0.1"),
@@ -189,7 +190,7 @@ fn a_network_that_was_divided_is_one_again() {
     let Some(lab) = lab(&addresses, 1500) else { return };
     let sockets = [0, 1, 2, 3].map(|index| socket(&lab, &format!("n{index}"), addresses[index]));
     let [a, b, c, d] = &sockets;
-    // Whose address is known: what waits for an address would be sent when it is found.
+    // The address is known: what waits for an address would be sent when it is found.
     arrives(a, c);
     arrives(d, b);
     lab.divide(&["n2", "n3"]).unwrap();

@@ -1,5 +1,5 @@
-//! Two routers with real sockets, threads and mailboxes: what is undeliverable is answered, what waits outlives a router, and what is not
-//! a node's own is refused.
+//! Two routers with real sockets, threads and mailboxes: what is undeliverable is answered, what waits outlives a
+//! router, and what is not a node's own is refused.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -174,7 +174,7 @@ fn what_comes_from_an_address_that_is_not_its_nodes_is_not_taken() {
 }
 
 #[test]
-fn each_sealed_life_has_an_incarnation_of_its_own_whatever_its_settings_say() {
+fn each_sealed_router_has_an_incarnation_of_its_own_whatever_its_settings_say() {
     let mut pair = Pair::new();
     let lives: Vec<_> = (0..3).map(|_| sealed_incarnation(&mut pair)).collect();
     assert!(lives[0] != lives[1] && lives[1] != lives[2] && lives[0] != lives[2], "{lives:?}");
@@ -256,7 +256,7 @@ fn what_comes_at_either_port_while_there_is_no_router_waits_for_the_next() {
 }
 
 #[test]
-fn what_waited_for_a_router_for_long_says_nothing_of_who_lives_now() {
+fn what_waited_for_a_router_for_long_says_nothing_of_the_present_incarnation() {
     let mut pair = Pair::new();
     pair.sides.iter_mut().for_each(|side| side.shell = None);
     let [there, here] = [0, 1].map(|node: usize| pair.sides[1].settings.nodes[node].address);
@@ -351,7 +351,7 @@ fn what_is_not_real_time_goes_by_a_port_of_its_own() {
 
 /// A command that hurries more than its sender may goes with what its sender may.
 #[test]
-fn who_may_not_hurry_is_not_carried_as_if_it_might() {
+fn packages_above_their_class_are_not_carried_as_such() {
     let mut pair = Pair::new();
     for side in &mut pair.sides {
         side.settings.real_time_from = 128;
@@ -365,7 +365,7 @@ fn who_may_not_hurry_is_not_carried_as_if_it_might() {
     assert_eq!(packages, [0, 1]);
 }
 
-/// Neither do those of which there is more than can leave: they are lost, and counted, before they take the way of what may.
+/// Neither do those of which there is more than can leave: they are lost, and counted, before they delay what may.
 #[test]
 fn a_flood_that_may_not_hurry_is_lost_rather_than_carried_as_if_it_might() {
     let mut pair = Pair::new();
@@ -392,7 +392,7 @@ fn a_flood_that_may_not_hurry_is_lost_rather_than_carried_as_if_it_might() {
 
 /// The two threads that carry what is not real time are never in real time, whatever their process is.
 #[test]
-fn who_carries_what_is_not_real_time_runs_below_all_that_is() {
+fn threads_that_are_not_real_time_run_below_all_that_are() {
     let mut pair = Pair::new();
     let _ = rohrpost_mailbox::sys::schedule(rohrpost_mailbox::sys::Scheduling::Fifo(1));
     for side in &mut pair.sides {

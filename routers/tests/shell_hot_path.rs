@@ -76,7 +76,8 @@ fn no_package_takes_from_the_heap() {
     });
 }
 
-/// Two nodes on a network that a large package keeps busy for a while: what is sent meanwhile waits, however soon the router looks.
+/// Two nodes on a network that a large package keeps busy for a while: what is sent meanwhile waits, however soon the
+/// router looks.
 fn paced(start: fn(&mut Side)) -> Pair {
     let mut pair = Pair::new();
     for side in &mut pair.sides {
@@ -119,7 +120,8 @@ fn assert_measured(stats: &Stats) {
     assert!(flow.latency().max > Duration::ZERO, "{flow:?}");
 }
 
-/// The thread that sends in time slots: synchronisation, questions and answers, packages alone, in company and in parts, and tools that look.
+/// The thread that sends in time slots: synchronisation, questions and answers, packages alone, in company and in
+/// parts, and tools that look.
 fn in_time_slots() {
     let pair = Pair::with(Some(turns()));
     let (mut sender, mut receiver) = mailboxes(&pair);

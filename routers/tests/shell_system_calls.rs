@@ -1,5 +1,5 @@
-//! What routers ask of the kernel for a package, counted by tracing their threads: one call to send, one to receive, one to sleep and one to
-//! wake on each side.
+//! What routers ask of the kernel for a package, counted by tracing their threads: one call to send, one to receive,
+//! one to sleep and one to wake on each side.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -20,7 +20,8 @@ use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 
 const PACKAGES: u64 = 200;
-/// Marks are system calls too: questions about a process that cannot be. Between the first and the second it is counted.
+/// Marks are system calls too: questions about a process that cannot be. Between the first and the second it is
+/// counted.
 const MARK: u64 = 0x4000_0000;
 const ROLE: &str = "ROHRPOST_TEST_TRACED";
 
@@ -112,9 +113,9 @@ fn call_name(number: libc::c_long, arguments: [u64; 6]) -> String {
         libc::SYS_futex if arguments[1] as i32 & 0x7f == libc::FUTEX_WAKE => "wake".into(),
         libc::SYS_sendmsg => "send".into(),
         libc::SYS_recvmsg => "receive".into(),
-        // Who is kept busy for long, as by being traced, pauses now and then.
+        // A thread that is kept busy for long, as by being traced, pauses now and then.
         libc::SYS_clock_nanosleep => "pause".into(),
-        // On a machine whose clock source cannot be read without the kernel, every look at the clock is a call.
+        // On a machine with a clock source that needs the kernel, each read of the clock is a call.
         libc::SYS_clock_gettime => "clock".into(),
         other => format!("system call {other}"),
     }

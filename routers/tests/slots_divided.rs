@@ -1,4 +1,5 @@
-//! A network with time slots is divided, and each part has a master and a time; when it is one again, it has one of each.
+//! A network with time slots is divided, and each part has a master and a time; when it is one again, it has one of
+//! each.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -120,7 +121,7 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
             let is_heard = |own: &u8| lonely.shell().stats().state(*own, monotonic_ns()) == State::Alive;
             lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
         });
-        segment.wait_until("it yields to who is followed", |segment| lonely(segment).master == Some(OTHERS[0]));
+        segment.wait_until("it yields to the followed master", |segment| lonely(segment).master == Some(OTHERS[0]));
         talk(&segment, &mut listeners, &ALL, 100);
         drop(held);
         reader.join().unwrap();
@@ -147,7 +148,7 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
                 "there is one master, and it spoke {silent_ns} ns before"
             );
         }
-        // Where masters stand still there may be a third reign, whose time is another.
+        // Where masters stand still there may be a third master, with another time.
         assert_kept("two parts that are one again", after, &time);
     });
 }

@@ -19,7 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 const ALL: [u8; NODES as usize] = [0, 1, 2];
-/// The clocks of two computers differ by at most so much, and their rates change by less than this swing brings: 470 ppb in a second.
+/// The clocks of two computers differ by at most so much, and their rates change by less than this swing brings: 470
+/// ppb in a second.
 const DRIFT_PPB: i64 = 100_000;
 const SWING_PPB: f64 = 1500.0;
 const DRIFTS: Duration = Duration::from_secs(5);
@@ -34,7 +35,7 @@ fn knows_its_rate(station: &Station) -> bool {
 }
 
 #[test]
-fn a_slave_whose_clock_drifts_and_changes_its_rate_keeps_its_slots() {
+fn a_slave_with_a_drifting_clock_keeps_its_slots() {
     repeated_on_stall(Watched::RealTime, || {
         let Some(mut segment) = Segment::at_rest(None) else { return };
         let Segment { stations, lab, .. } = &mut segment;
@@ -128,7 +129,7 @@ fn goes_on_behind_a_slow_bridge(segment: &Segment, listeners: &mut Listeners) ->
 }
 
 #[test]
-fn a_master_whose_packages_come_is_replaced_by_nobody_who_misses_its_syncs() {
+fn a_master_with_arriving_packages_is_not_replaced_for_missing_syncs() {
     repeated_on_stall(Watched::RealTime, || {
         let Some(segment) = Segment::start() else { return };
         assert!(

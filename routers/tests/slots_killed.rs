@@ -1,4 +1,5 @@
-//! The master of time slots dies, stands still or stumbles, as a process: the others go on in their slots and lose nothing.
+//! The master of time slots dies, stands still or stumbles, as a process: the others go on in their slots and lose
+//! nothing.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -20,7 +21,7 @@ use std::time::Duration;
 
 /// What the processes run.
 const PROCESS: &str = "in_a_process_of_its_own";
-/// This node is in this process, and never master: it sees who is.
+/// This node is in this process, and never master: it sees which node is.
 const WITNESS: u8 = 2;
 /// Longer than a takeover takes, and than anything may be late.
 const FROZEN: Duration = Duration::from_millis(500);
@@ -96,7 +97,7 @@ impl Scene {
         }
     }
 
-    /// Something happens to the master; who lives throughout loses nothing, and sends in its slots alone.
+    /// Something happens to the master; nodes that live throughout lose nothing, and send in their slots alone.
     fn round(&mut self, what: &str, happens: impl FnOnce(&mut Self, u8), ends: impl FnOnce(&mut Self, u8)) {
         let master = self.master();
         let others = [MASTERS[0] + MASTERS[1] - master, WITNESS];

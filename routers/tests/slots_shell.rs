@@ -70,7 +70,8 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
             stood_in > before.0 || missed > before.1,
             "it stood in before it took over, or woke up too late for that"
         );
-        // On a busy computer many wake-ups are late; that such slots are skipped is what keeps the frames above where they belong.
+        // On a busy computer many wake-ups are late; that such slots are skipped is what keeps the frames above where
+        // they belong.
         for station in others.map(|own| &segment.stations[usize::from(own)]) {
             let counts = station.slots().counts;
             assert!(counts.used > 0, "node {}: {counts:?}", station.own);
@@ -95,7 +96,7 @@ fn a_refusal_waits_for_a_slot() {
         let time = segment.stations[0].clock().record;
         segment.stations[2].shell = None;
         let capture = Capture::start(&segment.lab);
-        // In the place of node 2 now somebody speaks who has another configuration, and whenever he likes.
+        // In the place of node 2 there is now a sender with another configuration, which ignores slots.
         let stranger = segment.socket(2);
         let (mut heard, began) = ([0; 128], Instant::now());
         let refusals = loop {

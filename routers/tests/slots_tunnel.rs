@@ -1,13 +1,14 @@
-//! Ordinary traffic between nodes in time slots: somebody types, and a file is copied, through the tunnel, while declared flows keep what was
-//! computed for them.
+//! Ordinary traffic between nodes in time slots: somebody types, and a file is copied, through the tunnel, while
+//! declared flows keep what was computed for them.
 //!
 //! # How late a package is
-//! From its publishing to the moment at which the bridge sees it: that is what bounds are about, and no thread that wakes up is in it. On a
-//! computer with much to do the thread of the time slots comes too late now and then, and leaves a slot out; a bound holds for slots
-//! that are kept. So a package that is later than its bound counts only if all slots of its node that it could have taken were kept,
-//! as the bridge saw them; and as a thread may also lose its processor in the middle of a slot, which the bridge does not see, some may.
-//! How many depends on how busy the computer is, so flows are watched first without the tunnel's traffic. If that went before packages, a
-//! third of them would be later (it fills the slots of one node at a time).
+//! From its publishing to the moment at which the bridge sees it: that is what bounds are about, and no thread that
+//! wakes up is in it. On a computer with much to do the thread of the time slots comes too late now and then, and
+//! leaves a slot out; a bound holds for slots that are kept. So a package that is later than its bound counts only if
+//! all slots of its node that it could have taken were kept, as the bridge saw them; and as a thread may also lose its
+//! processor in the middle of a slot, which the bridge does not see, some may. How many depends on how busy the
+//! computer is, so flows are watched first without the tunnel's traffic. If that went before packages, a third of them
+//! would be later (it fills the slots of one node at a time).
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -46,18 +47,20 @@ const PERIOD: Duration = Duration::from_millis(23);
 const ALONE: Duration = Duration::from_secs(1);
 /// A slot was kept if its first frame was seen no later than a slot may begin, and the way to the bridge after.
 const KEPT: Duration = LATE.saturating_add(Duration::from_micros(60));
-/// Of the packages, so many more in a hundred may be later than their bounds than without the tunnel's traffic, although their slots seem
-/// to have been kept; and of that so many count at most.
+/// Of the packages, so many more in a hundred may be later than their bounds than without the tunnel's traffic,
+/// although their slots seem to have been kept; and of that so many count at most.
 const LATE_PERCENT: usize = 10;
 const LATE_ALONE_PERCENT_MAX: usize = 5;
 
 /// What a file would say of the segment, and of the flows.
 fn installation() -> Installation {
     let mut text = String::from(
-        "installation = \"segment\"\n[system]\nname = \"robot\"\nid = 1\n[network]\nsecurity = \"none\"\nmode = \"tdma\"\n\
+        "installation = \"segment\"\n[system]\nname = \"robot\"\nid = 1\n[network]\nsecurity = \"none\"\n\
+         mode = \"tdma\"\n\
          [classes]\nrouter = { id = 250, text = \"Carries packages\" }\nit = { id = 100, text = \"Some module\" }\n\
          tool = { id = 16, text = \"Programs run by hand\" }\n[time]\nsource = \"master\"\nmasters = [\"n0\", \"n1\"]\n\
-         [tdma]\ncycle = \"10 ms\"\nsynchronisation = \"1 ms\"\nguard = \"400 us\"\nlink = \"1 Gbit/s\"\ntunnel = \"10.78.0.0/24\"\n",
+         [tdma]\ncycle = \"10 ms\"\nsynchronisation = \"1 ms\"\nguard = \"400 us\"\nlink = \"1 Gbit/s\"\n\
+         tunnel = \"10.78.0.0/24\"\n",
     );
     for node in 0..NODES {
         let (address, tools, offset) = (node + 1, 16 * node, 3 + 2 * node);
@@ -99,7 +102,7 @@ fn publish(mut sender: Sender, flow: usize, ends: &AtomicBool) -> Vec<u64> {
     let (body, mut published) = (vec![7; bytes], Vec::new());
     while !ends.load(Ordering::Relaxed) {
         sender.send(&label(from, 100, published.len() as u16), &[&body]).unwrap();
-        // Behind it: who is kept up between the two must not look like a late router.
+        // Behind it: a process that is held up between the two must not look like a late router.
         published.push(monotonic_ns());
         std::thread::sleep(PERIOD);
     }
@@ -135,8 +138,8 @@ impl Come {
     }
 }
 
-/// Declared flows, until something is done; none of their packages is lost. How many of a hundred are later than their bounds although their
-/// slots were kept, of the flow of which most are.
+/// Declared flows, until something is done; none of their packages is lost. How many of a hundred are later than their
+/// bounds although their slots were kept, of the flow of which most are.
 fn late_percent(segment: &Segment, what: &str, mut is_done: impl FnMut() -> bool) -> usize {
     let bounds_ns = bounds_ns(segment);
     let time = segment.stations[0].clock().record;
@@ -169,8 +172,8 @@ fn late_percent(segment: &Segment, what: &str, mut is_done: impl FnMut() -> bool
         let mut latencies: Vec<_> = seen.iter().map(|(latency_ns, _)| *latency_ns as f64 / 1e6).collect();
         latencies.sort_by(f64::total_cmp);
         println!(
-            "{what}, flow {flow}: {} packages, p50 {:.2} ms, at most {:.2} ms; bound {:.2} ms, later {}, of these {late_in_kept} in slots \
-             that were kept",
+            "{what}, flow {flow}: {} packages, p50 {:.2} ms, at most {:.2} ms; bound {:.2} ms, later {}, of these {late_in_kept} \
+             in slots that were kept",
             seen.len(),
             latencies[seen.len() / 2],
             latencies[seen.len() - 1],
@@ -227,7 +230,8 @@ impl<'a> Bridge<'a> {
     }
 }
 
-/// Listens in the tunnel of node 1, and connects there from node 0: both ends, and from where the second was seen to come.
+/// Listens in the tunnel of node 1, and connects there from node 0: both ends, and from where the second was seen to
+/// come.
 fn connection(segment: &Segment, port: u16) -> (TcpStream, TcpStream) {
     let there = SocketAddr::from((TUNNEL.address(1), port));
     let listener = {

@@ -30,10 +30,10 @@ fn seldom() -> Tdma {
 #[test]
 fn role() {
     let Ok(said) = std::env::var(ROLE) else { return };
-    let [folder, first, second, life] = said.split(' ').collect::<Vec<_>>().try_into().unwrap();
+    let [folder, first, second, incarnation] = said.split(' ').collect::<Vec<_>>().try_into().unwrap();
     let addresses = [first, second].map(|address| address.parse::<IpAddr>().unwrap());
     let mut side = Side::new(0, Node::open(folder.as_ref()).unwrap(), addresses, Some(seldom()));
-    side.settings.incarnation = life.parse().unwrap();
+    side.settings.incarnation = incarnation.parse().unwrap();
     side.start();
     loop {
         std::thread::park();
@@ -49,9 +49,9 @@ impl Drop for Killed {
     }
 }
 
-fn start(side: &Side, life: u16) -> Killed {
+fn start(side: &Side, incarnation: u16) -> Killed {
     let [first, second] = [0, 1].map(|node: usize| side.settings.nodes[node].address);
-    let said = format!("{} {first} {second} {}", side.node.path().display(), 1000 + u64::from(life));
+    let said = format!("{} {first} {second} {}", side.node.path().display(), 1000 + u64::from(incarnation));
     let mut child = Command::new(std::env::current_exe().unwrap());
     child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, said);
     Killed(child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap())

@@ -1,4 +1,5 @@
-//! A device that stands still keeps up what is for its own peers: all others are sent to meanwhile, and are told that the node is there.
+//! A device that stands still keeps up what is for its own peers: all others are sent to meanwhile, and are told that
+//! the node is there.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -120,7 +121,7 @@ fn a_way_that_stands_still_keeps_nobody_else_waiting() {
                 let _ = flood.send(&label(module(0), 100, 0), &[&[7; 1400]]);
             }
             goes(1);
-            assert_ne!(shells[2].stats().state(0, monotonic_ns()), State::Silent, "who is still there says so");
+            assert_ne!(shells[2].stats().state(0, monotonic_ns()), State::Silent, "a living node says so");
         }
         assert_eq!(shells[2].stats().state(0, monotonic_ns()), State::Alive, "and was heard all the while");
         assert!(run(&lab, "ip link del slow0"), "the stall ends");

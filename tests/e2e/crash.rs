@@ -139,7 +139,7 @@ fn clean_keeps_the_packages_of_a_module_that_is_about_to_start_again() {
     wait("probe.0 is dead", || robot.process("probe.0").is_none().then_some(()));
     let call = robot.begin(&mut tool, "probe.0", COUNT, &(5u32,));
     assert!(place.say(&["clean"]).ok().contains("removed 0 mailboxes"));
-    let counted: u64 = tool.link.wait(call, |bytes| rohrpost::macro_support::from_bytes(bytes)).unwrap();
+    let counted: u64 = tool.link.wait(call, |bytes| rohrpost::wire::from_bytes(bytes)).unwrap();
     assert_eq!((counted, place.counted()), (1, vec![5]));
     tool.close();
     launch.stop();

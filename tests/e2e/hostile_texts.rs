@@ -3,10 +3,10 @@
 
 use crate::harness::{OUTPUT, PATIENCE, Place, wait};
 use rohrpost::interface::{Interface, Serve};
-use rohrpost::macro_support::append;
 use rohrpost::output::plain::is_obeyed;
 use rohrpost::parameter::{Parameter, ParameterSet, Refusal};
 use rohrpost::schema::{DataItem, Description, Field, Function, Members, Named, Schema, Type};
+use rohrpost::wire::append;
 use rohrpost::{Context, Fault, Module, ModuleError};
 use std::time::Duration;
 

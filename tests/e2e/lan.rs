@@ -5,7 +5,7 @@ use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait}
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Head, monotonic_ns};
@@ -266,10 +266,13 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
     // After a timeout the tool makes a new call: one call runs at most once.
     assert!((0..20).all(|number| counted.contains(&number)), "{counted:?}");
     // Known once it is clear that they are not just late.
-    wait("losses and copies are counted", || {
+    wait("losses and duplicates are counted", || {
         let told = lan.say(&["echo", "router.0", "links", "--count", "1", "--json"]).json();
         let peer = &told["value"]["peers"][0];
-        ["lost", "copies", "damaged"].iter().all(|count| peer[count].as_u64().unwrap() > 0).then_some(())
+        ["lost", "duplicates", "damaged"]
+            .iter()
+            .all(|count| peer["counters"][count].as_u64().unwrap() > 0)
+            .then_some(())
     });
     lan.stop();
 }
@@ -348,7 +351,10 @@ fn net_shows_what_was_refused_and_what_to_do() {
         assert!(text.contains(&words), "no `{words}` in:\n{text}");
     }
     let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
-    assert_eq!((&told[0]["links"]["peers"][0]["refused"], &told[0]["links"]["foreign"]), (&3.into(), &1.into()));
+    assert_eq!(
+        (&told[0]["links"]["peers"][0]["counters"]["refused"], &told[0]["links"]["foreign"]),
+        (&3.into(), &1.into())
+    );
     lan.stop();
 }
 

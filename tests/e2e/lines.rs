@@ -3,8 +3,8 @@
 use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, wait};
 use rohrpost::common::{DataHead, OutputLevel};
 use rohrpost::interfaces::{CollectorInterface, RefusedLines};
-use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::output::{LINES, OutputLine};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Class, ToolLink};
 use rohrpost_mailbox::{Label, Name, Options, Type};
 

@@ -4,8 +4,8 @@ use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
 use rohrpost::launcher::{LauncherInterface, LookError, LookPage, SnapshotRequest};
-use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::survey::{LookFailure, MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{FlowInfo, Name};
 use std::time::{Duration, Instant};
 

@@ -4,7 +4,7 @@ use crate::harness::{PATIENCE, Place, Robot, patient, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::Running;
 use rohrpost::common::{DataHead, SUBSCRIBE, Subscribe};
-use rohrpost::macro_support::append;
+use rohrpost::wire::append;
 use rohrpost_mailbox::{Receiver, local, monotonic_ns};
 use serde_json::Value;
 use std::time::Duration;

@@ -41,7 +41,7 @@ impl Raw {
 
     fn send_with(&mut self, function: u16, envelope: CallEnvelope, argument: impl Serialize) {
         let mut body = envelope.to_bytes().to_vec();
-        rohrpost::macro_support::append(&mut body, &(argument,)).unwrap();
+        rohrpost::wire::append(&mut body, &(argument,)).unwrap();
         let label = Label {
             from: self.replies.name(),
             kind: Type::command(function),
@@ -72,9 +72,9 @@ impl Raw {
         let package = self.replies.receive_timeout(PATIENCE).expect("no answer");
         let (envelope, result) = ReplyEnvelope::split(package.body()).unwrap();
         let result = if package.head().options.has(Options::ERROR) {
-            Err(rohrpost::macro_support::from_bytes(result).unwrap())
+            Err(rohrpost::wire::from_bytes(result).unwrap())
         } else {
-            Ok(rohrpost::macro_support::from_bytes(result).unwrap())
+            Ok(rohrpost::wire::from_bytes(result).unwrap())
         };
         (envelope, result)
     }
@@ -218,7 +218,7 @@ fn repeats_that_pile_up_before_a_stopped_server_run_once() {
 }
 
 fn begin(robot: &Robot, link: &mut Link, number: u32, timeout: Duration) -> Result<u32, CallError> {
-    let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(number,));
+    let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &(number,));
     link.begin(robot.name("probe.0"), COUNT, ProbingInterface::hash(), timeout, write)
 }
 
@@ -239,7 +239,7 @@ fn replies_that_find_no_room_are_asked_for_again_and_nothing_runs_twice() {
         // All have run, and seven answers found no room, before the first is taken.
         wait("the round has run", || (place.counted().len() >= (round as usize + 1) * 8).then_some(()));
         for call in calls {
-            match link.wait(call, |bytes| rohrpost::macro_support::from_bytes::<u64>(bytes)) {
+            match link.wait(call, |bytes| rohrpost::wire::from_bytes::<u64>(bytes)) {
                 Ok(answer) => assert!(answers.insert(answer), "{answer} was told to two calls"),
                 // On a busy computer both repeats may find no room.
                 Err(error) => assert!(matches!(error, CallError::Timeout(..)), "{error}"),
@@ -275,7 +275,7 @@ fn callers_in_a_crowd_before_a_small_mailbox_and_a_halting_server_never_run_twic
         let mut outcomes = Vec::new();
         for number in caller * 1000..caller * 1000 + each {
             let outcome = begin(&robot, &mut tool.link, number, timeout)
-                .and_then(|call| tool.link.wait(call, |bytes| rohrpost::macro_support::from_bytes::<u64>(bytes)));
+                .and_then(|call| tool.link.wait(call, |bytes| rohrpost::wire::from_bytes::<u64>(bytes)));
             if outcome.is_err() {
                 std::thread::sleep(Duration::from_millis(5));
             }

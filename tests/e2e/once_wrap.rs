@@ -20,7 +20,7 @@ fn calls_are_told_apart_where_their_numbers_wrap() {
             let calls: Vec<u32> =
                 (0..5).map(|call| robot.begin(&mut tool, "probe.0", COUNT, &(round * 5 + call,))).collect();
             for call in calls.into_iter().rev() {
-                told.push(tool.link.wait(call, |bytes| rohrpost::macro_support::from_bytes::<u64>(bytes)).unwrap());
+                told.push(tool.link.wait(call, |bytes| rohrpost::wire::from_bytes::<u64>(bytes)).unwrap());
             }
         }
         told.sort_unstable();
@@ -43,7 +43,7 @@ fn calls_with_equal_ids_have_their_own_answers() {
         calls.push(robot.begin(&mut tool, "probe.0", COUNT, &(number,)));
     }
     for (number, call) in calls.into_iter().enumerate().rev() {
-        let told = tool.link.wait(call, |bytes| rohrpost::macro_support::from_bytes::<u64>(bytes)).unwrap();
+        let told = tool.link.wait(call, |bytes| rohrpost::wire::from_bytes::<u64>(bytes)).unwrap();
         assert_eq!(told, number as u64 + 1);
     }
     assert_eq!(place.counted(), [0, 1, 2, 3]);

@@ -5,7 +5,7 @@ use crate::probe::{NEWEST, ProbingInterface, SWAPPED};
 use nix::sys::signal::Signal;
 use rohrpost::ToolLink;
 use rohrpost::common::{DataHead, GET_DATA, Refused, SUBSCRIBE, Subscribe};
-use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
 use rohrpost_modules::call::CallEnvelope;
 

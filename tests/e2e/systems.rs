@@ -5,7 +5,7 @@ use crate::harness::{NETWORK, Place, Robot, probe, skipped, wait};
 use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
 use rohrpost::CallError;
-use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

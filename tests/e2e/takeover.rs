@@ -7,8 +7,8 @@ use nix::sys::signal::Signal;
 use rohrpost::common::GET_DATA;
 use rohrpost::interface::DataPort;
 use rohrpost::interfaces::RouterInterface;
-use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::schema::Data;
+use rohrpost::wire::{append, from_bytes};
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::path::Path;
 use std::time::Duration;
@@ -116,7 +116,7 @@ fn settled(robots: &[Robot; 3]) -> Option<usize> {
 
 /// The demo with its master's router killed again and again; its output, and whether it ended well.
 fn killed_again(place: &Place) -> Option<Said> {
-    let demo = ["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet"];
+    let demo = ["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet", "-v"];
     let mut demo = Running::start(place.command(&demo));
     wait("all nodes run, or cannot", || {
         let all = NODES.iter().all(|node| demo.out().contains(&format!("node {node} of demo-tdma runs")));
@@ -182,7 +182,8 @@ fn ended_well(place: &Place, arguments: &[&str]) -> Option<Said> {
 fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
     repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
-        let arguments = ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "--kill-master"];
+        let arguments =
+            ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "-v", "--kill-master"];
         let Some(Said { out: said, .. }) = ended_well(&place, &arguments) else { return };
         for words in
             ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
@@ -208,7 +209,8 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
 fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
     repeated_on_stall(Watched::Ordinary, || {
         let place = Place::new();
-        let arguments = ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "--kill-master"];
+        let arguments =
+            ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "-v", "--kill-master"];
         let Some(Said { out, err, .. }) = ended_well(&place, &arguments) else { return };
         assert!(err.contains("is sealed with") || out.contains("is sealed with"), "{out}{err}");
         for words in

@@ -9,6 +9,7 @@
 mod drawings;
 mod launched;
 mod load;
+mod modules;
 mod own_view;
 mod picture;
 mod programs;

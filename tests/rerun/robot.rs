@@ -1,18 +1,14 @@
-//! A robot that measures itself: `source` sends beats, and everything that a bridge draws; `sink` reports their delay.
-//!
-//! Both are this test program itself, started by launch with the one test [`module`] to run.
+//! A robot that measures itself, and its configuration. Its modules are in `modules`.
 
-use super::load::on_one_processor;
+use super::modules::{BEAT, Mark, ReceivingInterface, SendingInterface, Times};
 use super::programs::bridge;
 use rohrpost::common::GET_DATA;
-use rohrpost::macro_support::{append, from_bytes};
-use rohrpost::serde::{Deserialize, de::DeserializeOwned};
-use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
-use rohrpost::{Context, Module, ModuleError, Name, Rate, Received, Subscription, ToolLink};
+use rohrpost::serde::de::DeserializeOwned;
+use rohrpost::types::LaserScan;
+use rohrpost::wire::{append, from_bytes};
+use rohrpost::{Name, ToolLink};
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{MailboxInfo, ModuleState, Node, monotonic_ns, node_directory};
-use std::io::{Read, Write};
-use std::net::TcpStream;
+use rohrpost_mailbox::{MailboxInfo, ModuleState, Node, node_directory};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -21,19 +17,6 @@ use tempfile::TempDir;
 
 /// Limit of all waits, long enough for a busy computer.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
-const BEAT: Duration = Duration::from_millis(5);
-/// Rows of data that are sent in a beat while there is a flood.
-const FLOOD: u64 = 8;
-
-/// Not a test: what launch starts. Run as a test it ends at once.
-#[test]
-fn module() {
-    let Some(name) = std::env::var_os("ROHRPOST_MODULE") else { return };
-    let is_source = name.to_string_lossy().starts_with("source");
-    let run = || if is_source { rohrpost::run::<Source>() } else { rohrpost::run::<Sink>() };
-    let code = on_one_processor(run);
-    std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
-}
 
 /// Waits until there is a value, and fails with the name of what was awaited.
 #[track_caller]
@@ -45,197 +28,6 @@ pub(crate) fn wait<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
         }
         assert!(start.elapsed() < PATIENCE, "waited {PATIENCE:?} in vain: {what}");
         std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
-/// An event, as an entity of its own in a drawing.
-#[rohrpost::data]
-#[derive(Clone, Debug)]
-pub(crate) enum Mark {
-    /// The beginning.
-    Begun(u64),
-    /// The viewer was frozen for a while.
-    Frozen(u64),
-    /// The viewer was killed and another one started.
-    Killed(u64),
-    /// The same in a flood.
-    Flooded(u64),
-}
-
-/// Delays of beats.
-#[rohrpost::data]
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Times {
-    /// Beats since the last question.
-    pub(crate) beats: u64,
-    /// From the time when a beat was due to its receipt, ns; the median.
-    pub(crate) p50_ns: u64,
-    /// Beats lost since the start.
-    pub(crate) lost: u64,
-}
-
-/// Sends.
-#[rohrpost::interface(class = "source")]
-pub(crate) trait Sending {
-    /// Sends a mark.
-    #[command(16)]
-    fn mark(&mut self, mark: Mark);
-
-    /// Begins or ends a flood of other data.
-    #[command(17)]
-    fn flood(&mut self, on: bool);
-
-    /// When the beat was due, on the monotonic clock.
-    #[data(1)]
-    fn beat() -> u64;
-
-    #[data(2)]
-    fn scan() -> LaserScan;
-
-    #[data(3)]
-    fn odometry() -> Odometry;
-
-    #[data(4)]
-    fn map() -> OccupancyGrid;
-
-    #[data(5)]
-    fn marks() -> Mark;
-
-    #[data(6)]
-    fn noise() -> Vec<u64>;
-}
-
-/// Receives.
-#[rohrpost::interface(class = "sink")]
-pub(crate) trait Receiving {
-    /// Figures since the last question.
-    #[command(16)]
-    fn take(&mut self) -> Times;
-}
-
-#[derive(Deserialize)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields, rename_all = "kebab-case")]
-struct SourceSettings {
-    /// Ask the viewer at this port before each beat, as a robot must never do: it shows that the test can fail.
-    ask_viewer: Option<u16>,
-}
-
-struct Source {
-    settings: SourceSettings,
-    /// On the monotonic clock, which ticks go by too.
-    began_ns: Option<u64>,
-    beats: u64,
-    mark: Option<Mark>,
-    flood: bool,
-}
-
-impl Module for Source {
-    type Settings = SourceSettings;
-    type Interfaces = SendingInterface;
-
-    fn new(settings: SourceSettings, context: &mut Context) -> Result<Self, ModuleError> {
-        context.set_period(BEAT);
-        Ok(Self { settings, began_ns: None, beats: 0, mark: None, flood: false })
-    }
-
-    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        let Some(began_ns) = self.began_ns else {
-            // Beats are due from here on: the first tick was late, and would set the grid of all others.
-            self.began_ns = Some(monotonic_ns());
-            context.set_period(BEAT);
-            return Ok(());
-        };
-        let beat_ns = BEAT.as_nanos() as u64;
-        let due_ns = began_ns + (monotonic_ns() - began_ns) / beat_ns * beat_ns;
-        if let Some(port) = self.settings.ask_viewer {
-            ask(port);
-        }
-        context.publish_now(SendingInterface::BEAT, &due_ns)?;
-        self.beats += 1;
-        let turn = self.beats as f32 * 0.01;
-        if self.beats.is_multiple_of(5) {
-            let ranges_m = (0..361).map(|beam| 3.0 + (turn + beam as f32 * 0.1).sin()).collect();
-            let scan = LaserScan { start_rad: -1.5, step_rad: 0.01, range_max_m: 8.0, ranges_m, pose: None };
-            context.publish_now(SendingInterface::SCAN, &scan)?;
-            let pose = Pose { x_m: f64::from(turn.cos()), y_m: f64::from(turn.sin()), heading_rad: f64::from(turn) };
-            context.publish_now(SendingInterface::ODOMETRY, &Odometry { pose, twist: Twist::default() })?;
-        }
-        if self.beats.is_multiple_of(20) {
-            context.publish_now(SendingInterface::MAP, &patch(self.beats / 20))?;
-        }
-        if let Some(mark) = self.mark.take() {
-            context.publish_now(SendingInterface::MARKS, &mark)?;
-        }
-        for _ in 0..if self.flood { FLOOD } else { 0 } {
-            context.publish_now(SendingInterface::NOISE, &vec![self.beats; 60])?;
-        }
-        Ok(())
-    }
-}
-
-/// One of 64 patches of a map, in turn.
-fn patch(number: u64) -> OccupancyGrid {
-    let (column, row) = (number % 8, number / 8 % 8);
-    let origin = Pose { x_m: column as f64 * 3.2, y_m: row as f64 * 3.2, heading_rad: 0.0 };
-    let cells = (0..64 * 64).map(|cell| if (cell + number).is_multiple_of(7) { 100 } else { 0 }).collect();
-    OccupancyGrid { origin, resolution_m: 0.05, columns: 64, rows: 64, cells }
-}
-
-/// A call as a module would make it, with a module's timeout.
-fn ask(port: u16) {
-    let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", port)) else { return };
-    let _ = viewer.set_read_timeout(Some(4 * BEAT));
-    let _ = viewer.write_all(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n");
-    let _ = viewer.read(&mut [0; 9]);
-}
-
-impl Sending for Source {
-    fn mark(&mut self, mark: Mark) {
-        self.mark = Some(mark);
-    }
-
-    fn flood(&mut self, on: bool) {
-        self.flood = on;
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(crate = "rohrpost::serde", deny_unknown_fields)]
-struct SinkSettings {}
-
-struct Sink {
-    beat: Subscription<u64>,
-    late_ns: Vec<u64>,
-    expected: u32,
-    lost: u64,
-}
-
-impl Module for Sink {
-    type Settings = SinkSettings;
-    type Interfaces = ReceivingInterface;
-
-    fn new(_: SinkSettings, context: &mut Context) -> Result<Self, ModuleError> {
-        let beat = context.subscribe(SendingInterface::BEAT, "source.0", Rate::Each)?;
-        Ok(Self { beat, late_ns: Vec::new(), expected: 0, lost: 0 })
-    }
-
-    fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if let Some(due_ns) = data.read(&self.beat)? {
-            self.late_ns.push(monotonic_ns() - due_ns);
-            self.lost += u64::from(data.head.sequence.wrapping_sub(self.expected));
-            self.expected = data.head.sequence + 1;
-        }
-        Ok(())
-    }
-}
-
-impl Receiving for Sink {
-    fn take(&mut self) -> Times {
-        self.late_ns.sort_unstable();
-        let p50_ns = self.late_ns.get(self.late_ns.len() / 2).copied().unwrap_or(0);
-        let beats = self.late_ns.len() as u64;
-        self.late_ns.clear();
-        Times { beats, p50_ns, lost: self.lost }
     }
 }
 
@@ -323,7 +115,7 @@ impl Robot {
         self.node.participants().into_iter().find(|p| p.module == gui).unwrap().pid
     }
 
-    /// Time of the newest published scan, ns since 1970: it has been sent to all subscribers of each scan.
+    /// Time of the newest scan that was published, ns since 1970. Each subscriber with `Rate::Each` has been sent it.
     pub(crate) fn newest_scan_ns(&mut self) -> u64 {
         let (source, scan) = (self.name("source.0"), SendingInterface::SCAN.number);
         let write = |body: &mut Vec<u8>| append(body, &(scan,));
@@ -397,7 +189,7 @@ impl Drop for Robot {
 /// No real-time scheduling, so that it runs where that is not allowed, and so that the bridge's load has an effect.
 fn configuration(drawing: &str, settings: &str) -> String {
     let me = std::env::current_exe().unwrap();
-    let program = format!("[{me:?}, \"--exact\", \"robot::module\", \"--nocapture\"]");
+    let program = format!("[{me:?}, \"--exact\", \"modules::module\", \"--nocapture\"]");
     let bridge = bridge();
     format!(
         r#"

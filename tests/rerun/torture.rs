@@ -13,7 +13,8 @@
 //! often, and applies the narrow one.
 
 use super::load::{Load, on_one_processor};
-use super::robot::{Mark, Robot};
+use super::modules::Mark;
+use super::robot::Robot;
 use super::viewer::{Viewer, free_port};
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};

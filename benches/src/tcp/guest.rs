@@ -53,7 +53,7 @@ impl Guest {
             reaches_own: false,
             common,
             system_digest: 1,
-            life: u64::from(index) + 1,
+            incarnation: u64::from(index) + 1,
             quota_bytes: QUOTA_BYTES,
             levels: LEVELS,
             admission: Admission::default(),

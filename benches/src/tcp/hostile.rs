@@ -101,7 +101,7 @@ fn hello() -> Vec<u8> {
         reaches_own: false,
         common: digest,
         system_digest: digest,
-        life: 1,
+        incarnation: 1,
         attempt: 1,
         asked_ns: 0,
         name: "nobody",

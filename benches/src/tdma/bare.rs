@@ -9,7 +9,7 @@ use super::stage::{NODES, Stage};
 use crate::Failure;
 use crate::harness::{Child, Gate, Samples, Shared, rest};
 use rohrpost_mailbox::{monotonic_ns, sys};
-use rohrpost_routers::shell::spin_ns;
+use rohrpost_routers::driver::spin_ns;
 use rohrpost_routers::tdma::{GATE_NS, Kind, Window};
 use rohrpost_routers::time::TIME_BYTES;
 use std::time::Duration;

@@ -1,9 +1,9 @@
 //! What went between the nodes of the demo, and whether nothing was forgotten.
 
 use crate::summary::class_name;
-use crate::table::{table, time};
+use crate::table::{counted, table, time};
 use rohrpost::Class;
-use rohrpost::interfaces::{Carried, ClassCarried, Links, PeerLink};
+use rohrpost::interfaces::{ClassCarried, Links, PeerLink};
 use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -105,7 +105,7 @@ impl fmt::Display for Balance {
         let Self { taken, delivered, lost, on_wire, datagrams, died, wrong } = self;
         writeln!(
             f,
-            "packages to other nodes: {taken}; delivered: {delivered}; lost in routers, for the causes above: {lost}\n\
+            "packages to other nodes: {taken}; delivered: {delivered}; lost in routers, for the causes below: {lost}\n\
              lost on the wire: {on_wire}; datagrams that did not come whole: {datagrams}"
         )?;
         if !died.is_empty() {
@@ -128,30 +128,27 @@ fn lost_of(class: &ClassCarried) -> u64 {
 
 /// Datagrams from a peer that did not come whole.
 fn gone(peer: &PeerLink) -> u64 {
-    peer.lost + peer.damaged
+    peer.counters.lost + peer.counters.damaged
 }
 
 /// A row for each class and node.
 pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
-    let mut rows: Vec<(u8, [String; 10])> = Vec::new();
+    let mut rows: Vec<(u8, [String; 8])> = Vec::new();
     for node in links {
         for class in &node.classes {
-            let ages = class.age.map_or(["-".into(), "-".into(), "-".into()], |age| {
-                [age.p50_ns, age.p99_ns, age.max_ns].map(|ns| time(Duration::from_nanos(ns)))
-            });
-            let [p50, p99, max] = ages;
+            let age = class.age.map_or("-".into(), |age| time(Duration::from_nanos(age.p99_ns)));
             let lost = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause));
             let lost: Vec<String> = lost.collect();
             let counts = [class.taken, class.sent, class.came, class.delivered].map(|count| count.to_string());
             let [taken, sent, came, delivered] = counts;
             let name = class_name(installation, Some(Class(class.class)));
             let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
-            rows.push((class.class, [name, node.node.clone(), taken, sent, came, delivered, lost, p50, p99, max]));
+            rows.push((class.class, [name, node.node.clone(), taken, sent, came, delivered, age, lost]));
         }
     }
     rows.sort_by_key(|(class, _)| std::cmp::Reverse(*class));
     table(
-        ["class", "node", ">taken", ">sent", ">came", ">delivered", "lost", ">age p50", ">p99", ">max"],
+        ["class", "node", ">taken", ">sent", ">came", ">delivered", ">age p99", "lost"],
         rows.into_iter().map(|(_, row)| row),
     )
 }
@@ -160,26 +157,16 @@ pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
 pub(super) fn by_link(links: &[Links]) -> String {
     let pairs = links.iter().flat_map(|to| to.peers.iter().map(move |from| (from, to)));
     let rows = pairs.map(|(from, to)| {
-        let Carried { packages, datagrams, bytes, parts } = from.received;
-        [
-            format!("{} → {}", from.node, to.node),
-            packages.to_string(),
-            datagrams.to_string(),
-            format!("{} KiB", bytes.div_ceil(1 << 10)),
-            parts.to_string(),
-            from.lost.to_string(),
-            from.damaged.to_string(),
-            from.copies.to_string(),
-            from.overtaken.to_string(),
-        ]
+        let [packages, datagrams] = [from.received.packages, from.received.datagrams].map(|count| count.to_string());
+        [format!("{} → {}", from.node, to.node), packages, datagrams, counted(&from.counters)]
     });
-    table(["link", ">packages", ">datagrams", ">bytes", ">parts", ">lost", ">damaged", ">copies", ">overtaken"], rows)
+    table(["link", ">packages", ">datagrams", "counted"], rows)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost::interfaces::{CarriedLoss, LinkState};
+    use rohrpost::interfaces::{Carried, CarriedLoss, LinkCounters, LinkState};
 
     const TOOL: u8 = 16;
 
@@ -198,14 +185,7 @@ mod tests {
             heard_ms: Some(1),
             sent: carried(sent),
             received: carried(received),
-            unsent: 0,
-            lost,
-            missed: 0,
-            copies: 0,
-            damaged: 0,
-            overtaken: 0,
-            refused: 0,
-            restarts: 0,
+            counters: LinkCounters { lost, ..LinkCounters::default() },
         }
     }
 

@@ -56,6 +56,9 @@ pub(crate) struct Arguments {
     /// No live table, only what happens.
     #[arg(long)]
     pub(super) quiet: bool,
+    /// The summary of several nodes with mailboxes, links, time slots and declared flows.
+    #[arg(long, short, requires = "nodes")]
+    pub(super) verbose: bool,
 }
 
 /// How a node is joined to the others.

@@ -5,7 +5,7 @@ use crate::table::{table, time};
 use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{BeyondLink, BeyondState, ClassPassed, TcpInterface};
-use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Class, ToolLink};
 use rohrpost_config::Installation;
 use std::collections::BTreeMap;

@@ -16,8 +16,8 @@ use crate::{flows, slots};
 use rohrpost::common::{GET_DATA, State};
 use rohrpost::interface::{DataPort, Interface};
 use rohrpost::interfaces::{CartographerInterface, FlowStates, Links, MapCounts, RouterInterface, SlotState};
-use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::survey::Survey;
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{ClassTraffic, Node, SystemClock, TimeSource, monotonic_ns, node_directory};
@@ -47,7 +47,8 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     let mut nodes = LaunchedNodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
     let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == Joined::Tcp)];
     let victims = victims.into_iter().filter(|(_, is_one)| *is_one).map(|(victim, _)| victim).collect();
-    let summary = watch(&mut nodes, &installation, long, victims).map(|seen| summary(&installation, &seen?));
+    let summary =
+        watch(&mut nodes, &installation, long, victims).map(|seen| summary(&installation, &seen?, arguments.verbose));
     let code = nodes.stop();
     speech.settle();
     let Some(summary) = summary else { return Ok(ExitCode::FAILURE) };
@@ -91,8 +92,8 @@ fn watch(
     Some(watch.end())
 }
 
-/// All there is to say at the end, and whether all is well.
-fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord) -> Result<(String, bool), Failure> {
+/// The summary, its verdict first, and whether all is well.
+fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: bool) -> Result<(String, bool), Failure> {
     let open = |node: &rohrpost_config::Node| Node::open(&node_directory(&installation.name, &node.name));
     let nodes = installation.nodes.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let (first, name) = (&nodes[0], &installation.nodes[0].name);
@@ -115,14 +116,28 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord) -> Result<(S
     let losses = losses.table(installation, &mut vocabulary, |module| tool.describe(module).ok());
     tool.close();
     let balance = Balance::of(&links, installation.classes.tool().0, &died);
-    let mut text = String::from("In the mailboxes of all nodes, and how long packages waited there:\n\n");
-    text += &print_classes(installation, &classes(&surveys));
-    text += "(data and replies carry the class of the module that asked for them)\n";
-    text += "\nOver the network, by class and node; age: from the stamp of data to the mailbox on the other node:\n\n";
+    let well = errors.is_empty() && clocks_hold && balance.holds() && seen.is_well() && beyond::is_well(&beyond);
+    let verdict = if well { "The demo went well." } else { "The demo did not go well." };
+    let mut text = format!("{verdict}\n\n{balance}\n{clocks}");
+    let deaths = seen.text();
+    if !deaths.is_empty() {
+        text += &format!("\n{deaths}\n");
+    }
+    text += &map;
+    for error in &errors {
+        text += &format!("{error}\n");
+    }
+    text += "\nOver the network; age: from the stamp of data to the mailbox on the other node:\n\n";
     text += &account::by_class(installation, &links);
+    text += &beyond::text(installation, &beyond, seen.tcp_router_died());
+    if !verbose {
+        return Ok((text, well));
+    }
     text += "\nOn the wire:\n\n";
     text += &account::by_link(&links);
-    text += &beyond::text(installation, &beyond, seen.tcp_router_died());
+    text += "\nIn the mailboxes of all nodes, and how long packages waited there:\n\n";
+    text += &print_classes(installation, &classes(&surveys));
+    text += "(data and replies carry the class of the module that asked for them)\n";
     if !kept.is_empty() {
         text += "\nIn time slots; off: how far the last frames were from the beginnings of their slots:\n\n";
         text += &slots::kept(&kept);
@@ -132,19 +147,11 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord) -> Result<(S
             &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
     }
     if !installation.flows.is_empty() {
-        text += "\nDeclared flows from end to end, as the modules themselves have counted; too late: answered, but after the caller's time:\n\n";
+        text +=
+            "\nDeclared flows from end to end, as modules count them; too late: answered after the caller's time:\n\n";
         text += &losses;
     }
-    text += &format!("\n{balance}\n{clocks}");
-    let deaths = seen.text();
-    if !deaths.is_empty() {
-        text += &format!("\n{deaths}\n");
-    }
-    text += &map;
-    for error in &errors {
-        text += &format!("{error}\n");
-    }
-    Ok((text, errors.is_empty() && clocks_hold && balance.holds() && seen.is_well() && beyond::is_well(&beyond)))
+    Ok((text, well))
 }
 
 /// What the mailboxes of all nodes did.

@@ -4,7 +4,7 @@ use crate::router::keys;
 use crate::terminal::Failure;
 use rohrpost_config::Installation;
 use rohrpost_routers::frame::FrameHead;
-use rohrpost_routers::security::{Opening, PeerSessions, Port, TAG_BYTES, Who};
+use rohrpost_routers::security::{Opening, PeerSessions, Port, RouterIdentity, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::time::TIME_BYTES;
 use rohrpost_routers::time::message::Message;
@@ -25,7 +25,7 @@ impl SealedCapture {
         for node in installation.lan_nodes() {
             let Some(keys) = keys::of(installation)? else { break };
             let settings = Settings::new(installation, &node.name, MUTE)?;
-            nodes.push(Opening::new(&PeerSessions::new(Who::of(&settings), keys), Port::Time));
+            nodes.push(Opening::new(&PeerSessions::new(RouterIdentity::of(&settings), keys), Port::Time));
         }
         Ok(Self { nodes })
     }

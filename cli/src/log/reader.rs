@@ -52,8 +52,8 @@ impl<'a> Reader<'a> {
 
     fn page(&self, tool: &mut ToolLink) -> Result<Page, CallError> {
         let from = self.next;
-        let write = |body: &mut Vec<u8>| rohrpost::macro_support::append(body, &(from,));
-        let read = |bytes: &[u8]| rohrpost::macro_support::from_bytes::<Page>(bytes);
+        let write = |body: &mut Vec<u8>| rohrpost::wire::append(body, &(from,));
+        let read = |bytes: &[u8]| rohrpost::wire::from_bytes::<Page>(bytes);
         tool.call(self.collector, LINES_FROM, CollectorInterface::hash(), write, read)
     }
 

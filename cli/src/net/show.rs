@@ -4,7 +4,7 @@ use super::beyond;
 use super::node_report::NodeReport;
 use crate::flows;
 use crate::slots::kept;
-use crate::table::{table, time};
+use crate::table::{counted, table, time};
 use crate::target::Running;
 use crate::units::{bytes, fine};
 use crate::vocabulary::Vocabulary;
@@ -64,23 +64,14 @@ fn links(all: &[NodeReport]) -> String {
                 bytes_s(rates.map(|rates| rates.sent_bytes_s)),
                 rate(rates.map(|rates| rates.received_packages_s)),
                 bytes_s(rates.map(|rates| rates.received_bytes_s)),
-                peer.lost.to_string(),
-                peer.missed.to_string(),
-                peer.copies.to_string(),
-                peer.damaged.to_string(),
-                peer.refused.to_string(),
-                peer.unsent.to_string(),
+                counted(&peer.counters),
             ]);
         }
     }
     if rows.is_empty() {
         return String::new();
     }
-    let heads = [
-        "node", "peer", "state", ">heard", ">out/s", ">B/s", ">in/s", ">B/s", ">lost", ">missed", ">copies",
-        ">damaged", ">refused", ">unsent",
-    ];
-    table(heads, rows)
+    table(["node", "peer", "state", ">heard", ">out/s", ">B/s", ">in/s", ">B/s", "counted"], rows)
 }
 
 fn state(state: LinkState) -> &'static str {
@@ -97,12 +88,12 @@ fn state(state: LinkState) -> &'static str {
 fn strangers(all: &[NodeReport]) -> String {
     let mut text = String::new();
     for links in all.iter().filter_map(|told| told.links.as_ref()) {
-        for peer in links.peers.iter().filter(|peer| peer.refused > 0) {
+        for peer in links.peers.iter().filter(|peer| peer.counters.refused > 0) {
             text += &format!(
                 "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or version (launch all \
                  nodes from the same file; `rohrpost version`), or of a router of it that is over\n",
                 links.node,
-                datagrams(peer.refused),
+                datagrams(peer.counters.refused),
                 peer.address,
                 peer.node
             );

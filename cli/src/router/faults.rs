@@ -58,7 +58,7 @@ impl Faults for Encoded {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost::macro_support::append;
+    use rohrpost::wire::append;
     use rohrpost_modules::call::ReplyEnvelope;
     use rohrpost_routers::frame::Reason;
     use rohrpost_routers::report::Mismatch;

@@ -1,7 +1,8 @@
 //! A router's counters, as it publishes them.
 
 use rohrpost::interfaces::{
-    Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkState, Links, PeerLink, Rejected, SocketFailure,
+    Age, Carried, CarriedLoss, ClassCarried, LevelWaiting, LinkCounters, LinkState, Links, PeerLink, Rejected,
+    SocketFailure,
 };
 use rohrpost_mailbox::{Class, Latency, Priority, monotonic_ns};
 use rohrpost_network::LEVELS;
@@ -85,22 +86,24 @@ fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
             packages: sent(|sent| &sent.packages),
             datagrams: sent(|sent| &sent.datagrams),
             bytes: sent(|sent| &sent.bytes),
-            parts: sent(|sent| &sent.fragments),
+            fragments: sent(|sent| &sent.fragments),
         },
         received: Carried {
             packages: received(|received| &received.packages),
             datagrams: received(|received| &received.datagrams),
             bytes: received(|received| &received.bytes),
-            parts: received(|received| &received.fragments),
+            fragments: received(|received| &received.fragments),
         },
-        unsent: sent(|sent| &sent.unsent),
-        lost: of_peer(|peer| peer.received.missing()),
-        missed: of_peer(|peer| peer.link.missed_by_it.get()),
-        copies: received(|received| &received.copies),
-        damaged: received(|received| &received.damaged),
-        overtaken: received(|received| &received.overtaken),
-        refused: of_peer(|peer| peer.received.refused.get() + peer.received.old.get()),
-        restarts: counts.received.restarts.get(),
+        counters: LinkCounters {
+            lost: of_peer(|peer| peer.received.missing()),
+            missed: of_peer(|peer| peer.link.missed_by_it.get()),
+            duplicates: received(|received| &received.duplicates),
+            reordered: received(|received| &received.reordered),
+            damaged: received(|received| &received.damaged),
+            refused: of_peer(|peer| peer.received.refused.get() + peer.received.old.get()),
+            unsent: sent(|sent| &sent.unsent),
+            restarts: counts.received.restarts.get(),
+        },
     }
 }
 

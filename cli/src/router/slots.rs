@@ -1,8 +1,9 @@
 //! How it keeps its time slots, as a router publishes it.
 
 use rohrpost::interfaces::{SlotState, SlotUse, TunnelState};
+use rohrpost_routers::driver::Used;
 use rohrpost_routers::shell::Shell;
-use rohrpost_routers::shell::slots::{State, Used};
+use rohrpost_routers::shell::slots::State;
 use rohrpost_routers::shell::tunnel::Passed;
 use rohrpost_routers::tdma::Kind;
 

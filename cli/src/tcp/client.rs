@@ -39,7 +39,7 @@ impl Module for ClientModule {
             reaches_own: !is_beyond,
             common: digest.common,
             system_digest: digest.system,
-            life: realtime_ns().max(1),
+            incarnation: realtime_ns().max(1),
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
             admission: Admission::new(installation, &node_name),

@@ -45,7 +45,7 @@ impl Module for ServerModule {
             common: digest.common,
             system: Some((installation.system.id, digest.system)),
             own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
-            life: realtime_ns().max(1),
+            incarnation: realtime_ns().max(1),
             clients_max: tcp.clients,
             greetings_max: tcp.clients.max(GREETINGS_MIN),
             quota_bytes: tcp.quota_bytes,
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::tcp::ends::NAME_BYTES_MAX;
     use rohrpost::interfaces::{CarriedLoss, ClassPassed};
-    use rohrpost::macro_support::append;
+    use rohrpost::wire::append;
     use rohrpost_routers::session::Cause;
     use rohrpost_routers::tcp::MEMBERS_MAX;
 

@@ -7,8 +7,8 @@ use rohrpost::CallError;
 use rohrpost::common::{self, Status};
 use rohrpost::interfaces::{CollectorInterface, Page};
 use rohrpost::launcher::{ControlError, SnapshotRequest, launcher_of};
-use rohrpost::macro_support::{append, from_bytes};
 use rohrpost::survey::{Distant, Scope, Snapshot, Survey};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Name, ToolLink};
 use std::time::Duration;
 

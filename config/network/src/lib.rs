@@ -1,11 +1,12 @@
-//! What the network between nodes is, for those who plan it and for those who send: sizes of frames, the link, the table of time slots, what has
-//! room in it, and how late a package can be.
+//! The network between nodes, for its planning and for the routers: sizes of frames, the link, the table of time slots,
+//! the room in it, and bounds of delays.
 //!
 //! ```text
 //!  sizes ◀── setup, table ◀── link, room ◀── plan ◀── bounds, remedy
 //! ```
 //!
-//! `config` reads all of this from a file and says in words what does not fit; `routers` send by it. There is no file here, and no socket.
+//! `config` reads all of this from a file and reports mistakes; `routers` send by it. There is no file here, and no
+//! socket.
 #![forbid(unsafe_code)]
 
 mod bounds;

@@ -1,4 +1,4 @@
-//! What packages and the routers' own datagrams take of a link.
+//! Transmission times of packages and of the routers' own datagrams on a link.
 
 use crate::setup::{Network, Security};
 use crate::sizes::{
@@ -8,12 +8,13 @@ use crate::sizes::{
 use crate::table::{LATE, Tdma};
 use rohrpost_mailbox::HEAD_BYTES as PACKAGE_HEAD_BYTES;
 
-/// What of time goes in the windows of a system with time slots: the rule by which clocks send, and bounds are computed.
+/// Frames of time in the windows of a system with time slots: the rule for clocks, and for bounds.
 ///
-/// In each of its synchronisation windows the master sends a Sync to every other node. If the window has room for twice as many frames,
-/// a warm-up goes before each of them; if it has room for a reply to each besides, replies go there too, and nowhere else; otherwise in slots of
-/// the master, before all else. A slave sends a warm-up and a request in a slot, before all else, at most once in a cycle; who hears no master a
-/// request to each master. A window has room for what is through before its guard also when it is begun [`LATE`].
+/// In each of its synchronisation windows the master sends a Sync to every other node. If the window has room for twice
+/// as many frames, a warm-up goes before each of them. If it has room for a reply to each besides, replies go there
+/// only, else in slots of the master, before all else. A slave sends a warm-up and a request in a slot, before all
+/// else, at most once in a cycle. A node that hears no master sends a request to each master. A window has room for
+/// frames that end before its guard even if it begins [`LATE`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TimeShare {
     /// A warm-up goes before each Sync.
@@ -25,7 +26,7 @@ pub struct TimeShare {
 }
 
 impl TimeShare {
-    /// `heads_bytes`: what is around each datagram, see [`Network::around_bytes`].
+    /// `heads_bytes`: headers and seal of each datagram, see [`Network::around_bytes`].
     pub fn new(tdma: &Tdma, heads_bytes: usize, nodes: usize, masters: usize) -> Self {
         let bytes_s = tdma.link_bytes_s.max(1);
         Link { bytes_s, heads_bytes, datagram_bytes_max: 0, answer_bytes: 0, nodes, masters }.time_share(tdma)
@@ -39,13 +40,13 @@ fn answer_bytes(security: Security) -> usize {
     }
 }
 
-/// The link of a system with time slots, and how many are at it.
+/// The link of a system with time slots, and the number of its nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct Link {
     bytes_s: u64,
     heads_bytes: usize,
     datagram_bytes_max: usize,
-    /// Of what goes once in a slot to whoever is not known: a refusal, or a hello.
+    /// Largest message that goes once in a slot to an unknown node: a refusal, or a hello.
     answer_bytes: usize,
     nodes: usize,
     masters: usize,
@@ -74,7 +75,7 @@ impl Link {
         self.masters
     }
 
-    /// How long the wire carries a datagram, ns.
+    /// Time of a datagram on the wire, ns.
     pub fn wire_ns(&self, datagram_bytes: usize) -> u64 {
         let bytes = (datagram_bytes + self.heads_bytes + ETHERNET_BYTES) as u64;
         (bytes * 1_000_000_000).div_ceil(self.bytes_s)
@@ -95,17 +96,17 @@ impl Link {
         self.takes_ns(FRAME_HEAD_BYTES + TIME_BYTES)
     }
 
-    /// How long the wire carries one, ns.
+    /// Its time on the wire, ns.
     pub fn time_wire_ns(&self) -> u64 {
         self.wire_ns(FRAME_HEAD_BYTES + TIME_BYTES)
     }
 
-    /// How long one that says "still there" keeps a slot busy, ns.
+    /// How long a keep-alive keeps a slot busy, ns.
     pub fn alive_ns(&self) -> u64 {
         self.takes_ns(FRAME_HEAD_BYTES + ALIVE_BYTES)
     }
 
-    /// What of time goes where.
+    /// Which frames of time go where.
     fn time_share(&self, tdma: &Tdma) -> TimeShare {
         let others = self.others();
         let sends_ns = tdma.synchronisation.saturating_sub(tdma.guard + LATE).as_nanos() as u64;
@@ -116,15 +117,15 @@ impl Link {
         TimeShare { warm_ups: frames >= 2 * others, replies_in_synchronisation, frames_in_slot }
     }
 
-    /// What routers say to each other in a slot at most, before any package, ns: frames of time, one to each other node that says "still
-    /// there", and a refusal or a hello.
+    /// Longest time of the routers' own messages in a slot, before any package, ns: frames of time, a keep-alive to
+    /// each other node, and a refusal or a hello.
     pub fn said_ns(&self, tdma: &Tdma) -> u64 {
         let answer_ns = self.takes_ns(FRAME_HEAD_BYTES + self.answer_bytes);
         let frames = self.time_share(tdma).frames_in_slot;
         frames as u64 * self.time_ns() + self.others() as u64 * self.alive_ns() + answer_ns
     }
 
-    /// What the datagrams of a package take, none of them shared with another package.
+    /// Time of a package's datagrams, if none of them is shared with another package.
     pub fn package(&self, body_bytes: usize) -> Parcel {
         let whole = FRAME_HEAD_BYTES + PACKAGE_HEAD_BYTES + body_bytes;
         if whole <= self.datagram_bytes_max {
@@ -150,7 +151,7 @@ impl Link {
     }
 }
 
-/// What a package takes of slots, in ns.
+/// Time of a package in slots, in ns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Parcel {
     /// Number of its datagrams.
@@ -159,9 +160,9 @@ pub struct Parcel {
     pub takes_ns: u64,
     /// The largest of them.
     pub largest_ns: u64,
-    /// Of the last one, what is its own.
+    /// Its own part of the last one.
     pub end_ns: u64,
-    /// The last one with all that may be in it.
+    /// The last one with all that may share it.
     pub last_ns: u64,
     /// The last one from a switch to the receiver.
     pub forward_ns: u64,

@@ -1,18 +1,18 @@
-//! What a system with time slots is planned for: its link, and the flows between its nodes.
+//! Input of a plan for time slots: the link, and the flows between nodes.
 
 use crate::link::Link;
 use crate::setup::Network;
 use rohrpost_mailbox::Priority;
 use std::time::Duration;
 
-/// A system with time slots, but for its table: that is what may change.
+/// A system with time slots, without its table: that is what may change.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Its link.
     pub link: Link,
     /// How its routers send.
     pub network: Network,
-    /// All flows by their places elsewhere; none where one does not go from node to node on the LAN.
+    /// All flows by their places elsewhere; none for one that does not go from node to node on the LAN.
     pub flows: Vec<Option<PlannedFlow>>,
 }
 
@@ -29,7 +29,7 @@ pub struct PlannedFlow {
     pub period: Duration,
     /// Time within which a package arrives.
     pub deadline: Duration,
-    /// Its priority: the sender's if it is commands, that of the receiver's request if it is data; both if it may be either.
+    /// Its priority: the sender's for commands, that of the receiver's request for data; both if it may be either.
     pub least: Priority,
     /// The more important of both.
     pub most: Priority,

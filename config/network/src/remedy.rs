@@ -1,31 +1,31 @@
-//! The smallest change of a slot table by which a flow keeps its deadline.
+//! The smallest change of a slot table with which a flow keeps its deadline.
 
 use crate::plan::{Plan, PlannedFlow};
 use crate::table::{Tdma, TimeSlot};
 use std::time::Duration;
 
-/// Slots are changed in such steps.
+/// Step of changes of slots.
 const STEP: Duration = Duration::from_micros(10);
-/// So many cycles as a period are tried.
+/// Longest period that is tried, in cycles.
 const CYCLES_MAX: u32 = 64;
 
-/// By what a flow keeps its deadline. Slots are told by their places in [`Tdma::slots`].
+/// A change with which a flow keeps its deadline. Slots are given by their places in [`Tdma::slots`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Remedy {
     /// A slot of its node that is longer.
     Longer(usize, TimeSlot),
-    /// A slot of its node that comes oftener.
+    /// A slot of its node with a shorter period.
     Oftener(usize, TimeSlot),
-    /// One slot more.
+    /// An additional slot.
     Another(TimeSlot),
-    /// No change of one slot suffices; a deadline so late does.
+    /// No change of one slot suffices, but this later deadline does.
     Later(Duration),
-    /// Nor does that; if there is one, the period with which it does.
+    /// No deadline suffices, either; the longer period that does, if there is one.
     Slower(Option<Duration>),
 }
 
 impl Plan {
-    /// What to change so that a flow keeps its deadline: found by trying, and tried.
+    /// The change with which a flow keeps its deadline: found by trying, and verified.
     pub fn remedy(&self, tdma: &Tdma, flow: usize) -> Remedy {
         let search = Search { plan: self, tdma, flow };
         let change = search.longer().or_else(|| search.oftener()).or_else(|| search.another().map(Remedy::Another));
@@ -36,7 +36,7 @@ impl Plan {
         change.or_else(later).unwrap_or_else(|| Remedy::Slower(self.slower(tdma, flow, |_| false)))
     }
 
-    /// The fewest cycles that a flow keeps as its period and deadline, if these others become as slow: found by trying.
+    /// The fewest cycles that a flow keeps as its period and deadline if these others become as slow: found by trying.
     pub fn slower(&self, tdma: &Tdma, flow: usize, others: impl Fn(&PlannedFlow) -> bool) -> Option<Duration> {
         let own = self.flows[flow]?;
         let holds = |period: &Duration| {
@@ -74,13 +74,13 @@ impl<'a> Search<'a> {
         self.latency(tdma).zip(deadline).is_some_and(|(latency, deadline)| latency <= deadline)
     }
 
-    /// Slots of the node that sends.
+    /// Slots of the sending node.
     fn own(&self) -> impl Iterator<Item = (usize, &'a TimeSlot)> {
         let node = self.plan.flows[self.flow].map(|flow| flow.node);
         self.tdma.slots.iter().enumerate().filter(move |(_, slot)| Some(slot.node) == node)
     }
 
-    /// The slot that has to grow least.
+    /// The slot with the least growth.
     fn longer(&self) -> Option<Remedy> {
         let tries = self.own().filter_map(|(index, slot)| {
             let free = self.tdma.free_behind(slot).saturating_sub(slot.length);
@@ -92,7 +92,7 @@ impl<'a> Search<'a> {
         tries.min_by_key(|(steps, _)| *steps).map(|(_, remedy)| remedy)
     }
 
-    /// The slot that has to come oftener, with its longest period.
+    /// The slot with a shorter period, the longest that suffices.
     fn oftener(&self) -> Option<Remedy> {
         let mut tries = self.own().flat_map(|(index, slot)| {
             let shorter = (1..slot.period).rev().filter(|period| slot.period.is_multiple_of(*period));
@@ -105,7 +105,7 @@ impl<'a> Search<'a> {
         tries.find(suffices).map(|(index, oftener)| Remedy::Oftener(index, oftener))
     }
 
-    /// A slot where there is none yet.
+    /// A new slot.
     fn another(&self) -> Option<TimeSlot> {
         let (_, model) = self.own().next()?;
         let link = &self.plan.link;
@@ -126,7 +126,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The least number from 1 to `most` that suffices, if more does not harm; whatever it gives does suffice.
+/// The least number from 1 to `most` that suffices, if larger ones do no harm; the result always suffices.
 fn least(most: u32, suffices: impl Fn(u32) -> bool) -> Option<u32> {
     if most == 0 || !suffices(most) {
         return None;

@@ -1,12 +1,12 @@
-//! What a slot table has room for.
+//! Room in a slot table.
 
 use crate::link::Link;
 use crate::sizes::RATE_MAX_PER;
 use crate::table::{LATE, Tdma, TimeSlot, common};
 use std::time::Duration;
 
-/// A node that joins takes frames of time to arrive within half of the guard: this part of it for the links, as much for the computers. It is off
-/// by as much at most, earlier or later.
+/// A joining node assumes that frames of time arrive within half of the guard: this part of it for the links, as much
+/// for the computers. Its error is as much at most, in both directions.
 pub const ARRIVES_WITHIN: u32 = 4;
 
 /// Up to ten microseconds, as people write.
@@ -15,7 +15,7 @@ pub fn round_up(duration: Duration) -> Duration {
 }
 
 impl Tdma {
-    /// What a slot needs at least: its guard, what routers say to each other, and a largest datagram.
+    /// Shortest slot: its guard, the routers' own messages, and a largest datagram.
     pub fn length_min(&self, link: &Link) -> Duration {
         round_up(self.guard + LATE + Duration::from_nanos(link.said_ns(self) + link.largest_ns()))
     }
@@ -25,8 +25,9 @@ impl Tdma {
         self.synchronisation * masters as u32
     }
 
-    /// Where a slot ends at the latest. Who joins knows the time by a Sync alone, so that it may be off by a quarter of the guard, and by what its
-    /// clock has drifted since: it must be sure to half of the guard until its slot ends, or it never asks for more.
+    /// Latest end of a slot. A joining node knows the time by a Sync alone: it may be off by a quarter of the guard,
+    /// and by the drift of its clock since. Its error must stay within half of the guard until its slot ends, or it can
+    /// never ask for more.
     pub fn joined_end_max(&self) -> Duration {
         self.guard * (RATE_MAX_PER / ARRIVES_WITHIN)
     }
@@ -49,7 +50,7 @@ impl Tdma {
         tdma
     }
 
-    /// Slots that are there at the same time, the one that begins first before the other.
+    /// Slots that overlap, the one that begins first before the other.
     pub fn collisions(&self) -> Vec<(usize, usize)> {
         let slots = self.slots.iter().enumerate();
         let pairs = slots.flat_map(|(first, a)| {
@@ -66,7 +67,7 @@ impl Tdma {
         end.saturating_sub(slot.offset)
     }
 
-    /// What a slot may take that is nobody's in any cycle: where it begins, and for how long.
+    /// Gaps that are free in every cycle: where each begins, and its length.
     pub fn gaps(&self, masters: usize) -> Vec<(Duration, Duration)> {
         let mut free_from = self.windows_end(masters);
         let mut gaps = Vec::new();
@@ -81,13 +82,15 @@ impl Tdma {
         gaps
     }
 
-    /// Whether one slot more is behind synchronisation, in the cycle, over soon enough for who joins, and alone.
+    /// Whether an additional slot is behind synchronisation, within the cycle, early enough for joining nodes, and
+    /// without overlap.
     pub fn has_room(&self, slot: &TimeSlot, masters: usize) -> bool {
         let is_inside = slot.offset >= self.windows_end(masters) && slot.end() <= self.end_max();
         is_inside && !self.slots.iter().any(|other| other.collides(slot))
     }
 
-    /// Where one slot more has room, as near as possible to where it would like to be: right behind something, or right before it.
+    /// Where an additional slot has room, as near as possible to its wanted place: right behind another, or right
+    /// before it.
     pub fn nearest_room(&self, slot: &TimeSlot, masters: usize) -> Option<Duration> {
         let behind = self.slots.iter().map(TimeSlot::end).chain([self.windows_end(masters)]);
         let before = self.slots.iter().map(|other| other.offset).chain([self.end_max()]);
@@ -103,7 +106,7 @@ impl TimeSlot {
         self.offset + self.length
     }
 
-    /// The same slot in each so many-th cycle.
+    /// The same slot with another period.
     pub fn with_period(&self, period: u32) -> Self {
         Self { period, phase: self.phase % period, ..*self }
     }
@@ -114,7 +117,7 @@ impl TimeSlot {
         apart.is_multiple_of(common(self.period.into(), other.period.into()))
     }
 
-    /// Whether both are there at once.
+    /// Whether both overlap.
     pub fn collides(&self, other: &Self) -> bool {
         self.meets(other) && self.offset < other.end() && other.offset < self.end()
     }

@@ -1,34 +1,35 @@
-//! Sizes of what routers write, and the two paces of clocks that bounds are computed with.
+//! Sizes of the routers' frames, and the two clock rates of the bounds.
 
 use std::time::Duration;
 
-/// What Ethernet adds to each packet: preamble 8, head 14, check 4, gap 12.
+/// Overhead of Ethernet for each packet: preamble 8, head 14, check 4, gap 12.
 pub const ETHERNET_BYTES: usize = 8 + 14 + 4 + 12;
-/// Before what a datagram of routers says.
+/// Head of a router's datagram.
 pub const FRAME_HEAD_BYTES: usize = 36;
-/// Before the bytes of a part of a package, the package's head included.
+/// Head of a fragment of a package, the package's head included.
 pub const FRAGMENT_HEAD_BYTES: usize = 32;
-/// What a datagram of time says.
+/// Content of a datagram of time.
 pub const TIME_BYTES: usize = 72;
-/// What a datagram says that only says "still there".
+/// Content of a keep-alive.
 pub const ALIVE_BYTES: usize = 24;
-/// What a datagram says that refuses others.
+/// Content of a refusal.
 pub const REFUSAL_BYTES: usize = 16;
-/// What a datagram says by which nodes that seal get to know each other.
+/// Content of a hello, by which nodes that seal authenticate each other.
 pub const HELLO_BYTES: usize = 32;
-/// A router keeps the body of a package that waits in pieces of so many bytes.
+/// Size of the blocks in which a router keeps the body of a waiting package.
 pub const KEPT_IN_BYTES: u64 = 256;
-/// A clock that was not compared with another yet is off by one, at most, in so long.
+/// A clock that was not compared with another yet drifts by at most one part in this many.
 pub const RATE_MAX_PER: u32 = 4000;
-/// System time is bent by one, at most, in so long, and the clock by which it is measured runs meanwhile as far off as [`RATE_MAX_PER`] says.
+/// System time is slewed by at most one part in this many. The clock that measures it may drift by [`RATE_MAX_PER`]
+/// meanwhile.
 pub const BEND_MAX_PER: u32 = 1000;
-/// A computer needs so long to hand over one datagram after the other: a quick link does not get more of them.
+/// Time of a computer to hand over one datagram: a fast link does not get more of them.
 pub const HAND_OVER: Duration = Duration::from_micros(20);
 
 /// Most that UDP over IPv4 carries, in bytes.
 pub const PAYLOAD_MAX: usize = 65_507;
-/// Behind what is sealed.
+/// Behind sealed content.
 pub const TAG_BYTES: usize = 16;
-/// Heads of IP and UDP, in bytes.
+/// Headers of IP and UDP, in bytes.
 pub(crate) const HEADS_V4: usize = 20 + 8;
 pub(crate) const HEADS_V6: usize = 40 + 8;

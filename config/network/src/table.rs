@@ -1,15 +1,16 @@
-//! Time slots: who may send when (seed 002, section 4).
+//! Time slots: the slot table.
 //!
-//! Time is divided into cycles of equal length; cycle n begins when system time is n times that length. A cycle begins with a window for
-//! each master's synchronisation; behind them lie the slots of the nodes. Who sends ends the guard before its slot does, so that
-//! clocks that differ by less than the guard never have two nodes on the wire at once.
+//! Time is divided into cycles of equal length; cycle n begins when system time is n times that length. A cycle begins
+//! with a window for each master's synchronisation, then the slots of the nodes follow. A sender stops one guard before
+//! its slot ends. So nodes with clocks that differ by less than the guard never send at the same time.
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
-/// Bounds allow for slots that are begun so late.
+/// Bounds assume that slots begin at most this late.
 pub const LATE: Duration = Duration::from_micros(50);
-/// A slot is begun so late at most; later it is left unused. What is begun after [`LATE`] may not carry all that bounds reckon with.
+/// A slot begins at most this late; later it is left unused. One that begins after [`LATE`] may carry less than the
+/// bounds assume.
 pub const GATE: Duration = Duration::from_micros(100);
 
 /// The slot table of a system.
@@ -17,11 +18,11 @@ pub const GATE: Duration = Duration::from_micros(100);
 pub struct Tdma {
     /// From the beginning of one cycle to that of the next.
     pub cycle: Duration,
-    /// Window of each master's synchronisation: that of the first master begins the cycle, the others' follow in their order.
+    /// Window of each master's synchronisation: that of the first master begins the cycle, the others' follow in order.
     pub synchronisation: Duration,
-    /// The end of each slot and window in which nobody sends.
+    /// The end of each slot and window, in which nothing is sent.
     pub guard: Duration,
-    /// Bytes a second that every link carries, the heads of Ethernet, IP and UDP counted.
+    /// Bytes a second that every link carries, with headers of Ethernet, IP and UDP.
     pub link_bytes_s: u64,
     /// The slots, by offset, then by phase.
     pub slots: Vec<TimeSlot>,
@@ -38,16 +39,16 @@ pub struct TimeSlot {
     pub offset: Duration,
     /// To its end, the guard included.
     pub length: Duration,
-    /// It is there in each so many-th cycle, 1 or more.
+    /// Its period in cycles, 1 or more.
     pub period: u32,
-    /// In which of them, 0 up to the period less 1: those cycles whose number divided by the period leaves it.
+    /// Its phase, from 0 to the period less 1: the remainder of the cycle's number divided by the period.
     pub phase: u32,
 }
 
-/// An IPv4 network whose packets go from node to node in the slots.
+/// An IPv4 network; its packets travel between nodes in the slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tunnel {
-    /// Its address: that of no node.
+    /// Its address: no node has it.
     pub network: Ipv4Addr,
     /// Bits that all its addresses share.
     pub prefix: u8,
@@ -66,8 +67,8 @@ impl Tdma {
         cycles(self.slots.iter())
     }
 
-    /// Bytes that may leave in a slot or window of a length: those that the link carries before the guard begins, the heads of Ethernet,
-    /// IP and UDP counted.
+    /// Bytes that may leave in a slot or window of a length: as many as the link carries before the guard begins, with
+    /// headers of Ethernet, IP and UDP.
     pub fn budget_bytes(&self, length: Duration) -> u64 {
         let ns = length.saturating_sub(self.guard).as_nanos();
         u64::try_from(ns * u128::from(self.link_bytes_s) / 1_000_000_000).unwrap_or(u64::MAX)

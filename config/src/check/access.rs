@@ -6,8 +6,8 @@ use crate::module::{Lines, Module};
 use crate::reader::Reader;
 use rohrpost_mailbox::Name;
 
-/// Nobody is listed as a caller of whom it may not command, and no alias lets in whom its module keeps out: a router goes by the class of the
-/// name that is commanded.
+/// No module is listed as a caller of one that it may not command, and no alias admits a caller that its module
+/// refuses: a router checks the class of the commanded name.
 pub(crate) fn validate(installation: &Installation, module: &Module, lines: &Lines, reader: &Reader<'_>) {
     for (to, line) in module.calls.iter().zip(&lines.calls) {
         let refuses = |access: &&Access| access.refuses(module.name.class(), to.class());
@@ -26,7 +26,8 @@ fn alias_text(installation: &Installation, module: &Module, alias: Name, access:
     let classes = &installation.classes;
     let class = classes.name(alias.class()).unwrap_or_default();
     format!(
-        "module `{}` may be commanded by the classes of [access] in line {} alone, and its alias `{}` by all; add a line for class `{class}` there",
+        "module `{}` may be commanded by the classes of [access] in line {} alone, and its alias `{}` by all; add a \
+         line for class `{class}` there",
         classes.format(module.name),
         access.line,
         classes.format(alias),
@@ -37,7 +38,8 @@ fn told(installation: &Installation, module: &Module, to: Name, access: &Access)
     let classes = &installation.classes;
     let class = |class| classes.name(class).unwrap_or_default();
     format!(
-        "module `{}` calls `{}`, and [access] in line {} does not let class `{}` command class `{}`; add it there, or drop the call",
+        "module `{}` calls `{}`, and [access] in line {} does not let class `{}` command class `{}`; add it there, or \
+         drop the call",
         classes.format(module.name),
         classes.format(to),
         access.line,

@@ -1,4 +1,4 @@
-//! What time slots mean: the cycle drawn, the slots, and how late each flow can be.
+//! Explains time slots: a drawing of the cycle, the slots, and the bounds of the flows.
 
 use super::{Page, timeline};
 use crate::plan::bounds;
@@ -6,7 +6,7 @@ use crate::units::{duration_decimal, duration_text, rate_text};
 use rohrpost_network::{Bound, GATE, LATE, Tdma, TimeSlot, round_up};
 use std::time::Duration;
 
-/// Below it some slots are begun too late for their successors; see the book's chapter.
+/// Below it some slots begin too late for their successors; see the book's chapter.
 const GUARD_USUAL: Duration = Duration::from_micros(100);
 
 impl Page<'_> {
@@ -95,16 +95,17 @@ impl Page<'_> {
         self.entry(
             "",
             &format!(
-                "slots: of its node that begin while it waits; waits: until the last of them; others: what goes before it meanwhile; \
-                 itself: its own datagrams. In \"at worst\" besides: {said} said by routers in a slot, {} by which it may be begun late, what \
-                 else is in the last datagram, and that once more through a switch.",
+                "slots: of its node that begin while it waits; waits: until the last of them; others: what goes before \
+                 it meanwhile; itself: its own datagrams. In \"at worst\" besides: {said} said by routers in a slot, \
+                 {} by which it may be begun late, what else is in the last datagram, and that once more through a \
+                 switch.",
                 duration_text(LATE)
             ),
         );
     }
 }
 
-/// What a bound consists of, as columns.
+/// Components of a bound, as columns.
 fn parts(bound: &Bound) -> String {
     let (waits, others, own) = (round(bound.waits), round(bound.others), round(bound.own));
     format!("{:>5}  {waits:>8}  {others:>8}  {own:>8}", bound.slots)

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 /// Cells of a row.
 const CELLS: usize = 64;
-/// What the page is wide in which a row begins.
+/// Least width of the label before a row.
 const LABEL_MIN: usize = 10;
 
 const SENDS: char = '█';
@@ -64,7 +64,7 @@ impl<'t> Row<'t> {
         Self { tdma, cells: vec![FREE; CELLS] }
     }
 
-    /// At least a cell for what is sent and, if there is room, one for the guard.
+    /// At least a cell for the sending part and, if there is room, one for the guard.
     fn window(&mut self, begin: Duration, length: Duration, sends: char) {
         let cell = |at: Duration| {
             let cells = (at.as_nanos() * CELLS as u128 + self.tdma.cycle.as_nanos() / 2) / self.tdma.cycle.as_nanos();

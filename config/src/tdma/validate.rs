@@ -1,7 +1,7 @@
-//! Whether a slot table can be kept: who sends when, and whether there is room for what must be sent.
+//! Validates a slot table: overlaps, and room for what must be sent.
 //!
-//! Each rule is asked of the table as it is when all that was said before is done: so what is told to one slot is not in the way of another,
-//! and no remedy breaks a rule that was asked already.
+//! Each rule is applied to the table with all earlier remedies applied: so the remedy of one slot does not conflict
+//! with that of another, and no remedy breaks a rule that was checked before.
 
 mod flows;
 mod places;
@@ -14,14 +14,15 @@ use crate::units::duration_decimal;
 use rohrpost_network::{ARRIVES_WITHIN, LATE, Plan, RATE_MAX_PER, Tdma, TimeSlot, round_up};
 use std::time::Duration;
 
-/// Clocks of two Linux computers that ask each other all the time are known to half of it.
+/// Clocks of two Linux computers in permanent exchange are known to half of it.
 const GUARD_MIN: Duration = Duration::from_micros(40);
-/// Peers take a node of which nothing came for a second for silent: it has two chances in that time to say that it is there.
+/// Peers take a node for silent after a second without a datagram: it has two chances in that time to send a
+/// keep-alive.
 const SLOT_WITHIN: Duration = Duration::from_millis(500);
-/// Who examines all cycles of a table must come to an end.
+/// A check of all cycles of a table must end.
 const CYCLES_MAX: u64 = 64;
 
-/// Judges the table, then whether every flow keeps its deadline with it.
+/// Validates the table, then whether every flow keeps its deadline with it.
 pub(crate) fn validate(installation: &Installation, lines: &TdmaLines, reader: &Reader<'_>) {
     let Some(tdma) = &installation.tdma else { return };
     let Some(plan) = plan(installation, tdma) else { return };
@@ -52,7 +53,7 @@ struct Validator<'a> {
     installation: &'a Installation,
     tdma: &'a Tdma,
     lines: &'a TdmaLines,
-    /// What becomes of it if all that was said is done: its slots are in the same order.
+    /// The table with all remedies applied: its slots have the same order.
     fixed: Tdma,
     plan: Plan,
     reader: &'a Reader<'a>,
@@ -69,7 +70,7 @@ impl<'a> Validator<'a> {
         self.reader.report(self.lines.table, format!("[tdma]: {message}"));
     }
 
-    fn whose(&self, slot: usize) -> String {
+    fn described(&self, slot: usize) -> String {
         let (TimeSlot { node, offset, .. }, line) = (self.tdma.slots[slot], self.lines.slots[slot]);
         format!("that of `{}` at {} (line {line})", self.node_name(node), duration_decimal(offset))
     }
@@ -86,12 +87,13 @@ impl<'a> Validator<'a> {
         self.fixed.length_min(&self.plan.link)
     }
 
-    /// No slot comes oftener than once in a cycle.
+    /// A slot comes at most once in a cycle.
     fn cycle(&mut self) {
         if self.fixed.cycle > SLOT_WITHIN {
             let (cycle, most) = (duration_decimal(self.fixed.cycle), duration_decimal(SLOT_WITHIN));
             self.report_table(format!(
-                "`cycle` {cycle} is so long that nodes would take each other for silent in between; write `cycle = \"{most}\"` or less"
+                "`cycle` {cycle} is so long that nodes would take each other for silent in between; write `cycle = \
+                 \"{most}\"` or less"
             ));
             self.fixed.cycle = SLOT_WITHIN;
         }
@@ -99,8 +101,8 @@ impl<'a> Validator<'a> {
 
     fn guard(&mut self) {
         let guard = self.fixed.guard;
-        // From a node to a switch and on. What the node takes before that is not in it: of eight frames the quickest counts, and from the call
-        // to the wire that takes some microseconds, not the 20 that bounds are computed with.
+        // From a node to a switch and on. The time in the node before that is left out: of eight frames the fastest
+        // counts, and that takes some microseconds from the call to the wire, not the 20 of the bounds.
         let way = Duration::from_nanos(2 * self.plan.link.time_wire_ns());
         let least = round_up(GUARD_MIN.max(way * ARRIVES_WITHIN));
         if guard >= least {
@@ -111,8 +113,8 @@ impl<'a> Validator<'a> {
         } else {
             let way = duration_decimal(round_up(way));
             format!(
-                "is too short for such a link: who joins takes it that a frame of time passes two links within a quarter of it, and that takes \
-                 {way}"
+                "is too short for such a link: a joining node assumes that a frame of time passes two links within a \
+                 quarter of it, and that takes {way}"
             )
         };
         self.fixed.guard = least;
@@ -120,7 +122,7 @@ impl<'a> Validator<'a> {
         self.report_table(format!("`guard` {guard} {why}; write `guard = \"{least}\"` or more"));
     }
 
-    /// The guard is what is wrong if a slot has no room because of it and cannot grow, and one that is not short would do for all.
+    /// The guard is wrong if a slot has no room because of it and cannot grow, and a usual guard would suffice for all.
     fn guard_leaves_room(&mut self, least: Duration) {
         let Tdma { cycle, synchronisation, guard, .. } = self.fixed;
         let (needed, slots) = (self.length_min(), &self.fixed.slots);
@@ -132,10 +134,10 @@ impl<'a> Validator<'a> {
         let right = guard.checked_sub(round_up(lacking.unwrap_or_default()));
         let Some(right) = right.filter(|right| *right >= least.max(GUARD)) else { return };
         self.report_table(format!(
-            "`guard` {} is too long for such slots: {} has no room for what routers say to each other and one largest datagram, and none to \
-             grow; write `guard = \"{}\"`",
+            "`guard` {} is too long for such slots: {} has no room for what routers say to each other and one largest \
+             datagram, and none to grow; write `guard = \"{}\"`",
             duration_decimal(guard),
-            self.whose(cramped),
+            self.described(cramped),
             duration_decimal(right)
         ));
         self.fixed.guard = right;
@@ -150,8 +152,8 @@ impl<'a> Validator<'a> {
         let needed = self.synchronisation_min();
         if self.fixed.synchronisation < needed {
             self.report_table(format!(
-                "`synchronisation` {} has no room for a warm-up and a Sync to each of {} other nodes before its guard; write \
-                 `synchronisation = \"{}\"` or more",
+                "`synchronisation` {} has no room for a warm-up and a Sync to each of {} other nodes before its guard; \
+                 write `synchronisation = \"{}\"` or more",
                 duration_decimal(self.fixed.synchronisation),
                 self.plan.link.others(),
                 duration_decimal(needed)
@@ -184,7 +186,7 @@ impl<'a> Validator<'a> {
         ));
     }
 
-    /// Who joins is sure of the time until its slot ends.
+    /// A joining node knows the time well enough until its slot ends.
     fn joining(&mut self) {
         let guard = self.fixed.guard;
         for index in 0..self.fixed.slots.len() {
@@ -197,13 +199,14 @@ impl<'a> Validator<'a> {
             let or_earlier = self.moved(index).map_or_else(String::new, |place| format!("{place}, or "));
             let (end, once) = (duration_decimal(end), self.once_longer(index));
             self.report(index, format!(
-                "ends {end} after the cycle begins{once}, and until then a node that joins knows the time to {known} only, which is more than half of \
-                 the guard: it could never send; write {or_earlier}`guard = \"{least}\"` or more in [tdma]"
+                "ends {end} after the cycle begins{once}, and until then a node that joins knows the time to {known} \
+                 only, which is more than half of the guard: it could never send; write {or_earlier}`guard = \
+                 \"{least}\"` or more in [tdma]"
             ));
         }
     }
 
-    /// Each node sends often enough that nobody takes it for silent.
+    /// Each node sends so often that no other takes it for silent.
     fn silence(&mut self) {
         let cycle = self.fixed.cycle;
         for node in 0..self.installation.lan_nodes().len() {
@@ -228,7 +231,7 @@ impl<'a> Validator<'a> {
         }
     }
 
-    /// All slots come together again soon enough. What was told to come oftener has such a period already.
+    /// The table repeats itself soon enough. A slot with a remedy for its period has such a period already.
     fn periods(&mut self) {
         let cycles = self.fixed.cycles();
         if cycles <= CYCLES_MAX {
@@ -252,7 +255,7 @@ impl<'a> Validator<'a> {
         }
     }
 
-    /// A slot with the first of these periods with which it is alone.
+    /// A slot with the first of these periods without overlap.
     fn oftener(&self, index: usize, periods: impl Iterator<Item = u32>) -> Option<TimeSlot> {
         let others = self.fixed.without(index);
         let mut tries = periods.map(|period| self.fixed.slots[index].with_period(period));
@@ -260,7 +263,7 @@ impl<'a> Validator<'a> {
     }
 }
 
-/// How to write the period of a slot, and its phase if that is not what it was.
+/// Text for the period of a slot, and for its phase if that has changed.
 fn period_text(slot: &TimeSlot, was: &TimeSlot) -> String {
     let phase = if slot.phase == was.phase { String::new() } else { format!(" and `phase = {}`", slot.phase) };
     format!("`period = {}`{phase}", slot.period)

@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::Drawing;
+use crate::testing::TestScene;
 
 fn map(fields: &[(&str, Value)]) -> Value {
     Value::Map(fields.iter().map(|(name, value)| ((*name).into(), value.clone())).collect())
@@ -67,7 +67,7 @@ fn wide_deep_and_long_data_are_bounded() {
 
 #[test]
 fn a_datum_lands_below_its_module_and_says_the_same_text_once() {
-    let mut drawing = Drawing::new();
+    let mut drawing = TestScene::new();
     for second in 0..5 {
         drawing.at_s(second);
         let gauge = map(&[("a/b", Value::U(second.into())), ("maker", Value::Text("Akku AG".into()))]);

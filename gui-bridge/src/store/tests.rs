@@ -1,4 +1,5 @@
 use super::*;
+use rerun::TimePoint;
 use rerun::{AsComponents, Points2D, Scalars, TextLog, TimeCell, Transform3D};
 
 const NEVER: fn() -> bool = || false;

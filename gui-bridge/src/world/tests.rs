@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::Drawing;
+use crate::testing::TestScene;
 
 const SOUTH_WEST: Pose = Pose { x_m: -1.0, y_m: -2.0, heading_rad: 0.0 };
 
@@ -9,7 +9,7 @@ fn tile(origin: Pose, columns: u32, rows: u32) -> OccupancyGrid {
 
 #[test]
 fn a_way_of_any_length_is_drawn_with_few_entities_and_rows() {
-    let mut drawing = Drawing::new();
+    let mut drawing = TestScene::new();
     let steps = 5_000u32;
     for step in 0..steps {
         let angle = f64::from(step) * 0.02;
@@ -17,9 +17,10 @@ fn a_way_of_any_length_is_drawn_with_few_entities_and_rows() {
         drawing.scene.pose("slam.0", &pose);
     }
     let rows = drawing.rows();
-    let trail: Vec<_> = rows.iter().filter(|(entity, _)| entity.starts_with("/world/trail/slam.0/")).collect();
-    assert_eq!(trail.len(), CHUNKS_MAX);
-    assert!(trail.iter().map(|(_, rows)| **rows).sum::<usize>() <= steps as usize);
+    let trajectory: Vec<_> =
+        rows.iter().filter(|(entity, _)| entity.starts_with("/world/trajectory/slam.0/")).collect();
+    assert_eq!(trajectory.len(), CHUNKS_MAX);
+    assert!(trajectory.iter().map(|(_, rows)| **rows).sum::<usize>() <= steps as usize);
     assert_eq!(rows["/world/robot/slam.0"], steps as usize);
     assert_eq!(rows["/world/robot/slam.0/body"], 1, "the body is drawn once and moved");
     assert!(rows["/world/frame"] < 40, "{}", rows["/world/frame"]);
@@ -54,7 +55,7 @@ fn a_stray_beam_is_neither_drawn_nor_makes_the_world_larger() {
 
 #[test]
 fn a_map_grows_by_tiles_and_a_tile_replaces_itself() {
-    let mut drawing = Drawing::new();
+    let mut drawing = TestScene::new();
     for east in [0.0, 6.4, 12.8, 0.0] {
         drawing.scene.grid("map.0", &tile(Pose { x_m: east, ..SOUTH_WEST }, 64, 64)).unwrap();
     }
@@ -79,7 +80,7 @@ fn only_what_is_known_of_a_tile_is_drawn() {
 
 #[test]
 fn maps_that_cannot_be_true_are_refused() {
-    let mut drawing = Drawing::new();
+    let mut drawing = TestScene::new();
     let good = tile(SOUTH_WEST, 4, 4);
     for (grid, why) in [
         (

@@ -1,7 +1,7 @@
 //! A tile of a map: whether it can be true, what of it is known, and its colours.
 
+use crate::error::DrawError;
 use crate::palette;
-use crate::scene::DrawError;
 use rerun::components::ImageFormat;
 use rerun::{AnnotationContext, AnnotationInfo, ChannelDatatype, ColorModel, Rgba32};
 use rohrpost::types::{Cell, OccupancyGrid, Pose};

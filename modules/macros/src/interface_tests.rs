@@ -1,4 +1,4 @@
-//! What a person reads who writes an interface that cannot be.
+//! Compile errors of invalid interfaces.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

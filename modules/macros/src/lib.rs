@@ -1,4 +1,5 @@
-//! The `interface`, `data`, `parameters` and `choice` attributes, and the derive `Schema`. Use them through the crate `rohrpost`.
+//! The `interface`, `data`, `parameters` and `choice` attributes, and the derive `Schema`. Use them through the crate
+//! `rohrpost`.
 
 #![forbid(unsafe_code)]
 
@@ -13,15 +14,16 @@ use quote::quote;
 
 /// Makes a trait an interface: its functions can be called from other modules, its data asked for and subscribed to.
 ///
-/// `#[interface(class = "motor")]` on `trait Motor` leaves the trait to be implemented, and makes `MotorInterface` (what a
-/// module names as its interface; its constants are the data) and `MotorProxy` (its functions look like local calls).
+/// `#[interface(class = "motor")]` on `trait Motor` leaves the trait to be implemented, and makes `MotorInterface`
+/// (what a module names as its interface; its constants are the data) and `MotorProxy` (its functions look like local
+/// calls).
 ///
 /// * `#[command(16)]` before a function gives its number, 16 or more; `#[command(17, idempotent)]` says that running it twice
 ///   does no harm. Functions take `&mut self` and owned arguments, at most eight.
 /// * `#[data(1)] fn scan() -> LaserScan;` declares data. The trait's implementor does not see it; the module publishes it.
 ///
-/// Doc comments become the texts that tools show. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before an argument, or under
-/// `#[data(1)]`, says what values mean; all its keys are optional.
+/// Doc comments become the texts that tools show. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before an argument,
+/// or under `#[data(1)]`, says what values mean; all its keys are optional.
 #[proc_macro_attribute]
 pub fn interface(attributes: TokenStream, item: TokenStream) -> TokenStream {
     interface::expand(attributes.into(), item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
@@ -78,8 +80,8 @@ pub fn parameters(attributes: TokenStream, item: TokenStream) -> TokenStream {
     parameters::expand(attributes.into(), item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
 }
 
-/// Makes an enum, whose variants carry nothing, a type that a parameter can have. In files and on command lines its variants
-/// are words in kebab-case: `TurnLeft` is `turn-left`.
+/// Makes an enum with variants that carry nothing a type that a parameter can have. In files and on command lines its
+/// variants are words in kebab-case: `TurnLeft` is `turn-left`.
 #[proc_macro_attribute]
 pub fn choice(attributes: TokenStream, item: TokenStream) -> TokenStream {
     parameters::expand_choice(attributes.into(), item.into()).unwrap_or_else(syn::Error::into_compile_error).into()

@@ -214,7 +214,7 @@ fn parameter_set(owner: &Ident, krate: &TokenStream, parameters: &[Parameter]) -
 pub(crate) fn expand_choice(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
     let ParameterOptions { krate } = syn::parse2(attributes)?;
     let item: ItemEnum = syn::parse2(item)
-        .map_err(|error| Error::new(error.span(), "a choice is an enum whose variants carry nothing"))?;
+        .map_err(|error| Error::new(error.span(), "a choice is an enum with variants that carry nothing"))?;
     if !item.generics.params.is_empty() {
         return Err(Error::new(item.generics.span(), "a choice has no generics"));
     }

@@ -1,4 +1,4 @@
-//! What a person reads who declares parameters that cannot be.
+//! Compile errors of invalid parameters.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -92,7 +92,7 @@ fn what_is_right_is_taken_and_proved() {
 #[test]
 fn mistakes_in_a_choice_are_told() {
     for (item, says) in [
-        ("struct S;", "a choice is an enum whose variants carry nothing"),
+        ("struct S;", "a choice is an enum with variants that carry nothing"),
         ("enum Side {}", "at least one variant"),
         ("enum Side { Left, Right(u8) }", "variants of a choice carry nothing"),
         ("enum Side<T> { Left }", "a choice has no generics"),

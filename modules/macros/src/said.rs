@@ -1,4 +1,5 @@
-//! What an author says of a value besides its type: unit, range, default. Of fields, arguments, data and parameters alike.
+//! What an author says of a value besides its type: unit, range, default. Of fields, arguments, data and parameters
+//! alike.
 
 use proc_macro2::TokenStream;
 use quote::quote;

@@ -1,4 +1,4 @@
-//! What a person reads who describes a type that cannot be described.
+//! Compile errors of types without a schema.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

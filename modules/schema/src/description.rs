@@ -69,9 +69,9 @@ impl Description {
         })
     }
 
-    /// Tells interfaces apart: callers and servers must have the same. Numbers, types, units, and names of functions and arguments
-    /// count (to swap two numbers is a mistake that types do not show); texts and ranges do not. A mistake goes unseen once in four
-    /// billion; malice is not what it is for.
+    /// Tells interfaces apart: callers and servers must have the same. Numbers, types, units, and names of functions
+    /// and arguments count (to swap two numbers is a mistake that types do not show); texts and ranges do not. A
+    /// mistake goes unseen once in four billion; malice is not what it is for.
     pub fn hash(&self) -> u32 {
         hash(&self.written(true))
     }

@@ -1,7 +1,8 @@
 //! Types of what travels between modules: described by the program that has them, read by others that do not.
 //!
-//! A module hands out a [`Description`] of its interface, bytes by a table of our own (`docs/src/wire.md`). In it are [`Type`]s;
-//! values are postcard's bytes. Between the two stands [`Value`], which also goes to and from JSON, as it implements serde's traits.
+//! A module hands out a [`Description`] of its interface, bytes by a table of our own (`docs/src/wire.md`). In it are
+//! [`Type`]s; values are postcard's bytes. Between the two stands [`Value`], which also goes to and from JSON, as it
+//! implements serde's traits.
 //!
 //! ```text
 //! struct ──derive(Schema)──▶ Type ──to_bytes, from_bytes──▶ others; hash
@@ -25,6 +26,7 @@ extern crate self as rohrpost_schema;
 
 mod argument;
 mod bytes;
+mod counters;
 mod decode;
 mod description;
 mod encode;
@@ -42,6 +44,7 @@ mod words;
 
 pub use argument::parse_argument;
 pub use bytes::{SchemaError, TYPES_MAX, VERSION, hash};
+pub use counters::{counter_fields, counters};
 pub use decode::decode;
 pub use description::{DataItem, Description, Function};
 pub use encode::encode;
@@ -90,7 +93,8 @@ pub const EMPTY_MAX: usize = 65_536;
     note = "write `#[rohrpost::data]` before it, or `#[derive(Schema)]`"
 )]
 pub trait Schema {
-    /// Types inside of each other, at least 1. A type that contains itself has no such number; so the compiler finds it.
+    /// Types inside of each other, at least 1. A type that contains itself has no such number; so the compiler finds
+    /// it.
     const LEVELS: usize;
 
     /// The description of this type.

@@ -139,8 +139,8 @@ const POWERS: [f64; 15] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e1
 /// The `f64` of the shortest decimal that is this `f32` and no other: people read and type 1.2, not 1.2000000476837158.
 pub(crate) fn shortest(number: f32) -> f64 {
     let exact = f64::from(number);
-    // Six digits of a decimal survive in an `f32`, nine tell all `f32`s apart. Numbers of usual size go this way, as the
-    // way by text below takes several times as long and scans have many numbers.
+    // Six digits of a decimal survive in an `f32`, nine tell all `f32`s apart. Numbers of usual size go this way, as
+    // the way by text below takes several times as long and scans have many numbers.
     if (1e-6..1e6).contains(&exact.abs()) {
         let from_six_digits = POWERS.iter().skip_while(|power| exact.abs() * **power < 1e5).take(4);
         let mut decimals = from_six_digits.map(|power| (exact * power).round() / power);

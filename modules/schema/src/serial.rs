@@ -1,4 +1,5 @@
-//! Descriptions as serde sees them: for people as JSON; in postcard a [`Field`] is its own bytes with their length before them.
+//! Descriptions as serde sees them: for people as JSON; in postcard a [`Field`] is its own bytes with their length
+//! before them.
 
 use crate::{Field, decode};
 use serde::de::{self, Deserialize, Deserializer, Visitor};

@@ -107,7 +107,8 @@ pub struct Field {
     pub unit: String,
     /// Its type.
     pub ty: Type,
-    /// Least value, postcard of the type. What a range means is the author's word to people and tools; decoding does not check it.
+    /// Least value, postcard of the type. What a range means is the author's word to people and tools; decoding does
+    /// not check it.
     pub least: Option<Vec<u8>>,
     /// Greatest value, likewise.
     pub most: Option<Vec<u8>>,

@@ -1,8 +1,9 @@
-//! Data whose type is known from a description alone.
+//! Data of a type that is known from a description alone.
 
-/// Data whose Rust type is not known.
+/// Data of an unknown Rust type.
 ///
-/// Each type has one form, the one that [`decode`](crate::decode) gives; [`encode`](crate::encode) takes more, see there.
+/// Each type has one form, the one that [`decode`](crate::decode) gives; [`encode`](crate::encode) takes more, see
+/// there.
 ///
 /// | Rust | here | JSON |
 /// |---|---|---|

@@ -1,11 +1,11 @@
-//! What built-in modules would refuse of a configuration, told before anything runs. The crate `config` knows no modules,
-//! so it is here that both meet.
+//! What built-in modules would refuse of a configuration, told before anything runs. The crate `config` knows no
+//! modules, so it is here that both meet.
 
 use super::{Builtin, description};
 use rohrpost_config::{Installation, Problem, Program, Show, nearest};
 
-/// Everything that built-in modules would refuse, by their settings, by what they call and by what the GUI is to show of
-/// them. What programs of one's own would refuse only they know.
+/// Everything that built-in modules would refuse, by their settings, by what they call and by what the GUI is to show
+/// of them. What programs of one's own would refuse only they know.
 pub fn check(installation: &Installation) -> Vec<Problem> {
     let mut problems = Vec::new();
     for module in &installation.modules {
@@ -16,7 +16,8 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
     problems
 }
 
-/// Everything that built-in modules would refuse of the values that were saved of their parameters, by line of that file.
+/// Everything that built-in modules would refuse of the values that were saved of their parameters, by line of that
+/// file.
 pub fn check_saved(installation: &Installation) -> Vec<Problem> {
     let wrong = installation.modules.iter().filter_map(|module| {
         let Program::Builtin(name) = &module.program else { return None };

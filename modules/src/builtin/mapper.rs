@@ -110,7 +110,7 @@ impl Module for MapModule {
 }
 
 impl MapModule {
-    /// Maps the scans whose poses are known by now.
+    /// Maps the scans with known poses.
     fn work_off(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         while let Some((stamp_ns, scan)) = self.waiting.front() {
             let pose = match scan.pose {

@@ -1,4 +1,4 @@
-//! Mailboxes that were looked for and not found. Who sends to a module that does not run asks again and again; while the
+//! Mailboxes that were looked for and not found. A sender to a module that does not run asks again and again; while the
 //! registry's epoch stays the same, the answer is known without a system call.
 
 use rohrpost_mailbox::Name;

@@ -1,5 +1,5 @@
-//! Callers, a network that loses, copies, delays and reorders, and a server that dies at any step. Virtual time; all chance
-//! comes from a seed.
+//! Callers, a network that loses, copies, delays and reorders, and a server that dies at any step. Virtual time; all
+//! chance comes from a seed.
 
 use super::{CALLERS_MAX, Deduplicator, Fault, Principal, Request, TRANSIT_MAX_NS, VALIDITY_MAX_NS, Verdict, WINDOW};
 use std::cmp::Reverse;

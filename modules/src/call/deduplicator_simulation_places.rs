@@ -31,8 +31,8 @@ impl World {
         self.held().any(|known| known == caller)
     }
 
-    /// However many call, and however long they say that it is valid: no principal has more than half of the open places, and none for
-    /// longer than it may.
+    /// However many call, and however long they say that it is valid: no principal has more than half of the open
+    /// places, and none for longer than it may.
     pub(super) fn judge_places(&mut self) {
         if self.deduplicator.callers.len() > CALLERS_MAX + NAMED {
             self.problems.push("remembers more callers than it may".into());
@@ -50,7 +50,8 @@ impl World {
         }
     }
 
-    /// A caller of its own place is never refused for want of one, and a principal that has none only where none is left.
+    /// A caller of its own place is never refused for want of one, and a principal that has none only where none is
+    /// left.
     pub(super) fn judge_refusal(&mut self, caller: usize, knows: bool) {
         let principal = self.principal(caller);
         let has_one = self.held().any(|other| self.principal(other) == principal);

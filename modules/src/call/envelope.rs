@@ -13,7 +13,7 @@ use std::time::Duration;
 pub struct CallEnvelope {
     /// Hash of the interface that the caller was compiled with.
     pub interface: u32,
-    /// Tells this incarnation of the caller from earlier ones: later than that of whoever had its reply mailbox before.
+    /// Tells this incarnation of the caller from earlier ones: later than that of the previous owner of its reply mailbox.
     pub incarnation: u32,
     /// Counts this incarnation's calls. A repeat carries the number of the first try.
     pub sequence: u32,

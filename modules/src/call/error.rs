@@ -1,4 +1,4 @@
-//! What may go wrong with a call, and who says so.
+//! Errors of calls: of the caller, the server and the routers.
 
 use super::{CallEnvelope, ReplyEnvelope};
 use crate::call::append;
@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 use std::time::Duration;
 
-/// Why the server did not run a command; the body of a reply with the option `error`. Shown, what others wrote in it stays in its line.
+/// Why the server did not run a command; the body of a reply with the option `error`. Shown, what others wrote in it
+/// stays in its line.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, Schema, thiserror::Error)]
 pub enum Fault {
     /// The module is switched off.
@@ -39,7 +40,7 @@ pub enum Fault {
         "the command was older than its validity, or than the minute for which a server runs it, when its turn came"
     )]
     Expired,
-    /// There is no place for another caller or subscription of whoever sent it. It was not run.
+    /// There is no place for another caller or subscription of its sender. It was not run.
     #[error(
         "the server has no place for another caller or subscription from there: its share is used up, or all are taken; end some, try again \
          later, or name the server in the caller's `calls`, which keeps places for it"
@@ -112,7 +113,8 @@ pub enum Fault {
         /// File and line of the rule.
         rule: String,
     },
-    /// A later incarnation of the caller has called this server, so this command is of one that is over, or seems so. This try was not run.
+    /// A later incarnation of the caller has called this server, so this command is of one that is over, or seems so.
+    /// This try was not run.
     #[error(
         "a later incarnation of this caller has called it already: two programs have this name, or the computer's clock was set back \
          before the node was launched; this passes {} s after the later one's last call was over",
@@ -122,8 +124,8 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Appends the body of a reply that says this to a command, of which `command` is the body or at least its envelope; false when it
-    /// is none that can be answered.
+    /// Appends the body of a reply that says this to a command, of which `command` is the body or at least its
+    /// envelope; false when it is none that can be answered.
     pub fn answer(&self, command: &[u8], reply: &mut Vec<u8>) -> bool {
         let Ok((call, _)) = CallEnvelope::split(command) else { return false };
         let before = reply.len();
@@ -178,6 +180,14 @@ fn differs(server: u32) -> String {
 }
 
 /// Why a call has no result. `E` is the function's own error.
+///
+/// ```
+/// use rohrpost_modules::call::{CallError, Fault};
+///
+/// fn may_have_run(error: &CallError) -> bool {
+///     matches!(error, CallError::Timeout(..) | CallError::Fault(_, Fault::Interrupted))
+/// }
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum CallError<E = Infallible> {
     /// No answer in time. The command may have been run, or not; it is no longer valid.

@@ -12,24 +12,24 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A command whose answer does not come is sent again after this share of its time, or of the time for which a server may run it: three
-/// tries in all that can be run.
+/// A command whose answer does not come is sent again after this share of its time, or of the time for which a server
+/// may run it: three tries in all that can be run.
 const REPEATS: u32 = 3;
 /// Calls under way at a time, to all servers together.
 pub const CALLS_MAX: usize = 64;
 /// Envelopes tell no longer time; a longer timeout is cut to it, so that a command's age always is the truth.
 const TIMEOUT_MAX: Duration = Duration::from_micros(u32::MAX as u64);
-/// Ways into other mailboxes that are kept open; the first goes when there are more. If all of them are on other nodes, they
-/// are claims in the mailbox of the router, where one participant may have 255.
+/// Ways into other mailboxes that are kept open; the first goes when there are more. If all of them are on other nodes,
+/// they are claims in the mailbox of the router, where one participant may have 255.
 const SENDERS_MAX: usize = 240;
-/// Answers taken in one go: a flood of them must not keep whoever waits from seeing its time go by.
+/// Answers taken in one go: a flood of them must not keep a waiting caller from its timeout.
 const BURST: usize = 64;
 
 /// A module's or tool's way to all others: sends packages, and matches replies to calls.
 pub struct Link {
     participant: Arc<Participant>,
     me: Name,
-    /// Tells its calls from those of whoever had this name before.
+    /// Tells its calls from those of the previous owner of this name.
     incarnation: u32,
     replies: Receiver,
     senders: Vec<Sender>,
@@ -51,7 +51,8 @@ struct PendingCall {
     /// The whole body of the command, to be sent again; then, when the answer has come, the answer.
     body: Vec<u8>,
     label: Label,
-    /// When it began and when it is to be sent again, ns of time that passed: a caller that slept must not say that its command is young.
+    /// When it began and when it is to be sent again, ns of time that passed: a caller that slept must not say that its
+    /// command is young.
     began_ns: u64,
     timeout: Duration,
     repeat_ns: u64,
@@ -70,7 +71,8 @@ fn ns(of: Duration) -> u64 {
     u64::try_from(of.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Whether who answers was called: itself, or that name in all systems, of which the first that answers counts.
+/// Whether the answering module was called: itself, or that name in all systems, of which the first that answers
+/// counts.
 pub(crate) fn is_to(to: Name, from: Name) -> bool {
     let (to, from) = (to.module(), from.module());
     to == from || to == Name::new(ALL_SYSTEMS, from.class().0, from.instance(), 0)
@@ -82,8 +84,9 @@ impl Link {
         Self {
             participant: participant.clone(),
             me,
-            // Not the participant's: of two that join, the first may have the name after the other, and whoever served that
-            // other would take these calls for those of an earlier incarnation. The mailbox is ours, so all earlier owners have theirs.
+            // Not the participant's: of two that join, the first may have the name after the other, and the server of
+            // that other would take these calls for those of an earlier incarnation. The mailbox is ours, so all earlier
+            // owners have theirs.
             incarnation: participant.node().next_incarnation(),
             replies,
             senders: Vec::new(),
@@ -106,7 +109,7 @@ impl Link {
         self.incarnation
     }
 
-    /// Whose bell wakes it.
+    /// The participant with the bell that wakes it.
     pub fn participant(&self) -> &Arc<Participant> {
         &self.participant
     }
@@ -166,7 +169,8 @@ impl Link {
     /// Sends a command and returns at deduplicator; [`Link::wait`] fetches the answer. `arguments` are postcard.
     ///
     /// # Errors
-    /// [`CallError::NotSent`], [`CallError::BadArguments`], or [`CallError::TooMany`] when too many calls are under way.
+    /// [`CallError::NotSent`], [`CallError::BadArguments`], or [`CallError::TooMany`] when too many calls are under
+    /// way.
     pub fn begin(
         &mut self,
         to: Name,
@@ -227,7 +231,7 @@ impl Link {
             }
             Err(error) => {
                 self.spare.push(call.body);
-                // One whose server is not there is none of the calls that should have had an answer.
+                // One with an absent server is none of the calls that should have had an answer.
                 if matches!(error, SendError::Full(_)) {
                     self.tallies.ended(sequence, to, CallOutcome::Refused);
                 }
@@ -274,13 +278,13 @@ impl Link {
         }
     }
 
-    /// The outcome of a call without a result, if it is known by now; none while it is under way. Repeats the command when
-    /// it is time.
+    /// The outcome of a call without a result, if it is known by now; none while it is under way. Repeats the command
+    /// when it is time.
     pub fn poll(&mut self, sequence: u32) -> Option<Result<(), CallError>> {
         self.poll_for(sequence, |_| Ok(()))
     }
 
-    /// The same of a call with a result, whose bytes `read` takes.
+    /// The same of a call with a result; `read` takes its bytes.
     pub fn poll_for<T>(
         &mut self,
         sequence: u32,
@@ -317,7 +321,7 @@ impl Link {
         result
     }
 
-    /// Whom it has called, and what came of it.
+    /// The modules that it has called, and the outcomes.
     pub fn tallies(&self) -> &[Tally] {
         self.tallies.all()
     }
@@ -329,7 +333,8 @@ impl Link {
         }
     }
 
-    /// Moves the answers that have come to their calls. Late ones are counted, all others to nobody (to an earlier incarnation) are dropped.
+    /// Moves the answers that have come to their calls. Late ones are counted, all others to nobody (to an earlier
+    /// incarnation) are dropped.
     pub fn collect(&mut self) {
         for _ in 0..BURST {
             let Some(package) = self.replies.try_receive() else { return };
@@ -382,48 +387,4 @@ fn repeat_after(timeout: Duration) -> Duration {
 
 fn is_of_one_try(fault: &[u8]) -> bool {
     postcard::from_bytes(fault).is_ok_and(|fault: Fault| fault.is_of_this_try())
-}
-
-/// A call that was begun: [`Pending::wait`] for its result. Dropped, it is given up (the server may run it all the same).
-#[must_use = "a call that is begun and not waited for is given up"]
-pub struct Pending<T> {
-    link: Caller,
-    sequence: u32,
-    to: Name,
-    result: std::marker::PhantomData<fn() -> T>,
-}
-
-impl<T: serde::de::DeserializeOwned> Pending<T> {
-    /// Of a call that [`Link::begin`] began.
-    pub fn new(link: Caller, sequence: u32, to: Name) -> Self {
-        Self { link, sequence, to, result: std::marker::PhantomData }
-    }
-
-    /// Waits for the result.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    pub fn wait(self) -> Result<T, CallError> {
-        self.link.borrow_mut().wait(self.sequence, |bytes| postcard::from_bytes(bytes))
-    }
-}
-
-impl<T: serde::de::DeserializeOwned, E: serde::de::DeserializeOwned> Pending<Result<T, E>> {
-    /// Waits for the result of a function that has an error of its own.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    pub fn wait_result(self) -> Result<T, CallError<E>> {
-        let to = self.to;
-        self.wait().map_err(CallError::widen)?.map_err(|error| CallError::Module(to, error))
-    }
-}
-
-impl<T> Drop for Pending<T> {
-    fn drop(&mut self) {
-        // Not while the link waits: then this call is the one it waits for, and it forgets by itself.
-        if let Ok(mut link) = self.link.try_borrow_mut() {
-            link.forget(self.sequence);
-        }
-    }
 }

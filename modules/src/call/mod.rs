@@ -1,12 +1,14 @@
 //! Calls: a command with an envelope, its reply, and what may go wrong between.
 //!
-//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side, `tally` counts what came of its calls.
+//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side,
+//! `tally` counts what came of its calls.
 
 mod absent;
 mod deduplicator;
 mod envelope;
 mod error;
 mod link;
+mod pending;
 mod tally;
 
 pub use deduplicator::{CALLERS_MAX, Deduplicator, REPLIES_KEPT, Request, TRANSIT_MAX, VALIDITY_MAX, Verdict, WINDOW};
@@ -14,5 +16,6 @@ pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope, append};
 pub use error::{CallError, Fault};
 pub(crate) use link::is_to;
-pub use link::{CALLS_MAX, Caller, Link, Pending};
+pub use link::{CALLS_MAX, Caller, Link};
+pub use pending::Pending;
 pub use tally::Tally;

@@ -1,16 +1,16 @@
-//! What came of the calls of one link, for whoever asks how well others are reached.
+//! Outcomes of the calls of one link, to show how well others are reached.
 
 use super::Fault;
 use rohrpost_mailbox::Name;
 use std::collections::VecDeque;
 
-/// Calls given up whose answers may still come; older ones stay unanswered.
+/// Calls given up with answers that may still come; older ones stay unanswered.
 const OVERDUE_MAX: usize = 64;
 
 /// What came of the calls of one module.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Tally {
-    /// Who was called.
+    /// The called module.
     pub to: Name,
     /// Calls that have ended.
     pub calls: u64,
@@ -18,14 +18,14 @@ pub struct Tally {
     pub repeated: u64,
     /// Calls that ended without an answer, and have had none since.
     pub unanswered: u64,
-    /// Calls whose answer came when their time was over.
+    /// Calls with an answer that came too late.
     pub late: u64,
 }
 
 /// How a call ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum CallOutcome {
-    /// With an answer of who was called; also one that says it was not run.
+    /// With an answer of the called module; also one that says it was not run.
     Answered,
     /// Its command was not delivered, and a router or a mailbox said so.
     Refused,
@@ -44,7 +44,7 @@ impl CallOutcome {
 #[derive(Default)]
 pub(super) struct Tallies {
     all: Vec<Tally>,
-    /// Sequence numbers of calls whose time was over before they were answered, and who was called.
+    /// Sequence numbers of calls whose time was over before they were answered, and the called modules.
     overdue: VecDeque<(u32, Name)>,
 }
 
@@ -72,8 +72,8 @@ impl Tallies {
         self.of(to).repeated += 1;
     }
 
-    /// An answer came to none of the calls under way: perhaps to one that was given up. `is_of` tells whether who answers was called
-    /// when this one was.
+    /// An answer came to none of the calls under way: perhaps to one that was given up. `is_of` tells whether who
+    /// answers was called when this one was.
     pub(super) fn came_late(&mut self, sequence: u32, is_of: impl Fn(Name) -> bool) {
         let its = |(number, to): &(u32, Name)| *number == sequence && is_of(*to);
         let Some((_, to)) = self.overdue.iter().position(its).and_then(|at| self.overdue.remove(at)) else { return };

@@ -24,13 +24,48 @@ pub enum LinkState {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Carried {
     /// Packages, whole.
+    #[schema(unit = "packages")]
     pub packages: u64,
     /// Datagrams, with those that only say "still there".
+    #[schema(unit = "datagrams")]
     pub datagrams: u64,
     /// Bytes of the datagrams, as UDP's payload.
+    #[schema(unit = "bytes")]
     pub bytes: u64,
-    /// Parts of packages that are larger than a datagram.
-    pub parts: u64,
+    /// Fragments of packages that are larger than a datagram.
+    #[schema(unit = "fragments")]
+    pub fragments: u64,
+}
+
+/// What went wrong between two routers, since the counting one began.
+///
+/// Tools, charts and the book take names, units and texts from here, by [`counters`](rohrpost_schema::counters).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct LinkCounters {
+    /// Datagrams from the peer that never came.
+    #[schema(unit = "datagrams")]
+    pub lost: u64,
+    /// Datagrams to the peer that never came there, as it says.
+    #[schema(unit = "datagrams")]
+    pub missed: u64,
+    /// Datagrams from the peer that came twice; dropped.
+    #[schema(unit = "datagrams")]
+    pub duplicates: u64,
+    /// Datagrams from the peer that came after later ones; taken.
+    #[schema(unit = "datagrams")]
+    pub reordered: u64,
+    /// Datagrams from the peer that were changed on the way; dropped.
+    #[schema(unit = "datagrams")]
+    pub damaged: u64,
+    /// Datagrams from the peer's address of another version or configuration, or of another incarnation of its router; dropped.
+    #[schema(unit = "datagrams")]
+    pub refused: u64,
+    /// Datagrams to the peer that this computer did not send.
+    #[schema(unit = "datagrams")]
+    pub unsent: u64,
+    /// New starts of the peer's router.
+    #[schema(unit = "starts")]
+    pub restarts: u64,
 }
 
 /// Another node, as a router sees it.
@@ -50,22 +85,8 @@ pub struct PeerLink {
     pub sent: Carried,
     /// From it.
     pub received: Carried,
-    /// Datagrams to it that this computer did not send.
-    pub unsent: u64,
-    /// Datagrams from it that never came.
-    pub lost: u64,
-    /// Datagrams to it that never came there, as it says.
-    pub missed: u64,
-    /// Datagrams from it that came twice.
-    pub copies: u64,
-    /// Datagrams from it that were changed on the way.
-    pub damaged: u64,
-    /// Datagrams from it that came after later ones.
-    pub overtaken: u64,
-    /// Datagrams with its address that were not taken: of another version or configuration, or of another incarnation of its router.
-    pub refused: u64,
-    /// Times that its router was started anew.
-    pub restarts: u64,
+    /// What went wrong.
+    pub counters: LinkCounters,
 }
 
 /// What a class did in a router; the packages that went with its priority.

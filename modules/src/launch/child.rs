@@ -1,5 +1,5 @@
-//! One module's process: started, watched, started again, stopped. Nothing here waits: each step looks, and says when to
-//! look again.
+//! One module's process: started, watched, started again, stopped. Nothing here waits: each step looks, and says when
+//! to look again.
 
 mod ended;
 mod ending;
@@ -24,10 +24,11 @@ use std::time::{Duration, Instant};
 
 /// While a module starts it is looked after so often, and when it has ended, until all that it printed is there.
 const LOOK: Duration = Duration::from_millis(5);
-/// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes behind
-/// that hold its pipe.
+/// When a process has ended, what it printed last is still on its way for moments; or for ever, if it left processes
+/// behind that hold its pipe.
 const PRINTED_WAIT: Duration = Duration::from_millis(100);
-/// What somebody else may keep waiting for long is looked at so often: a registry that is locked, a process that was killed.
+/// What somebody else may keep waiting for long is looked at so often: a registry that is locked, a process that was
+/// killed.
 const LOOK_KEPT: Duration = Duration::from_millis(100);
 /// Bytes of a text that are told to tools.
 const TOLD_MAX: usize = 1000;
@@ -210,8 +211,8 @@ impl Child {
         }
     }
 
-    /// Starts the process; what there is to say if that fails. That is an end without success: the program may be replaced just
-    /// now, or the computer be short of something for moments.
+    /// Starts the process; what there is to say if that fails. That is an end without success: the program may be
+    /// replaced just now, or the computer be short of something for moments.
     pub(super) fn spawn(&mut self, now: Instant) -> Option<String> {
         match self.try_spawn(now) {
             Ok(process) => {
@@ -235,8 +236,8 @@ impl Child {
         // First: a process whose words nobody reads would be stuck at the first of them too many.
         let quiet = self.repeats.is_quiet().then_some(STEADY);
         let pipes = self.printed.begin(quiet.map(|quiet| now + quiet))?;
-        // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes before any
-        // word of launch's: so it switches itself on. At the first start launch does, when all are ready.
+        // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes
+        // before any word of launch's: so it switches itself on. At the first start launch does, when all are ready.
         self.program.spawn(self.lives > 0 && self.turn_on, self.restarts, quiet, pipes)
     }
 
@@ -326,8 +327,8 @@ impl Child {
         }
     }
 
-    /// It is not started again unless somebody asks for it, and then finds empty mailboxes: what was meant for this run must
-    /// not drive that one.
+    /// It is not started again unless somebody asks for it, and then finds empty mailboxes: what was meant for this run
+    /// must not drive that one.
     fn rest(&mut self, phase: Phase) {
         self.phase = phase;
         if self.mailboxes == Mailboxes::Used {

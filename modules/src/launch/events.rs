@@ -1,4 +1,4 @@
-//! What wakes launch: signals, or whoever runs it.
+//! What wakes launch: signals, or its caller.
 
 use super::LaunchError;
 use rohrpost_mailbox::Participant;
@@ -14,7 +14,8 @@ pub enum Event {
     Child,
 }
 
-/// A channel of events: SIGINT, SIGTERM and SIGHUP (a terminal was closed) say stop, SIGCHLD that a child may have ended.
+/// A channel of events: SIGINT, SIGTERM and SIGHUP (a terminal was closed) say stop, SIGCHLD that a child may have
+/// ended.
 ///
 /// # Errors
 /// [`LaunchError::Signals`].

@@ -1,5 +1,5 @@
-//! What launch sees of a module that runs: the part of its code that does not come back, and why it is in error. Knows no process and
-//! asks nobody; what there is to know comes as an argument.
+//! What launch sees of a module that runs: the part of its code that does not come back, and why it is in error. Knows
+//! no process and asks nobody; what there is to know comes as an argument.
 
 use crate::survey::Working;
 use rohrpost_mailbox::{InHand, Name, Node, monotonic_ns};

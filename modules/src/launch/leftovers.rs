@@ -64,8 +64,8 @@ fn send(pid: u32, signal: Signal) {
     }
 }
 
-/// Removes the mailboxes of a module that is not started again: whoever sends there is told so, instead of filling them. One
-/// that cannot be removed does not keep the others.
+/// Removes the mailboxes of a module that is not started again: whoever sends there is told so, instead of filling
+/// them. One that cannot be removed does not keep the others.
 ///
 /// Never waits: [`NodeError::Busy`] while somebody else holds the registry.
 pub(super) fn remove_mailboxes(node: &Node, module: &Module) -> Result<(), NodeError> {

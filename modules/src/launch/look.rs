@@ -1,7 +1,7 @@
 //! Looks at its node that launch takes for tools elsewhere, and hands out page by page.
 //!
-//! A look is taken once and kept as bytes; its pages are parts of these, so they belong together however long their reader takes.
-//! The oldest look gives way to a new one, and its reader is told to begin anew.
+//! A look is taken once and kept as bytes; its pages are parts of these, so they belong together however long their
+//! reader takes. The oldest look gives way to a new one, and its reader is told to begin anew.
 
 use crate::launcher::{LOOK_BYTES_MAX, LookError, LookPage, SnapshotRequest};
 use crate::survey::{MailboxSnapshot, Snapshot, Survey};

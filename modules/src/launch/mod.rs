@@ -65,14 +65,14 @@ const LOOK_SWITCHING: Duration = Duration::from_millis(50);
 const LOOK_ENDING: Duration = Duration::from_millis(20);
 /// By then no thread of launch's holds its place on the node any more.
 const LET_GO: Duration = Duration::from_secs(1);
-/// Notes that are kept for who asks; the oldest go first.
+/// Notes that are kept for queries; the oldest go first.
 const NOTES_MAX: usize = 1000;
 
 /// A node that somebody else removes just now is taken at the next try, or the next but one.
 const TAKE_MAX: usize = 20;
 
-/// A node that is launched. The thread that begins it must live as long as its modules: the kernel takes that thread's end
-/// for launch's, and tells them so.
+/// A node that is launched. The thread that begins it must live as long as its modules: the kernel takes that thread's
+/// end for launch's, and tells them so.
 pub struct Launch {
     installation: Arc<Installation>,
     node_name: String,
@@ -89,7 +89,7 @@ pub struct Launch {
     bell: Bell,
     lock: LaunchLock,
     _time: TimeKeeper,
-    /// What happened, for whoever shows it; oldest first.
+    /// Events to show, oldest first.
     notes: Vec<String>,
 }
 
@@ -107,13 +107,14 @@ pub fn choose_node<'a>(installation: &'a Installation, name: Option<&str>) -> Re
 }
 
 impl Launch {
-    /// Makes the node and starts its modules one after the other, each when the one before is ready; then switches them on.
-    /// The collector of output is switched on as soon as it is ready.
-    /// `executable` is the `rohrpost` command, which holds the built-in modules; `resolved` is laid beside the mailboxes as `node.json`: what the
-    /// configuration resolved to, for programs.
+    /// Makes the node and starts its modules one after the other, each when the one before is ready; then switches them
+    /// on. The collector of output is switched on as soon as it is ready. `executable` is the `rohrpost` command, which
+    /// holds the built-in modules; `resolved` is laid beside the mailboxes as `node.json`: what the configuration
+    /// resolved to, for programs.
     ///
     /// # Errors
-    /// When the node runs already, a program is missing, or a module does not become ready. Then nothing is left running.
+    /// When the node runs already, a program is missing, or a module does not become ready. Then nothing is left
+    /// running.
     pub fn begin(
         installation: Arc<Installation>,
         node_name: &str,
@@ -194,8 +195,8 @@ impl Launch {
         self.note(note);
     }
 
-    /// Removes what those leave that have ended, or were told to stay so, and answers tools: whoever is told that a module is stopped finds
-    /// no mailbox of it.
+    /// Removes what those leave that have ended, or were told to stay so, and answers tools: whoever is told that a
+    /// module is stopped finds no mailbox of it.
     fn serve(&mut self, ending: bool) {
         // At the end all goes at once, with the node.
         if !ending {
@@ -209,7 +210,8 @@ impl Launch {
         self.counter.serve(orders, &mut self.tool.link);
     }
 
-    /// A module is not started again: its mailboxes go. While somebody else holds the registry, that is tried again later.
+    /// A module is not started again: its mailboxes go. While somebody else holds the registry, that is tried again
+    /// later.
     fn remove_left_mailboxes(&mut self, index: usize) {
         let child = &mut self.children[index];
         if !child.has_left_mailboxes() {
@@ -304,8 +306,8 @@ impl Launch {
         &self.installation
     }
 
-    /// Stops all modules, the last first, and removes the node. What does not stop in its time is killed; all is killed at
-    /// once when a second word to stop comes. Returns what there is to say about it.
+    /// Stops all modules, the last first, and removes the node. What does not stop in its time is killed; all is killed
+    /// at once when a second word to stop comes. Returns what there is to say about it.
     pub fn stop(mut self) -> Vec<String> {
         let mut ending = LaunchShutdown::begin(&mut self.children, self.bell.words(), Instant::now());
         loop {
@@ -359,8 +361,8 @@ fn take_node(path: &Path, mode: u32) -> Result<(Arc<Node>, LaunchLock), NodeErro
     }
 }
 
-/// Whether an earlier launch that ends just now, or `rohrpost clean`, may be the reason: they keep all others out while they
-/// remove a node, which takes a moment.
+/// Whether an earlier launch that ends just now, or `rohrpost clean`, may be the reason: they keep all others out while
+/// they remove a node, which takes a moment.
 fn passes(error: &NodeError) -> bool {
     match error {
         NodeError::Missing(_) | NodeError::Launched(..) => true,
@@ -376,8 +378,8 @@ fn begin_time(node: &Arc<Node>, installation: &Installation, name: &str) -> Resu
     }
     let (source, pace) = match installation.time {
         ConfiguredTime::Local => (TimeSource::Local, 1.0),
-        // The router writes the master's time into the page as soon as it knows it; until then nobody is without a time, launch
-        // itself included. Another launch must not begin another epoch: all nodes would have to.
+        // The router writes the master's time into the page as soon as it knows it; until then nobody is without a
+        // time, launch itself included. Another launch must not begin another epoch: all nodes would have to.
         ConfiguredTime::Master { .. } => return TimeKeeper::await_master(node),
         ConfiguredTime::Simulation { speed } => (TimeSource::Simulation, speed),
         ConfiguredTime::Log => (TimeSource::Log, 1.0),

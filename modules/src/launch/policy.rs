@@ -4,9 +4,11 @@ use rohrpost_config::{Restart, RestartPolicy};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Longest pause before a restart, unless the configured one is longer, or the time in which restarts are counted is shorter.
+/// Longest pause before a restart, unless the configured one is longer, or the time in which restarts are counted is
+/// shorter.
 const BACKOFF_MAX: Duration = Duration::from_secs(10);
-/// Without an end for so long, and for the time in which restarts are counted, the next begins with the short pause again.
+/// Without an end for so long, and for the time in which restarts are counted, the next begins with the short pause
+/// again.
 pub(super) const STEADY: Duration = Duration::from_secs(10);
 
 /// What follows an end.
@@ -114,7 +116,8 @@ mod tests {
         }
     }
 
-    /// A router is never given up; the pauses bound how often it is tried, and how much is said of it, however long each incarnation is.
+    /// A router is never given up; the pauses bound how often it is tried, and how much is said of it, however long
+    /// each incarnation is.
     #[test]
     fn a_crash_loop_that_never_ends_is_slow() {
         let (ms, second) = (Duration::from_millis, Duration::from_secs(1));

@@ -5,9 +5,10 @@
 //!  stderr ─▶ thread ─┴─▶ held for a moment ─▶ collector: info, warn; error for stderr if the process fails in that moment
 //! ```
 //!
-//! The threads never wait for launch or the collector, so a module that prints is never kept from it. What is too much is
-//! suppressed and counted like what a module says. Lines that the module has sent itself are marked, and only remembered; so are those
-//! that say where a panic came from, which launch tells once and not again as long as they stay the same.
+//! The threads never wait for launch or the collector, so a module that prints is never kept from it. What is too much
+//! is suppressed and counted like what a module says. Lines that the module has sent itself are marked, and only
+//! remembered; so are those that say where a panic came from, which launch tells once and not again as long as they
+//! stay the same.
 
 use crate::common::OutputLevel;
 use crate::output::{OutputProxy, SENT, TRACE_LINES_MAX, TRACED, WeakOutputProxy};
@@ -148,7 +149,8 @@ impl Printed {
         due_at.into_iter().chain(self.voice.as_ref()?.retry_at()).min()
     }
 
-    /// Its process has ended, and launch has told the like before: what it printed while nothing was to be passed on is not said.
+    /// Its process has ended, and launch has told the like before: what it printed while nothing was to be passed on is
+    /// not said.
     pub(super) fn drop_quiet(&mut self, now: Instant) {
         lock(&self.lines).drop_quiet(now);
     }

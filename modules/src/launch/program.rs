@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Where launch has the right to it, it goes before ordinary programs by so much: on a busy computer a router that died is to be there again before
-/// calls that wait for it run out of time.
+/// Where launch has the right to it, it goes before ordinary programs by so much: on a busy computer a router that died
+/// is to be there again before calls that wait for it run out of time.
 const NICE: i8 = -15;
 
-/// From now on the calling thread, which starts modules, goes before ordinary programs, if it may: then with its usual niceness, which modules that are
-/// not real time begin with. Whoever was started to give way does so.
+/// From now on the calling thread, which starts modules, goes before ordinary programs, if it may: then with its usual
+/// niceness, which modules that are not real time begin with. Whoever was started to give way does so.
 pub(super) fn hurry() -> Option<i8> {
     let Ok(sys::Scheduling::Normal(usual)) = sys::scheduling() else { return None };
     let may = (NICE + 1..=0).contains(&usual) && sys::schedule(sys::Scheduling::Normal(NICE)).is_ok();
@@ -66,8 +66,8 @@ impl Program {
         &self.path
     }
 
-    /// Starts a process, in a process group of its own so that a Ctrl-C is launch's to handle. `on`: it switches itself on. `quiet`: for so
-    /// long it keeps its lines of output to itself.
+    /// Starts a process, in a process group of its own so that a Ctrl-C is launch's to handle. `on`: it switches itself
+    /// on. `quiet`: for so long it keeps its lines of output to itself.
     pub(super) fn spawn(
         &self,
         on: bool,

@@ -1,5 +1,5 @@
-//! How much is said of a module that ends again and again: the first ends whole, then one line for many, at growing intervals. Knows no
-//! process; time comes as an argument.
+//! How much is said of a module that ends again and again: the first ends whole, then one line for many, at growing
+//! intervals. Knows no process; time comes as an argument.
 
 use std::time::{Duration, Instant};
 
@@ -64,7 +64,8 @@ impl Repeats {
     }
 }
 
-/// A cause without what differs from end to end: process ids, times, addresses, temporary names. Each word with a digit becomes one mark.
+/// A cause without what differs from end to end: process ids, times, addresses, temporary names. Each word with a digit
+/// becomes one mark.
 fn comparable(cause: &str) -> String {
     let in_word = |letter: char| letter.is_alphanumeric() || matches!(letter, '-' | '_' | '.');
     let words = cause.split_inclusive(|letter| !in_word(letter));

@@ -1,4 +1,4 @@
-//! Launch as those who send it commands see it.
+//! Launch as the senders of commands see it.
 
 use super::child::{Child, Then};
 use super::look::{Looks, see};
@@ -47,7 +47,7 @@ impl Counter {
         &mut self.command_server.commands
     }
 
-    /// Answers those who have asked.
+    /// Answers pending requests.
     pub(super) fn serve(&mut self, orders: Orders<'_>, link: &mut Link) {
         let Self { description, bytes, refusals, .. } = self;
         let mut clerk = Clerk { orders, link, description, bytes, refusals };

@@ -1,5 +1,5 @@
-//! The start of a launch: modules one after the other, then switched on; and what is asked of a module later on: to switch itself on,
-//! and why it is in error. Nothing here waits for a module that may be done without.
+//! The start of a launch: modules one after the other, then switched on; and what is asked of a module later on: to
+//! switch itself on, and why it is in error. Nothing here waits for a module that may be done without.
 
 use super::child::Child;
 use super::{Launch, LaunchError};
@@ -107,13 +107,15 @@ impl Launch {
         Some(child.name().class()) == self.installation.classes.id(crate::output::CLASS)
     }
 
-    /// A router is never given up, but a node on which it never was ready has not started: perhaps another one has its port.
+    /// A router is never given up, but a node on which it never was ready has not started: perhaps another one has its
+    /// port.
     fn never_ready(&self, child: &Child) -> bool {
         let is_router = self.installation.module(child.name()).is_some_and(|module| !module.is_in_file());
         is_router && child.is_required() && child.restarts() > ROUTER_RESTARTS_MAX
     }
 
-    /// What to say of modules that are meant to be real time and are not: where nobody reads the log, nobody would know.
+    /// What to say of modules that are meant to be real time and are not: where nobody reads the log, nobody would
+    /// know.
     fn without_real_time(&self) -> Option<String> {
         let is_ordinary = |child: &&Child| {
             let wanted = self.installation.scheduling(child.name().class());
@@ -143,8 +145,8 @@ impl Launch {
         Ok(())
     }
 
-    /// Switches a module on that is ready, or looks how far that is. Never waits: one that hangs must not keep the others
-    /// from being watched.
+    /// Switches a module on that is ready, or looks how far that is. Never waits: one that hangs must not keep the
+    /// others from being watched.
     pub(super) fn switch_on(&mut self, index: usize) {
         let child = &mut self.children[index];
         let call = self.calls[index].switch.take();

@@ -1,4 +1,4 @@
-//! What launch knows of its modules, in a file of the node's directory: whoever looks at the node reads it and asks nobody.
+//! What launch knows of its modules, in a file of the node's directory: readers of the node need no call.
 
 use super::{ChildState, LauncherInterface};
 use rohrpost_mailbox::Node;
@@ -15,7 +15,8 @@ pub(crate) struct Known {
 }
 
 impl Known {
-    /// Writes it, whole, if it has changed. A full /dev/shm is no reason not to look after modules: then it is tried again.
+    /// Writes it, whole, if it has changed. A full /dev/shm is no reason not to look after modules: then it is tried
+    /// again.
     pub(crate) fn write(&mut self, node: &Node, mut states: Vec<ChildState>) {
         // It changes all the time, and whoever wants it asks.
         states.iter_mut().for_each(|state| state.starts_in_ms = None);

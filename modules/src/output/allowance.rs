@@ -12,8 +12,8 @@ const LATEST_NS: u64 = 5 * SECOND_NS;
 
 /// So many a second, and so many at once after a pause.
 ///
-/// It is a bucket of tokens, seen from the other side: the time at which it will be full again says how many are missing
-/// (the generic cell rate algorithm). So one number is all of it, and taking is one compare-and-swap.
+/// It is a bucket of tokens, seen from the other side: the time at which it will be full again says how many are
+/// missing (the generic cell rate algorithm). So one number is all of it, and taking is one compare-and-swap.
 pub(crate) struct Bucket {
     /// A token drips in so often.
     interval_ns: u64,
@@ -61,8 +61,8 @@ impl Excess {
     /// Counts one; true when it is the first.
     pub(super) fn add(&self, now_ns: u64) -> bool {
         self.last_ns.fetch_max(now_ns, Ordering::Relaxed);
-        // ORDERING: counts, then looks at `first_ns`, while `tell_all` empties `first_ns`, then takes the count. SeqCst, so that
-        // not both miss the other: a count that nobody tells of.
+        // ORDERING: counts, then looks at `first_ns`, while `tell_all` empties `first_ns`, then takes the count.
+        // SeqCst, so that not both miss the other: a count that nobody tells of.
         self.count.fetch_add(1, Ordering::SeqCst);
         self.first_ns.compare_exchange(0, now_ns.max(1), Ordering::SeqCst, Ordering::SeqCst).is_ok()
     }
@@ -134,8 +134,8 @@ mod tests {
         assert_eq!((0..200_000).filter(|_| fast.take(SECOND_NS)).count(), 100_000);
     }
 
-    /// For any arrivals: in no stretch of time do more pass than the burst and the rate allow, and none is refused while
-    /// a token by token account has one left.
+    /// For any arrivals: in no stretch of time do more pass than the burst and the rate allow, and none is refused
+    /// while a token by token account has one left.
     #[test]
     fn no_stretch_of_time_has_more_than_its_share() {
         for seed in 0..500 {

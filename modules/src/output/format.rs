@@ -41,8 +41,8 @@ impl<'a> Format<'a> {
         self.text(line, &time)
     }
 
-    /// For a file: as [`short`](Self::short), with the date, to the microsecond. When system time is not the computer's clock,
-    /// its source stands behind it.
+    /// For a file: as [`short`](Self::short), with the date, to the microsecond. When system time is not the computer's
+    /// clock, its source stands behind it.
     pub fn long(&self, line: &OutputLine) -> String {
         let mut time = iso(line.time_ns);
         if let Some(source) = self.source() {
@@ -102,8 +102,8 @@ pub fn iso(time_ns: u64) -> String {
     humantime::format_rfc3339_micros(UNIX_EPOCH + Duration::from_nanos(time_ns)).to_string()
 }
 
-/// A text of several lines goes on behind a tab: only what begins a line of output begins a line of the file. What else a terminal
-/// would obey is written out.
+/// A text of several lines goes on behind a tab: only what begins a line of output begins a line of the file. What else
+/// a terminal would obey is written out.
 fn escape(text: &str, into: &mut String) {
     for c in text.chars() {
         match c {

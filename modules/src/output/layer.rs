@@ -43,7 +43,8 @@ struct OutputLayer;
 
 impl<S: Subscriber> Layer<S> for OutputLayer {
     fn register_callsite(&self, metadata: &'static Metadata<'static>) -> Interest {
-        // Asked again for all of them when the level changes: an event that nobody hears costs its loop next to nothing.
+        // Asked again for all of them when the level changes: an event that nobody hears costs its loop next to
+        // nothing.
         if is_heard(metadata) { Interest::always() } else { Interest::never() }
     }
 

@@ -5,9 +5,10 @@
 //!  panic ──────────────────────────────▲                                                     └─▶ subscribers, `rohrpost log`
 //! ```
 //!
-//! Every `tracing` event becomes a line. A line goes into a small queue of this process and from there, at once if nobody
-//! else is at it, into the collector's mailbox: a module never waits on its own words. What is beyond its allowance is
-//! suppressed before it is even written; what finds no room is lost; both are counted, and said as soon as there is room.
+//! Every `tracing` event becomes a line. A line goes into a small queue of this process and from there, at once if
+//! nobody else is at it, into the collector's mailbox: a module never waits on its own words. What is beyond its
+//! allowance is suppressed before it is even written; what finds no room is lost; both are counted, and said as soon as
+//! there is room.
 
 mod allowance;
 #[cfg(feature = "builtin")]
@@ -43,9 +44,11 @@ pub const CLASS: &str = "output";
 /// Longest text of a line, bytes; what is longer is cut.
 pub const TEXT_MAX: usize = 900;
 
-/// Begins each line that a launched module prints although it has sent it, too: launch repeats it, and does not send it again.
+/// Begins each line that a launched module prints although it has sent it, too: launch repeats it, and does not send it
+/// again.
 pub(crate) const SENT: char = '\u{1e}';
-/// Begins each line that says where a panic came from, of a launched module: launch tells it once, and does not send it.
+/// Begins each line that says where a panic came from, of a launched module: launch tells it once, and does not send
+/// it.
 pub(crate) const TRACED: char = '\u{1d}';
 
 /// One line of output.
@@ -53,7 +56,8 @@ pub(crate) const TRACED: char = '\u{1d}';
 pub struct OutputLine {
     /// System time at which it was said, ns since 1970.
     pub time_ns: u64,
-    /// Module that said it: the 32 bits of its name, which is the sender's; or a module of whose node the sender is launch.
+    /// Module that said it: the 32 bits of its name, which is the sender's; or a module of whose node the sender is
+    /// launch.
     pub module: u32,
     /// How important it is.
     pub level: OutputLevel,

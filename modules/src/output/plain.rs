@@ -1,13 +1,15 @@
-//! What others wrote, as a terminal may have it. A module, a node or a program beyond may write anything; shown, it must not move a cursor,
-//! ring a bell, change what is read from left to right, or begin a line that somebody else seems to have written.
+//! What others wrote, as a terminal may have it. A module, a node or a program beyond may write anything; shown, it
+//! must not move a cursor, ring a bell, change what is read from left to right, or begin a line that somebody else
+//! seems to have written.
 //!
-//! What a terminal would obey is written out as JSON does it, such as `\u001b`: so a line of JSON means the same afterwards.
+//! What a terminal would obey is written out as JSON does it, such as `\u001b`: so a line of JSON means the same
+//! afterwards.
 
 use std::borrow::Cow;
 use std::fmt::{self, Write};
 
-/// Whether a terminal obeys this character, or shows it nowhere: control characters (C0, DEL, C1), those that change the direction of writing or
-/// separate lines, and those that have no width.
+/// Whether a terminal obeys this character, or shows it nowhere: control characters (C0, DEL, C1), those that change
+/// the direction of writing or separate lines, and those that have no width.
 pub fn is_obeyed(c: char) -> bool {
     c.is_control()
         || matches!(c,
@@ -41,7 +43,8 @@ fn write_plain(c: char, to: &mut (impl Write + ?Sized)) -> fmt::Result {
     }
 }
 
-/// Lines that a tool has written, with texts of others in them: ends of lines and tabs are its own, all else that a terminal obeys is not.
+/// Lines that a tool has written, with texts of others in them: ends of lines and tabs are its own, all else that a
+/// terminal obeys is not.
 pub struct Lines<T>(pub T);
 
 impl<T: fmt::Display> fmt::Display for Lines<T> {

@@ -1,5 +1,5 @@
-//! What this process writes to its standard error: whoever reads it may be gone, or stopped, and neither is a reason to panic or
-//! to wait.
+//! What this process writes to its standard error: whoever reads it may be gone, or stopped, and neither is a reason to
+//! panic or to wait.
 
 use super::{SENT, TRACED};
 use crate::common::OutputLevel;
@@ -89,8 +89,8 @@ fn whole(text: &[u8]) -> usize {
 
 /// How to write without waiting.
 enum WriteMode {
-    /// A pipe or a terminal, opened anew: writes to this description never wait. The one that standard error has is shared with
-    /// other processes, and with all that print with the standard library; those may expect that theirs do.
+    /// A pipe or a terminal, opened anew: writes to this description never wait. The one that standard error has is
+    /// shared with other processes, and with all that print with the standard library; those may expect that theirs do.
     Again(File),
     /// A file: it has room or an error, and nobody to wait for. Opened anew it would be written from another place.
     File,

@@ -37,8 +37,8 @@ impl Relay {
 }
 
 impl OutputProxy {
-    /// Says a line as of this system time, unless the module says too much already, or its configuration wants to hear only
-    /// of more important things.
+    /// Says a line as of this system time, unless the module says too much already, or its configuration wants to hear
+    /// only of more important things.
     pub(crate) fn say(&self, level: OutputLevel, time_ns: u64, text: String) {
         if level <= self.0.level() && self.0.allows(Lane::of(level)) {
             self.0.say(level, time_ns, cut(text));

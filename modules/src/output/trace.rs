@@ -1,5 +1,5 @@
-//! Which lines of a back trace are printed: those of the module's own code. What lies above them is how a panic is raised, what lies
-//! below how a program and this runtime begin; both are the same each time.
+//! Which lines of a back trace are printed: those of the module's own code. What lies above them is how a panic is
+//! raised, what lies below how a program and this runtime begin; both are the same each time.
 
 use std::path::Path;
 
@@ -26,7 +26,8 @@ const OTHERS: [&str; 15] = [
 /// In paths of sources that are nobody's own: the standard library's, and those of packages that were fetched.
 const FOREIGN: [&str; 3] = ["/rustc/", "/rustlib/src/", "/registry/src/"];
 
-/// The frames of a back trace that are worth a look, at most [`LINES_MAX`] lines of them; all frames where `all` is wished.
+/// The frames of a back trace that are worth a look, at most [`LINES_MAX`] lines of them; all frames where `all` is
+/// wished.
 pub(super) fn lines(trace: &str, all: bool) -> Vec<&str> {
     let folder = std::env::current_dir().unwrap_or_default();
     let mut shown = Vec::new();

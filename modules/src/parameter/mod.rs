@@ -7,8 +7,8 @@
 //! `param set`   ──runtime::parameters────┘
 //! ```
 //!
-//! A value travels as postcard of its type, and whoever has no such type reads it by the description that comes with it:
-//! [`Parameter`].
+//! A value travels as postcard of its type, and whoever has no such type reads it by the description that comes with
+//! it: [`Parameter`].
 //!
 //! ```
 //! #[rohrpost_modules::parameters(crate = rohrpost_modules::macro_support)]

@@ -6,8 +6,8 @@
 //! FLASER n r1 .. rn x y theta odom_x odom_y odom_theta stamp host time
 //! ```
 //!
-//! The order of the lines is the truth; nothing is sorted. Other kinds of lines (NEFF, SYNC, TRUEPOS, RLASER, remarks) are
-//! skipped and counted; a broken one is an item of its own, and reading goes on behind it.
+//! The order of the lines is the truth; nothing is sorted. Other kinds of lines (NEFF, SYNC, TRUEPOS, RLASER, remarks)
+//! are skipped and counted; a broken one is an item of its own, and reading goes on behind it.
 //!
 //! A FLASER line names no angles. CARMEN's own reader takes 180 and 181 readings to be one degree apart, beginning at
 //! -90°: the 181st closes the half circle, the 180-reading scanner leaves it open. See [`beams`].
@@ -28,7 +28,8 @@ pub const READINGS_MAX: usize = 4096;
 /// How to read what the log does not say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Readings of this length and more mean that nothing came back. The SICK scanners of most logs write 81.83 or 81.91.
+    /// Readings of this length and more mean that nothing came back. The SICK scanners of most logs write 81.83 or
+    /// 81.91.
     pub range_max_m: f32,
 }
 
@@ -242,7 +243,8 @@ impl<R: BufRead> Iterator for Reader<R> {
 
 /// First direction and step of a FLASER line with this many readings, radians.
 ///
-/// An odd number closes the half circle (181 readings: 180 steps of 1°), an even one leaves it open (180 readings: 1° too).
+/// An odd number closes the half circle (181 readings: 180 steps of 1°), an even one leaves it open (180 readings: 1°
+/// too).
 pub fn beams(readings: usize) -> (f64, f64) {
     let steps = if readings % 2 == 1 { readings - 1 } else { readings };
     (-FRAC_PI_2, PI / steps.max(1) as f64)

@@ -1,8 +1,8 @@
 //! A map of free and occupied squares, made from scans whose poses are known.
 //!
-//! Each square holds the log-odds of being occupied, in hundredths. A scan counts once for a square, however many of its
-//! beams cross it, and a square that one beam hits is not cleared by another beam that grazes it. The map grows in tiles
-//! of 128 × 128 squares, one package each, as they are first touched.
+//! Each square holds the log-odds of being occupied, in hundredths. A scan counts once for a square, however many of
+//! its beams cross it, and a square that one beam hits is not cleared by another beam that grazes it. The map grows in
+//! tiles of 128 × 128 squares, one package each, as they are first touched.
 
 mod dump;
 mod tile;
@@ -84,8 +84,8 @@ pub struct Mapper {
     scan: u16,
 }
 
-/// Where the walk is: neighbouring squares are mostly in the same tile, and asking the tree for each would cost more than
-/// all else.
+/// Where the walk is: neighbouring squares are mostly in the same tile, and asking the tree for each would cost more
+/// than all else.
 struct Cursor {
     index: TileIndex,
     place: Option<usize>,

@@ -1,4 +1,5 @@
-//! What the demonstration's modules compute: a simulated robot and its world, a real robot's log, a map, a way to drive.
+//! What the demonstration's modules compute: a simulated robot and its world, a real robot's log, a map, a way to
+//! drive.
 //!
 //! ```text
 //! world ──▶ simulator ──scan──▶ pilot ──twist──▶ simulator

@@ -9,8 +9,8 @@
 //!        └── long enough ── Turn: on the spot, to one side until it is clear: no dithering in corners
 //! ```
 //!
-//! The preferred side makes it turn into doors, as one who keeps a hand on the wall does; changing it by chance now and then
-//! breaks the rounds that such a one would walk for ever.
+//! The preferred side makes it turn into doors, as one who keeps a hand on the wall does; changing it by chance now and
+//! then breaks the rounds that such a one would walk for ever.
 
 use crate::types::{LaserScan, Pose, Twist};
 use nalgebra::Point2;
@@ -65,9 +65,10 @@ impl Default for Settings {
 /// Headings of the fan: from -90° to 90° of the robot, 5° apart.
 const HEADINGS: i32 = 18;
 const HEADING_STEP_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
-/// Ways longer than this are all the same. This and the next three were picked from 16 settings, each tried on 24 seeds, for
-/// the most rooms in 8 minutes: 6.2 of 8 (others 4.4 to 6.0), and 4.0 in 3 minutes (3.0 to 4.5). A mean is known to some
-/// 0.2 rooms only, so near ones are as good. On 20 seeds that took no part: 4.0 in 3 minutes, 3.65 with the first guess.
+/// Ways longer than this are all the same. This and the next three were picked from 16 settings, each tried on 24
+/// seeds, for the most rooms in 8 minutes: 6.2 of 8 (others 4.4 to 6.0), and 4.0 in 3 minutes (3.0 to 4.5). A mean is
+/// known to some 0.2 rooms only, so near ones are as good. On 20 seeds that took no part: 4.0 in 3 minutes, 3.65 with
+/// the first guess.
 const SIGHT_M: f64 = 5.0;
 /// What turns it to its preferred side, and what keeps it straight, in metres of way at a right angle.
 const SIDE_WEIGHT_M: f64 = 1.0;
@@ -206,7 +207,8 @@ impl Pilot {
             .collect()
     }
 
-    /// How far the robot could go straight in a heading before its rim, margin included, would touch; at most `SIGHT_M`.
+    /// How far the robot could go straight in a heading before its rim, margin included, would touch; at most
+    /// `SIGHT_M`.
     fn way_m(&self, obstacles: &[Point2<f64>], heading_rad: f64) -> f64 {
         let (sin, cos) = heading_rad.sin_cos();
         let width_m = self.settings.radius_m + self.settings.margin_m;

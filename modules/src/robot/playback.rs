@@ -21,7 +21,8 @@ pub const GAP_MAX_S: f64 = 10.0;
 /// A record and when to play it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Due {
-    /// Since the start of the playback: time in the log divided by the speed. Never less than that of the record before.
+    /// Since the start of the playback: time in the log divided by the speed. Never less than that of the record
+    /// before.
     pub due_ns: u64,
     /// What to play.
     pub record: Record,

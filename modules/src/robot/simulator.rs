@@ -1,8 +1,8 @@
 //! A simulated robot: a disc on two wheels with a range scanner, moved in steps of 10 ms.
 //!
 //! Time comes from the caller: the first stamp given is step 0. Everything random comes from the seed: the same seed,
-//! commands and stamps give the same bits. Odometry and scanner draw from streams of their own, so that looking does not
-//! change the way.
+//! commands and stamps give the same bits. Odometry and scanner draw from streams of their own, so that looking does
+//! not change the way.
 
 use super::world::World;
 use crate::types::{LaserScan, Odometry, Pose, Twist};
@@ -16,8 +16,8 @@ use thiserror::Error;
 pub const STEP_NS: u64 = 10_000_000;
 const STEP_S: f64 = 0.01;
 
-/// Steps that one call makes at most, 5 s: a caller that was away longer (a suspended computer) finds the robot where it
-/// stood after these; the rest of the time is skipped and counted. The dead-man time is long over by then.
+/// Steps that one call makes at most, 5 s: a caller that was away longer (a suspended computer) finds the robot where
+/// it stood after these; the rest of the time is skipped and counted. The dead-man time is long over by then.
 pub const STEPS_AT_ONCE_MAX: u64 = 500;
 
 /// Nearer than this it still leans against what it hit.
@@ -146,7 +146,8 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Stands where the world says, which should have room for it: it can't drive out of a wall. Odometry begins at zero.
+    /// Stands where the world says, which should have room for it: it can't drive out of a wall. Odometry begins at
+    /// zero.
     pub fn new(world: World, settings: Settings) -> Self {
         let mut wheel_random = ChaCha8Rng::seed_from_u64(settings.seed);
         let mut scan_random = wheel_random.clone();
@@ -203,7 +204,8 @@ impl Simulator {
         Odometry { pose: self.odometry, twist: self.twist }
     }
 
-    /// Time is another one from now on: the robot goes on from where it stands, and its last command is as old as it was.
+    /// Time is another one from now on: the robot goes on from where it stands, and its last command is as old as it
+    /// was.
     pub fn set_time(&mut self, now_ns: u64) {
         if let Some(last_ns) = self.now_ns.replace(now_ns) {
             let age_ns = last_ns.saturating_sub(self.commanded_ns);

@@ -1,6 +1,7 @@
 //! The cells that a ray crosses, in order and without a gap (Amanatides and Woo, "A Fast Voxel Traversal Algorithm").
 //!
-//! All lengths are in cells: cell (c, r) covers [c, c+1) × [r, r+1). The world's rays and the map's beams both walk here.
+//! All lengths are in cells: cell (c, r) covers [c, c+1) × [r, r+1). The world's rays and the map's beams both walk
+//! here.
 
 /// A step of the walk: the cell, and how far from the ray's origin it is entered.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! A robot's world from a text map: squares that are free or blocked, and where the robot starts.
 //!
-//! Our own format: a header, the line `map`, then rows from north to south. The file is drawn as the world lies: x grows to
-//! the right, y upwards; (0, 0) is the outer corner of the lower left square. All beyond the map is blocked.
+//! Our own format: a header, the line `map`, then rows from north to south. The file is drawn as the world lies: x
+//! grows to the right, y upwards; (0, 0) is the outer corner of the lower left square. All beyond the map is blocked.
 //!
 //! ```text
 //! rohrpost-map 1
@@ -141,8 +141,8 @@ impl World {
         drawn.world(cell_m, |world| Ok(world.pose_in(column, row, heading_rad)))
     }
 
-    /// Reads the grid format of the MovingAI benchmarks. Without a start, the robot starts in the free square nearest to
-    /// the middle, facing along x.
+    /// Reads the grid format of the MovingAI benchmarks. Without a start, the robot starts in the free square nearest
+    /// to the middle, facing along x.
     pub fn parse_octile(text: &str, cell_m: f64, start: Option<Pose>) -> Result<Self, MapError> {
         if !(cell_m.is_finite() && cell_m > 0.0) {
             return Err(MapError::CellSize(cell_m));

@@ -1,6 +1,7 @@
 //! What a module can ask of its runtime.
 
 use super::endpoint::Endpoint;
+use super::error::ContextError;
 use super::follow::{Followings, Rate, Subscription};
 use super::refusals::Refusals;
 use crate::call::append;
@@ -8,7 +9,7 @@ use crate::call::{Caller, Link};
 use crate::common::DataHead;
 use crate::interface::{DataPort, Proxy};
 use crate::publish::{Delivery, Newest, Subscriptions};
-use rohrpost_config::{ClassTable, Installation, NameTextError, Principal};
+use rohrpost_config::{ClassTable, Installation, Principal};
 use rohrpost_mailbox::{
     CreateError, Head, Interest, Label, Name, Options, OverflowPolicy, Publications, Receiver, SendError, Shape,
     SystemClock, SystemTime, Type, Watch, Watches, local,
@@ -26,52 +27,18 @@ use std::time::{Duration, Instant};
 const PERIOD_MIN: Duration = Duration::from_micros(10);
 const PERIOD_MAX: Duration = Duration::from_secs(86_400);
 
-/// Why a module cannot speak to another.
-#[derive(Debug, thiserror::Error)]
-pub enum ContextError {
-    /// The text names no module.
-    #[error(transparent)]
-    Name(#[from] NameTextError),
-    /// A proxy or subscription of another class.
-    #[error("`{module}` is of class `{class}`, but this speaks to class `{wanted}`")]
-    Class {
-        /// What was named.
-        module: String,
-        /// Its class.
-        class: String,
-        /// The interface's class.
-        wanted: &'static str,
-    },
-    /// A subscription into a mailbox that this module has not opened.
-    #[error("this module has no mailbox {0} for data; make it with `open_mailbox` before it is subscribed into")]
-    NoMailbox(u8),
-    /// More subscriptions than have ids.
-    #[error("this module has 65536 subscriptions, and no id for another")]
-    TooMany,
-    /// Data that no endpoint of this module publishes.
-    #[error(
-        "this module has no endpoint of class `{0}`; add one to `endpoints` in the configuration, or to its `Interfaces`"
-    )]
-    NoName(&'static str),
-    /// Data of an interface that the program does not serve under the name that has its class.
-    #[error(
-        "data `{data}` of an interface of class `{class}` cannot be published as `{module}`: its program does not serve that \
-         interface there, so nobody could subscribe to it; add it to the module's `Interfaces`"
-    )]
-    Undeclared {
-        /// The data.
-        data: &'static str,
-        /// Class of its interface.
-        class: &'static str,
-        /// The module or endpoint.
-        module: String,
-    },
-    /// The value cannot be written as postcard.
-    #[error("data `{0}` cannot be written: {1}")]
-    Encode(&'static str, postcard::Error),
-}
-
-/// A module's way to its node: proxies, subscriptions, publishing, time, settings.
+/// A module's connection to its node: proxies, subscriptions, publishing, time, settings.
+///
+/// ```
+/// use rohrpost_modules::interfaces::WheelsInterface;
+/// use rohrpost_modules::runtime::{Context, ContextError, Rate, Subscription};
+/// use rohrpost_modules::types::Odometry;
+///
+/// fn prepare(context: &mut Context) -> Result<Subscription<Odometry>, ContextError> {
+///     context.set_period(std::time::Duration::from_millis(100));
+///     context.subscribe(WheelsInterface::ODOMETRY, "odometry.0", Rate::Each)
+/// }
+/// ```
 pub struct Context {
     pub(crate) me: Name,
     pub(crate) installation: Arc<Installation>,
@@ -153,12 +120,12 @@ impl Context {
         &self.installation
     }
 
-    /// A path from the settings, which starts from the configuration file's folder.
+    /// Resolves a path of the settings, relative to the configuration file's folder.
     pub fn path(&self, path: &str) -> PathBuf {
         self.installation.resolve(path)
     }
 
-    /// System time now.
+    /// System time now, with its error bound and age; its field `ns` is ns since 1970.
     pub fn now(&self) -> SystemTime {
         self.clock.now()
     }
@@ -168,14 +135,21 @@ impl Context {
         &self.clock
     }
 
-    /// Asks for [`crate::Module::tick`] once in this time, from now on; at least 10 µs, at most a day. Ticks that come too
-    /// late because the one before took too long are left out.
+    /// Asks for [`crate::Module::tick`] once in this time, from now on; at least 10 µs, at most a day. Ticks that come
+    /// too late because the one before took too long are left out.
     pub fn set_period(&mut self, period: Duration) {
         self.period = Some(period.clamp(PERIOD_MIN, PERIOD_MAX));
         self.next_tick = Some(Instant::now());
     }
 
     /// A proxy of the module that a setting names, such as `motor.0`.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{interfaces::MotorProxy, runtime::{Context, ContextError}};
+    /// fn motor(context: &Context) -> Result<MotorProxy, ContextError> {
+    ///     context.proxy("motor.0")
+    /// }
+    /// ```
     ///
     /// # Errors
     /// When the text names no module, or one of another class.
@@ -188,8 +162,8 @@ impl Context {
         &self.link
     }
 
-    /// Subscribes to data of the module that a setting names. The subscription is kept alive, and asked for anew when that
-    /// module is restarted.
+    /// Subscribes to data of the module that a setting names. The subscription is kept alive, and asked for anew when
+    /// that module is restarted.
     ///
     /// # Errors
     /// When the text names no module, or one of another class.
@@ -218,8 +192,8 @@ impl Context {
         self.follow(mailbox, from, port.number, (port.hash)(), rate)
     }
 
-    /// Subscribes to data whose type is known by its description alone. They come to `mailbox`: [`local::DATA`], or one of the
-    /// module's own.
+    /// Subscribes to data of a type that is known by its description alone. They come to `mailbox`: [`local::DATA`], or
+    /// one of the module's own.
     ///
     /// # Errors
     /// [`ContextError::NoMailbox`], when there is no such mailbox.
@@ -248,8 +222,8 @@ impl Context {
         Ok(Subscription::new(followed.ok_or(ContextError::TooMany)?, mailbox))
     }
 
-    /// Makes a mailbox of the module's own, local id 3 or more, for [`Context::subscribe_in`]. It takes what the module has subscribed
-    /// to, and nothing else.
+    /// Makes a mailbox of the module's own, local id 3 or more, for [`Context::subscribe_in`]. It takes what the module
+    /// has subscribed to, and nothing else.
     ///
     /// # Errors
     /// When it cannot be made.
@@ -260,7 +234,8 @@ impl Context {
     }
 
     /// Makes a mailbox of the module's own, local id 3 or more, that takes data from all: what comes to it comes to
-    /// [`crate::Module::received`], whoever sent it, if it begins as data do. Whose word counts is for the module to validate.
+    /// [`crate::Module::received`] from any sender, if it begins as data do. The module decides which senders it
+    /// trusts.
     ///
     /// # Errors
     /// When it cannot be made.
@@ -276,8 +251,8 @@ impl Context {
         Ok(())
     }
 
-    /// Whether data may go on to the module: they come to a mailbox that takes them from all, or belong to a subscription. What may not is
-    /// counted.
+    /// Whether data may go on to the module: they come to a mailbox that takes them from all, or belong to a
+    /// subscription. What may not is counted.
     pub(crate) fn admits(&mut self, (mailbox, latest): (u8, bool), head: &Head, number: u16, data: &DataHead) -> bool {
         if self.open.contains(&mailbox) {
             return true;
@@ -286,14 +261,14 @@ impl Context {
         judged.map_err(|cause| self.refusals.note(cause, head.from)).is_ok()
     }
 
-    /// Waits for a file descriptor too: a serial port, a socket, a pipe, anything that `poll` knows. When there is something to do
-    /// [`crate::Module::ready`] is called, while the module is on; until then it waits in the kernel.
+    /// Waits for a file descriptor too: a serial port, a socket, a pipe, anything that `poll` knows. When there is
+    /// something to do [`crate::Module::ready`] is called, while the module is on; until then it waits in the kernel.
     ///
     /// A duplicate is kept until [`Context::unwatch`]: closing one's own descriptor does not end it.
     ///
     /// # Errors
-    /// When [`rohrpost_mailbox::WATCHES_MAX`] are watched, the process has no descriptor left, or the pipe by which senders wake who
-    /// waits like this cannot be made in the node's directory.
+    /// When [`rohrpost_mailbox::WATCHES_MAX`] are watched, the process has no descriptor left, or the pipe by which
+    /// senders wake who waits like this cannot be made in the node's directory.
     pub fn watch(&mut self, descriptor: &impl AsFd, interest: Interest) -> io::Result<Watch> {
         let watches = match &mut self.watches {
             Some(watches) => watches,
@@ -316,7 +291,7 @@ impl Context {
         if class != wanted {
             return Err(ContextError::Class { module: module.into(), class: class.into(), wanted });
         }
-        // The configuration counts on `calls`: who calls how many decides how many slots a mailbox needs.
+        // The configuration counts on `calls`: the number of callers decides how many slots a mailbox needs.
         let declared = is_beyond || self.installation.module(self.me).is_none_or(|me| me.calls.contains(&name));
         if !declared {
             tracing::warn!(
@@ -326,8 +301,8 @@ impl Context {
         Ok(name)
     }
 
-    /// Publishes a value that was true at `stamp_ns` (system time): it becomes the newest, and goes to all who subscribed.
-    /// A subscriber whose mailbox is full misses it, and sees that it did.
+    /// Publishes a value that was true at `stamp_ns` (system time): it becomes the newest, and goes to all subscribers.
+    /// A subscriber with a full mailbox misses it, and sees that it did.
     ///
     /// # Errors
     /// [`ContextError::NoName`], [`ContextError::Undeclared`] or [`ContextError::Encode`].
@@ -350,6 +325,14 @@ impl Context {
     }
 
     /// Publishes a value that is true now.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{interfaces::WheelsInterface, types::Odometry};
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// fn publish(context: &mut Context, odometry: &Odometry) -> Result<(), ContextError> {
+    ///     context.publish_now(WheelsInterface::ODOMETRY, odometry)
+    /// }
+    /// ```
     ///
     /// # Errors
     /// As for [`Context::publish`].

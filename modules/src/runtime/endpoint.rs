@@ -30,7 +30,7 @@ pub(crate) struct Offer<M> {
 }
 
 impl<M> Endpoint<M> {
-    /// `named`: who always finds a place as its caller.
+    /// `named`: callers that always find a place.
     pub(crate) fn new(
         name: Name,
         class: &str,

@@ -56,7 +56,8 @@ pub enum StartError {
 }
 
 impl StartError {
-    /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the same way.
+    /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the
+    /// same way.
     pub const CONFIGURATION: u8 = 78;
 
     /// The exit code that tells launch whether starting again may help.
@@ -73,4 +74,49 @@ impl StartError {
             Self::Node(_) | Self::Mailbox(_) | Self::Orphan(_) | Self::Module(..) | Self::System(..) => 1,
         }
     }
+}
+
+/// Why a module cannot speak to another.
+#[derive(Debug, thiserror::Error)]
+pub enum ContextError {
+    /// The text names no module.
+    #[error(transparent)]
+    Name(#[from] NameTextError),
+    /// A proxy or subscription of another class.
+    #[error("`{module}` is of class `{class}`, but this speaks to class `{wanted}`")]
+    Class {
+        /// What was named.
+        module: String,
+        /// Its class.
+        class: String,
+        /// The interface's class.
+        wanted: &'static str,
+    },
+    /// A subscription into a mailbox that this module has not opened.
+    #[error("this module has no mailbox {0} for data; make it with `open_mailbox` before it is subscribed into")]
+    NoMailbox(u8),
+    /// More subscriptions than have ids.
+    #[error("this module has 65536 subscriptions, and no id for another")]
+    TooMany,
+    /// Data that no endpoint of this module publishes.
+    #[error(
+        "this module has no endpoint of class `{0}`; add one to `endpoints` in the configuration, or to its `Interfaces`"
+    )]
+    NoName(&'static str),
+    /// Data of an interface that the program does not serve under the name that has its class.
+    #[error(
+        "data `{data}` of an interface of class `{class}` cannot be published as `{module}`: its program does not serve that \
+         interface there, so nobody could subscribe to it; add it to the module's `Interfaces`"
+    )]
+    Undeclared {
+        /// The data.
+        data: &'static str,
+        /// Class of its interface.
+        class: &'static str,
+        /// The module or endpoint.
+        module: String,
+    },
+    /// The value cannot be written as postcard.
+    #[error("data `{0}` cannot be written: {1}")]
+    Encode(&'static str, postcard::Error),
 }

@@ -18,6 +18,16 @@ const _: () = assert!(ANSWER.as_millis() < RENEW.as_millis() && RENEW.as_millis(
 const RETRY: Duration = Duration::from_millis(100);
 
 /// How often a subscriber wants data.
+///
+/// ```
+/// use rohrpost_modules::runtime::Rate;
+/// use std::time::Duration;
+///
+/// assert_eq!(Rate::hz(20.0)?, Rate::Every(Duration::from_millis(50)));
+/// assert_eq!(Rate::hz(0.0)?, Rate::Each);
+/// assert!(Rate::hz(f64::NAN).is_err());
+/// # Ok::<(), rohrpost_modules::runtime::BadRate>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Rate {
     /// Each value.
@@ -32,7 +42,7 @@ pub enum Rate {
 pub struct BadRate(f64);
 
 impl Rate {
-    /// At most so often a second; each value for 0.
+    /// The newest value at most `hz` times a second; each value for 0.
     ///
     /// # Errors
     /// It is below 0, infinite, or no number.
@@ -48,7 +58,8 @@ impl Rate {
     }
 }
 
-/// A subscription to data of type `T`; [`super::Received::read`] tells whether data belong to it.
+/// A subscription to data of type `T`, made by [`super::Context::subscribe`]; [`super::Received::read`] tells whether
+/// data belong to it.
 pub struct Subscription<T> {
     pub(crate) id: u16,
     pub(crate) mailbox: u8,
@@ -103,8 +114,8 @@ impl Followings {
         Self { list: Vec::new(), incarnation }
     }
 
-    /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id, if one is left. `latest`: there
-    /// only the newest counts, and on the way as well.
+    /// Follows data number `number` of a module, which come to `mailbox`; returns the subscription's id, if one is
+    /// left. `latest`: there only the newest counts, and on the way as well.
     pub(crate) fn follow(
         &mut self,
         (mailbox, latest): (u8, bool),
@@ -178,12 +189,13 @@ impl Followings {
         self.list.iter().map(|followed| followed.next).min()
     }
 
-    /// Whether data that came to `mailbox` are what was subscribed to; if so, notes their number. `latest`: a gap there is what newer ones
-    /// replaced, there or on the way, and no loss.
+    /// Whether data that came to `mailbox` are what was subscribed to; if so, notes their number. `latest`: a gap there
+    /// is what newer ones replaced, there or on the way, and no loss.
     ///
-    /// A subscription is told by its id and by the incarnation of this incarnation, which nothing before it has had: so whoever still sends what an
-    /// earlier incarnation asked for, in whatever order that subscribed, is not taken for another. The publisher and the number are compared
-    /// besides, since both numbers are no secret; a router lets nobody send in the name of another node's module.
+    /// A subscription is told by its id and by the incarnation of this incarnation, which nothing before it has had: so
+    /// whoever still sends what an earlier incarnation asked for, in whatever order that subscribed, is not taken for another.
+    /// The publisher and the number are compared besides, since both numbers are no secret; a router lets nobody send
+    /// in the name of another node's module.
     pub(crate) fn admit(
         &mut self,
         (mailbox, latest): (u8, bool),

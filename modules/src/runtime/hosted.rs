@@ -1,4 +1,4 @@
-//! A module as those who send it commands see it, under one of its names.
+//! A module as the senders of commands see it, under one of its names.
 
 use super::context::Context;
 use super::endpoint::Offer;

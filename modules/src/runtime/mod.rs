@@ -23,8 +23,8 @@ mod runner;
 pub(crate) mod server;
 mod start;
 
-pub use context::{Context, ContextError};
-pub use error::StartError;
+pub use context::Context;
+pub use error::{ContextError, StartError};
 pub use follow::{BadRate, Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};
 pub use received::{Received, Unreadable};

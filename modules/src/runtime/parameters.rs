@@ -87,7 +87,8 @@ fn put<M: Module>(module: &mut M, changed: &[&Wanted], value: impl Fn(&Wanted) -
     }
 }
 
-/// What reading the settings could not see: saved values of what is no parameter, and defaults in code that are out of range.
+/// What reading the settings could not see: saved values of what is no parameter, and defaults in code that are out of
+/// range.
 pub(crate) fn check_start<M: Module>(
     module: &mut M,
     installation: &Installation,

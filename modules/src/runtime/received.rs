@@ -15,6 +15,15 @@ pub struct Unreadable {
 }
 
 /// Data that a subscription brought.
+///
+/// ```
+/// use rohrpost_modules::runtime::{Received, Subscription, Unreadable};
+/// use rohrpost_modules::types::Odometry;
+///
+/// fn speed_m_s(data: &Received<'_>, odometry: &Subscription<Odometry>) -> Result<Option<f64>, Unreadable> {
+///     Ok(data.read(odometry)?.map(|odometry| odometry.twist.speed_m_s))
+/// }
+/// ```
 pub struct Received<'a> {
     /// The module that published it.
     pub from: Name,

@@ -1,4 +1,5 @@
-//! Packages that a module or launch does not take: counted by cause, and told seldom, so that nobody fills the log with them.
+//! Packages that a module or launch does not take: counted by cause, and told seldom, so that nobody fills the log with
+//! them.
 
 use crate::common::Refused;
 use rohrpost_mailbox::Name;
@@ -24,12 +25,14 @@ pub(crate) enum Cause {
     OtherNumber,
     /// An earlier incarnation of the module asked for it.
     PreviousIncarnation,
-    /// It is of an earlier incarnation of its sender than one that is remembered. Told, and not counted: it passes by itself.
+    /// It is of an earlier incarnation of its sender than one that is remembered. Told, and not counted: it passes by
+    /// itself.
     EarlierIncarnation,
 }
 
 impl Cause {
-    /// What is told of it. Nothing where it happens to all: after a restart, what the incarnation before asked for still comes for a while.
+    /// What is told of it. Nothing where it happens to all: after a restart, what the incarnation before asked for still comes
+    /// for a while.
     fn words(self) -> Option<&'static str> {
         match self {
             Self::NotAllowed => Some("[access] does not let that class command this one"),

@@ -23,15 +23,15 @@ use std::time::{Duration, Instant};
 /// flood nor slow handlers must keep ticks, renewals, other mailboxes and the end waiting.
 const BURST: usize = 32;
 const BURST_TIME: Duration = Duration::from_millis(2);
-/// A loop that has not slept for so long is made to, for this short time: the kernel ends a real-time process that works
-/// without pause (RLIMIT_RTTIME), and a flood, or a period too short for its work, is no reason to be ended.
+/// A loop that has not slept for so long is made to, for this short time: the kernel ends a real-time process that
+/// works without pause (RLIMIT_RTTIME), and a flood, or a period too short for its work, is no reason to be ended.
 const AWAKE_MAX: Duration = Duration::from_millis(250);
 const PAUSE: Duration = Duration::from_micros(50);
 
 /// Runs a module until it is told to end; the whole of a module's `main`.
 ///
-/// Launch tells it by its environment what it is; by hand say `--config FILE --name CLASS.INSTANCE` (and `--off`, to leave it
-/// switched off).
+/// Launch tells it by its environment what it is; by hand say `--config FILE --name CLASS.INSTANCE` (and `--off`, to
+/// leave it switched off).
 pub fn run<M: Module>() -> ExitCode {
     exit(Start::from_environment().and_then(run_started::<M>))
 }
@@ -268,8 +268,8 @@ fn burst(mut handle: impl FnMut() -> bool) -> bool {
     true
 }
 
-/// The same memory without what was in it, for things that live for another time. Collecting in place is how the standard
-/// library does this; were it not, it would allocate, and `tests/hot_path.rs` would tell.
+/// The same memory without what was in it, for things that live for another time. Collecting in place is how the
+/// standard library does this; were it not, it would allocate, and `tests/hot_path.rs` would tell.
 fn empty<'a>(mut receivers: Vec<&mut Receiver>) -> Vec<&'a mut Receiver> {
     receivers.clear();
     receivers.into_iter().map(|_| -> &'a mut Receiver { unreachable!("it is empty") }).collect()

@@ -1,4 +1,4 @@
-//! Commands: taken from a mailbox, decided on, run by whoever serves there, answered.
+//! Commands: taken from a mailbox, decided on, run by the server, answered.
 
 use super::refusals::Cause;
 use crate::call::append;
@@ -7,13 +7,13 @@ use crate::common::{self, DescriptionPart};
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{Head, Kind, Label, Name, Options, Package, Receiver, SendError, Type, local, monotonic_ns};
 
-/// Whoever runs the commands of a mailbox: a module under one of its names, or launch.
+/// Runs the commands of a mailbox: a module under one of its names, or launch.
 pub(crate) trait CommandHandler {
     /// Whether a function may be run twice without harm.
     fn is_idempotent(&self, number: u16) -> bool;
     /// Runs a command; what it has to say is appended to the reply.
     fn run(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault>;
-    /// Whose share of places a command uses, unless its sender may not command at all.
+    /// The principal that is charged for a command, unless its sender may not command at all.
     fn admit(&self, head: &Head) -> Result<Principal, Fault>;
     /// Counts what is not taken.
     fn refuse(&mut self, cause: Cause, from: Name);
@@ -30,7 +30,8 @@ pub(crate) struct CommandServer {
 }
 
 impl CommandServer {
-    /// Whoever had this mailbox before has ended by now, and ran nothing after this. These principals always find a place.
+    /// The previous owner of this mailbox has ended by now, and ran nothing after this. These principals always find a
+    /// place.
     pub(crate) fn new(commands: Receiver, named: &[Principal]) -> Self {
         Self { commands, deduplicator: Deduplicator::new(monotonic_ns(), named), reply: Vec::with_capacity(1024) }
     }
@@ -88,8 +89,8 @@ impl CommandServer {
     }
 }
 
-/// Judges by `[access]` who sent a command, and says whose share of places it uses. The routers have judged by the same rules what comes
-/// from other nodes; here it holds for what comes from the same one, too.
+/// Judges by `[access]` who sent a command, and says whose share of places it uses. The routers have judged by the same
+/// rules what comes from other nodes; here it holds for what comes from the same one, too.
 pub(crate) fn admit(installation: &Installation, head: &Head) -> Result<Principal, Fault> {
     let Some(rule) = installation.access_against(head.from, head.to) else {
         return Ok(installation.principal(head.from));

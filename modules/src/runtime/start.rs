@@ -36,8 +36,8 @@ pub(crate) mod environment {
     pub(crate) const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
 }
 
-/// What launch keeps for all processes of this module, one after the other, in its order. To be asked for once. Nothing of a module for which it keeps
-/// nothing, and of one that was started by hand.
+/// What launch keeps for all processes of this module, one after the other, in its order. To be asked for once. Nothing
+/// of a module for which it keeps nothing, and of one that was started by hand.
 pub fn kept() -> Vec<OwnedFd> {
     sys::handed_on()
 }
@@ -176,8 +176,8 @@ fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
     if nix::unistd::getppid().as_raw().unsigned_abs() == launcher { Ok(()) } else { Err(StartError::Orphan(launcher)) }
 }
 
-/// On SIGTERM, SIGINT and SIGHUP: ask the loop to end; if it does not within the time, end the process. SIGHUP is how the
-/// kernel wakes a stopped module whose launch has died.
+/// On SIGTERM, SIGINT and SIGHUP: ask the loop to end; if it does not within the time, end the process. SIGHUP is how
+/// the kernel wakes a stopped module whose launch has died.
 fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGHUP])

@@ -59,8 +59,8 @@ struct AskedPage {
 }
 
 impl Distant {
-    /// Begins to look at the node of this launch; all of it is to come within `timeout`. Of several looks at a time, `nodes` is
-    /// their number: they share the reply mailbox.
+    /// Begins to look at the node of this launch; all of it is to come within `timeout`. Of several looks at a time,
+    /// `nodes` is their number: they share the reply mailbox.
     pub fn new(launcher: Name, what: SnapshotRequest, timeout: Duration, nodes: usize) -> Self {
         let ahead = (AHEAD / nodes.max(1)).max(1);
         let (look, bytes, there, next) = (None, Vec::new(), 0, 0);

@@ -1,22 +1,21 @@
-//! A look at a node as it travels from that node's launch to a tool elsewhere: postcard of these structs.
+//! A look at a node as it travels from that node's launch to a tool elsewhere: postcard of forms of its types.
 //!
-//! They are the types of `rohrpost-mailbox`, which know no serialization, field by field. What arrives is a claim of another
-//! process: whatever the bytes are, reading them gives a look or an error.
+//! Those of `rohrpost-mailbox` know no serialization, so `travels!` makes a form of each, field by field. What arrives is
+//! a claim of another process: whatever the bytes are, reading them gives a look or an error.
 
-mod detail;
 #[cfg(test)]
 mod tests;
-mod traffic;
 
 use super::{MailboxSnapshot, ModuleSurvey, Survey, Usage, Working};
 use crate::launcher::ChildState;
-use detail::{DetailForm, detail, detail_form};
 use rohrpost_mailbox::sys::Scheduling;
-use rohrpost_mailbox::{Loss, MailboxInfo, ModuleState, Name, OverflowPolicy, ParticipantInfo, Shape};
+use rohrpost_mailbox::{
+    Class, ClassTraffic, FlowInfo, FlowSecond, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, MailboxInfo, ModuleState,
+    Name, OverflowPolicy, ParticipantInfo, Party, Priority, Shape, SlotInfo, Type, VictimInfo, WaitingPackage,
+};
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
-use traffic::{ClassForm, FlowForm, LatencyForm, class, class_form, flow, flow_form, latency, latency_form, ns};
 
 /// What one look shows.
 #[derive(Clone, Debug)]
@@ -30,12 +29,8 @@ pub enum Snapshot {
 impl Snapshot {
     /// As it travels.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
-        let form = match self {
-            Self::Survey(survey) => SeenForm::Survey(survey_form(survey)),
-            Self::Mailbox(look) => SeenForm::Mailbox(look.as_ref().map(|look| detail_form(look))),
-        };
-        // Writing to a growing vector does not fail; what is empty is refused by whoever reads it.
-        postcard::to_stdvec(&form).unwrap_or_default()
+        // Writing to a growing vector does not fail; an empty one is refused by its reader.
+        postcard::to_stdvec(&self.form()).unwrap_or_default()
     }
 
     /// Reads what [`Snapshot::to_bytes`] wrote.
@@ -43,10 +38,7 @@ impl Snapshot {
     /// # Errors
     /// When the bytes are of another kind.
     pub(crate) fn from_bytes(bytes: &[u8]) -> Result<Self, postcard::Error> {
-        Ok(match postcard::from_bytes(bytes)? {
-            SeenForm::Survey(form) => Self::Survey(Box::new(survey(form))),
-            SeenForm::Mailbox(form) => Self::Mailbox(form.map(|form| Box::new(detail(form)))),
-        })
+        postcard::from_bytes(bytes).map(Self::of)
     }
 
     /// Tells the forms of different versions of this program apart: computed from the types below.
@@ -55,262 +47,278 @@ impl Snapshot {
     }
 }
 
-#[derive(Serialize, Deserialize, Schema)]
-enum SeenForm {
-    Survey(SurveyForm),
-    Mailbox(Option<DetailForm>),
+/// A type that travels in another form, with the same content.
+trait Travels {
+    type Form;
+
+    fn form(&self) -> Self::Form;
+
+    fn of(form: Self::Form) -> Self;
 }
 
-#[derive(Serialize, Deserialize, Schema)]
-struct SurveyForm {
-    node: String,
-    at_ns: u64,
-    modules: Vec<ModuleForm>,
-    mailboxes: Vec<MailboxForm>,
-    classes: Vec<ClassForm>,
-    flows: Vec<FlowForm>,
+/// Types that travel as they are.
+macro_rules! plain {
+    ($($ty:ty),*) => {$(
+        impl Travels for $ty {
+            type Form = Self;
+
+            fn form(&self) -> Self {
+                self.clone()
+            }
+
+            fn of(form: Self) -> Self {
+                form
+            }
+        }
+    )*};
+}
+plain! { bool, u8, u16, u32, u64, u128, i8, i16, String, (u32, u32), (u64, u64), [u64; Loss::ALL.len()], ChildState }
+
+/// Types that travel as one of the above.
+macro_rules! as_plain {
+    ($($ty:ty => $plain:ty, $form:expr, $of:expr;)*) => {$(
+        impl Travels for $ty {
+            type Form = $plain;
+
+            fn form(&self) -> $plain {
+                let form: fn(&Self) -> $plain = $form;
+                form(self)
+            }
+
+            fn of(form: $plain) -> Self {
+                $of(form)
+            }
+        }
+    )*};
+}
+as_plain! {
+    Name => u32, |name| name.raw(), Self::from_raw;
+    Class => u8, |class| class.0, Self;
+    Priority => u8, |priority| priority.0, Self;
+    Type => i16, |ty| ty.0, Self;
+    Duration => u64, |time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX), Self::from_nanos;
 }
 
-#[derive(Serialize, Deserialize, Schema)]
-struct ModuleForm {
-    node: String,
-    at_ns: Option<u64>,
-    name: u32,
-    aliases: Vec<u32>,
-    process: Option<ProcessForm>,
-    usage: Option<UsageForm>,
-    scheduling: Option<SchedulingForm>,
-    received: u64,
-    bytes_in: u64,
-    lost: u64,
-    losses: [u64; Loss::ALL.len()],
-    waited: LatencyForm,
-    sent: u64,
-    bytes_out: u64,
-    depth: u32,
-    working: Option<WorkingForm>,
-    child: Option<ChildState>,
-}
+impl<T: Travels> Travels for Box<T> {
+    type Form = T::Form;
 
-#[derive(Serialize, Deserialize, Schema)]
-struct WorkingForm {
-    part: String,
-    lasts_ms: u64,
-}
+    fn form(&self) -> T::Form {
+        (**self).form()
+    }
 
-#[derive(Serialize, Deserialize, Schema)]
-struct ProcessForm {
-    module: u32,
-    pid: u32,
-    incarnation: u32,
-    state: Option<StateForm>,
-    restarts: u32,
-    joined_ns: u64,
-}
-
-#[derive(Serialize, Deserialize, Schema)]
-enum StateForm {
-    Starting,
-    Off,
-    On,
-    Error,
-    Stopping,
-}
-
-#[derive(Serialize, Deserialize, Schema)]
-struct UsageForm {
-    cpu_ms: u64,
-    memory_bytes: u64,
-}
-
-#[derive(Serialize, Deserialize, Schema)]
-enum SchedulingForm {
-    Fifo(u8),
-    Normal(i8),
-}
-
-#[derive(Serialize, Deserialize, Schema)]
-struct MailboxForm {
-    name: u32,
-    slots: u16,
-    body_bytes_max: u16,
-    full: FullForm,
-    max_age_ns: Option<u64>,
-    claims: u8,
-    owner: Option<u32>,
-    adoptions: u32,
-    depth: u32,
-    depth_max: u32,
-    sent: u64,
-    classes: Vec<ClassForm>,
-}
-
-#[derive(Serialize, Deserialize, Schema)]
-enum FullForm {
-    Displace,
-    Latest,
-    Reject,
-}
-
-fn survey_form(survey: &Survey) -> SurveyForm {
-    SurveyForm {
-        node: survey.node.clone(),
-        at_ns: survey.at_ns,
-        modules: survey.modules.iter().map(module_form).collect(),
-        mailboxes: survey.mailboxes.iter().map(mailbox_form).collect(),
-        classes: survey.classes.iter().map(class_form).collect(),
-        flows: survey.flows.iter().map(flow_form).collect(),
+    fn of(form: T::Form) -> Self {
+        Self::new(T::of(form))
     }
 }
 
-fn survey(form: SurveyForm) -> Survey {
-    Survey {
-        node: form.node,
-        at_ns: form.at_ns,
-        modules: form.modules.into_iter().map(module).collect(),
-        mailboxes: form.mailboxes.into_iter().map(mailbox).collect(),
-        classes: form.classes.into_iter().map(class).collect(),
-        flows: form.flows.into_iter().map(flow).collect(),
+impl<T: Travels> Travels for Option<T> {
+    type Form = Option<T::Form>;
+
+    fn form(&self) -> Self::Form {
+        self.as_ref().map(T::form)
+    }
+
+    fn of(form: Self::Form) -> Self {
+        form.map(T::of)
     }
 }
 
-fn module_form(module: &ModuleSurvey) -> ModuleForm {
-    ModuleForm {
-        node: module.node.clone(),
-        at_ns: module.at_ns,
-        name: module.name.raw(),
-        aliases: module.aliases.iter().map(|alias| alias.raw()).collect(),
-        process: module.process.as_ref().map(process_form),
-        usage: module.usage.map(|usage| UsageForm {
-            cpu_ms: u64::try_from(usage.cpu.as_millis()).unwrap_or(u64::MAX),
-            memory_bytes: usage.memory_bytes,
-        }),
-        scheduling: module.scheduling.map(|scheduling| match scheduling {
-            Scheduling::Fifo(priority) => SchedulingForm::Fifo(priority),
-            Scheduling::Normal(nice) => SchedulingForm::Normal(nice),
-        }),
-        received: module.received,
-        bytes_in: module.bytes_in,
-        lost: module.lost,
-        losses: module.losses,
-        waited: latency_form(&module.waited),
-        sent: module.sent,
-        bytes_out: module.bytes_out,
-        depth: module.depth,
-        working: module.working.as_ref().map(|working| WorkingForm {
-            part: working.part.clone(),
-            lasts_ms: u64::try_from(working.lasts.as_millis()).unwrap_or(u64::MAX),
-        }),
-        child: module.child.clone(),
+impl<T: Travels> Travels for Vec<T> {
+    type Form = Vec<T::Form>;
+
+    fn form(&self) -> Self::Form {
+        self.iter().map(T::form).collect()
+    }
+
+    fn of(form: Self::Form) -> Self {
+        form.into_iter().map(T::of).collect()
     }
 }
 
-fn module(form: ModuleForm) -> ModuleSurvey {
-    ModuleSurvey {
-        node: form.node,
-        at_ns: form.at_ns,
-        name: Name::from_raw(form.name),
-        aliases: form.aliases.into_iter().map(Name::from_raw).collect(),
-        process: form.process.map(process),
-        usage: form
-            .usage
-            .map(|usage| Usage { cpu: Duration::from_millis(usage.cpu_ms), memory_bytes: usage.memory_bytes }),
-        scheduling: form.scheduling.map(|scheduling| match scheduling {
-            SchedulingForm::Fifo(priority) => Scheduling::Fifo(priority),
-            SchedulingForm::Normal(nice) => Scheduling::Normal(nice),
-        }),
-        received: form.received,
-        bytes_in: form.bytes_in,
-        lost: form.lost,
-        losses: form.losses,
-        waited: latency(form.waited),
-        sent: form.sent,
-        bytes_out: form.bytes_out,
-        depth: form.depth,
-        working: form
-            .working
-            .map(|working| Working { part: working.part, lasts: Duration::from_millis(working.lasts_ms) }),
-        child: form.child,
-        error: None,
-    }
+/// Makes the forms of structs and enums. Fields behind `without` stay behind; they arrive as the value given there.
+macro_rules! travels {
+    () => {};
+    (
+        struct $ty:ident as $form:ident { $($field:ident: $of:ty,)* } $(without { $($left:ident: $value:expr),* })?;
+        $($rest:tt)*
+    ) => {
+        #[derive(Serialize, Deserialize, Schema)]
+        struct $form {
+            $($field: <$of as Travels>::Form,)*
+        }
+
+        impl Travels for $ty {
+            type Form = $form;
+
+            fn form(&self) -> $form {
+                $form { $($field: self.$field.form(),)* }
+            }
+
+            fn of(form: $form) -> Self {
+                Self { $($field: Travels::of(form.$field),)* $($($left: $value,)*)? }
+            }
+        }
+
+        travels! { $($rest)* }
+    };
+    (
+        enum $ty:ident as $form:ident {
+            $($choice:ident $(($inner:ident: $of:ty))? $({ $($field:ident: $its:ty),* })?,)*
+        };
+        $($rest:tt)*
+    ) => {
+        #[derive(Serialize, Deserialize, Schema)]
+        enum $form {
+            $($choice $((<$of as Travels>::Form))? $({ $($field: <$its as Travels>::Form),* })?,)*
+        }
+
+        impl Travels for $ty {
+            type Form = $form;
+
+            fn form(&self) -> $form {
+                match self {
+                    $(Self::$choice $(($inner))? $({ $($field),* })? => {
+                        $form::$choice $(($inner.form()))? $({ $($field: $field.form()),* })?
+                    })*
+                }
+            }
+
+            fn of(form: $form) -> Self {
+                match form {
+                    $($form::$choice $(($inner))? $({ $($field),* })? => {
+                        Self::$choice $((Travels::of($inner)))? $({ $($field: Travels::of($field)),* })?
+                    })*
+                }
+            }
+        }
+
+        travels! { $($rest)* }
+    };
 }
 
-fn process_form(process: &ParticipantInfo) -> ProcessForm {
-    ProcessForm {
-        module: process.module.raw(),
-        pid: process.pid,
-        incarnation: process.incarnation,
-        state: process.state.map(|state| match state {
-            ModuleState::Starting => StateForm::Starting,
-            ModuleState::Off => StateForm::Off,
-            ModuleState::On => StateForm::On,
-            ModuleState::Error => StateForm::Error,
-            ModuleState::Stopping => StateForm::Stopping,
-        }),
-        restarts: process.restarts,
-        joined_ns: process.joined_ns,
-    }
+travels! {
+    enum Snapshot as SeenForm {
+        Survey(survey: Box<Survey>),
+        Mailbox(look: Option<Box<MailboxSnapshot>>),
+    };
+    struct Survey as SurveyForm {
+        node: String,
+        at_ns: u64,
+        modules: Vec<ModuleSurvey>,
+        mailboxes: Vec<MailboxInfo>,
+        classes: Vec<ClassTraffic>,
+        flows: Vec<FlowInfo>,
+    };
+    struct ModuleSurvey as ModuleForm {
+        node: String,
+        at_ns: Option<u64>,
+        name: Name,
+        aliases: Vec<Name>,
+        process: Option<ParticipantInfo>,
+        usage: Option<Usage>,
+        scheduling: Option<Scheduling>,
+        received: u64,
+        bytes_in: u64,
+        lost: u64,
+        losses: [u64; Loss::ALL.len()],
+        waited: Latency,
+        sent: u64,
+        bytes_out: u64,
+        depth: u32,
+        working: Option<Working>,
+        child: Option<ChildState>,
+    } without { error: None };
+    // What lasts long is in the module's own form, with the names of functions.
+    struct ParticipantInfo as ProcessForm {
+        module: Name,
+        pid: u32,
+        incarnation: u32,
+        state: Option<ModuleState>,
+        restarts: u32,
+        joined_ns: u64,
+    } without { in_hand: None };
+    enum ModuleState as StateForm { Starting, Off, On, Error, Stopping, };
+    struct Usage as UsageForm { cpu: Duration, memory_bytes: u64, };
+    struct Working as WorkingForm { part: String, lasts: Duration, };
+    enum Scheduling as SchedulingForm { Fifo(priority: u8), Normal(nice: i8), };
+    struct MailboxInfo as MailboxForm {
+        name: Name,
+        shape: Shape,
+        owner: Option<u32>,
+        adoptions: u32,
+        depth: u32,
+        depth_max: u32,
+        sent: u64,
+        classes: Vec<ClassTraffic>,
+    };
+    struct Shape as ShapeForm { slots: u16, body_bytes_max: u16, full: OverflowPolicy, max_age: Option<Duration>, claims: u8, };
+    enum OverflowPolicy as FullForm { Displace, Latest, Reject, };
+    struct ClassTraffic as ClassForm {
+        class: Option<Class>,
+        received: u64,
+        body_bytes: u64,
+        losses: [u64; Loss::ALL.len()],
+        latency: Latency,
+    };
+    struct FlowInfo as FlowForm {
+        pid: u32,
+        module: Name,
+        incarnation: u32,
+        from: Name,
+        to: Name,
+        kind: Type,
+        packages: u64,
+        bytes: u64,
+        refused: u64,
+        first_ns: u64,
+        last_ns: u64,
+        interval_squares_ns2: u128,
+        age_sum_ns: u64,
+        seconds: Vec<FlowSecond>,
+    };
+    struct FlowSecond as SecondForm { second: u64, interval_ns: Option<(u64, u64)>, bytes: (u32, u32), };
+    struct MailboxSnapshot as LookForm { stopped: Vec<u32>, detail: MailboxDetail, };
+    struct MailboxDetail as DetailForm {
+        info: MailboxInfo,
+        receiver: Option<Party>,
+        is_retired: bool,
+        slots: Vec<SlotInfo>,
+    };
+    enum SlotInfo as SlotForm {
+        Free,
+        Filling { by: Party, victim: Option<VictimInfo> },
+        Ready(package: WaitingPackage),
+        Taken(package: WaitingPackage),
+    };
+    struct WaitingPackage as WaitingForm { priority: Priority, ticket: u64, is_redelivered: bool, };
+    struct VictimInfo as VictimForm { priority: Priority, is_replaced: bool, };
+    struct Party as PartyForm { participant: u16, pid: Option<u32>, module: Name, is_alive: bool, };
 }
 
-fn process(form: ProcessForm) -> ParticipantInfo {
-    ParticipantInfo {
-        module: Name::from_raw(form.module),
-        pid: form.pid,
-        incarnation: form.incarnation,
-        state: form.state.map(|state| match state {
-            StateForm::Starting => ModuleState::Starting,
-            StateForm::Off => ModuleState::Off,
-            StateForm::On => ModuleState::On,
-            StateForm::Error => ModuleState::Error,
-            StateForm::Stopping => ModuleState::Stopping,
-        }),
-        restarts: form.restarts,
-        joined_ns: form.joined_ns,
-        // What lasts long is in the module's own form, with the names of functions.
-        in_hand: None,
-    }
+/// Most buckets are empty: those that are not, with their numbers.
+#[derive(Serialize, Deserialize, Schema)]
+struct LatencyForm {
+    max_ns: u64,
+    sum_ns: u64,
+    buckets: Vec<(u8, u32)>,
 }
 
-fn mailbox_form(mailbox: &MailboxInfo) -> MailboxForm {
-    MailboxForm {
-        name: mailbox.name.raw(),
-        slots: mailbox.shape.slots,
-        body_bytes_max: mailbox.shape.body_bytes_max,
-        full: match mailbox.shape.full {
-            OverflowPolicy::Displace => FullForm::Displace,
-            OverflowPolicy::Latest => FullForm::Latest,
-            OverflowPolicy::Reject => FullForm::Reject,
-        },
-        max_age_ns: mailbox.shape.max_age.map(ns),
-        claims: mailbox.shape.claims,
-        owner: mailbox.owner,
-        adoptions: mailbox.adoptions,
-        depth: mailbox.depth,
-        depth_max: mailbox.depth_max,
-        sent: mailbox.sent,
-        classes: mailbox.classes.iter().map(class_form).collect(),
-    }
-}
+impl Travels for Latency {
+    type Form = LatencyForm;
 
-fn mailbox(form: MailboxForm) -> MailboxInfo {
-    MailboxInfo {
-        name: Name::from_raw(form.name),
-        shape: Shape {
-            slots: form.slots,
-            body_bytes_max: form.body_bytes_max,
-            full: match form.full {
-                FullForm::Displace => OverflowPolicy::Displace,
-                FullForm::Latest => OverflowPolicy::Latest,
-                FullForm::Reject => OverflowPolicy::Reject,
-            },
-            max_age: form.max_age_ns.map(Duration::from_nanos),
-            claims: form.claims,
-        },
-        owner: form.owner,
-        adoptions: form.adoptions,
-        depth: form.depth,
-        depth_max: form.depth_max,
-        sent: form.sent,
-        classes: form.classes.into_iter().map(class).collect(),
+    fn form(&self) -> LatencyForm {
+        let counted = (0u8..).zip(&self.buckets).filter(|(_, count)| **count > 0);
+        let buckets = counted.map(|(at, count)| (at, *count)).collect();
+        LatencyForm { max_ns: self.max.form(), sum_ns: self.sum.form(), buckets }
+    }
+
+    fn of(form: LatencyForm) -> Self {
+        let mut buckets = [0; LATENCY_BUCKETS];
+        for (at, count) in form.buckets {
+            if let Some(bucket) = buckets.get_mut(usize::from(at)) {
+                *bucket = count;
+            }
+        }
+        Self { max: Duration::from_nanos(form.max_ns), sum: Duration::from_nanos(form.sum_ns), buckets }
     }
 }

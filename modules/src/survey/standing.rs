@@ -1,7 +1,8 @@
-//! How a module stands, in the words that all tools use: `list`, `status`, `top`, the table of `launch`, JSON and the GUI.
+//! How a module stands, in the words that all tools use: `list`, `status`, `top`, the table of `launch`, JSON and the
+//! GUI.
 //!
-//! Two sources say it. The process itself, in its node's table: that is the present. Its launch: what has become of a process that is
-//! not there, and how often it was started again. What the process says goes first.
+//! Two sources say it. The process itself, in its node's table: that is the present. Its launch: what has become of a
+//! process that is not there, and how often it was started again. What the process says goes first.
 
 use super::ModuleSurvey;
 use crate::common::State;
@@ -194,8 +195,8 @@ impl ModuleSurvey {
         }
     }
 
-    /// The last that went wrong with it, in words: what it is stuck in, why it is in error, or how its last process ended. Empty if
-    /// nothing did, or nobody knows.
+    /// The last that went wrong with it, in words: what it is stuck in, why it is in error, or how its last process
+    /// ended. Empty if nothing did, or nobody knows.
     pub fn last_error(&self, installation: &Installation) -> String {
         if let Some(working) = &self.working {
             return working.to_string();

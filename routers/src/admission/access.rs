@@ -28,7 +28,8 @@ impl Access {
         Self { rules: rules.iter().map(rule).collect() }
     }
 
-    /// Whether a package may go to its mailbox: all may but commands, and what else takes up room in a mailbox for commands.
+    /// Whether a package may go to its mailbox: all may but commands, and what else takes up room in a mailbox for
+    /// commands.
     pub fn allows(&self, head: &Head) -> bool {
         let is_command = matches!(head.kind.kind(), Kind::Command(_)) || head.to.local() == local::COMMANDS;
         let Class(from) = head.from.class();

@@ -1,4 +1,5 @@
-//! The one point of admission: what comes from another node, from another system, or by the TCP router is judged here before it reaches a mailbox.
+//! The one point of admission: what comes from another node, from another system, or by the TCP router is judged here
+//! before it reaches a mailbox.
 //!
 //! ```text
 //!  LAN ─▶ Inbound ──────────┐                                    ┌─▶ the mailbox, with the priority that it may have
@@ -6,8 +7,8 @@
 //!  TCP router ─▶ Client ────┘             · priority · body      └─▶ refused: counted by cause, a command is answered
 //! ```
 //!
-//! A function of what configuration says and of the package alone: no socket, no clock, no memory of what came before. What a receiver has asked
-//! for only the receiver knows: that data are of its subscription is looked at there.
+//! A function of what configuration says and of the package alone: no socket, no clock, no memory of what came before.
+//! What a receiver has asked for only the receiver knows: that data are of its subscription is looked at there.
 
 mod access;
 mod packet;
@@ -25,9 +26,9 @@ use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
 
 /// Of a router of the LAN: takes IP packets from the same mailbox of other nodes.
-pub(crate) const TUNNEL: u8 = 4;
+pub const TUNNEL: u8 = 4;
 /// Type of an IP packet.
-pub(crate) const PACKET: Type = Type::data(1);
+pub const PACKET: Type = Type::data(1);
 /// An IP packet goes behind all packages of modules.
 pub(crate) const PACKET_PRIORITY: Priority = Priority(0);
 
@@ -47,7 +48,8 @@ pub struct Admission {
 /// The way by which a package came.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ArrivalPath {
-    /// From a node of the LAN. `is_its_name`: the sender is one of that node, or nobody vouches for who sent it anyway.
+    /// From a node of the LAN. `is_its_name`: the sender's name is one of that node, or nothing vouches for the sender
+    /// anyway.
     Lan {
         /// Which node.
         node: NodeIndex,
@@ -142,19 +144,20 @@ impl Admission {
         Addresses::of(body) == Some(expected)
     }
 
-    /// The node whose mailbox for IP packets this is.
+    /// The node that this mailbox for IP packets belongs to.
     pub(crate) fn tunnel_end(&self, name: Name) -> Option<NodeIndex> {
         (Some(name.class()) == self.router && name.local() == TUNNEL).then_some(name.instance())
     }
 
-    /// Whether a mailbox is one by which routers carry packages. Commands, replies and data of their modules have the same mailboxes as those of
-    /// any module.
+    /// Whether a mailbox is one by which routers carry packages. Commands, replies and data of their modules have the
+    /// same mailboxes as those of any module.
     fn is_routers_own(&self, name: Name) -> bool {
         let class = Some(name.class());
         name.local() >= local::TRANSIT && (class == self.router || class == self.tcp)
     }
 
-    /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own address.
+    /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own
+    /// address.
     fn judge_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), Refused> {
         let node = match way {
             ArrivalPath::Lan { node, .. } => Some(node),
@@ -184,11 +187,11 @@ impl Admission {
 
 /// A package's head with the priority that it may have beyond its own node.
 ///
-/// Nobody makes others hurry more than it may hurry itself: a command has at most the class of its sender. A reply has the priority of the
-/// command that asked, so at most the class of its receiver, which is who asked. Data are either asked for, like a reply, or sent unasked, like a
-/// command: they have at most the greater of both classes. More cannot be said without knowing who asked for what; and who pretends to have been
-/// asked is no more urgent to its receiver than that has made itself. Into a mailbox for commands nobody has anything sent: what is more urgent than
-/// its sender would push commands out of it.
+/// A command has at most the class of its sender: no sender gives others more urgency than it has itself. A reply has
+/// the priority of the command, so at most the class of its receiver, which sent the command. Data are either asked
+/// for, like a reply, or sent unasked, like a command: they have at most the greater of both classes. Requests are not
+/// tracked, so nothing tighter can be checked; and pretended replies are no more urgent to their receiver than its own
+/// class. A mailbox for commands takes nothing above its sender's class: that would push commands out of it.
 #[must_use]
 pub fn capped(head: &Head) -> Head {
     let (sender, receiver) = (head.from.class().priority(), head.to.class().priority());

@@ -1,4 +1,4 @@
-//! Source and destination of an IP packet, version 4 or 6, whose header agrees with its length.
+//! Source and destination of an IP packet, version 4 or 6, if its header agrees with its length.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
@@ -8,14 +8,15 @@ const V6_HEAD_BYTES: usize = 40;
 /// Where a packet says that it comes from and goes to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Addresses {
-    /// Who sent it.
+    /// The source.
     pub source: IpAddr,
-    /// Who is to get it.
+    /// The destination.
     pub destination: IpAddr,
 }
 
 impl Addresses {
-    /// Reads a packet; none if it is of another version, shorter than its header says, or of another length than it says.
+    /// Reads a packet; none if it is of another version, shorter than its header says, or of another length than it
+    /// says.
     pub fn of(packet: &[u8]) -> Option<Self> {
         match packet.first()? >> 4 {
             4 => Self::of_v4(packet),
@@ -68,7 +69,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn only_a_packet_whose_header_agrees_with_its_length_has_addresses() {
+    fn only_a_packet_with_a_header_that_agrees_with_its_length_has_addresses() {
         let (one, two) = (Ipv4Addr::new(10, 78, 0, 1), Ipv4Addr::new(10, 78, 0, 2));
         let whole = v4(one, two, b"payload");
         let changed = |at: usize, byte: u8| {

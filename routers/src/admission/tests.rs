@@ -27,7 +27,7 @@ fn judged(way: ArrivalPath, kind: Type, from: Name, to: Name) -> Result<(), Refu
 }
 
 #[test]
-fn who_has_not_the_name_that_it_sends_under_is_refused() {
+fn a_sender_under_a_name_of_another_is_refused() {
     let (mine, yours) = (name(1, 60, 1, 1), name(1, 90, 0, 2));
     for (way, from, is_admitted, why) in [
         (lan(1), mine, true, "a node speaks for its own names"),
@@ -67,7 +67,7 @@ fn the_mailboxes_of_routers_take_nothing_and_their_modules_are_as_any() {
 #[test]
 fn of_another_systems_routers_the_tcp_router_alone_is_for_all() {
     for (from, to, is_admitted, why) in [
-        (2, name(1, TCP.0, TCP_SERVER, 0), true, "who asks what is hosted"),
+        (2, name(1, TCP.0, TCP_SERVER, 0), true, "the client asks what is hosted"),
         (2, name(1, TCP.0, 0, 0), false, "the client of a node"),
         (2, name(1, ROUTER.0, 0, 0), false, "the router of a node"),
         (1, name(1, TCP.0, 0, 0), true, "a tool of the same system, beyond the LAN"),
@@ -99,7 +99,7 @@ fn only_classes_that_are_listed_may_command_by_whichever_way() {
 }
 
 #[test]
-fn packets_of_the_tunnel_come_from_the_node_whose_address_they_have() {
+fn packets_of_the_tunnel_come_from_the_node_with_their_address() {
     let (ours, theirs) = (TUNNEL_NET.address(0), TUNNEL_NET.address(1));
     let end = |node| name(1, ROUTER.0, node, TUNNEL);
     let packet = v4(theirs, ours, b"payload");
@@ -128,12 +128,12 @@ fn packets_of_the_tunnel_come_from_the_node_whose_address_they_have() {
 }
 
 #[test]
-fn nobody_hurries_more_than_it_may_or_than_who_asked_for_it() {
+fn no_sender_exceeds_its_class_or_that_of_its_request() {
     for (kind, from, to, limit, why) in [
         (Type::command(16), 60, 200, 60, "a command, as its sender"),
         (Type::command(16), 200, 60, 200, "a command, as its sender"),
-        (Type::reply(16), 200, 60, 60, "a reply, as who asked"),
-        (Type::reply(16), 60, 200, 200, "a reply, as who asked"),
+        (Type::reply(16), 200, 60, 60, "a reply, as its receiver"),
+        (Type::reply(16), 60, 200, 200, "a reply, as its receiver"),
         (Type::data(1), 60, 200, 200, "data that were asked for"),
         (Type::data(1), 200, 60, 200, "data that were not"),
         (Type(0), 60, 200, 60, "nothing that there is"),
@@ -155,5 +155,5 @@ fn nobody_hurries_more_than_it_may_or_than_who_asked_for_it() {
         assert_eq!(capped(&head).priority, Priority(60), "among commands all go as their sender");
     }
     let unasked = Head { to: name(1, 60, 0, 0), kind: Type::command(1), priority: Priority(1), ..Head::default() };
-    assert_eq!(capped(&unasked).priority, Priority(0), "who says no name has no importance");
+    assert_eq!(capped(&unasked).priority, Priority(0), "a sender without a name has no importance");
 }

@@ -1,42 +1,43 @@
-//! Packages that do not fit in a datagram: put together from their parts, bounded in memory and time.
+//! Reassembly of packages that do not fit in a datagram, bounded in memory and time.
 //!
-//! A sender has at most one package under way for each level and peer, and a more urgent one may go between. So several are put together
-//! at a time; more than there is room for means that parts were lost, and the least important, then oldest, is given up.
+//! A sender has at most one package in progress for each level and peer, and a more urgent one may go between. So
+//! several are reassembled at a time. More than there is room for means that fragments were lost: the least important,
+//! then oldest, is given up.
 
 use crate::broken::broken;
 use crate::frame::{Fragment, PARTS_MAX};
 use rohrpost_mailbox::Head;
 
-/// Packages of one peer that are put together at a time.
+/// Packages of one peer in reassembly at a time.
 pub const PARTIAL_MAX: usize = 8;
-/// A package of which no further part came for so long is given up.
+/// A package without a further fragment for this long is given up.
 pub const PATIENCE_NS: u64 = 1_000_000_000;
-/// Packages given up that are remembered, so that a part that comes after does not begin them again.
+/// Remembered packages that were given up, so that a late fragment does not begin them again.
 const GIVEN_UP_KEPT: usize = 8;
 
-/// What becomes of a package whose parts come.
+/// Events of a package that arrives in fragments.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Change {
-    /// Its first part came, in whatever order.
+    /// Its first fragment came, in any order.
     Began,
-    /// It will not be whole.
+    /// It will not be complete.
     GivenUp,
 }
 
-/// A package put together.
+/// A complete package.
 #[derive(Debug)]
 pub struct Whole<'a> {
     /// Its head.
     pub head: Head,
-    /// Sequence of the datagram with its first part: its place in the order.
+    /// Sequence of the datagram with its first fragment: its place in the order.
     pub first: u64,
-    /// Something newer of its flow was delivered before it.
+    /// A newer package of its flow was delivered before it.
     pub is_late: bool,
     /// Its body.
     pub body: &'a [u8],
 }
 
-/// The packages of one peer of which parts have come. Takes memory for each when first needed, and keeps it.
+/// The incomplete packages of one peer. Takes memory for each when first needed, and keeps it.
 #[derive(Debug, Default)]
 pub struct Reassembly {
     partial: Vec<Partial>,
@@ -51,18 +52,18 @@ struct Partial {
     first: u64,
     part_bytes: usize,
     count: u16,
-    /// Parts that came, one bit each.
+    /// Fragments that came, one bit each.
     came: [u64; PARTS_MAX as usize / 64],
     missing: u16,
     touched_ns: u64,
-    /// Something newer of its flow was delivered.
+    /// A newer package of its flow was delivered.
     is_late: bool,
     body: Vec<u8>,
 }
 
 impl Reassembly {
-    /// Takes a part; the whole if it was the last that was missing. A part that does not agree with the others of its package is dropped.
-    /// `is_late` is asked when a package begins: whether something newer of its flow was delivered before.
+    /// Takes a fragment; returns the package if it was the last missing one. A fragment that contradicts the others is
+    /// dropped. `is_late` is called when a package begins: whether a newer one of its flow was delivered before.
     pub fn take(
         &mut self,
         now_ns: u64,
@@ -95,7 +96,8 @@ impl Reassembly {
         Some(Whole { head, first, is_late, body: &self.partial[at].body })
     }
 
-    /// A package of the datagram of this sequence is delivered: what is put together of its flow and began before it is late from now on.
+    /// A package of the datagram with this sequence is delivered: incomplete packages of its flow that began before it
+    /// are late now.
     pub fn delivers(&mut self, newer: &Head, sequence: u64) {
         let flow = |head: &Head| (head.to, head.from, head.priority);
         for older in self.partial.iter_mut().filter(|older| older.is_used && older.first < sequence) {
@@ -103,7 +105,7 @@ impl Reassembly {
         }
     }
 
-    /// Gives up what no part came of for too long.
+    /// Gives up packages without a fragment for too long.
     pub fn expire(&mut self, now_ns: u64, mut tell: impl FnMut(&Head, &[u8], Change)) {
         for at in 0..self.partial.len() {
             let partial = &self.partial[at];
@@ -113,7 +115,7 @@ impl Reassembly {
         }
     }
 
-    /// Gives up all: their sender lives no more.
+    /// Gives up all: their sender is dead.
     pub fn clear(&mut self, mut tell: impl FnMut(&Head, &[u8], Change)) {
         for at in 0..self.partial.len() {
             if self.partial[at].is_used {
@@ -124,7 +126,7 @@ impl Reassembly {
         self.given_up = [None; GIVEN_UP_KEPT];
     }
 
-    /// Packages that are being put together.
+    /// Packages in reassembly.
     pub fn len(&self) -> usize {
         self.partial.iter().filter(|partial| partial.is_used).count()
     }
@@ -187,7 +189,7 @@ impl Partial {
     fn begin(&mut self, part: &Fragment<'_>, is_late: bool) {
         let Fragment { first, count, head, .. } = *part;
         let mut body = std::mem::take(&mut self.body);
-        // What is not overwritten is not handed out: see `Fragment::is_sound`.
+        // Bytes that are not overwritten are not handed out: see `Fragment::is_sound`.
         body.resize(head.len.into(), 0);
         let came = [0; PARTS_MAX as usize / 64];
         *self = Self {
@@ -204,7 +206,7 @@ impl Partial {
         };
     }
 
-    /// Whether the package is whole now.
+    /// Whether the package is complete now.
     fn add(&mut self, now_ns: u64, part: &Fragment<'_>) -> bool {
         let agrees = part.head == self.head && part.count == self.count && part.part_bytes() == self.part_bytes;
         let (word, bit) = (usize::from(part.index) / 64, 1 << (part.index % 64));

@@ -33,7 +33,7 @@ impl Cut {
     }
 }
 
-/// Takes a part; first of the package that is whole now, and what became of others.
+/// Takes a fragment; returns `first` of a complete package, and the events of others.
 fn take(parts: &mut Reassembly, now_ns: u64, part: &Fragment<'_>) -> (Option<u64>, Vec<(u64, Change)>) {
     let mut changes = Vec::new();
     let whole = parts.take(now_ns, part, || false, |head, _, change| changes.push((head.priority.0.into(), change)));
@@ -157,8 +157,10 @@ proptest! {
         packages in prop::collection::vec((any::<u8>(), PART + 1..2000), 1..6),
         order in prop::collection::vec(any::<prop::sample::Index>(), 200),
     ) {
-        let cuts: Vec<Cut> = packages.iter().enumerate().map(|(n, (p, len))| Cut::new(n as u64 * 50, *p, *len)).collect();
-        let mut left: Vec<_> = cuts.iter().flat_map(|cut| (0..cut.body.len().div_ceil(PART)).map(move |i| (cut, i))).collect();
+        let numbered = packages.iter().enumerate();
+        let cuts: Vec<Cut> = numbered.map(|(n, (p, len))| Cut::new(n as u64 * 50, *p, *len)).collect();
+        let count = |cut: &Cut| cut.body.len().div_ceil(PART);
+        let mut left: Vec<_> = cuts.iter().flat_map(|cut| (0..count(cut)).map(move |i| (cut, i))).collect();
         let mut parts = Reassembly::default();
         let mut whole = 0;
         for index in order {

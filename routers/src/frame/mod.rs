@@ -1,26 +1,25 @@
-//! The bytes of a datagram between routers: checked once, then no accessor can fail. The page `docs/src/wire.md` is exact.
+//! Bytes of a datagram between routers: checked once, then no accessor can fail. The page `docs/src/wire.md` is exact.
 //!
 //! ```text
 //!  0     2    3    4       5     6     7  8        16            24         32      36
-//! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬───────┬──────────────────────────────────┐
-//! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ check │ as its kind says                 │
-//! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴───────┴──────────────────────────────────┘
-//!  packages: (package head 16, body) over and over        fragment: first u64, index u16, count u16, offset u32, package head, bytes
-//!  alive: incarnation u64 and next sequence u64 of the peer as we heard it, datagrams of it that we missed u64
+//! ┌──────┬────┬────┬───────┬─────┬────┬──┬────────┬─────────────┬──────────┬───────┬─────────────────────────────┐
+//! │ "Rp" │ v1 │kind│system │from │ to │ 0│ digest │ incarnation │ sequence │ check │ content by kind             │
+//! └──────┴────┴────┴───────┴─────┴────┴──┴────────┴─────────────┴──────────┴───────┴─────────────────────────────┘
+//!  packages: (head 16, body) repeated     fragment: first u64, index u16, count u16, offset u32, package head, bytes
+//!  alive: incarnation u64 and next sequence u64 of the peer as heard here, datagrams of it that were missed u64
 //!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
-//!  byte 7: key that what follows the head is sealed with, 0: it is not, see `security`; hello: always sealed
+//!  byte 7: key of the seal over the content, 0: none, see `security`; hello: always sealed
 //! ```
 //!
-//! All fields of ours are little-endian; the head of a package is in the order that its own options tell. The check is the CRC-32 of
-//! zlib over all bytes but itself: a flipped bit that the 16 bits of UDP let pass must not look like a restarted router.
+//! Little-endian; a package head has the order of its options. The check is the CRC-32 of zlib over all other bytes.
 
 use crate::broken::broken;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 pub use rohrpost_network::{ALIVE_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES as HEAD_BYTES, REFUSAL_BYTES};
 
-/// The version of this format; the first four bytes, the check and a refusal mean the same in all of them.
+/// Version of this format. The first four bytes, the check and a refusal are the same in all.
 pub const VERSION: u8 = 1;
-/// Parts of a package, at most: one of 64 KiB in the smallest datagrams has fewer.
+/// Fragments of a package, at most: one of 64 KiB in the smallest datagrams has fewer.
 pub const PARTS_MAX: u16 = 256;
 const MAGIC: [u8; 2] = *b"Rp";
 /// A million datagrams a second reach it after nine years; so a sequence and a place in its datagram fit in 64 bits.
@@ -30,32 +29,32 @@ const CHECK: std::ops::Range<usize> = 32..36;
 /// A node by its place in the configuration, from 0.
 pub type NodeIndex = u8;
 
-/// What a datagram is.
+/// Kind of a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
 pub enum Kind {
     /// Whole packages, one after the other.
     Packages = 1,
-    /// A part of a package.
+    /// A fragment of a package.
     Fragment = 2,
-    /// Nothing to carry, but still there.
+    /// Keep-alive.
     Alive = 3,
-    /// "I take nothing from you."
+    /// The sender takes nothing from the receiver.
     Refusal = 4,
-    /// Sealed always: "do you live?", and the answer to it.
+    /// Always sealed: a challenge, or the response to it.
     Hello = 5,
-    /// Time: the master says what time it is.
+    /// Time: the master's present time.
     Sync = 16,
-    /// Time: makes the way warm for the next, and says nothing.
+    /// Time: warms the path for the next frame; empty.
     WarmUp = 17,
-    /// Time: a slave asks how long the way is.
+    /// Time: a slave measures the delay.
     Request = 18,
     /// Time: the master's answer.
     Reply = 19,
 }
 
 impl Kind {
-    const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Packages,
         Self::Fragment,
         Self::Alive,
@@ -68,12 +67,12 @@ impl Kind {
     ];
 }
 
-/// What every datagram begins with.
+/// The head of every datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FrameHead {
     /// What it is.
     pub kind: Kind,
-    /// System of both ends.
+    /// System of sender and receiver.
     pub system: u8,
     /// Node that sent it.
     pub from: NodeIndex,
@@ -81,13 +80,14 @@ pub struct FrameHead {
     pub to: NodeIndex,
     /// Of the sender's configuration.
     pub digest: u64,
-    /// Tells this incarnation of the sending router from its others; never 0.
+    /// Distinguishes this incarnation of the sending router from its others; never 0.
     pub incarnation: u64,
-    /// Counts the datagrams of this incarnation from this sender to this receiver, from 0. Time frames have a count of their own.
+    /// Counts the datagrams of this incarnation from this sender to this receiver, from 0. Time frames have a count of
+    /// their own.
     pub sequence: u64,
 }
 
-/// Why bytes are no frame of ours.
+/// Why bytes are no valid frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum BadFrame {
     /// Something else, or cut short.
@@ -96,16 +96,16 @@ pub enum BadFrame {
     /// Another version of the format.
     #[error("wire format {theirs}, ours is {VERSION}; run the same version of Rohrpost on all nodes", theirs = .0)]
     Version(u8),
-    /// Sealed, and nothing else is taken here that is.
+    /// Sealed, but no seal is expected here.
     #[error("sealed, and this node's configuration says `security = \"none\"`; launch all nodes from the same file")]
     Sealed,
-    /// Of this format, but wrong in itself.
+    /// Of this format, but malformed.
     #[error("damaged: {0}")]
     Damaged(&'static str),
 }
 
 impl FrameHead {
-    /// The 36 bytes that go before `rest`, which is all that follows, in parts.
+    /// The 36 bytes before `rest`, which is all that follows, in pieces.
     pub fn to_bytes(&self, rest: &[&[u8]]) -> [u8; HEAD_BYTES] {
         let mut bytes = [0; HEAD_BYTES];
         self.write(0, &mut bytes);
@@ -114,7 +114,7 @@ impl FrameHead {
         bytes
     }
 
-    /// Writes all but the check to where a datagram begins. `key`: what it is to be sealed with.
+    /// Writes all but the check to the beginning of a datagram. `key`: the key of its seal.
     pub(crate) fn write(&self, key: u8, bytes: &mut [u8]) {
         bytes[0..2].copy_from_slice(&MAGIC);
         bytes[2..8].copy_from_slice(&[VERSION, self.kind as u8, self.system, self.from, self.to, key]);
@@ -123,7 +123,7 @@ impl FrameHead {
         bytes[24..32].copy_from_slice(&self.sequence.to_le_bytes());
     }
 
-    /// Reads the head; what follows is returned as it is, see [`Frame::parse`].
+    /// Reads the head. The rest is returned as it is, see [`Frame::parse`].
     ///
     /// # Errors
     /// [`BadFrame`]
@@ -135,8 +135,8 @@ impl FrameHead {
         Ok((head, &datagram[HEAD_BYTES..]))
     }
 
-    /// Reads the head, and which key what follows it is sealed with; 0: none.
-    pub(crate) fn read(datagram: &[u8]) -> Result<(Self, u8), BadFrame> {
+    /// Reads the head, and the key of the seal over the rest; 0: none.
+    pub fn read(datagram: &[u8]) -> Result<(Self, u8), BadFrame> {
         let (b, rest) = datagram.split_first_chunk::<HEAD_BYTES>().ok_or(BadFrame::Foreign)?;
         if b[0..2] != MAGIC {
             return Err(BadFrame::Foreign);
@@ -167,7 +167,7 @@ impl FrameHead {
     }
 }
 
-/// Of a head that was written: for whom it is, and its sequence.
+/// Receiver and sequence of a written head.
 ///
 /// # Panics
 /// If there is none.
@@ -176,7 +176,7 @@ pub(crate) fn place_of(datagram: &[u8]) -> (NodeIndex, u64) {
     (head[6], long(head, 24))
 }
 
-/// Where a head has the digest.
+/// Offset of the digest in a head.
 pub(crate) const DIGEST_AT: u32 = 8;
 
 /// The first four bytes of a datagram of a kind, of this version.
@@ -184,18 +184,18 @@ pub(crate) fn beginning(kind: Kind) -> [u8; 4] {
     [MAGIC[0], MAGIC[1], VERSION, kind as u8]
 }
 
-/// Says in a head what the datagram is sealed with.
-pub(crate) fn write_key(key: u8, datagram: &mut [u8]) {
+/// Writes the key of the seal into a head.
+pub fn write_key(key: u8, datagram: &mut [u8]) {
     datagram[7] = key;
 }
 
-/// Of a head, what the check and a seal are over.
+/// The part of a head that check and seal cover.
 pub(crate) fn before_check(head: &[u8]) -> &[u8] {
     &head[..CHECK.start]
 }
 
-/// Writes the check of a datagram that is whole but for it.
-pub(crate) fn write_check(datagram: &mut [u8]) {
+/// Writes the check of an otherwise complete datagram.
+pub fn write_check(datagram: &mut [u8]) {
     if let Some((head, rest)) = datagram.split_first_chunk_mut::<HEAD_BYTES>() {
         let check = check(head, &[rest]);
         head[CHECK].copy_from_slice(&check.to_le_bytes());
@@ -209,23 +209,23 @@ fn check(head: &[u8; HEAD_BYTES], rest: &[&[u8]]) -> u32 {
     hasher.finalize()
 }
 
-/// What a datagram of packages brought, whole.
+/// Content of a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Frame<'a> {
     /// Whole packages.
     Packages(Packages<'a>),
-    /// A part of one.
+    /// A fragment of one.
     Fragment(Fragment<'a>),
-    /// Still there.
+    /// Keep-alive.
     Alive(Alive),
-    /// It takes nothing from us.
+    /// The sender takes nothing from the receiver.
     Refusal(Refusal),
-    /// Of the time protocol; `time` reads on.
+    /// Of the time protocol; `time` parses it.
     Time(&'a [u8]),
 }
 
 impl<'a> Frame<'a> {
-    /// Checks all that a datagram says of itself.
+    /// Checks all claims of a datagram.
     ///
     /// # Errors
     /// [`BadFrame`]
@@ -234,7 +234,7 @@ impl<'a> Frame<'a> {
         Ok((head, Self::read(head.kind, datagram[2], rest)?))
     }
 
-    /// The same of what follows a head, as a router of a `version` wrote it.
+    /// The same for the rest after a head, as a router of a `version` wrote it.
     pub(crate) fn read(kind: Kind, version: u8, rest: &'a [u8]) -> Result<Self, BadFrame> {
         Ok(match kind {
             Kind::Packages => Self::Packages(Packages::check(rest)?),
@@ -247,7 +247,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Packages of a datagram; an iterator over them. It was checked as a whole: at least one, none cut short, nothing behind.
+/// Iterator over the packages of a datagram. Checked as a whole: at least one, none cut short, nothing behind.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Packages<'a> {
     rest: &'a [u8],
@@ -282,20 +282,20 @@ fn split_package(bytes: &[u8]) -> Option<(Head, &[u8], &[u8])> {
     Some((head, body, rest))
 }
 
-/// A part of a package that does not fit in a datagram.
+/// A fragment of a package that does not fit in a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Fragment<'a> {
-    /// Sequence of the datagram with its first part: which package it is, and its place in the order.
+    /// Sequence of the datagram with the first fragment: identifies the package, and its place in the order.
     pub first: u64,
-    /// Which part, from 0.
+    /// Index of the fragment, from 0.
     pub index: u16,
-    /// Of how many.
+    /// Number of fragments.
     pub count: u16,
-    /// Where in the body these bytes begin.
+    /// Offset of these bytes in the body.
     pub offset: u32,
     /// The package's head; its `len` is that of the whole body.
     pub head: Head,
-    /// The part.
+    /// Content of the fragment.
     pub bytes: &'a [u8],
 }
 
@@ -322,12 +322,12 @@ impl<'a> Fragment<'a> {
         if part.is_sound() { Ok(part) } else { Err(BadFrame::Damaged("a fragment lies outside its package")) }
     }
 
-    /// Bytes of each part but the last.
+    /// Bytes of each fragment but the last.
     pub fn part_bytes(&self) -> usize {
         if self.is_last() { self.offset as usize / usize::from(self.index).max(1) } else { self.bytes.len() }
     }
 
-    /// Of the body's first bytes those that are here.
+    /// The first bytes of the body, as far as they are here.
     pub(crate) fn beginning(&self) -> &'a [u8] {
         if self.index == 0 { self.bytes } else { &[] }
     }
@@ -336,7 +336,7 @@ impl<'a> Fragment<'a> {
         usize::from(self.index) + 1 == usize::from(self.count)
     }
 
-    /// All parts but the last are of one size, so that those of every index, each once, make the whole without gap or overlap.
+    /// All fragments but the last have one size, so that each index once makes the body without gap or overlap.
     fn is_sound(&self) -> bool {
         let (part, len, index) = (self.part_bytes(), usize::from(self.head.len), usize::from(self.index));
         let begins = usize::try_from(self.offset).ok() == index.checked_mul(part);
@@ -346,12 +346,12 @@ impl<'a> Fragment<'a> {
     }
 }
 
-/// "Still there", and what was heard of the receiver: so one-way links are noticed, and losses at the end of a burst.
+/// Keep-alive with a report on the receiver: reveals one-way links, and losses at the end of a burst.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Alive {
-    /// The incarnation of the receiver that is heard; 0: none.
+    /// The receiver's incarnation that is heard; 0: none.
     pub heard_incarnation: u64,
-    /// The sequence that is expected next of it.
+    /// The next sequence that is expected of it.
     pub heard_next: u64,
     /// Datagrams of that incarnation that never came.
     pub heard_lost: u64,
@@ -373,7 +373,7 @@ impl Alive {
     }
 }
 
-/// Why a peer takes nothing from us.
+/// Why a peer takes nothing from this node.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
 pub enum Reason {
@@ -383,20 +383,20 @@ pub enum Reason {
     Digest = 2,
     /// Its configuration has no such node, or that node has another address.
     Stranger = 3,
-    /// Who seals is not understood by who does not.
+    /// One end seals, and the other does not.
     Sealed = 4,
     /// Sealed with another key. No refusal says so: each end finds it out by itself.
     Key = 5,
 }
 
-/// "I take nothing from you, since …"
+/// A refusal: the sender takes nothing from the receiver, and why.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Refusal {
-    /// Wire version of who refuses: the third byte of all its datagrams.
+    /// Wire version of the refusing router: the third byte of all its datagrams.
     pub version: u8,
     /// Why.
     pub reason: Reason,
-    /// Digest of who refuses.
+    /// Digest of the refusing router.
     pub digest: u64,
 }
 
@@ -418,7 +418,7 @@ impl Refusal {
     }
 }
 
-/// Eight bytes at a place that the caller's array has.
+/// Eight bytes at an offset that the caller's array has.
 fn long<const N: usize>(bytes: &[u8; N], at: usize) -> u64 {
     let mut eight = [0; 8];
     eight.copy_from_slice(&bytes[at..at + 8]);

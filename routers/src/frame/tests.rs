@@ -10,7 +10,7 @@ fn datagram(kind: Kind, rest: &[u8]) -> Vec<u8> {
     [&frame_head(kind).to_bytes(&[rest]), rest].concat()
 }
 
-/// As if it had been meant so: the check is right.
+/// A datagram with a right check, so that only its content is wrong.
 fn checked(mut datagram: Vec<u8>) -> Vec<u8> {
     let head = *datagram.first_chunk::<HEAD_BYTES>().unwrap();
     let check = check(&head, &[&datagram[HEAD_BYTES..]]);

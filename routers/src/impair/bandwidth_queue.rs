@@ -1,11 +1,11 @@
 //! One way of a stream through a bad network: all bytes arrive, in their order, but late.
 //!
 //! ```text
-//!  push ──▶ segments ──▶ line of `rate` ──▶ delay ± jitter ──▶ lost? sent again, later each time ──▶ none before those in front ──▶ arrived
+//!  push ──▶ segments ──▶ line of `rate` ──▶ delay ± jitter ──▶ lost? sent again, later each time ──▶ in order ──▶ arrived
 //! ```
 //!
-//! A segment that is lost, or changed, is sent again after a retransmission time, and what is behind it waits with it. One that is held back
-//! makes the others wait as well. Copies are nothing to a stream.
+//! A segment that is lost, or changed, is sent again after a retransmission time, and what is behind it waits with it.
+//! One that is held back makes the others wait as well. Copies are nothing to a stream.
 
 use super::{BYTES_MAX, Drawn, Settings, nanos};
 use rand::SeedableRng;
@@ -44,7 +44,7 @@ impl BandwidthQueue {
         Self { settings, random, free_ns: 0, on_way, last_due_ns: 0, bytes, arrived: 0 }
     }
 
-    /// Bytes that it takes now: of what it does not take whoever sends must hold the rest.
+    /// Bytes that it takes now; the sender keeps the rest.
     pub fn room(&self, now_ns: u64) -> usize {
         let kept = BYTES_MAX.saturating_sub(self.bytes.len());
         let Some(rate) = self.settings.rate_bytes_s else { return kept };

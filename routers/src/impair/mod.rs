@@ -1,14 +1,15 @@
-//! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line, changed bits. And what
-//! the same network is to a stream: a [`BandwidthQueue`].
+//! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line,
+//! changed bits. And what the same network is to a stream: a [`BandwidthQueue`].
 //!
 //! ```text
 //!  push ──▶ lost? ──▶ line of `rate` ──▶ delay ± jitter ──▶ held back? ──▶ changed bit? ──▶ due, in order of time ──▶ poll
 //!                                                                            └─ copied? ──▶ once more, a little later
 //! ```
 //!
-//! Each fault can be had alone: jitter never changes the order (as queues of switches do not), only `reorder` does. What is drawn for a
-//! datagram depends on the seed, the stream and how many came before it, not on the time or on other faults: raising the loss leaves the
-//! same datagrams late. The kernel's netem does the same where it exists; this is everywhere, and in the simulator too.
+//! Each fault can be had alone: jitter never changes the order (as queues of switches do not), only `reorder` does.
+//! What is drawn for a datagram depends on the seed, the stream and how many came before it, not on the time or on
+//! other faults: raising the loss leaves the same datagrams late. The kernel's netem does the same where it exists;
+//! this is everywhere, and in the simulator too.
 
 mod bandwidth_queue;
 mod text;
@@ -52,7 +53,8 @@ impl Share {
     }
 }
 
-/// How bad the network is. The text form, `loss=5%,delay=2ms,seed=7`, has each key at most once, in any order; see [`Settings::from_str`].
+/// How bad the network is. The text form, `loss=5%,delay=2ms,seed=7`, has each key at most once, in any order; see
+/// [`Settings::from_str`].
 ///
 /// ```
 /// # use rohrpost_routers::impair::Settings;
@@ -200,7 +202,8 @@ fn part(whole: u64, drawn: u32) -> u64 {
 }
 
 impl<T: Clone> Impairment<T> {
-    /// `stream` tells users of one seed apart: each socket of each node has its own, or all would lose the same datagrams.
+    /// `stream` tells users of one seed apart: each socket of each node has its own, or all would lose the same
+    /// datagrams.
     pub fn new(settings: Settings, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
         random.set_stream(stream);

@@ -173,7 +173,8 @@ fn mistakes_say_what_is_right() {
 proptest! {
     #[test]
     fn what_is_written_reads_back(
-        shares in proptest::array::uniform4(0..=Share::ALL), delay_us in 0u64..=10_000_000, jitter_us in 0u64..=10_000_000,
+        shares in proptest::array::uniform4(0..=Share::ALL),
+        delay_us in 0u64..=10_000_000, jitter_us in 0u64..=10_000_000,
         rate in proptest::option::of(1u64..), seed: u64,
     ) {
         let [loss, duplicate, reorder, corrupt] = shares.map(Share::per_million);

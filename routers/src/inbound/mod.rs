@@ -1,8 +1,8 @@
-//! What comes from other nodes: who sent it, what is missing, what came twice, and where it goes.
+//! Datagrams from other nodes: checks of sender, loss and duplicates, and delivery.
 //!
 //! ```text
-//!  datagram ─▶ ours? ─▶ of our version and digest? ─▶ this incarnation of the peer? ─▶ not seen yet? ─┬─ packages ──────────┬─▶ in order? ─▶ deliver
-//!              foreign   refused, and told so          old                       copy           └─ part ─▶ Reassembly ┘   late
+//!  datagram ─▶ ours? ─▶ our digest? ─▶ this incarnation? ─▶ not seen yet? ─┬─ packages ───────┬─▶ in order? ─▶ deliver
+//!              foreign  refused, told so   old               duplicate      └ fragment ▶ whole ┘   late
 //! ```
 
 mod doubt;
@@ -22,40 +22,40 @@ use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use order::position;
-use peer::{Peer, PeerContext, Refusing};
+use peer::{PeerContext, PeerReceiver, Refusing};
 use rohrpost_mailbox::Head;
 use std::net::IpAddr;
 use std::sync::Arc;
 
-/// A refusal is said again to the same node after so long.
+/// Shortest time between two refusals to one node.
 pub const REFUSE_EVERY_NS: u64 = 1_000_000_000;
-/// Packages that waited longer in the socket are not delivered: this router stood still, and they are old.
+/// Packages that waited longer in the socket are dropped as old: this router was stalled.
 pub const SOCKET_MAX_NS: u64 = 400_000_000;
 const SWEEP_EVERY_NS: u64 = 100_000_000;
-/// A sweep that comes so late says that this router stood still itself: that nothing was heard says nothing then.
+/// A sweep that comes this late shows that this router was stalled itself: silence then says nothing.
 const STOOD_STILL_NS: u64 = 400_000_000;
 /// Missing datagrams are given up after two to three of these, if not before.
-pub(crate) const TICK_EVERY_NS: u64 = 500_000_000;
+pub const TICK_EVERY_NS: u64 = 500_000_000;
 
-/// A datagram as it came.
+/// A received datagram.
 #[derive(Clone, Copy, Debug)]
 pub struct Datagram<'a> {
-    /// Who sent it, as the socket says.
+    /// Source address.
     pub source: IpAddr,
-    /// When it came to this computer, ns of the monotonic clock; the time of its handling, if that is all that is known.
+    /// When it came to this computer, ns of the monotonic clock; the time of its handling, if only that is known.
     pub arrived_ns: u64,
-    /// What is in it.
+    /// Content.
     pub bytes: &'a [u8],
 }
 
-/// How a datagram came that was opened: as [`Datagram`] has it.
+/// Envelope of a datagram that was opened: as [`Datagram`] has it.
 #[derive(Clone, Copy, Debug)]
 pub struct Came {
-    /// Who sent it.
+    /// Source address.
     pub source: IpAddr,
-    /// When.
+    /// Arrival.
     pub arrived_ns: u64,
-    /// How long it was.
+    /// Its length.
     pub bytes: usize,
 }
 
@@ -81,9 +81,9 @@ pub enum Output {
 pub struct Inbound {
     settings: Settings,
     stats: Arc<Stats>,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerReceiver]>,
     strangers: Refusing,
-    /// Some refusal is to be said.
+    /// A refusal is due.
     must_refuse: bool,
     sweep_ns: u64,
     tick_ns: u64,
@@ -93,7 +93,7 @@ impl Inbound {
     /// For the router of `settings.own`.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         Self {
-            peers: settings.nodes.iter().map(|_| Peer::default()).collect(),
+            peers: settings.nodes.iter().map(|_| PeerReceiver::default()).collect(),
             strangers: Refusing::default(),
             must_refuse: false,
             sweep_ns: 0,
@@ -103,7 +103,7 @@ impl Inbound {
         }
     }
 
-    /// Takes a datagram, whatever it is.
+    /// Handles any datagram.
     pub fn handle(&mut self, now_ns: u64, datagram: &Datagram<'_>, deliver: &mut impl Deliver) {
         let Datagram { source, arrived_ns, bytes } = *datagram;
         let came = Came { source, arrived_ns, bytes: bytes.len() };
@@ -126,7 +126,8 @@ impl Inbound {
         }
     }
 
-    /// The same of one that was sealed, and opened: `text` is what follows its head, `first` the sequence from which on its incarnation is heard.
+    /// The same for one that was sealed, and opened: `text` is what follows its head, `first` the first sequence that
+    /// counts of its incarnation.
     pub fn handle_opened(
         &mut self,
         now_ns: u64,
@@ -150,13 +151,13 @@ impl Inbound {
         self.settings.nodes.get(usize::from(node)).is_some_and(|node| node.address == address)
     }
 
-    /// Bytes of the longest datagram that a router of ours seals.
+    /// Bytes of the longest datagram that a router seals.
     pub(crate) fn sealed_bytes_max(&self) -> usize {
         let network = &self.settings.network;
         network.datagram_bytes_max + network.security.tag_bytes()
     }
 
-    /// Whether an incarnation of a peer may begin that has this head: it may if all that must be equal is.
+    /// Whether an incarnation of a peer with this head may begin: it may if all that must be equal is.
     pub(crate) fn may_greet(
         &mut self,
         now_ns: u64,
@@ -168,17 +169,17 @@ impl Inbound {
         mismatch.inspect(|mismatch| self.refuse(now_ns, source, *mismatch, deliver)).is_none()
     }
 
-    /// A peer has shown that it lives, and that it says what time it is by another configuration.
+    /// A verified peer sends time of another configuration.
     pub(crate) fn tells_other(&self, now_ns: u64, head: &FrameHead) {
         self.stats.peer(head.from).link.tells_other(now_ns, head.digest);
     }
 
-    /// Whether a head, which was sealed, is one of a peer that goes by another configuration.
+    /// Whether a sealed head is from a peer of another configuration.
     pub(crate) fn is_of_other(&self, source: IpAddr, head: &FrameHead) -> bool {
         head.digest != self.settings.digest && self.is_address_of(head.from, source)
     }
 
-    /// Counts what is no datagram of a router, or a damaged one.
+    /// Counts a foreign or a damaged datagram.
     pub(crate) fn bad(&self, source: IpAddr, why: BadFrame) {
         match why {
             BadFrame::Foreign => self.stats.foreign.add(1),
@@ -193,7 +194,7 @@ impl Inbound {
         }
     }
 
-    /// What is to be sent, and when to ask again. `datagram` has room for a refusal, 52 bytes.
+    /// The next step, and when to ask again. `datagram` has room for a refusal, 52 bytes.
     ///
     /// # Panics
     /// If it has not.
@@ -209,12 +210,12 @@ impl Inbound {
         Output::Wait { until_ns: self.sweep_ns }
     }
 
-    /// Packages of which only parts have come.
+    /// Packages with missing fragments.
     pub fn partial(&self) -> u64 {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    /// `first`: see [`Peer::lives`].
+    /// `first`: see [`PeerReceiver::lives`].
     fn take(
         &mut self,
         now_ns: u64,
@@ -233,7 +234,7 @@ impl Inbound {
         if !peer.is_new(head.sequence, &way) {
             return;
         }
-        // A copy says nothing of whether its sender is still there.
+        // A duplicate does not show that its sender is still there.
         peer.is_heard(now_ns, &way, deliver);
         way.peer.received.datagrams.add(1);
         way.peer.received.bytes.add(came.bytes as u64);
@@ -255,7 +256,7 @@ impl Inbound {
             Frame::Fragment(part) => {
                 way.peer.received.fragments.add(1);
                 let part = Fragment { head: admitted(&part.head), ..part };
-                let Peer { order, reassembly, .. } = peer;
+                let PeerReceiver { order, reassembly, .. } = peer;
                 let is_late = || order.is_late(&part.head, position(part.first, 0));
                 let tell = |head: &Head, body: &[u8], change| way.partial(head, body, change, deliver);
                 if let Some(whole) = reassembly.take(now_ns, &part, is_late, tell) {
@@ -265,12 +266,12 @@ impl Inbound {
                 }
             }
             Frame::Alive(alive) => way.hears_of_us(now_ns, self.settings.incarnation, &alive),
-            // Taken out before.
+            // Handled before.
             Frame::Refusal(_) | Frame::Time(_) => {}
         }
     }
 
-    /// What time alone brings about: losses, silence, parts that never came.
+    /// Effects of time alone: losses, silence, fragments that never came.
     fn sweep(&mut self, now_ns: u64, deliver: &mut impl Deliver) {
         let stood_still = self.sweep_ns > 0 && now_ns > self.sweep_ns + STOOD_STILL_NS;
         self.sweep_ns = now_ns + SWEEP_EVERY_NS;

@@ -1,10 +1,11 @@
 //! Order: of one sender, one receiver and one priority nothing is delivered after something newer.
 //!
-//! A table with four places for each value of a hash. What has no place any more is remembered by its group's floor: nothing unknown at
-//! or below it is delivered. So a full table costs packages that were overtaken, never the order.
+//! A table with four places for each value of a hash. The group's floor stands for what has no place any more: nothing
+//! unknown at or below it is delivered. So a full table costs reordered packages, never the order.
 //!
-//! A package that comes in parts stands at the place of its first one, which may be far behind the floor by the time the last has come. So
-//! it is judged when it begins, and [`Reassembly`](crate::fragment::Reassembly) notes whether something newer of its flow goes before it.
+//! A package in fragments takes the place of its first fragment, which may be far behind the floor when the last comes.
+//! So it is checked when it begins, and [`Reassembly`](crate::fragment::Reassembly) notes whether a newer package of
+//! its flow goes before it.
 
 use crate::broken::broken;
 use crate::fragment::Whole;
@@ -13,7 +14,7 @@ use rohrpost_mailbox::Head;
 const GROUPS: usize = 64;
 const PLACES: usize = 4;
 
-/// Where a package stands among all of its peer's incarnation: sequence of its first datagram, then its place in it.
+/// Position of a package in its peer's incarnation: sequence of its first datagram, then its place in it.
 pub(super) fn position(sequence: u64, index: u16) -> u64 {
     sequence << 16 | u64::from(index)
 }
@@ -23,7 +24,7 @@ pub(super) fn sequence_of(position: u64) -> u64 {
     position >> 16
 }
 
-/// What was delivered last of each flow, for one peer.
+/// The last delivered package of each flow, for one peer.
 #[derive(Debug)]
 pub(super) struct Order {
     groups: Box<[Group; GROUPS]>,
@@ -31,9 +32,9 @@ pub(super) struct Order {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Group {
-    /// One more than the position delivered last; 0: empty.
+    /// One more than the last delivered position; 0: empty.
     places: [(u64, Flow); PLACES],
-    /// One more than the highest position that was forgotten.
+    /// One more than the highest forgotten position.
     floor: u64,
 }
 
@@ -63,7 +64,7 @@ impl Order {
         !is_late
     }
 
-    /// Whether a package that came in parts is late; if it is not, it is the newest of its flow.
+    /// Whether a package that came in fragments is late; if it is not, it is the newest of its flow.
     pub(super) fn is_whole_late(&mut self, whole: &Whole<'_>) -> bool {
         let position = position(whole.first, 0);
         let is_late = if broken!(ForgetsBegun) { self.is_late(&whole.head, position) } else { whole.is_late };
@@ -83,7 +84,7 @@ impl Order {
         }
     }
 
-    /// It is delivered, and nothing of its flow that is newer was.
+    /// It is delivered, and no newer one of its flow was.
     pub(super) fn note(&mut self, head: &Head, position: u64) {
         let (flow, group) = place(head);
         let (group, mark) = (&mut self.groups[group], position + 1);
@@ -91,7 +92,7 @@ impl Order {
             *last = mark.max(*last);
             return;
         }
-        // The oldest gives way; an empty place is older than all.
+        // The oldest is replaced; an empty place is older than all.
         if let Some(oldest) = group.places.iter_mut().min_by_key(|(last, _)| *last) {
             group.floor = group.floor.max(oldest.0);
             *oldest = (mark, flow);
@@ -103,7 +104,7 @@ impl Order {
 fn place(head: &Head) -> (Flow, usize) {
     let names = u64::from(head.to.raw()) << 32 | u64::from(head.from.raw());
     let flow = Flow { names, priority: head.priority.0 };
-    // The golden ratio spreads what names have in common.
+    // The golden ratio spreads names that have bits in common.
     let spread = (names ^ u64::from(flow.priority) << 24).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     (flow, (spread >> 58) as usize % GROUPS)
 }

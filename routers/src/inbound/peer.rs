@@ -1,4 +1,4 @@
-//! One peer as it is heard: which incarnation, which datagrams, and what becomes of the packages in them.
+//! Receiving side of one peer: its incarnation, its datagrams, and the results for their packages.
 
 use super::doubt::Doubt;
 use super::order::{Order, sequence_of};
@@ -10,28 +10,28 @@ use crate::frame::{Alive, FrameHead, NodeIndex, Reason};
 use crate::link::{REFUSED_FOR_NS, SILENT_AFTER_NS, State};
 use crate::report::{Deliver, Event, Mismatch, NotDelivered};
 use crate::stats::{PeerStats, Stats};
-use rohrpost_mailbox::Head;
+use rohrpost_mailbox::{Head, Throttle};
 use std::net::IpAddr;
 
-/// Lives of a peer that are known to be over.
+/// Incarnations of a peer that are known to be over.
 const OLD_KEPT: usize = 8;
-/// Further lives within this time are counted, not told.
+/// Further incarnations within this time are counted, not reported.
 const RESTARTS_TOLD_NS: u64 = 5_000_000_000;
-/// Datagrams of an old incarnation are on their way for so long at most; after that, its router still runs.
+/// Datagrams of an old incarnation are in flight for this long at most; after that, its router still runs.
 const OLD_GONE_NS: u64 = 2_000_000_000;
 
-/// What is known of a peer.
+/// State of a peer.
 #[derive(Debug, Default)]
-pub(super) struct Peer {
+pub(super) struct PeerReceiver {
     /// The incarnation that is heard; 0: none yet.
     incarnation: u64,
     began_ns: u64,
     /// More than one of its datagrams came.
     is_sure: bool,
     doubt: Doubt,
-    /// When it was told last that an incarnation began, ns; 0: never.
-    restart_told_ns: u64,
-    old: [Old; OLD_KEPT],
+    /// Bounds the reports that an incarnation began.
+    restarts_told: Throttle,
+    old: [PastIncarnation; OLD_KEPT],
     old_next: usize,
     pub(super) window: Window,
     pub(super) order: Order,
@@ -43,9 +43,9 @@ pub(super) struct Peer {
 /// Refusals to one address.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Refusing {
-    /// To whom and why, if it is still to be said.
+    /// Receiver and reason of a refusal that is due.
     pub(super) due: Option<(IpAddr, Reason)>,
-    /// Not before this time again, ns.
+    /// No refusal before this time, ns.
     pub(super) not_before_ns: u64,
     pub(super) told: Option<(IpAddr, Mismatch)>,
     pub(super) told_ns: u64,
@@ -54,14 +54,14 @@ pub(super) struct Refusing {
 
 /// An incarnation that is over.
 #[derive(Clone, Copy, Debug, Default)]
-struct Old {
+struct PastIncarnation {
     /// 0: none.
     incarnation: u64,
-    /// The sequence that was expected next of it: what it sent before may have been delivered.
+    /// Its next expected sequence: earlier ones may have been delivered.
     next: u64,
 }
 
-/// What was said of a peer and is not over.
+/// Reported conditions of a peer that are not over.
 #[derive(Clone, Copy, Debug, Default)]
 struct PeerNotices {
     heard: bool,
@@ -72,12 +72,12 @@ struct PeerNotices {
     refuses: Option<(Mismatch, u64)>,
 }
 
-impl Peer {
-    /// Whether a datagram is of the incarnation that is heard. An incarnation that was not known begins; of one that is over nothing is taken, unless
-    /// it goes on, and the one that was taken for its successor is silent: then it was the other way round. What it sent before it was
-    /// over says nothing: that may be a copy, which the wire or a stranger kept. What nobody vouches for is taken when another datagram
-    /// says the same: see [`Doubt`].
-    /// `first`: where datagrams are sealed, it has shown to be the present incarnation, and to be heard from this sequence on.
+impl PeerReceiver {
+    /// Whether a datagram is of the present incarnation. An unknown incarnation begins. An incarnation that is over is
+    /// ignored, unless it sends more while its supposed successor is silent: then the order was the other way round.
+    /// What it sent before it was over says nothing: that may be a duplicate from the wire or a replay. Unauthenticated
+    /// claims need a second datagram: see [`Doubt`]. `first`: where datagrams are sealed, the handshake has shown that
+    /// this incarnation is the present one, and that it counts from this sequence on.
     pub(super) fn lives(
         &mut self,
         now_ns: u64,
@@ -111,17 +111,16 @@ impl Peer {
             self.end_incarnation(way, deliver);
             let place = was.unwrap_or(self.old_next % OLD_KEPT);
             self.old_next += usize::from(was.is_none());
-            self.old[place] = Old { incarnation: self.incarnation, next };
+            self.old[place] = PastIncarnation { incarnation: self.incarnation, next };
             self.told = PeerNotices { heard: true, twice: self.told.twice, ..PeerNotices::default() };
-            if self.restart_told_ns == 0 || now_ns >= self.restart_told_ns + RESTARTS_TOLD_NS {
-                self.restart_told_ns = now_ns;
+            if self.restarts_told.note(now_ns, RESTARTS_TOLD_NS).is_some() {
                 deliver.event(Event::Restarted { peer: way.from });
             }
         }
         self.window = match (first, was) {
             // What is missing from there on was sent to this incarnation of ours, and is lost.
             (Some(first), _) => Window::going_on(first),
-            // What it sent before may have been delivered.
+            // Earlier ones may have been delivered.
             (None, Some(_)) => Window::going_on(head.sequence),
             (None, None) if is_first => Window::joining(head.sequence),
             (None, None) => Window::default(),
@@ -133,8 +132,8 @@ impl Peer {
         true
     }
 
-    /// Whether a datagram of the incarnation that is heard may be where it says. Far ahead is also a peer that was not reached for long; far behind,
-    /// one of which the only datagram that came was no true one.
+    /// Whether the sequence of a datagram is plausible. A peer that did not reach us for long is far ahead, too. One is
+    /// far behind if the only datagram of it so far was forged.
     fn is_plausible(&mut self, now_ns: u64, head: &FrameHead) -> bool {
         let next = self.window.next();
         let is_ahead = head.sequence >= next + WINDOW;
@@ -170,7 +169,7 @@ impl Peer {
         is_late
     }
 
-    /// Notes that it is there, and takes something from us or not.
+    /// Notes that the peer is alive, and whether it takes our packets.
     pub(super) fn is_heard(&mut self, now_ns: u64, way: &PeerContext<'_>, deliver: &mut impl Deliver) {
         let link = &way.peer.link;
         if !self.told.heard {
@@ -180,7 +179,7 @@ impl Peer {
         }
         link.heard_ns.set(now_ns);
         match self.told.refuses {
-            // That it does not know our address says nothing of what it sends.
+            // It does not know our address; that says nothing of its own datagrams.
             Some((Mismatch { reason: Reason::Stranger, .. }, until_ns)) if now_ns < until_ns => {}
             _ => {
                 self.told.refuses = None;
@@ -189,13 +188,13 @@ impl Peer {
         }
     }
 
-    /// Notes that it takes nothing from us; whether that is to be told.
+    /// Notes that it refuses our packets; returns whether to report that.
     pub(super) fn is_refused_anew(&mut self, now_ns: u64, mismatch: Mismatch) -> bool {
         let before = self.told.refuses.replace((mismatch, now_ns + REFUSED_FOR_NS));
         before.is_none_or(|(before, _)| before != mismatch)
     }
 
-    /// Counts a datagram by its sequence; whether it is to be read.
+    /// Counts a datagram by its sequence; returns whether to read it.
     pub(super) fn is_new(&mut self, sequence: u64, way: &PeerContext<'_>) -> bool {
         let received = &way.peer.received;
         let mut lost = 0;
@@ -206,17 +205,17 @@ impl Peer {
         way.peer.link.next.set(self.window.next());
         match arrival {
             Arrival::Newest => return true,
-            Arrival::Overtaken => received.overtaken.add(1),
+            Arrival::Overtaken => received.reordered.add(1),
             Arrival::Returned => {
-                received.overtaken.add(1);
+                received.reordered.add(1);
                 received.returned.add(1);
             }
-            Arrival::Copy => received.copies.add(1),
+            Arrival::Copy => received.duplicates.add(1),
         }
         arrival != Arrival::Copy
     }
 
-    /// Begins to wait for it anew: nobody could have been heard.
+    /// Restarts the wait for it: this router could not have heard it.
     pub(super) fn excuse(&self, now_ns: u64, way: &PeerContext<'_>) {
         if self.told.heard {
             way.peer.link.heard_ns.set(now_ns);
@@ -224,7 +223,7 @@ impl Peer {
         }
     }
 
-    /// Notices silence, and that nothing of ours reaches it.
+    /// Notices silence, and that our datagrams do not reach it.
     pub(super) fn look_after(&mut self, now_ns: u64, way: &PeerContext<'_>, deliver: &mut impl Deliver) {
         let peer = way.from;
         let state = way.stats.state(peer, now_ns);
@@ -240,7 +239,7 @@ impl Peer {
     }
 }
 
-/// Who something came from, and where it is counted.
+/// The sender of a datagram, and its counters.
 #[derive(Clone, Copy)]
 pub(super) struct PeerContext<'a> {
     pub(super) from: NodeIndex,
@@ -249,7 +248,7 @@ pub(super) struct PeerContext<'a> {
 }
 
 impl PeerContext<'_> {
-    /// Delivers a package that is there as a whole, unless it is `refused`, or says why not.
+    /// Delivers a complete package, unless it is `refused`; reports the cause if it does not.
     pub(super) fn pass(&self, refused: Option<Cause>, head: &Head, body: &[u8], deliver: &mut impl Deliver) {
         self.peer.received.packages.add(1);
         if let Some(cause) = refused {
@@ -263,7 +262,7 @@ impl PeerContext<'_> {
         }
     }
 
-    /// Counts a package whose parts come.
+    /// Counts a package that arrives in fragments.
     pub(super) fn partial(&self, head: &Head, body: &[u8], change: Change, deliver: &mut impl Deliver) {
         match change {
             Change::Began => self.stats.inn.came(head.priority),
@@ -271,7 +270,7 @@ impl PeerContext<'_> {
         }
     }
 
-    /// Hears what the peer says of us.
+    /// Takes the peer's report on what it hears of us.
     pub(super) fn hears_of_us(&self, now_ns: u64, own: u64, alive: &Alive) {
         let hears = alive.heard_incarnation == own;
         self.peer.link.hears_us(now_ns, hears);

@@ -1,4 +1,4 @@
-//! Whose datagrams are not taken, and how they learn of it: at most once a second each.
+//! Refusals: of which nodes datagrams are not taken, and how they learn of it, at most once a second each.
 
 use super::{Inbound, REFUSE_EVERY_NS};
 use crate::broken::broken;
@@ -8,7 +8,7 @@ use crate::report::{Deliver, Event, Mismatch};
 use crate::settings::Settings;
 use std::net::IpAddr;
 
-/// After so long without another, a refusal is over; the next is told anew.
+/// A refusal is over after this long without another; the next is reported anew.
 const OVER_NS: u64 = 5_000_000_000;
 
 impl Inbound {
@@ -33,7 +33,7 @@ impl Inbound {
             Some(peer) => {
                 let stats = self.stats.peer(peer);
                 stats.received.refused.add(1);
-                // Sealed, it may be what a peer said when it had another configuration: who is heard has ours by now.
+                // Sealed, it may be a replay of a peer's earlier configuration: a peer that is heard has ours by now.
                 if !self.settings.is_sealed() || self.stats.state(peer, now_ns) != State::Alive {
                     stats.link.refuse(now_ns, mismatch);
                 }
@@ -44,14 +44,14 @@ impl Inbound {
                 &mut self.strangers
             }
         };
-        // Sealed, nobody is told: that would have to be believed without a seal.
+        // Sealed, no refusal is sent: it could not be authenticated.
         if refusing.due.is_none() && !self.settings.is_sealed() {
             refusing.due = Some((source, mismatch.reason));
             self.must_refuse = true;
         }
         let is_over = refusing.last_ns + OVER_NS < now_ns;
         refusing.last_ns = now_ns;
-        // Two that take turns are not told of each time.
+        // Two sources in turns are not reported each time.
         let is_other = refusing.told != Some((source, mismatch)) && refusing.told_ns + OVER_NS < now_ns;
         if is_over || is_other {
             (refusing.told, refusing.told_ns) = (Some((source, mismatch)), now_ns);
@@ -59,8 +59,9 @@ impl Inbound {
         }
     }
 
-    /// What cannot be opened comes from a peer's address, which anybody can write on a datagram. So it is believed of a peer alone from which
-    /// nothing comes, to which nothing goes either: its callers learn the likely cause in place of silence, and nothing is lost by it.
+    /// A datagram that cannot be opened has a peer's source address, which anybody can forge. So it counts only for a
+    /// peer that neither sends nor receives: its callers learn the likely cause in place of silence, and nothing is
+    /// lost by it.
     pub(crate) fn suspect(&self, now_ns: u64, peer: NodeIndex, mismatch: Mismatch) {
         let is_away = matches!(self.stats.state(peer, now_ns), State::Silent | State::Refused(_));
         if is_away || broken!(BelievesUnopened) {
@@ -73,11 +74,12 @@ impl Inbound {
         let mismatch = Mismatch { reason: refusal.reason, version: refusal.version, digest: Some(refusal.digest) };
         let stats = self.stats.peer(peer);
         if refusal.reason == Reason::Digest {
-            // Not doubted: two times on one wire are worse than none for a moment. What is heard of it by our configuration ends it.
+            // Not doubted: two times on one wire are worse than none for a moment. A datagram with our configuration
+            // ends it.
             stats.link.refuses_us(now_ns, refusal.digest);
         }
-        // Who takes nothing from us does not hear us, and says so after a second. Anybody can send a refusal where nothing is sealed, so until
-        // then it is doubted.
+        // A node that refuses us does not hear us, and says so after a second. Anybody can forge a refusal where
+        // nothing is sealed, so until then it is doubted.
         let heard_ns = stats.link.hears_us_ns.get();
         if heard_ns > 0 && heard_ns + SILENT_AFTER_NS > now_ns && !broken!(BelievesRefusals) {
             return stats.received.old.add(1);
@@ -107,7 +109,7 @@ impl Inbound {
     }
 }
 
-/// Writes that this node takes nothing from another, which is none of ours if it has no number; how many bytes.
+/// Writes a refusal of this node to another, which is no node of ours if it has no number; returns its length.
 pub(crate) fn write_refusal(settings: &Settings, to: Option<NodeIndex>, reason: Reason, datagram: &mut [u8]) -> usize {
     let Settings { system, own, digest, incarnation, .. } = *settings;
     let to = to.unwrap_or(NodeIndex::MAX);

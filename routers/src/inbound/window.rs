@@ -1,19 +1,19 @@
-//! Which datagrams of a peer's incarnation have come: what comes twice is dropped, and what is missing is counted.
+//! Which datagrams of a peer's incarnation have come: duplicates are dropped, and missing ones are counted.
 //!
 //! ```text
-//!        copies      lost, unless it still comes        may still come        not yet
+//!      duplicates    lost, unless it still comes        may still come        not yet
 //!  ─────────────┬──────────────────────────────────┬─────────────────────┬──────────────▶ sequence
 //!           next - 1024                       settled (next - 64)       next
 //! ```
 
 use crate::broken::broken;
 
-/// Sequences whose coming is remembered.
+/// Sequences that are remembered.
 pub const WINDOW: u64 = 1024;
-/// So many may overtake a datagram before it counts as lost.
+/// How many may overtake a datagram before it counts as lost.
 pub const REORDER_MAX: u64 = 64;
 
-/// What a sequence is.
+/// Result for a sequence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     /// The newest.
@@ -22,17 +22,17 @@ pub(crate) enum Arrival {
     Overtaken,
     /// It had been counted as lost.
     Returned,
-    /// It came before, or is so old that it cannot be told.
+    /// It came before, or is too old to tell.
     Copy,
 }
 
-/// Sequences of one incarnation of one peer; at first all from 0 on are to come.
+/// Sequences of one incarnation of one peer; at first all from 0 on are expected.
 #[derive(Debug, Default)]
 pub(crate) struct Window {
     next: u64,
-    /// All below is judged.
+    /// All below is decided.
     settled: u64,
-    /// What came before this is none of ours.
+    /// Sequences before this do not count.
     start: u64,
     came: [u64; (WINDOW / 64) as usize],
     /// `next` as it stood at the last two ticks.
@@ -40,15 +40,15 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Of an incarnation that may have begun long before us: what it sent before this sequence is not missed. Near its beginning both have just
-    /// begun, and what is missing is lost, also if nobody listened yet: a router sends to a peer of which it knows nothing, so packages
-    /// may have been in it, and no account may forget them.
+    /// For an incarnation that may have begun long before us: earlier sequences are not missed. Near its beginning both
+    /// have just begun. Then missing sequences count as lost, even if nothing listened yet: a router sends to a peer of
+    /// which it knows nothing, so packages may have been in them, and each must be accounted for.
     pub(crate) fn joining(sequence: u64) -> Self {
         let start = if sequence < REORDER_MAX { 0 } else { sequence };
         Self { next: start, settled: start, start, ticks: [start; 2], ..Self::default() }
     }
 
-    /// Of an incarnation that was heard before: what it sent before this sequence has come.
+    /// For an incarnation that was heard before: earlier sequences have come.
     pub(crate) fn going_on(sequence: u64) -> Self {
         let came = [u64::MAX; (WINDOW / 64) as usize];
         Self { next: sequence, settled: sequence, start: sequence, came, ticks: [sequence; 2] }
@@ -59,7 +59,7 @@ impl Window {
         self.next
     }
 
-    /// Judges a sequence that came, and adds to `lost` what is given up since newer ones have come.
+    /// Takes a sequence that came, and adds to `lost` what is given up since newer ones have come.
     pub(crate) fn arrive(&mut self, sequence: u64, lost: &mut u64) -> Arrival {
         if sequence >= self.next {
             self.advance(sequence, lost);
@@ -72,26 +72,26 @@ impl Window {
         if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Overtaken }
     }
 
-    /// Whether a sequence came before, or is so old that it cannot be told.
+    /// Whether a sequence came before, or is too old to tell.
     pub(crate) fn is_copy(&self, sequence: u64) -> bool {
         sequence < self.next && (self.next - sequence > WINDOW || self.has(sequence))
     }
 
-    /// Gives up what was missing two ticks ago; how many.
+    /// Gives up what was missing two ticks ago; returns how many.
     pub(crate) fn tick(&mut self) -> u64 {
         let lost = self.settle(self.ticks[1]);
         self.ticks = [self.next, self.ticks[0]];
         lost
     }
 
-    /// Gives up all that is missing; how many.
+    /// Gives up all that is missing; returns how many.
     pub(crate) fn close(&mut self) -> u64 {
         self.settle(self.next)
     }
 
     fn advance(&mut self, sequence: u64, lost: &mut u64) {
         let next = sequence + 1;
-        // What leaves the window is judged before its bit is used again.
+        // A sequence that leaves the window is decided before its bit is used again.
         let judged = next.saturating_sub(REORDER_MAX);
         *lost += self.settle(judged.min(self.next));
         if judged > self.settled {

@@ -1,4 +1,5 @@
-//! Nodes that are not on the LAN, as a laptop in another network: a second bridge, which one node of the LAN is on as well.
+//! Nodes that are not on the LAN, as a laptop in another network: a second bridge, which one node of the LAN is on as
+//! well.
 //!
 //! ```text
 //!  namespace of `base`              namespace of the hub                namespace of `desk`
@@ -6,7 +7,8 @@
 //!   far 192.168.7.1 ──veth──── home ── far bridge ──── n2 ────veth──── lan 198.18.0.1
 //! ```
 //!
-//! Nothing is handed on between both: who is beyond reaches that one node, and the others of the LAN only by what runs there.
+//! Nothing is forwarded between the bridges: a node beyond reaches that one node, and the others of the LAN only by
+//! what runs there.
 
 use super::namespace::Namespace;
 use super::{DEVICE, FIRST_PORT, LAN, LOOPBACK, Lab, LabError, Node, NodeSpec, told};
@@ -20,7 +22,8 @@ const HOME_PORT: Device = FAR_BRIDGE + 1;
 const FAR: Device = LAN + 1;
 
 impl Lab {
-    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. Deduplicator in the incarnation of a lab.
+    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. Once
+    /// in the life of a lab.
     ///
     /// # Errors
     /// As for [`Lab::new`].

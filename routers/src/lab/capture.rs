@@ -27,7 +27,7 @@ const UDP_BYTES: usize = 8;
 pub struct Crossing<'a> {
     /// When the bridge took it from its sender, on the monotonic clock.
     pub at_ns: u64,
-    /// Who sent it.
+    /// The sender.
     pub source: IpAddr,
     /// The port that it goes to.
     pub port: u16,
@@ -102,7 +102,8 @@ fn open() -> io::Result<OwnedFd> {
     Ok(socket)
 }
 
-/// Source, port and contents of a frame that carries UDP; none of all others, fragments and options of IP included, which routers do not send.
+/// Source, port and contents of a frame that carries UDP; none of all others, fragments and options of IP included,
+/// which routers do not send.
 fn datagram(frame: &[u8]) -> Option<(IpAddr, u16, &[u8])> {
     let (ethernet, packet) = frame.split_at_checked(ETHERNET_BYTES)?;
     let (protocol, source, udp) = match ethernet[12..] {

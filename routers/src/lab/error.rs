@@ -12,7 +12,9 @@ pub enum LabError {
     /// The system lets us make no namespaces.
     #[error(
         "network namespaces cannot be made here ({0}); run it as root, or let users make namespaces: \
-         sysctl -w user.max_user_namespaces=10000 user.max_net_namespaces=10000 kernel.apparmor_restrict_unprivileged_userns=0; in a container, start it with --privileged"
+         sysctl -w user.max_user_namespaces=10000 user.max_net_namespaces=10000 \
+         kernel.apparmor_restrict_unprivileged_userns=0; \
+         in a container, start it with --privileged"
     )]
     NotAllowed(io::Error),
     /// See [`become_able`](super::become_able).

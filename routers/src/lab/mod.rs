@@ -5,11 +5,12 @@
 //!   lan 10.77.0.1 ────veth──── n0 ──┬── bridge ──┬── n1 ────veth──── lan 10.77.0.2
 //! ```
 //!
-//! No namespace has a name, so there is nothing to clean up: they and all devices in them vanish with the last process and the last
-//! descriptor that hold them, however those end. Nothing in a namespace sees the computer's own network.
+//! No namespace has a name, so there is nothing to clean up: they and all devices in them vanish with the last process
+//! and the last descriptor that hold them, however those end. Nothing in a namespace sees the computer's own network.
 //!
-//! A thread goes into the namespace of a node ([`Lab::enter`]) and comes out again; sockets that it makes and processes that it starts
-//! meanwhile stay in. Whoever is not root goes into a user namespace first ([`become_able`]).
+//! A thread goes into the namespace of a node ([`Lab::enter`]) and comes out again; sockets that it makes and processes
+//! that it starts meanwhile stay in. A process without root's rights goes into a user namespace first
+//! ([`become_able`]).
 
 mod beyond;
 mod capture;
@@ -66,7 +67,8 @@ struct Node {
 }
 
 impl Lab {
-    /// Makes namespaces and joins them; when this returns, every node reaches every other. `mtu` is that of all links, in bytes.
+    /// Makes namespaces and joins them; when this returns, every node reaches every other. `mtu` is that of all links,
+    /// in bytes.
     ///
     /// # Errors
     /// When the system does not allow it, or lacks a part.
@@ -103,8 +105,8 @@ impl Lab {
         self.nodes.iter().map(|node| &node.spec)
     }
 
-    /// Takes this thread into the namespace of a node, until what is returned is dropped. Sockets that it makes and processes and threads
-    /// that it starts meanwhile stay there.
+    /// Takes this thread into the namespace of a node, until what is returned is dropped. Sockets that it makes and
+    /// processes and threads that it starts meanwhile stay there.
     ///
     /// # Errors
     /// [`LabError::NoNode`], or when the system does not allow it.
@@ -112,8 +114,8 @@ impl Lab {
         self.node(node)?.namespace.enter()
     }
 
-    /// Takes this thread to the bridge, which all frames between nodes cross: a packet socket made there sees each when it comes in by the
-    /// port of its sender. As [`Lab::enter`].
+    /// Takes this thread to the bridge, which all frames between nodes cross: a packet socket made there sees each when
+    /// it comes in by the port of its sender. As [`Lab::enter`].
     ///
     /// # Errors
     /// When the system does not allow it.
@@ -121,7 +123,8 @@ impl Lab {
         self.hub.enter()
     }
 
-    /// Starts a program on a node. Its parent is this thread: what it asks to be told of its parent's death, it is told of this thread's.
+    /// Starts a program on a node. Its parent is this thread: what it asks to be told of its parent's death, it is told
+    /// of this thread's.
     ///
     /// # Errors
     /// [`LabError::NoNode`], or when it cannot be started.
@@ -149,8 +152,8 @@ impl Lab {
         self.wait_until_it_runs(node)
     }
 
-    /// Divides the network: these nodes reach each other, and so do the others, but none of these any of those. [`Lab::capture`] sees both
-    /// parts. Who was parted before stays parted, until [`Lab::unite`].
+    /// Divides the network: these nodes reach each other, and so do the others, but none of these any of those.
+    /// [`Lab::capture`] sees both parts. A node that was separated before stays separated, until [`Lab::unite`].
     ///
     /// # Errors
     /// As for [`Lab::cut`].

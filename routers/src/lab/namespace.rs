@@ -34,8 +34,8 @@ pub struct Inside {
 
 impl Drop for Inside {
     fn drop(&mut self) {
-        // It was there before, and nothing that could forbid it has changed since: only a bug could make this fail, and then all that this
-        // thread does from here on would go to the wrong network.
+        // It was there before, and nothing that could forbid it has changed since: only a bug could make this fail, and
+        // then all that this thread does from here on would go to the wrong network.
         setns(&self.outside, CloneFlags::CLONE_NEWNET)
             .expect("a thread goes back to the network namespace it came from");
     }
@@ -71,9 +71,9 @@ impl Namespace {
     }
 }
 
-/// Lets this process make labs: it does already as root; else it goes into a user namespace, in which it has the same user and group
-/// and may make network namespaces. That is possible only before it has a second thread, so `main` calls this first. Other groups of the
-/// user are lost in it, and so are rights of root that a program got by sudo later on.
+/// Lets this process make labs: it does already as root; else it goes into a user namespace, in which it has the same
+/// user and group and may make network namespaces. That is possible only before it has a second thread, so `main` calls
+/// this first. Other groups of the user are lost in it, and so are rights of root that a program got by sudo later on.
 ///
 /// # Errors
 /// When users may make no namespaces here, or there is a second thread.

@@ -1,8 +1,9 @@
 //! Tests of what has to happen in time, on computers that do not always leave the time for it.
 //!
-//! A virtual machine loses its processors to others for a tenth of a second now and then; then slots are left out, masters are replaced, packages
-//! become too old, and all of that is right. So a test fails here if it fails on a computer that ran meanwhile, or if it fails whenever
-//! it is tried. What a thread that only wants to wake up misses of the time is the measure.
+//! A virtual machine loses its processors to others for a tenth of a second now and then; then slots are left out,
+//! masters are replaced, packages become too old, and all of that is right. So a test fails here if it fails on a
+//! computer that ran meanwhile, or if it fails whenever it is tried. What a thread that only wants to wake up misses of
+//! the time is the measure.
 
 use nix::sched::{CpuSet, sched_setaffinity};
 use nix::unistd::Pid;
@@ -28,7 +29,7 @@ const TRIES: usize = 5;
 /// After the last, so long is looked whether it is the computer that has no time, or the test that takes it.
 const ALONE: Duration = Duration::from_secs(1);
 
-/// Of whose time a thread that watches knows.
+/// Threads with a watched processor time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Watched {
     /// Threads in real time: what a hypervisor takes, or others in real time.
@@ -37,8 +38,9 @@ pub enum Watched {
     Ordinary,
 }
 
-/// Runs a test, and again if it failed while the computer stood still; five times at most. Where a quarter of the time of threads in real
-/// time is taken in each of them, and also after the last, nothing can be said, and the test says so.
+/// Runs a test, and again if it failed while the computer stood still; five times at most. Where a quarter of the time
+/// of threads in real time is taken in each of them, and also after the last, nothing can be said, and the test says
+/// so.
 ///
 /// # Panics
 /// As the test does.
@@ -197,7 +199,8 @@ mod tests {
     const DISTURBED: WakeDelay = WakeDelay { longest: Duration::from_millis(300), taken: 0.02, is_real_time: true };
     const NO_TIME: WakeDelay = WakeDelay { longest: Duration::from_millis(300), taken: 0.4, is_real_time: true };
 
-    /// What comes of a test that fails so many times, on a computer of which this is seen, and this once the test is over; and how often it ran.
+    /// What comes of a test that fails so many times, on a computer of which this is seen, and this once the test is
+    /// over; and how often it ran.
     fn outcome(fails: usize, seen: WakeDelay, alone: WakeDelay) -> (Option<Result<(), String>>, usize) {
         let (times, begun) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let test = || assert!(times.fetch_add(1, Ordering::Relaxed) >= fails, "on purpose");
@@ -218,13 +221,13 @@ mod tests {
     }
 
     #[test]
-    fn who_fails_undisturbed_fails_at_once() {
+    fn a_test_that_fails_undisturbed_fails_at_once() {
         assert_eq!(outcome(1, CALM, CALM), (failed(), 1));
         assert_eq!(outcome(0, NO_TIME, NO_TIME), (Some(Ok(())), 1));
     }
 
     #[test]
-    fn who_fails_while_the_computer_stands_still_is_tried_again_but_not_for_ever() {
+    fn a_test_that_fails_in_a_stall_is_tried_again_but_not_for_ever() {
         assert_eq!(outcome(TRIES - 1, DISTURBED, DISTURBED), (Some(Ok(())), TRIES));
         assert_eq!(outcome(usize::MAX, DISTURBED, DISTURBED), (failed(), TRIES));
     }
@@ -247,7 +250,7 @@ mod tests {
             is_granted
         };
         let stalls = StallDetector::watched(Watched::RealTime);
-        // One for each processor, so that who watches does not come to it.
+        // One for each processor, so that the watching thread does not come to it.
         let processors = std::thread::available_parallelism().unwrap().get();
         let threads: Vec<_> = (0..processors).map(|_| std::thread::spawn(spins)).collect();
         if !threads.into_iter().all(|thread| thread.join().unwrap()) {

@@ -1,6 +1,6 @@
-//! How a datagram is made: of one package where it lies, of many that wait, of a part of one, or of nothing but "still there".
+//! Makes datagrams: of one package without a copy, of many that wait, of one fragment, or a keep-alive.
 
-use super::{DIRECT_HEAD_BYTES, Outbound, Package, Peer, is_stale};
+use super::{DIRECT_HEAD_BYTES, KeepAlive, Outbound, Package, is_stale};
 use crate::broken::broken;
 use crate::counts::Cause;
 use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
@@ -10,13 +10,21 @@ use crate::report::Report;
 use crate::settings::Settings;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 
-/// Where nothing is sealed, the first datagram to a peer is doubted: if nothing else goes to it within this time, it is told once more.
+/// Where nothing is sealed, the first datagram to a peer is doubted. If nothing else goes to it within this time, a
+/// second keep-alive does.
 const SAY_AGAIN_NS: u64 = 10_000_000;
-/// Where a part begins in its datagram.
+/// Where a fragment begins in its datagram.
 pub(super) const PART_START: usize = frame::HEAD_BYTES + frame::FRAGMENT_HEAD_BYTES;
 
+/// Kind and receiver of a datagram that this router made, and what follows its head; where it is to be sealed it has no check yet.
+pub(crate) fn kind_of_own(datagram: &[u8]) -> Option<(Kind, NodeIndex, &[u8])> {
+    let (head, rest) = datagram.split_first_chunk::<{ frame::HEAD_BYTES }>()?;
+    let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == head[3])?;
+    Some((kind, head[6], rest))
+}
+
 impl Outbound {
-    /// What goes before the body of a package; it goes with this head.
+    /// The bytes before the body of a package that leaves at once with this head.
     pub(super) fn direct(
         &mut self,
         now_ns: u64,
@@ -36,7 +44,8 @@ impl Outbound {
         bytes
     }
 
-    /// As many whole packages for a peer as fit, level by level from one to the other; how long the datagram is. The first one fits.
+    /// As many whole packages for a peer as fit, level by level between the two; returns the datagram's length. The
+    /// first one fits.
     pub(super) fn pack(
         &mut self,
         now_ns: u64,
@@ -58,7 +67,7 @@ impl Outbound {
                 if self.in_slots && !broken!(OvertakesInSlot) {
                     break;
                 }
-                // Its turn comes; behind it nothing of its level may go, but perhaps something of a lower one fits.
+                // The rest of this level waits; something of a lower level may still fit.
                 level += 1;
                 continue;
             }
@@ -77,7 +86,7 @@ impl Outbound {
         self.finish(now_ns, (Kind::Packages, Some(from)), peer, &mut datagram[..end])
     }
 
-    /// The next part of a package that does not fit in a datagram; how long its datagram is.
+    /// The next fragment of a package that does not fit in a datagram; returns its datagram's length.
     pub(super) fn part(&mut self, now_ns: u64, place: Place, datagram: &mut [u8]) -> usize {
         let waiting = *self.queue.at(place);
         let peer = waiting.peer;
@@ -100,7 +109,7 @@ impl Outbound {
         self.finish(now_ns, (Kind::Fragment, Some(waiting.level)), peer, &mut datagram[..start + size])
     }
 
-    /// "Still there", for a peer; how long the datagram is.
+    /// A keep-alive for a peer; returns the datagram's length.
     pub(super) fn alive(&mut self, now_ns: u64, peer: NodeIndex, datagram: &mut [u8]) -> usize {
         let stats = self.stats.peer(peer);
         let told = stats.link.told(now_ns, stats.received.missing()).to_bytes();
@@ -110,7 +119,7 @@ impl Outbound {
         self.finish(now_ns, (Kind::Alive, None), peer, &mut datagram[..end])
     }
 
-    /// Writes the head before what lies in the datagram already: of this kind, with packages of this level first. How long it is.
+    /// Writes the head before the content: of this kind, with packages of this level first. Returns the length.
     fn finish(&mut self, now_ns: u64, (kind, level): (Kind, Option<u8>), to: NodeIndex, datagram: &mut [u8]) -> usize {
         let (head, rest) = datagram.split_at_mut(frame::HEAD_BYTES);
         head.copy_from_slice(&self.head_bytes(kind, to, &[rest]));
@@ -118,7 +127,7 @@ impl Outbound {
         datagram.len()
     }
 
-    /// What goes before `rest`. Who seals it writes the check over what it makes of it.
+    /// The bytes before `rest`. The sealing code writes the check over the result of the cipher.
     fn head_bytes(&self, kind: Kind, to: NodeIndex, rest: &[&[u8]]) -> [u8; frame::HEAD_BYTES] {
         let Settings { system, own, digest, incarnation, .. } = self.settings;
         let sequence = self.stats.peer(to).sent.datagrams.get();
@@ -141,9 +150,9 @@ impl Outbound {
         self.pace.left(now_ns, bytes, level);
     }
 
-    /// A peer that is to be told that we are still there. If none is, notes when one will be.
+    /// A peer that needs a keep-alive. If none does, notes when one will.
     pub(super) fn due(&mut self, now_ns: u64) -> Option<NodeIndex> {
-        let when = |peer: &Peer| peer.quiet_until_ns.min(peer.tell_ns);
+        let when = |peer: &KeepAlive| peer.quiet_until_ns.min(peer.tell_ns);
         let reached = self.settings.peers().filter(|node| self.open() & 1 << node != 0);
         let peers = reached.map(|node| (when(&self.peers[usize::from(node)]), node));
         match peers.min() {

@@ -4,10 +4,10 @@ use super::Outbound;
 use crate::frame::{HEAD_BYTES, NodeIndex};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 
-/// Those of the datagram that was made last.
+/// Those of the last datagram.
 #[derive(Debug)]
 pub(super) struct Aboard {
-    /// The flow, and when the package was published, ns. As many as fit at most.
+    /// The flow, and when the package was published, ns. Limited by what fits in a datagram.
     packages: Vec<(u16, u64)>,
     /// From then on all slots were kept, ns.
     kept_since_ns: u64,
@@ -25,12 +25,12 @@ impl Aboard {
 }
 
 impl Outbound {
-    /// Whether the datagram that was made last has something aboard for which [`sent`](Self::sent) is to be said.
+    /// Whether the last datagram carries something that needs a call of [`sent`](Self::sent).
     pub fn is_measured(&self) -> bool {
         !self.aboard.packages.is_empty()
     }
 
-    /// Says that the datagram that was made last has left: that its last bit is at the other computer at this time, ns.
+    /// The last datagram has left: its last bit is at the other computer at this time, ns.
     pub fn sent(&mut self, arrives_ns: u64) {
         for (flow, published_ns) in self.aboard.packages.drain(..) {
             let kept = published_ns >= self.aboard.kept_since_ns;
@@ -38,12 +38,12 @@ impl Outbound {
         }
     }
 
-    /// Says that until now, ns, a slot was left out or cut short: of packages that were published before no bound holds.
+    /// Until now, ns, a slot was left out or cut short: for packages that were published before no bound holds.
     pub fn slot_left_out(&mut self, now_ns: u64) {
         self.aboard.kept_since_ns = now_ns;
     }
 
-    /// The last or only part of a package goes into the datagram.
+    /// The last or only fragment of a package goes into the datagram.
     pub(super) fn passed(&mut self, peer: NodeIndex, head: &Head, published_ns: u64) {
         self.stats.peer(peer).sent.packages.add(1);
         self.stats.out.passed(head.priority, head.len);

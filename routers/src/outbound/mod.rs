@@ -1,11 +1,11 @@
-//! What goes to other nodes: which package next, in which datagram, and when.
+//! Packages to other nodes: which one next, in which datagram, and when.
 //!
 //! ```text
-//!  accept: route ─ age ─ peer there? ─┬─ nothing waits, may leave now ──▶ at once, from where it lies
-//!                                     └─ Queue ──▶ poll: first level first; with it all for that peer that fits; in parts if too large
+//!  accept: route ─ age ─ peer there? ─┬─ nothing waits, may leave now ──▶ at once, without a copy
+//!                                     └─ Queue ──▶ poll: first level first, and all that fits for that peer
 //! ```
 //!
-//! Each package that is accepted is sent or lost with a cause; see [`Stats`].
+//! Each accepted package is sent or lost with a cause; see [`Stats`].
 
 use crate::admission::capped;
 use crate::broken::broken;
@@ -26,20 +26,21 @@ mod flows;
 mod pace;
 mod slot;
 
+pub(crate) use datagram::kind_of_own;
 use flows::Aboard;
 use pace::Pace;
 
-/// Longest time from the publishing of a package to its leaving. The time to its mailbox is [`TRANSIT_MAX`] of "at most once" at most,
-/// so this leaves half a second for the wire and the other end.
+/// Longest time from the publishing of a package to its leaving. The time to its mailbox is [`TRANSIT_MAX`] of "at most
+/// once" at most, so this leaves half a second for the wire and the other end.
 ///
 /// [`TRANSIT_MAX`]: https://docs.rs/rohrpost-modules
 pub const WAIT_MAX_NS: u64 = 1_500_000_000;
-/// What does not leave is looked for this often.
+/// Packages that cannot leave are searched for this often.
 const SWEEP_EVERY_NS: u64 = 100_000_000;
 /// Bytes before the body of a package that leaves at once.
 pub const DIRECT_HEAD_BYTES: usize = frame::HEAD_BYTES + PACKAGE_HEAD_BYTES;
 
-/// A package that a router is to carry.
+/// A package to carry.
 #[derive(Clone, Copy, Debug)]
 pub struct Package<'a> {
     /// Its head.
@@ -55,9 +56,9 @@ pub struct Package<'a> {
 pub enum Accepted {
     /// Send these bytes and then the body, now, as one datagram.
     Send {
-        /// To this node.
+        /// Receiver.
         to: NodeIndex,
-        /// What goes before the body.
+        /// The bytes before the body.
         head: [u8; DIRECT_HEAD_BYTES],
     },
     /// It waits; `poll`.
@@ -71,9 +72,9 @@ pub enum Accepted {
 pub enum Output {
     /// Send the first bytes of the buffer as one datagram, then ask again.
     Send {
-        /// To this node.
+        /// Receiver.
         to: NodeIndex,
-        /// How many.
+        /// Length.
         bytes: usize,
     },
     /// Nothing before this time, unless a package comes.
@@ -91,37 +92,37 @@ pub struct Outbound {
     queue: Queue,
     pace: Pace,
     levels: [u8; 256],
-    /// Modules of this node by their numbers, sorted, and which quota they have.
+    /// Modules of this node by their numbers, sorted, and the quota of each.
     senders: Box<[(u32, u16)]>,
-    /// The quota of everyone else.
+    /// The quota of all other senders.
     others: u16,
-    peers: Box<[Peer]>,
+    peers: Box<[KeepAlive]>,
     /// Most bytes of a datagram.
     datagram_bytes: usize,
     aboard: Aboard,
-    /// Where datagrams are sealed: who is known. What is for others waits.
+    /// Where datagrams are sealed: the peers with a session. Packages to others wait.
     peer_sessions: Option<Arc<PeerSessions>>,
-    /// Those to whom it sends, one bit each.
+    /// Peers that it sends to, one bit each.
     reached: u64,
-    /// Those whose way has no room just now, one bit each: they are passed over.
+    /// Peers with no socket room at present, one bit each: they are passed over.
     full: u64,
-    /// Peers to which packages may go since they have said that they hear this incarnation, one bit each; all where that is not waited for.
+    /// Peers that hear this incarnation by their word, one bit each; all peers where that does not matter.
     hearing: u64,
-    /// What is real time, if this is not: all that leaves leaves at one rate. And how much of it was counted, bytes.
+    /// Counters of the real-time half, if this is the other one, and its counted bytes: both share one rate.
     shares_with: Option<(Arc<Stats>, u64)>,
     /// It sends in time slots only.
     in_slots: bool,
-    /// Nobody is due to be told anything before this, ns.
+    /// No keep-alive is due before this, ns.
     alive_ns: u64,
     sweep_ns: u64,
 }
 
 #[derive(Clone, Debug, Default)]
-struct Peer {
-    /// When it is to be told at the latest that we are still there: if nothing goes to it, and anyway, ns.
+struct KeepAlive {
+    /// When the next keep-alive is due: without other traffic, and in any case, ns.
     quiet_until_ns: u64,
     tell_ns: u64,
-    /// The incarnation of it that was heard when that was looked at last.
+    /// Its incarnation at the last look.
     life: u64,
 }
 
@@ -139,7 +140,7 @@ impl Outbound {
             levels: std::array::from_fn(|priority| settings.network.level(Priority(priority as u8))),
             senders: senders.into(),
             others: others as u16,
-            peers: vec![Peer::default(); settings.nodes.len()].into(),
+            peers: vec![KeepAlive::default(); settings.nodes.len()].into(),
             datagram_bytes: settings.datagram_bytes(),
             aboard: Aboard::new(settings.datagram_bytes()),
             peer_sessions: None,
@@ -155,30 +156,30 @@ impl Outbound {
         }
     }
 
-    /// From now on datagrams are sealed, by who has them sent, and only for those who are known.
+    /// From now on the caller seals datagrams, and they go only to peers with a session.
     #[must_use]
     pub fn sealed(self, peer_sessions: Arc<PeerSessions>) -> Self {
         Self { reached: 0, hearing: u64::MAX, peer_sessions: Some(peer_sessions), ..self }
     }
 
-    /// From now on it sends what is not real time, at the rate that what is real time leaves. Where nothing is sealed, a package waits until its
-    /// peer has said that it hears this incarnation: before that the peer takes nothing of it at the port of what is not real time. To be called
-    /// before [`Self::sealed`].
+    /// From now on it sends what is not real time, at the rate that real time leaves. Where nothing is sealed, a
+    /// package waits until its peer has said that it hears this incarnation: before that the peer takes nothing of it
+    /// at the port for what is not real time. Call it before [`Self::sealed`].
     #[must_use]
     pub fn behind(self, real_time: &Arc<Stats>) -> Self {
         Self { hearing: 0, shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
     }
 
-    /// The ways to these peers, one bit each, have no room just now: what is for them waits, and keeps nobody else waiting.
+    /// The sockets of these peers, one bit each, have no room: packages to them wait, without delay of others.
     pub fn pass_over(&mut self, full: u64) {
         if full != self.full {
             (self.full, self.alive_ns) = (full, 0);
         }
     }
 
-    /// Takes a package of this node. `alone`: no other waits behind it, so it need not wait for company in its datagram; nor need one
-    /// so large that no second of its size would fit. Where there are time slots, each waits for one. So does what is for a peer that was not
-    /// told yet that we are there: it doubts the first datagram of an incarnation.
+    /// Takes a package of this node. `alone`: no other waits behind it, so it need not be combined; nor must one that
+    /// is so large that no second of its size would fit. With time slots each package waits for a slot. A package to a
+    /// peer without a keep-alive so far waits, too: the peer doubts the first datagram of an incarnation.
     pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
         let head = if broken!(Hurries) { package.head } else { capped(&package.head) };
         self.stats.out.came(head.priority);
@@ -214,7 +215,7 @@ impl Outbound {
         if taken { Accepted::Waits } else { Accepted::Lost }
     }
 
-    /// Loses a package instead of taking it: of its sender there is more than is taken.
+    /// Loses a package instead of taking it: its sender has too many.
     pub fn displace(&self, package: &Package<'_>, report: &mut impl Report) {
         let head = capped(&package.head);
         self.stats.out.came(head.priority);
@@ -226,43 +227,43 @@ impl Outbound {
         !self.queue.is_empty()
     }
 
-    /// Whether so much waits that more is of use only if it is more important: it fills datagrams, and half of what one sender may have. Not
-    /// where all of it waits for peers to which nothing may leave: others must not wait for these.
+    /// Whether only more important packages are of use. False if all waits for closed peers.
     pub fn has_plenty(&self) -> bool {
         let enough = (2 * self.datagram_bytes).max(self.settings.network.quota_bytes / 2);
         self.queue.used_bytes() >= enough as u64 && self.first_level().is_some()
     }
 
-    /// Bytes of memory that packages take of those who share a quota with this one.
+    /// Bytes of memory of all packages that share a quota with this sender.
     pub fn waiting_bytes_of(&self, sender: Name) -> u64 {
         self.queue.used_by(self.sender_of(sender))
     }
 
-    /// The level on which packages of a priority wait.
-    pub(crate) fn level(&self, priority: Priority) -> u8 {
+    /// The level of a priority.
+    pub fn level(&self, priority: Priority) -> u8 {
         self.levels[usize::from(priority.0)]
     }
 
     /// The first level on which something waits that may leave.
-    pub(crate) fn first_level(&self) -> Option<u8> {
+    pub fn first_level(&self) -> Option<u8> {
         self.queue.first_among(self.open()).map(|place| self.queue.at(place).level)
     }
 
-    /// What waits has at most this priority: only what is above it may leave before what waits.
+    /// Highest priority that waits: only more important packages may leave before.
     pub fn waits_up_to(&self) -> Priority {
         let level = self.first_level();
         let highest = (0..=u8::MAX).rev().find(|priority| Some(self.levels[usize::from(*priority)]) == level);
         Priority(highest.unwrap_or_default())
     }
 
-    /// What leaves next, or when to ask again. `datagram` has room for the largest. Where there are time slots, see [`Self::poll_slot`].
+    /// The next datagram, or when to ask again. `datagram` has room for the largest. For time slots see
+    /// [`Self::poll_slot`].
     ///
     /// # Panics
     /// If it has not.
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
         let datagram = &mut datagram[..self.datagram_bytes];
         self.aboard.clear();
-        self.look_who_is_known();
+        self.greet_new_sessions();
         self.look_at_what_is_real_time(now_ns);
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
@@ -289,16 +290,15 @@ impl Outbound {
             };
             return Output::Send { to: waiting.peer, bytes };
         }
-        // What waits for somebody who is not known may become too old.
+        // A package for a peer without a session may become too old.
         Output::Wait { until_ns: if self.queue.is_empty() { self.alive_ns } else { quiet_until_ns } }
     }
 
-    /// Says that the socket did not take what was to be sent last: the datagram, and the body besides if it was [`Accepted::Send`].
+    /// The socket did not take the last datagram; nor the body if it was [`Accepted::Send`].
     pub fn unsent(&mut self, datagram: &[u8], body: &[u8], report: &mut impl Report) {
-        let Some((head, mut rest)) = datagram.split_first_chunk::<{ frame::HEAD_BYTES }>() else { return };
-        let (kind, peer) = (head[3], head[6]);
+        let Some((kind, peer, mut rest)) = kind_of_own(datagram) else { return };
         self.stats.peer(peer).sent.unsent.add(1);
-        if kind == Kind::Packages as u8 {
+        if kind == Kind::Packages {
             while let Ok(head) = Head::from_bytes(rest) {
                 rest = &rest[PACKAGE_HEAD_BYTES..];
                 let (inside, behind) = rest.split_at_checked(head.len.into()).unwrap_or((body, &[]));
@@ -306,10 +306,10 @@ impl Outbound {
                 rest = behind;
             }
         }
-        if kind == Kind::Fragment as u8
+        if kind == Kind::Fragment
             && let Ok(part) = Fragment::parse(rest)
         {
-            // Without this part the others are worth nothing.
+            // Without this fragment the others are worth nothing.
             let level = self.levels[usize::from(part.head.priority.0)];
             let under_way = self.queue.first_of(peer, level);
             match under_way.filter(|place| self.queue.at(*place).parts > 0 && self.queue.at(*place).first == part.first)
@@ -320,7 +320,7 @@ impl Outbound {
         }
     }
 
-    /// Has every peer told at once that we are here.
+    /// Makes a keep-alive to every peer due now.
     #[cfg(test)]
     pub(crate) fn tell_all(&mut self, now_ns: u64) {
         self.alive_ns = now_ns;
@@ -357,12 +357,12 @@ impl Outbound {
         is_known && self.full & 1 << peer == 0 && self.hearing & 1 << peer != 0
     }
 
-    /// Those to whom something may leave now.
+    /// Peers to which something may leave now.
     fn open(&self) -> u64 {
         if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full & self.hearing }
     }
 
-    /// What is real time has left besides, at the same rate, and has heard of who hears us.
+    /// Accounts for the rate that real time uses, and copies which peers hear this node.
     fn look_at_what_is_real_time(&mut self, now_ns: u64) {
         let Some((real_time, counted)) = &mut self.shares_with else { return };
         let bytes = real_time.on_wire_bytes.get();
@@ -378,8 +378,8 @@ impl Outbound {
         }
     }
 
-    /// Whoever is known since just now is told at once that we are there.
-    fn look_who_is_known(&mut self) {
+    /// A peer with a new session gets a keep-alive at once.
+    fn greet_new_sessions(&mut self) {
         let Some(all) = &self.peer_sessions else { return };
         let reached = all.reached();
         if reached != self.reached {
@@ -387,7 +387,7 @@ impl Outbound {
         }
     }
 
-    /// A peer in a new incarnation is told soon that it is heard: it may wait for that.
+    /// A peer in a new incarnation soon gets a keep-alive that it is heard: it may wait for that.
     fn greet_new_incarnations(&mut self) {
         for (peer, stats) in self.peers.iter_mut().zip(0..).map(|(peer, node)| (peer, self.stats.peer(node))) {
             let life = stats.link.incarnation.get();
@@ -410,7 +410,7 @@ impl Outbound {
             && self.pace.may_leave(now_ns, level).is_ok()
     }
 
-    /// Two of this size are more than a datagram holds. Copied into the queue and out of it, it would leave no sooner.
+    /// Two of this size do not fit in a datagram: the queue has no gain.
     fn fills_a_datagram(&self, body_bytes: usize) -> bool {
         frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.datagram_bytes
     }
@@ -430,7 +430,7 @@ impl Outbound {
         self.stats.waiting_bytes.set(self.queue.used_bytes());
     }
 
-    /// Drops what has waited too long behind others, and what goes to peers that are not there any more.
+    /// Drops packages that waited too long behind others, and those to peers that are gone.
     fn sweep(&mut self, now_ns: u64, report: &mut impl Report) {
         self.sweep_ns = now_ns + SWEEP_EVERY_NS;
         self.greet_new_incarnations();

@@ -1,12 +1,12 @@
-//! Bytes a second: a bucket of tokens, kept as the time at which it will be full.
+//! Rate limit in bytes a second: a token bucket, kept as the time at which it will be full.
 //!
-//! A flood keeps the bucket empty. What is more important than that which left last goes all the same, by one datagram in advance:
-//! so it is behind the one that is on the wire, and not behind the pace as well.
+//! A flood keeps the bucket empty. A package more important than the last one leaves nevertheless, one datagram in
+//! advance: it waits for the datagram on the wire, and not for the rate limit as well.
 
 use crate::broken::broken;
 use crate::settings::Settings;
 
-/// A burst of so much time may leave at once: waking up takes a part of it.
+/// A burst of this length may leave at once: waking up takes a part of it.
 const BURST_NS: u64 = 1_000_000;
 /// Fractional bits of the time of a byte.
 const FRACTION: u32 = 20;
@@ -15,15 +15,15 @@ const FRACTION: u32 = 20;
 pub(super) struct Pace {
     /// Time that a byte takes, in 2^-20 ns.
     byte: u128,
-    /// Heads around each datagram.
+    /// Headers of each datagram.
     pub(super) overhead_bytes: usize,
-    /// What has left is through by then, at the given rate.
+    /// When all that left is through, at the given rate.
     through_ns: u64,
     /// How far that may lie ahead.
     ahead_ns: u64,
-    /// How much farther for what is more important than what left last: a largest datagram.
+    /// How much farther for a package more important than the last: a largest datagram.
     advance_ns: u64,
-    /// Level of what left last.
+    /// Level of the last datagram.
     level: u8,
 }
 
@@ -37,7 +37,7 @@ impl Pace {
         pace
     }
 
-    /// Whether a datagram whose most important package is of this level may leave now; else when.
+    /// Whether a datagram with this highest level may leave now; else when.
     pub(super) fn may_leave(&self, now_ns: u64, level: u8) -> Result<(), u64> {
         let hurries = level < self.level && !broken!(NeverInAdvance);
         let ahead_ns = self.ahead_ns + if hurries { self.advance_ns } else { 0 };
@@ -45,13 +45,13 @@ impl Pace {
         if from_ns <= now_ns || broken!(Unpaced) { Ok(()) } else { Err(from_ns) }
     }
 
-    /// A datagram has left; none: without packages.
+    /// A datagram has left; level none: without packages.
     pub(super) fn left(&mut self, now_ns: u64, bytes: usize, level: Option<u8>) {
         self.level = level.unwrap_or(self.level);
         self.takes(now_ns, bytes + self.overhead_bytes);
     }
 
-    /// So many bytes go over the wire, all heads counted.
+    /// Bytes go over the wire, with all headers.
     pub(super) fn takes(&mut self, now_ns: u64, bytes: usize) {
         if bytes > 0 {
             self.through_ns = self.through_ns.max(now_ns).saturating_add(self.takes_ns(bytes));

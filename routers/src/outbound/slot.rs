@@ -1,11 +1,11 @@
-//! What leaves in a time slot: what is most important, as long as it fits.
+//! Datagrams in a time slot: the most important first, as long as they fit.
 //!
 //! ```text
 //!  queue:  level 0 ▓▓  level 3 ▓▓▓▓▓▓▓▓▓  level 9 ▒          room in the slot: ▓▓▓▓▓▓▓
 //!          fits: leaves   does not fit: the slot ends        9 does not overtake 3, and 3 goes first in the next slot
 //! ```
 //!
-//! Who computes how late a package can be counts on it: nothing less important leaves before it but what was on the wire already.
+//! The computed bounds rely on it: before a package nothing less important leaves except what was on the wire already.
 
 use super::datagram::PART_START;
 use super::{DIRECT_HEAD_BYTES, Outbound};
@@ -17,9 +17,9 @@ use rohrpost_mailbox::Priority;
 use rohrpost_network::LEVELS;
 
 impl Outbound {
-    /// What leaves next in a time slot: for whom, and how many bytes of the buffer; none when nothing is left that may. `room_bytes` is
-    /// how long a datagram may be to be on the wire before the slot's guard begins. `datagram` has room for the largest. `behind`: the most
-    /// important of what was not taken yet.
+    /// The next datagram in a time slot: its receiver and its length in the buffer; none when nothing is left that may
+    /// leave. `room_bytes`: the longest datagram that is on the wire before the slot's guard begins. `datagram` has
+    /// room for the largest. `behind`: the most important package that was not accepted yet.
     ///
     /// # Panics
     /// If it has not.
@@ -33,7 +33,7 @@ impl Outbound {
         let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };
         let datagram = &mut datagram[..room_bytes];
         self.aboard.clear();
-        self.look_who_is_known();
+        self.greet_new_sessions();
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {
@@ -60,7 +60,7 @@ impl Outbound {
         None
     }
 
-    /// Drops what would leave next and cannot, so that it is known what leaves next. To be called before each datagram of a slot.
+    /// Drops expired packages at the front, so that the next one is known. Call it before each datagram of a slot.
     pub fn drop_first(&mut self, now_ns: u64, report: &mut impl Report) {
         while let Some(place) = self.queue.first_among(self.open()) {
             let waiting = self.queue.at(place);
@@ -69,14 +69,14 @@ impl Outbound {
         }
     }
 
-    /// Looks through what waits for a slot, and drops what waits for too long or for nobody. To be called between slots.
+    /// Drops waiting packages that are too old or have no receiver. Call it between slots.
     pub fn tidy(&mut self, now_ns: u64, report: &mut impl Report) {
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
         }
     }
 
-    /// Bytes of the datagram that a package leaves in without company; of one that leaves in parts, of its next.
+    /// Bytes of a package's own datagram; for a package in fragments, of its next.
     fn takes_bytes(&self, waiting: &Waiting) -> usize {
         let len = usize::from(waiting.head.len);
         if !self.is_large(waiting) {
@@ -86,8 +86,8 @@ impl Outbound {
         self.datagram_bytes.min(PART_START + left)
     }
 
-    /// In a slot a datagram carries nothing that is less important than what waits for other peers, or in the mailbox: that would be later
-    /// by as much as this takes.
+    /// In a slot a datagram carries nothing less important than what waits for other peers, or in the mailbox: that
+    /// would be delayed by the extra bytes.
     fn last_level_of_company(&self, peer: NodeIndex, behind: Option<Priority>) -> u8 {
         if broken!(AnyCompany) {
             return LEVELS as u8;

@@ -1,6 +1,6 @@
 //! Memory in blocks of one size: a body is a chain of them, written once and read once, front to back.
 
-/// Bytes of a block: what is told of a lost package lies in its first.
+/// Bytes of a block. The first one holds what is reported of a lost package.
 pub(super) const BLOCK_BYTES: usize = rohrpost_network::KEPT_IN_BYTES as usize;
 const NONE: u32 = u32::MAX;
 
@@ -18,7 +18,7 @@ pub(super) struct Chain {
     first: u32,
     last: u32,
     blocks: u32,
-    /// Block that is read next, and from where in it.
+    /// The next block to read, and the offset in it.
     reading: u32,
     offset: u32,
 }
@@ -40,7 +40,7 @@ impl Blocks {
         bytes.div_ceil(BLOCK_BYTES).max(1) as u32
     }
 
-    /// Copies a body in. The caller has seen that so many blocks are free.
+    /// Copies a body in. The caller has checked that enough blocks are free.
     pub(super) fn store(&mut self, body: &[u8]) -> Chain {
         let blocks = Self::needed(body.len());
         let first = self.free;
@@ -72,7 +72,7 @@ impl Blocks {
         }
     }
 
-    /// The first of a body's bytes, also when they were read or freed, until others are stored.
+    /// The first of a body's bytes, even after they were read or freed, until others are stored.
     pub(super) fn beginning(&self, chain: &Chain, len: u16) -> &[u8] {
         let start = chain.first as usize * BLOCK_BYTES;
         &self.bytes[start..start + BLOCK_BYTES.min(len.into())]

@@ -1,14 +1,14 @@
 //! Where the newest package of each state waits: of one sender, receiver, type and id.
 //!
-//! What is found is a hint, which may be out of date: whoever reads one looks what waits there. So nothing has to be forgotten when a package
-//! leaves. A look costs the same however much waits. Where more states meet than a set has room for, one is not found, and its next package
-//! waits behind the one before.
+//! A hint may be out of date: the caller checks the place. So nothing has to be removed when a package leaves. A lookup
+//! costs the same however much waits. When more states meet than a set has room for, one is not found, and its next
+//! package waits behind the one before.
 
 use rohrpost_mailbox::Head;
 
-/// States whose hints lie in one set.
+/// Hints in one set.
 const WAYS: usize = 4;
-/// Sets, at most: more states at a time wait for no connection.
+/// Sets, at most: no connection has more states waiting at a time.
 const SETS_MAX: usize = 256;
 const NONE: u32 = u32::MAX;
 
@@ -27,7 +27,7 @@ impl Hints {
         self.0[self.set(head)].into_iter().filter(|place| *place != NONE)
     }
 
-    /// A package waits there. `newest` has the head of what waits in a place, if of that only the newest counts.
+    /// A package waits there. `newest` returns the head of a waiting package if only the newest of it counts.
     pub(super) fn note<'a>(&mut self, head: &Head, place: u32, newest: impl Fn(u32) -> Option<&'a Head>) {
         let set = self.set(head);
         let is_dated =
@@ -39,7 +39,7 @@ impl Hints {
     fn set(&self, head: &Head) -> usize {
         let names = u64::from(head.to.raw()) << 32 | u64::from(head.from.raw());
         let state = u64::from(head.kind.0.cast_unsigned()) << 16 | u64::from(head.id);
-        // Odd factors with many bits spread what differs in few, and the upper half has the better of it.
+        // Odd factors with many bits spread inputs that differ in few; the upper half is spread best.
         let mixed = (names ^ state.wrapping_mul(0x9e37_79b9_7f4a_7c15)).wrapping_mul(0xff51_afd7_ed55_8ccd);
         (mixed >> 32) as usize & (self.0.len() - 1)
     }

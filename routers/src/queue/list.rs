@@ -1,4 +1,4 @@
-//! Lists through an array: places are linked by their numbers, so that one can be taken out of the middle, and nothing is allocated.
+//! Linked lists in an array: places are linked by number. One can be removed from the middle, and nothing is allocated.
 
 const NONE: u32 = u32::MAX;
 
@@ -27,21 +27,21 @@ impl List {
 
 /// The links of lists that have no place in common.
 #[derive(Debug)]
-pub(super) struct Lists(Box<[Link]>);
+pub(super) struct Lists(Box<[ListNode]>);
 
 #[derive(Clone, Copy, Debug)]
-struct Link {
+struct ListNode {
     before: u32,
     after: u32,
 }
 
 impl Lists {
     pub(super) fn new(places: usize) -> Self {
-        Self(vec![Link { before: NONE, after: NONE }; places].into())
+        Self(vec![ListNode { before: NONE, after: NONE }; places].into())
     }
 
     pub(super) fn append(&mut self, list: &mut List, place: u32) {
-        self.0[place as usize] = Link { before: list.last, after: NONE };
+        self.0[place as usize] = ListNode { before: list.last, after: NONE };
         match list.last {
             NONE => list.first = place,
             last => self.0[last as usize].after = place,
@@ -50,7 +50,7 @@ impl Lists {
     }
 
     pub(super) fn prepend(&mut self, list: &mut List, place: u32) {
-        self.0[place as usize] = Link { before: NONE, after: list.first };
+        self.0[place as usize] = ListNode { before: NONE, after: list.first };
         match list.first {
             NONE => list.last = place,
             first => self.0[first as usize].before = place,
@@ -59,7 +59,7 @@ impl Lists {
     }
 
     pub(super) fn remove(&mut self, list: &mut List, place: u32) {
-        let Link { before, after } = self.0[place as usize];
+        let ListNode { before, after } = self.0[place as usize];
         match before {
             NONE => list.first = after,
             before => self.0[before as usize].after = after,
@@ -70,7 +70,7 @@ impl Lists {
         }
     }
 
-    /// What stands behind a place of a list.
+    /// The place behind a place of a list.
     pub(super) fn after(&self, place: u32) -> Option<u32> {
         Some(self.0[place as usize].after).filter(|after| *after != NONE)
     }

@@ -1,16 +1,16 @@
-//! Packages that wait for the wire: 32 levels, and a quota for each sender (seed 002, 4.1.2).
+//! Packages that wait for the wire: 32 levels, and a quota for each sender.
 //!
 //! ```text
 //!  level 0 … 31 of each peer   first ─▶ package ─▶ package      first in, first out
-//!  level 0 … 31 of each sender first ─▶ package ─▶ package      who is over its quota loses the newest of its own lowest level
-//!  package                     head · block ─▶ block ─▶ block   256 B each, so that one large package does not need one large hole
+//!  level 0 … 31 of each sender first ─▶ package ─▶ package      beyond its quota: loses its lowest, newest
+//!  package                     head · block ─▶ block ─▶ block   256 B each: no large hole needed
 //! ```
 //!
-//! Of data of which only the newest counts, one that waits can be [`replace`](Queue::replace)d by a newer one in its place, if the queue was
-//! made [for that](Queue::shared).
+//! If only the newest value of some data counts, a newer package can [`replace`](Queue::replace) a waiting one in its
+//! place, provided that the queue was made [for that](Queue::shared).
 //!
-//! All memory is taken at the start: each sender's quota is there for it alone, so no sender can use up another's. In a
-//! queue that is [shared](Queue::shared) all use one memory, and whoever has most of it gives way.
+//! All memory is taken at the start. Each sender's quota is reserved, so no sender can use up another's. In a queue
+//! that is [shared](Queue::shared) all use one memory, and the sender that uses most of it loses packages first.
 
 mod blocks;
 mod hints;
@@ -37,19 +37,19 @@ pub struct Waiting {
     pub head: Head,
     /// When its sender published it, ns.
     pub published_ns: u64,
-    /// Where it goes.
+    /// Receiver.
     pub peer: NodeIndex,
-    /// Which sender's quota it is counted in.
+    /// The sender for its quota.
     pub sender: u16,
-    /// As whom it is counted, in a queue that is shared.
+    /// Its sender and party in a shared queue.
     pub share: Share,
     /// Its level; 0 goes first.
     pub level: u8,
-    /// How often it was handed on, where that counts.
+    /// How often it was forwarded, where that counts.
     pub hops: u8,
-    /// If parts of it have left: the sequence of the first.
+    /// Sequence of the first fragment, if some have left.
     pub first: u64,
-    /// How many parts have left.
+    /// How many fragments have left.
     pub parts: u16,
 }
 
@@ -60,7 +60,7 @@ struct Entry {
     body: Chain,
 }
 
-/// A place in the queue; good until its package is taken out.
+/// A place in the queue; valid until its package is taken out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Place(u32);
 
@@ -69,7 +69,7 @@ pub struct Place(u32);
 pub struct Queue {
     entries: Box<[Entry]>,
     blocks: Blocks,
-    /// Links of both kinds of lists; an entry that is not in use is in `free`, through its peer's links.
+    /// Links of both kinds of lists. A free entry is in `free`, through its peer's links.
     by_peer: Lists,
     by_sender: Lists,
     free: List,
@@ -77,7 +77,7 @@ pub struct Queue {
     /// Levels on which something waits for a peer, one bit each.
     waiting_for: Box<[u32]>,
     senders: Vec<Sender>,
-    /// Who the senders are, and what they had of the line; none: each has a quota of its own.
+    /// The senders, and their use of the line; none: each has a quota of its own.
     shares: Option<Shares>,
     /// Peers with something on a level, one bit each.
     busy: [u64; LEVELS],
@@ -91,7 +91,7 @@ pub struct Queue {
     len: usize,
 }
 
-/// Whether of such packages only the newest counts.
+/// Whether only the newest of such packages counts.
 pub fn counts_newest(head: &Head) -> bool {
     let is_data = matches!(head.kind.kind(), Kind::Data(_));
     is_data && (head.options.has(Options::NEWEST) || broken!(ReplacesAllData))
@@ -100,9 +100,9 @@ pub fn counts_newest(head: &Head) -> bool {
 #[derive(Clone, Debug, Default)]
 struct Sender {
     levels: [List; LEVELS],
-    /// Blocks of what could give way, by level.
+    /// Blocks that may be displaced, by level.
     blocks: [u32; LEVELS],
-    /// Levels with something that could give way, one bit each.
+    /// Levels with something that may be displaced, one bit each.
     waiting: u32,
     /// Blocks in all.
     used: u32,
@@ -137,8 +137,8 @@ impl Queue {
         queue
     }
 
-    /// For one peer and any number of senders, which [share](Queue::sender_of) the quota; and it finds what a newer
-    /// package replaces.
+    /// For one peer and any number of senders, which [share](Queue::sender_of) the quota; it finds what a newer package
+    /// replaces.
     pub fn shared(quota_bytes: usize) -> Self {
         let mut queue = Self::new(1, 1, quota_bytes);
         queue.senders.clear();
@@ -165,8 +165,8 @@ impl Queue {
         self.senders.get(usize::from(sender)).map_or(0, |sender| u64::from(sender.used) * BLOCK_BYTES as u64)
     }
 
-    /// Lets a package wait. What has to give way for it is handed to `gone`; if nothing less important of the same sender can make room,
-    /// the package itself is not taken.
+    /// Queues a package. Displaced packages are handed to `gone`. If nothing less important of the same sender can make
+    /// room, the package itself is not taken.
     #[must_use]
     pub fn push(&mut self, waiting: Waiting, body: &[u8], mut gone: impl FnMut(&Waiting, &[u8])) -> bool {
         let needed = Blocks::needed(body.len());
@@ -199,8 +199,8 @@ impl Queue {
         true
     }
 
-    /// What waits and is replaced by this package, which is to wait as well: both are of the same state, no part of it has left, and of such
-    /// packages only the newest counts.
+    /// The waiting package that this one replaces: both are of the same state, no fragment of it has left, and only the
+    /// newest of such packages counts.
     pub fn older(&self, newer: &Waiting) -> Option<Place> {
         let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head) && !broken!(NeverReplaces))?;
         let is_older = |place: &u32| {
@@ -213,8 +213,8 @@ impl Queue {
         hints.of(&newer.head).find(is_older).map(Place)
     }
 
-    /// Lets a package wait in the place of the [older](Self::older) one. False: it has no room, not even if what is less important gives way;
-    /// then the older one goes on waiting.
+    /// Queues a package in the place of the [older](Self::older) one. False: it has no room, even if less important
+    /// ones are displaced; then the older one stays.
     #[must_use]
     pub fn replace(
         &mut self,
@@ -256,7 +256,7 @@ impl Queue {
             return false;
         }
         while self.senders[sender].used + needed > quota {
-            // There is one: what could give way was counted.
+            // There is one: displaceable packages were counted.
             if !self.displace(sender, lower, gone) {
                 return false;
             }
@@ -264,7 +264,7 @@ impl Queue {
         true
     }
 
-    /// The newest of a sender's least important level, from `lower` on, gives way; false: there is none.
+    /// Displaces the newest package of a sender's least important level, from `lower` on; false: there is none.
     fn displace(&mut self, sender: usize, lower: usize, gone: &mut impl FnMut(&Waiting, &[u8])) -> bool {
         let end = if broken!(DisplacesOldest) { List::first } else { List::last };
         let Some(last) = self.senders[sender].levels[lower..].iter().rev().find_map(end) else { return false };
@@ -275,12 +275,12 @@ impl Queue {
         true
     }
 
-    /// The package that goes next: of the first level, the one that has waited longest.
+    /// The next package: of the first level, the one that has waited longest.
     pub fn first(&self) -> Option<Place> {
         self.first_among(u64::MAX)
     }
 
-    /// The same of those for some peers alone, one bit each.
+    /// The same among packages for these peers, one bit each.
     pub fn first_among(&self, peers: u64) -> Option<Place> {
         if self.levels == 0 {
             return None;
@@ -300,7 +300,7 @@ impl Queue {
         if broken!(TakesNewest) { list.last() } else { list.first() }.map(Place)
     }
 
-    /// What waits behind a package, for the same peer and on the same level.
+    /// The next package behind another, for the same peer and on the same level.
     pub fn behind(&self, place: Place) -> Option<Place> {
         self.by_peer.after(place.0).map(Place)
     }
@@ -317,7 +317,7 @@ impl Queue {
         bits(self.levels.into()).find(others).map(|level| level as u8)
     }
 
-    /// What waits at a place.
+    /// The package at a place.
     pub fn at(&self, place: Place) -> &Waiting {
         &self.entries[place.0 as usize].waiting
     }
@@ -327,7 +327,7 @@ impl Queue {
         self.blocks.read(&mut self.entries[place.0 as usize].body, into);
     }
 
-    /// A part of it has left: it does not give way any more.
+    /// A fragment has left: the package cannot be displaced any more.
     pub fn part_left(&mut self, place: Place, first: u64) {
         let entry = &mut self.entries[place.0 as usize];
         entry.waiting.parts += 1;
@@ -341,7 +341,7 @@ impl Queue {
         }
     }
 
-    /// Takes a package out; with it comes the beginning of its body.
+    /// Takes a package out, and returns it with the beginning of its body.
     pub fn remove(&mut self, place: Place) -> (Waiting, &[u8]) {
         let Entry { waiting, body, .. } = self.entries[place.0 as usize];
         let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
@@ -373,7 +373,7 @@ impl Queue {
 }
 
 impl Sender {
-    /// Something was taken from a level.
+    /// A package was taken from a level.
     fn emptied(&mut self, level: usize) {
         if self.levels[level].first().is_none() {
             self.waiting &= !(1 << level);
@@ -382,13 +382,13 @@ impl Sender {
 }
 
 impl Entry {
-    /// Its head, if a package waits there of which only the newest counts.
+    /// Its head, if only the newest of such packages counts.
     fn of_newest(&self) -> Option<&Head> {
         (self.body.blocks() > 0 && counts_newest(&self.waiting.head)).then_some(&self.waiting.head)
     }
 }
 
-/// Whether two packages tell of the same, the one earlier and the other later.
+/// Whether two packages are values of the same state, one earlier and the other later.
 fn same_state(one: &Head, other: &Head) -> bool {
     (one.to, one.from, one.kind, one.id) == (other.to, other.from, other.kind, other.id)
 }

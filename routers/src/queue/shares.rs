@@ -1,32 +1,32 @@
-//! Shares of one memory and one line, for senders that do not trust each other: each has an equal part of what others
-//! want too.
+//! Shares of one memory and one line, for senders that do not trust each other: each gets an equal part where there is
+//! not enough.
 //!
 //! ```text
-//!  memory   of too much, the least important and newest of the sender that has most gives way; nobody loses anything
-//!           to others as long as it has no more than they have
-//!  line     the most important goes first, of those parties that are not a window ahead of the one that had least of
-//!           the line; senders that trust each other are one party, and among them nothing counts but importance
+//!  memory   when full, the sender that uses most loses its least important and newest package; a sender that uses no
+//!           more than others loses nothing to them
+//!  line     the most important goes first, among parties that are at most a window ahead of the one that was served
+//!           least; senders that trust each other are one party, within which only importance counts
 //! ```
 
 use super::{Place, Queue, Sender, Waiting};
 use crate::broken::broken;
 
-/// What a package takes of the line besides its body, about.
+/// Bytes of a package on the line besides its body, about.
 const HEADS_BYTES: u64 = 32;
 
-/// As whom a package is counted.
+/// The sender and the party of a package.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Share {
-    /// In memory: whose it is.
+    /// The sender, for memory.
     pub sender: u32,
-    /// On the line: the party of that sender.
+    /// Its party, for the line.
     pub party: u32,
 }
 
-/// Whose the places of senders are, and what each party had of the line.
+/// The senders' places, and how much each party was served.
 #[derive(Debug, Default)]
 pub(super) struct Shares {
-    /// By the sender's place: who that is, and the place of its party.
+    /// By the sender's place: its number, and the place of its party.
     senders: Vec<(u32, usize)>,
     parties: Vec<Party>,
 }
@@ -34,24 +34,24 @@ pub(super) struct Shares {
 #[derive(Debug)]
 struct Party {
     number: u32,
-    /// Bytes of the line; it began with as much as the party had that had least.
+    /// Bytes of the line. A party begins with the amount of the party that was served least.
     served: u64,
-    /// Senders of which something waits.
+    /// Its senders with something waiting.
     waiting: u32,
 }
 
 impl Shares {
-    /// What the party had of the line that had least of those of which something waits.
+    /// The least served amount among parties with something waiting.
     fn least_served(&self) -> Option<u64> {
         self.parties.iter().filter(|party| party.waiting > 0).map(|party| party.served).min()
     }
 
-    /// The place of a party; a new one, or one that nobody needs, if it has none.
+    /// The place of a party; a new or a free one, if it has none.
     fn party(&mut self, number: u32) -> usize {
         if let Some(at) = self.parties.iter().position(|party| party.number == number) {
             return at;
         }
-        // Who had more of the line than others is remembered until they have caught up.
+        // A party that was served more than others is remembered until they have caught up.
         let least = self.least_served().unwrap_or(u64::MAX);
         let fresh = Party { number, served: 0, waiting: 0 };
         match self.parties.iter().position(|party| party.waiting == 0 && party.served <= least) {
@@ -66,11 +66,11 @@ impl Shares {
         }
     }
 
-    /// Something of a sender waits from now on, which had nothing waiting. Nobody saves up by that.
+    /// Something of a sender waits from now on; nothing did before. No party saves up credit.
     pub(super) fn begins(&mut self, sender: u16) {
         let least = self.least_served();
         if least.is_none() {
-            // Who is alone waits for nobody.
+            // A party that is alone waits for no other.
             self.parties.iter_mut().for_each(|party| party.served = 0);
         }
         let party = &mut self.parties[self.senders[usize::from(sender)].1];
@@ -85,8 +85,8 @@ impl Shares {
 }
 
 impl Queue {
-    /// The place of a sender; that of one of which nothing waits, or a new one, if it has none. So there are no more
-    /// than packages wait, and one.
+    /// The place of a sender; a free or a new one, if it has none. So there are at most as many as packages wait, and
+    /// one.
     pub fn sender_of(&mut self, share: Share) -> u16 {
         let number = if broken!(SharesQueue) { 0 } else { share.sender };
         let Some(shares) = &mut self.shares else { return 0 };
@@ -104,13 +104,13 @@ impl Queue {
         at as u16
     }
 
-    /// Whether something of others than this sender waits.
+    /// Whether packages of other senders wait.
     pub fn others_wait(&self, sender: u16) -> bool {
         self.used_blocks > self.senders.get(usize::from(sender)).map_or(0, |sender| sender.used)
     }
 
-    /// The package that goes next: the most important of those parties that had at most so many bytes of the line more
-    /// than the one that had least.
+    /// The next package: the most important of those parties that were served at most this many bytes more than the
+    /// least served one.
     pub fn first_shared(&self, window_bytes: u64) -> Option<Place> {
         let shares = self.shares.as_ref().filter(|_| !broken!(IgnoresShares));
         let Some((shares, least)) = shares.and_then(|shares| Some((shares, shares.least_served()?))) else {
@@ -125,7 +125,7 @@ impl Queue {
         firsts.min().map(|(_, _, place)| Place(place))
     }
 
-    /// Takes a package out that leaves.
+    /// Takes out a package that leaves.
     pub fn serve(&mut self, place: Place) -> (Waiting, &[u8]) {
         let Waiting { sender, head, .. } = self.entries[place.0 as usize].waiting;
         if let Some(shares) = &mut self.shares {
@@ -135,7 +135,8 @@ impl Queue {
         self.remove(place)
     }
 
-    /// Makes room where all use one memory: of whoever has more than the sender would, and then of the sender itself.
+    /// Makes room where all use one memory: from the sender that uses more than this one would, then from this one
+    /// itself.
     pub(super) fn make_shared_room(
         &mut self,
         sender: usize,
@@ -162,7 +163,7 @@ impl Queue {
                 Some(largest) => self.displace(largest, 0, gone),
                 None => self.displace(sender, lower, gone),
             };
-            // Something could give way: it was counted.
+            // There is something to displace: it was counted.
             if !is_made {
                 return false;
             }

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use rohrpost_mailbox::{Priority, Type};
 
 pub(crate) const CHECKS: &[fn()] =
-    &[check_order_of_levels, check_who_gives_way, check_senders_have_memory_of_their_own, check_what_gives_way_is_told];
+    &[check_order_of_levels, check_displacement, check_senders_have_memory_of_their_own, check_what_gives_way_is_told];
 
 const QUOTA: usize = 16 * BLOCK_BYTES;
 
@@ -12,7 +12,7 @@ fn waiting(id: u16, sender: u16, peer: NodeIndex, level: u8, len: usize) -> Wait
     Waiting { head, peer, sender, level, ..Waiting::default() }
 }
 
-/// Lets a package wait; what gave way for it, or itself.
+/// Queues a package; returns what was displaced for it, or itself.
 fn push(queue: &mut Queue, id: u16, sender: u16, level: u8, len: usize) -> Vec<u16> {
     let mut gone = Vec::new();
     let body = vec![id as u8; len];
@@ -50,7 +50,7 @@ fn urgent_ones_go_first_and_equal_ones_in_order() {
     check_order_of_levels();
 }
 
-fn check_who_gives_way() {
+fn check_displacement() {
     let mut queue = Queue::new(1, 3, QUOTA);
     for id in 0..16 {
         assert_eq!(push(&mut queue, id, 0, [20, 10][usize::from(id) % 2], 100), []);
@@ -69,8 +69,8 @@ fn check_who_gives_way() {
 }
 
 #[test]
-fn who_is_over_its_quota_loses_its_own_least_important_and_newest() {
-    check_who_gives_way();
+fn a_sender_over_its_quota_loses_its_own_least_important_and_newest() {
+    check_displacement();
 }
 
 fn check_senders_have_memory_of_their_own() {
@@ -128,7 +128,7 @@ fn levels_of_a_peer_are_found_one_after_the_other() {
     assert_eq!((queue.next_level(1, 0), queue.next_level(2, 0)), (Some(4), None));
 }
 
-/// Lets a package of a party's sender wait in a shared queue; what gave way for it, or itself.
+/// Queues a package of a party's sender in a shared queue; returns what was displaced for it, or itself.
 fn push_shared(queue: &mut Queue, id: u16, (party, sender): (u32, u32), level: u8) -> Vec<u16> {
     let share = Share { sender, party };
     let new = Waiting { share, sender: queue.sender_of(share), ..waiting(id, 0, 0, level, 200) };
@@ -144,7 +144,7 @@ fn of_one_memory_each_sender_has_an_equal_part_whatever_its_level() {
     (0..16).for_each(|id| assert_eq!(push_shared(&mut queue, id, (1, 1), 0), [], "alone it has all"));
     assert_eq!(push_shared(&mut queue, 16, (1, 1), 0), [16]);
     for (id, sender, gone) in [(20, 2, 15), (21, 2, 14), (22, 3, 13), (23, 2, 12), (24, 3, 11), (25, 4, 10)] {
-        assert_eq!(push_shared(&mut queue, id, (1, sender), 31), [gone], "who has most gives way, to {id}");
+        assert_eq!(push_shared(&mut queue, id, (1, sender), 31), [gone], "the largest user loses, to {id}");
     }
     for id in 30..34 {
         push_shared(&mut queue, id, (1, 2), 31);
@@ -157,7 +157,7 @@ fn of_one_memory_each_sender_has_an_equal_part_whatever_its_level() {
 
 #[test]
 fn on_one_line_parties_take_turns_and_within_one_importance_alone_counts() {
-    // Two senders of one party, the first with what is urgent, and another party with what is least important.
+    // Two senders of one party, the first with urgent packages, and another party with the least important ones.
     let served = |parties: [u32; 2], window| {
         let mut queue = Queue::shared(QUOTA);
         (0..8).for_each(|id| assert_eq!(push_shared(&mut queue, id, (parties[0], 1), 0), []));
@@ -176,7 +176,7 @@ fn on_one_line_parties_take_turns_and_within_one_importance_alone_counts() {
 }
 
 #[test]
-fn who_begins_to_wait_has_saved_up_nothing() {
+fn a_party_that_begins_to_wait_has_no_credit() {
     let mut queue = Queue::shared(QUOTA);
     let serve = |queue: &mut Queue| {
         let place = queue.first_shared(0).unwrap();
@@ -184,7 +184,7 @@ fn who_begins_to_wait_has_saved_up_nothing() {
     };
     (0..8).for_each(|id| assert_eq!(push_shared(&mut queue, id, (1, 1), 0), []));
     (0..4).for_each(|id| assert_eq!(serve(&mut queue), id));
-    // The other had nothing of the line so far, and gets no more than turns from now on.
+    // The other was not served so far, and gets no more than turns from now on.
     (10..14).for_each(|id| assert_eq!(push_shared(&mut queue, id, (2, 2), 31), []));
     let order: Vec<u16> = (0..8).map(|_| serve(&mut queue)).collect();
     assert_eq!(order, [4, 10, 5, 11, 6, 12, 7, 13]);
@@ -196,7 +196,7 @@ fn who_begins_to_wait_has_saved_up_nothing() {
     assert!(queue.senders.len() < 5, "{} places", queue.senders.len());
 }
 
-/// What the queue promises, in a slow and simple way.
+/// A slow and simple model of the queue's promises.
 #[derive(Default)]
 struct Model {
     waiting: Vec<Waiting>,
@@ -231,7 +231,7 @@ impl Model {
         Some(self.waiting.remove(at))
     }
 
-    /// Of one sender; what gave way, by `first`.
+    /// Of one sender; returns what was displaced, by `first`.
     fn push_newest(&mut self, new: Waiting) -> Vec<u64> {
         let blocks = |waiting: &Waiting| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
         let state = |waiting: &Waiting| (waiting.level, waiting.head.id);

@@ -1,5 +1,5 @@
-//! What stands before the incoming half of a router that seals: it opens what comes before anything else is done with it, and asks
-//! those who are not known.
+//! Opens datagrams before the receiving half of a router handles them, and challenges peers that are
+//! not known.
 
 use super::handshake::Handshake;
 use super::opening::{Greeting, Opened, Opening};
@@ -13,22 +13,22 @@ use crate::report::{Deliver, Event, Mismatch};
 use crate::stats::Stats;
 use std::sync::Arc;
 
-/// Who is not known, or silent, is asked so often.
+/// Interval of challenges to a peer that is not known, or silent.
 pub const ASK_EVERY_NS: u64 = 100_000_000;
-/// Who was asked in vain for so long is asked seldom: once it is there, it asks us.
+/// After this time without an answer a peer is challenged seldom: when it starts, it challenges this node.
 const EAGER_FOR_NS: u64 = 10_000_000_000;
 /// See [`EAGER_FOR_NS`].
 const ASK_SELDOM_NS: u64 = 1_000_000_000;
 /// A peer that says something of another incarnation than the one that is known is asked so often at most.
 const DOUBT_EVERY_NS: u64 = 20_000_000;
 
-/// Who is to be asked is looked for so often at most, however many datagrams come.
+/// Interval at which the gate looks for peers to challenge, however many datagrams come.
 const LOOK_EVERY_NS: u64 = 10_000_000;
 
 /// A hello in the buffer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Said {
-    /// For whom.
+    /// The receiver.
     pub to: NodeIndex,
     /// How long it is.
     pub bytes: usize,
@@ -42,7 +42,7 @@ pub struct Said {
 pub struct Gate {
     all: Arc<PeerSessions>,
     opening: Opening,
-    /// None at a port where nobody is greeted: who lives is found out at that of packages.
+    /// None at a port without handshakes: the port of packages finds out which incarnations live.
     handshake: Option<Handshake>,
     tally: Tally,
     peers: Box<[Asked]>,
@@ -76,14 +76,14 @@ impl Gate {
             opening: Opening::new(all, port),
             handshake,
             tally: Tally::new(all.rejections(port)),
-            peers: vec![Asked::default(); all.who.nodes.into()].into(),
+            peers: vec![Asked::default(); all.router.nodes.into()].into(),
             all: all.clone(),
             look_ns: 0,
         }
     }
 
-    /// Takes a datagram, whatever it is. `reply` has room for a hello ([`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES)), if one is to
-    /// be sent back. Then [`Self::begin`].
+    /// Takes a datagram, whatever it is. `reply` has room for a hello
+    /// ([`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES)), if one is to be sent back. Then [`Self::begin`].
     pub fn take(
         &mut self,
         now_ns: u64,
@@ -125,8 +125,8 @@ impl Gate {
         None
     }
 
-    /// Whoever goes by another configuration is told so by what is sealed: else both would take what they hear of the other for something that
-    /// somebody repeats.
+    /// Tells a peer with another configuration so, in a sealed reply. Without it each end would take the other's
+    /// datagrams for replays.
     fn greet_other(
         &mut self,
         now_ns: u64,
@@ -147,8 +147,8 @@ impl Gate {
         self.opening.first(peer)
     }
 
-    /// Has a hello wait for a slot: `put` says whether there was room. Nothing is sealed to an incarnation that begins by it before it has left; but if it
-    /// is lost, nothing waits for it.
+    /// Has a hello wait for a slot: `put` says whether there was room. Nothing is sealed to an incarnation that begins
+    /// by it before it has left; but if it is lost, nothing waits for it.
     pub fn waits(&self, said: Said, put: impl FnOnce() -> bool) {
         let waits = said.begins && self.all.reply_waits(said.to);
         if !put() && waits {
@@ -156,7 +156,8 @@ impl Gate {
         }
     }
 
-    /// Lets the incarnation begin that what was taken last has shown to live; whether one does. To be done when the reply has left.
+    /// Lets the incarnation begin that what was taken last has shown to live; whether one does. To be done when the
+    /// reply has left.
     pub fn begin(&mut self, now_ns: u64) -> bool {
         let began = self.handshake.as_mut().and_then(Handshake::begin);
         if let Some(peer) = began {
@@ -170,7 +171,7 @@ impl Gate {
         if now_ns < self.look_ns || self.handshake.is_none() {
             return None;
         }
-        let mut peers = 0..self.all.who.nodes;
+        let mut peers = 0..self.all.router.nodes;
         let Some(to) = peers.find(|peer| self.is_to_be_asked(*peer, now_ns, stats)) else {
             self.look_ns = now_ns + LOOK_EVERY_NS;
             return None;

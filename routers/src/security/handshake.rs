@@ -1,4 +1,4 @@
-//! Who lives is found out by challenge and answer; no state is kept for who has not answered.
+//! Finds out by challenge and response which incarnations live. A peer that has not answered takes no state.
 
 use super::hello::Hello;
 use super::opening::Greeting;
@@ -9,14 +9,14 @@ use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use std::sync::Arc;
 
-/// Questions of one peer that are answered in [`PER_NS`], at most: recorded ones that are sent again must not cost more than they are worth.
-/// Of more than half as many, a random share is.
+/// Questions of one peer that are answered in [`PER_NS`], at most: recorded ones that are sent again must not cost more
+/// than they are worth. Of more than half as many, a random share is.
 pub const ANSWERS_MAX: u32 = 10;
 /// See [`ANSWERS_MAX`].
 pub const PER_NS: u64 = 100_000_000;
 /// A challenge is drawn anew so often, ns.
 const DRAW_EVERY_NS: u64 = 1_000_000_000;
-/// So long after it was drawn it can be answered: an answer that is kept back says nothing of who lives when it comes.
+/// How long a challenge can be answered after it was drawn: a response that was held back proves nothing when it comes.
 pub const CHALLENGE_MAX_NS: u64 = 2 * DRAW_EVERY_NS;
 
 /// Takes hellos, in the thread that receives packages.
@@ -60,20 +60,21 @@ pub struct Greeted {
 impl Handshake {
     /// There is one. `seed` comes from a source of random numbers that is fit for keys; each incarnation has another.
     pub fn new(all: &Arc<PeerSessions>, seed: [u8; 32]) -> Self {
-        let peers = vec![Peer::default(); all.who.nodes.into()].into();
+        let peers = vec![Peer::default(); all.router.nodes.into()].into();
         let mut handshake = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), peers, begins: None };
-        (0..all.who.nodes).for_each(|peer| handshake.draw(0, peer));
+        (0..all.router.nodes).for_each(|peer| handshake.draw(0, peer));
         handshake
     }
 
     /// Takes a hello that was opened, if all else in its head is as it must be. `datagram` has room for a hello of
-    /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If an incarnation begins by it, [`Self::begin`] when the reply has left.
+    /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If an incarnation begins by it, [`Self::begin`] when the
+    /// reply has left.
     pub fn greet(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
         self.take(now_ns, head, greeting, true, datagram)
     }
 
-    /// The same of one whose digest is another: no incarnation begins by it. A question is answered, so that its sender knows that this node lives, and by
-    /// which configuration.
+    /// The same for a peer with another digest: no incarnation begins. A challenge is answered, so that its sender
+    /// knows that this node lives, and by which configuration.
     pub fn greet_other(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
         self.take(now_ns, head, greeting, false, datagram)
     }
@@ -100,19 +101,19 @@ impl Handshake {
             self.begins = Some((peer, PeerIncarnation { incarnation: head.incarnation, key, next: hello.next }));
         }
         let is_question = hello.answer == 0;
-        // Nobody but who lives can answer, and once: that need not be counted.
+        // Only a living peer can answer a challenge, and only once: such replies need no limit.
         let may = hello.challenge != 0 && (proves || is_question && self.may_answer(now_ns, peer));
-        // Who has shown that it lives is told that we do, and that is the last word; who has not must show it first.
+        // A peer that has proved that it lives gets the final response; any other must prove it first.
         let challenge = if is_question { self.all.challenge(peer) } else { 0 };
         let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
         Greeted { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
 
-    /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the network before: it says from
-    /// which sequence on we are to be heard, and what left before it would not be taken.
+    /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the
+    /// network before: it says from which sequence on we are to be heard, and what left before it would not be taken.
     pub fn begin(&mut self) -> Option<NodeIndex> {
-        let (peer, life) = self.begins.take()?;
-        self.all.begin(peer, life);
+        let (peer, session) = self.begins.take()?;
+        self.all.begin(peer, session);
         Some(peer)
     }
 
@@ -137,7 +138,7 @@ impl Handshake {
         answer == self.all.challenge(peer) || is_before
     }
 
-    /// Of a flood each question has the same chance, not the first ones alone: among them may be one of who lives.
+    /// In a flood each challenge has the same chance, not only the first: one of them may come from a living peer.
     fn may_answer(&mut self, now_ns: u64, peer: NodeIndex) -> bool {
         let questions = &mut self.peers[usize::from(peer)].questions;
         let passed_ns = now_ns.saturating_sub(questions.since_ns);

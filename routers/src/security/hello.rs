@@ -12,7 +12,7 @@ pub use rohrpost_network::HELLO_BYTES;
 /// "This incarnation of mine asks whether you live", the answer to that, or the last word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hello {
-    /// Whoever answers it shows that it lives now; 0: no answer is wanted.
+    /// A response to it proves that its sender lives now; 0: no response is wanted.
     pub challenge: u64,
     /// The challenge that this answers; 0: it is a question.
     pub answer: u64,

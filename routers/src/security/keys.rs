@@ -1,4 +1,5 @@
-//! The keys of an installation, and those that are derived from them: one for each direction, port and pair of incarnations.
+//! The keys of an installation, and those that are derived from them: one for each direction, port and pair of
+//! incarnations.
 
 use super::seal::Seal;
 use crate::frame::NodeIndex;
@@ -63,7 +64,7 @@ impl KeyRing {
     /// `older` is still valid while keys are changed.
     ///
     /// # Panics
-    /// If both have one id: whoever reads them from a file sees to it.
+    /// If both have one id: the reader of the key file rules that out.
     pub fn new(newest: InstallationKey, older: Option<InstallationKey>) -> Self {
         assert!(older.as_ref().is_none_or(|older| older.id != newest.id), "two keys with the id {}", newest.id.0);
         Self { keys: [Some(newest), older].into_iter().flatten().collect() }

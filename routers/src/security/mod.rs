@@ -1,26 +1,29 @@
-//! Seals what routers send to each other, and opens what they get. The page `docs/src/security.md` says what is promised, and what is not.
+//! Seals what routers send to each other, and opens what they get. The page `docs/src/security.md` says what is
+//! promised, and what is not.
 //!
 //! ```text
 //!  head 36, of which all but the check is signed │ what follows it, sealed │ tag 16
 //!
 //!  A                                   B
-//!  ── question: challenge a ─────────▶      any incarnation of A may have said it, today or last year: nothing begins by it
-//!  ◀── answer to a: challenge b ──────      a is A's own, and new: this incarnation of B lives. A takes its datagrams, and seals to it
-//!  ── last word: answer to b ────────▶      so does B
+//!  ── challenge a ───────────────────▶      may be a replay from any incarnation of A: nothing begins by it
+//!  ◀── response to a, challenge b ────      a is A's own, and new: this incarnation of B lives. A opens its datagrams,
+//!                                           and seals to it
+//!  ── response to b ─────────────────▶      B does the same
 //!  ══ packages, time: sealed by A's present incarnation to B's present incarnation ══▶
 //! ```
 //!
-//! A *hello* (one of these three) is sealed from node to node, packages from incarnation to incarnation, time from incarnation to node: so nothing that was recorded in
-//! another incarnation of either end is taken in this one. A challenge serves once, and not for long, then there is another; and a hello says from which
-//! sequence on its incarnation will be heard, so nothing that an incarnation had sent before is taken either.
+//! A *hello* (one of these three) is sealed from node to node, packages from incarnation to incarnation, time from
+//! incarnation to node: so nothing that was recorded in another incarnation of either end is taken in this one. A
+//! challenge serves once, and not for long, then there is another; and a hello says from which sequence on its
+//! incarnation will be heard, so nothing that an incarnation had sent before is taken either.
 //!
 //! ```text
-//!  arrivals:   Gate: Opening (packages), Handshake ──── PeerSessions: who lives ────▶ tx_thread: Sealing (packages)
+//!  arrivals:   Gate: Opening (packages), Handshake ───── PeerSessions ──────▶ tx_thread: Sealing (packages)
 //!                                                                        └────▶ clock:     Sealing, Opening (time)
 //! ```
 //!
-//! No sockets, threads or clocks here. Sealing and opening take nothing from the heap and no lock; keys are derived when an incarnation begins, which
-//! nobody brings about who has no key.
+//! No sockets, threads or clocks here. Sealing and opening use no heap and no lock. Keys are derived when an
+//! incarnation begins, and only holders of a key can cause that.
 
 mod gate;
 mod handshake;
@@ -41,7 +44,7 @@ pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Handshake, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 pub use opening::{Greeting, Opened, Opening};
-pub use peer_sessions::{PeerSessions, Port, Who};
+pub use peer_sessions::{PeerSessions, Port, RouterIdentity};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;

@@ -12,7 +12,7 @@ use crate::frame::{FrameHead, Kind, NodeIndex};
 use crate::inbound::window::{Arrival, Window};
 use std::sync::Arc;
 
-/// A datagram whose seal was right.
+/// A datagram with a valid seal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Opened<'a> {
     /// Of the peer's present incarnation to our present one, and not opened before: its head and what was sealed.
@@ -41,10 +41,12 @@ pub struct Opening {
     past: Box<[[Past; PAST]]>,
 }
 
-/// Lives of a peer that took turns: of so many it is remembered what was opened of them at the port of what is not real time.
+/// Lives of a peer that took turns: of so many it is remembered what was opened of them at the port of what is not real
+/// time.
 const PAST: usize = 4;
 
-/// An incarnation that was heard at that port, and from which sequence on it is heard when it is taken for the present one again.
+/// An incarnation that was heard at that port, and from which sequence on it is heard when it is taken for the present
+/// one again.
 #[derive(Clone, Copy, Default)]
 struct Past {
     incarnation: u64,
@@ -56,7 +58,8 @@ struct Heard {
     incarnation: u64,
     /// By the place of the key: which of two the peer seals with is its choice.
     seals: Vec<Seal>,
-    /// From this sequence on it is heard. At the port of what is not real time no hello says it: then it is that of what is opened first.
+    /// From this sequence on it is heard. At the port of what is not real time no hello says it: then it is that of
+    /// what is opened first.
     first: Option<u64>,
     window: Window,
 }
@@ -64,9 +67,9 @@ struct Heard {
 impl Opening {
     /// For a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
-        let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
-        let overheard = (0..all.who.nodes).map(|_| UnverifiedIncarnations::default()).collect();
-        let past = vec![<[Past; PAST]>::default(); all.who.nodes.into()].into();
+        let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
+        let overheard = (0..all.router.nodes).map(|_| UnverifiedIncarnations::default()).collect();
+        let past = vec![<[Past; PAST]>::default(); all.router.nodes.into()].into();
         Self { peers, overheard, past, all: all.clone(), port }
     }
 
@@ -78,7 +81,8 @@ impl Opening {
         self.open_from(datagram, |_| true)
     }
 
-    /// The same, if it comes from where the node is that it says it is from: what others bring costs no opening, and does not use up what comes from there.
+    /// The same, if it comes from where the node is that it says it is from: what others bring costs no opening, and
+    /// does not use up what comes from there.
     ///
     /// # Errors
     /// [`NotOpened`]; nothing has changed, and no key was derived.
@@ -122,7 +126,8 @@ impl Opening {
         Ok(Opened::Frame(head, text))
     }
 
-    /// Whether a datagram of time says that it is of another incarnation of its node than the known one, or none is known: then it can be overheard.
+    /// Whether a datagram of time says that it is of another incarnation of its node than the known one, or none is
+    /// known: then it can be overheard.
     pub fn is_strange(&mut self, datagram: &[u8]) -> bool {
         let Ok((head, _)) = FrameHead::read(datagram) else { return false };
         let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != Kind::Hello;
@@ -134,8 +139,8 @@ impl Opening {
         is_theirs && !heard(self)
     }
 
-    /// Opens a datagram that [`Self::is_strange`]: some incarnation of its node has said it to this node at some time. For each incarnation that is named a key is
-    /// derived, which costs about as much as to open a datagram.
+    /// Opens a datagram that [`Self::is_strange`]: some incarnation of its node has said it to this node at some time.
+    /// For each incarnation that is named a key is derived, which costs about as much as to open a datagram.
     ///
     /// # Errors
     /// [`NotOpened`]
@@ -175,10 +180,11 @@ impl Opening {
     /// Whether it says that it comes from another node of ours, to this one.
     fn is_ours(&self, head: &FrameHead) -> bool {
         let all = &self.all;
-        all.is_peer(head.from) && head.to == all.who.own && head.system == all.who.system
+        all.is_peer(head.from) && head.to == all.router.own && head.system == all.router.system
     }
 
-    /// From which sequence on the incarnation of a peer is heard that was opened last; what is missing from there on is lost.
+    /// From which sequence on the incarnation of a peer is heard that was opened last; what is missing from there on is
+    /// lost.
     pub(super) fn first(&self, peer: NodeIndex) -> u64 {
         self.peers[usize::from(peer)].made.as_ref().and_then(|heard| heard.first).unwrap_or(0)
     }
@@ -204,18 +210,18 @@ impl Opening {
         port: Port,
         from: NodeIndex,
     ) -> Option<&'a mut Heard> {
-        peers[usize::from(from)].of(all, from, |life| {
-            let peer = End { node: from, incarnation: life.incarnation };
+        peers[usize::from(from)].of(all, from, |session| {
+            let peer = End { node: from, incarnation: session.incarnation };
             let from = match port {
                 // What is sealed there is sealed to this incarnation of ours: all of it may be opened, and once.
-                Port::Rest => remembered(past, life.incarnation),
+                Port::Rest => remembered(past, session.incarnation),
                 // What was overheard is not proven a second time.
                 Port::Packages | Port::Time => {
-                    life.next[port as usize].max(overheard[usize::from(from)].next(life.incarnation))
+                    session.next[port as usize].max(overheard[usize::from(from)].next(session.incarnation))
                 }
             };
             Heard {
-                incarnation: life.incarnation,
+                incarnation: session.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
                 first: (port != Port::Rest).then_some(from),
                 window: Window::going_on(from),
@@ -224,8 +230,9 @@ impl Opening {
     }
 }
 
-/// From which sequence on an incarnation is heard that becomes the present one, and has it stand first among those that are remembered. Of an incarnation
-/// that is forgotten again and again nothing is opened twice as long as no more than [`PAST`] routers of one node live at once.
+/// From which sequence on an incarnation is heard that becomes the present one, and has it stand first among those that
+/// are remembered. Of an incarnation that is forgotten again and again nothing is opened twice as long as no more than
+/// [`PAST`] routers of one node live at once.
 fn remembered(past: &mut [Past; PAST], incarnation: u64) -> u64 {
     let at = past.iter().position(|past| past.incarnation == incarnation);
     past[..=at.unwrap_or(PAST - 1)].rotate_right(1);

@@ -1,4 +1,4 @@
-//! Which incarnation of each peer this router knows to live: one thread finds out, those that send and the clock go by it.
+//! Tracks each peer's authenticated incarnation. One thread writes; senders and the clock read.
 
 use super::hello::Hello;
 use super::keys::{Binding, End, KeyRing, Purpose};
@@ -39,7 +39,7 @@ impl Port {
 
 /// A router, as far as keys depend on it.
 #[derive(Clone, Copy, Debug)]
-pub struct Who {
+pub struct RouterIdentity {
     /// Its system.
     pub system: u8,
     /// Its node.
@@ -48,11 +48,12 @@ pub struct Who {
     pub nodes: NodeIndex,
     /// Of its configuration.
     pub digest: u64,
-    /// Its incarnation, from a source of random numbers that is fit for keys: if two incarnations had one, they would use a nonce twice. Not 0.
+    /// Its incarnation, from a source of random numbers that is fit for keys: if two incarnations had one, they would
+    /// use a nonce twice. Not 0.
     pub incarnation: u64,
 }
 
-impl Who {
+impl RouterIdentity {
     /// The router of these settings.
     pub fn of(settings: &Settings) -> Self {
         let Settings { system, own, digest, incarnation, .. } = *settings;
@@ -70,14 +71,14 @@ pub(super) struct PeerIncarnation {
     pub(super) next: [u64; 2],
 }
 
-/// What the threads of one router know of its peers' lives.
+/// What the threads of one router know of its peers' incarnations.
 pub struct PeerSessions {
-    pub(super) who: Who,
+    pub(super) router: RouterIdentity,
     pub(super) keys: KeyRing,
     peers: Box<[Peer]>,
     /// Peers of which an incarnation is known, one bit each.
     known: AtomicU64,
-    /// Peers of whose incarnation datagrams said something else, one bit each.
+    /// One bit for each peer with datagrams of another incarnation than the known one.
     doubts: AtomicU64,
     /// Peers for which a reply waits for a slot, one bit each: nothing is sealed to them before it has left.
     unsaid: AtomicU64,
@@ -87,7 +88,7 @@ pub struct PeerSessions {
 
 impl fmt::Debug for PeerSessions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("PeerSessions").field("who", &self.who).finish_non_exhaustive()
+        f.debug_struct("PeerSessions").field("router", &self.router).finish_non_exhaustive()
     }
 }
 
@@ -96,7 +97,7 @@ struct Peer {
     /// By the place of the key.
     hello_to: Vec<Seal>,
     hello_from: Vec<Seal>,
-    life: Published,
+    session: Published,
     /// What it must answer for an incarnation of it to begin.
     challenge: AtomicU64,
     /// Questions to it.
@@ -112,25 +113,25 @@ impl PeerSessions {
     ///
     /// # Panics
     /// If the incarnation is 0.
-    pub fn new(who: Who, keys: KeyRing) -> Arc<Self> {
-        assert_ne!(who.incarnation, 0, "an incarnation has an incarnation");
+    pub fn new(router: RouterIdentity, keys: KeyRing) -> Arc<Self> {
+        assert_ne!(router.incarnation, 0, "an incarnation is not 0");
         let seals = |from, to| {
             let (from, to) = (End::any(from), End::any(to));
-            keys.derive_all(&Binding { purpose: Purpose::Hello, system: who.system, from, to })
+            keys.derive_all(&Binding { purpose: Purpose::Hello, system: router.system, from, to })
         };
         let peer = |node| Peer {
-            hello_to: seals(who.own, node),
-            hello_from: seals(node, who.own),
-            life: Published::default(),
+            hello_to: seals(router.own, node),
+            hello_from: seals(node, router.own),
+            session: Published::default(),
             challenge: AtomicU64::new(0),
             asked: AtomicU32::new(0),
             hellos: AtomicU64::new(0),
             sealed: Default::default(),
         };
-        let peers = (0..who.nodes).map(peer).collect();
-        let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(who.nodes)));
+        let peers = (0..router.nodes).map(peer).collect();
+        let rejections = Port::ALL.map(|_| Arc::new(Rejections::new(router.nodes)));
         let none = || AtomicU64::new(0);
-        Arc::new(Self { peers, who, keys, known: none(), doubts: none(), unsaid: none(), rejections })
+        Arc::new(Self { peers, router, keys, known: none(), doubts: none(), unsaid: none(), rejections })
     }
 
     /// What was not taken at a port.
@@ -140,18 +141,18 @@ impl PeerSessions {
 
     /// The peers that something can be sealed to, one bit each.
     pub fn known(&self) -> u64 {
-        // ORDERING (F): who finds a peer here finds its incarnation, and so can seal to it. Pairs with (E).
+        // ORDERING (F): a reader that finds a peer here finds its incarnation, and so can seal to it. Pairs with (E).
         self.known.load(Ordering::Acquire)
     }
 
     /// The peers of [`Self::known`] that can open what is sealed to them.
     pub fn reached(&self) -> u64 {
-        // ORDERING (H): who finds that a reply has left finds so after it has. Pairs with (G).
+        // ORDERING (H): a reader that finds that a reply has left finds so after it has. Pairs with (G).
         self.known() & !self.unsaid.load(Ordering::Acquire)
     }
 
-    /// A reply to a peer is to leave in a slot: until then it may not be able to open what is sealed to it. Whether none
-    /// waited before.
+    /// A reply to a peer is to leave in a slot: until then it may not be able to open what is sealed to it. Whether
+    /// none waited before.
     pub fn reply_waits(&self, peer: NodeIndex) -> bool {
         self.unsaid.fetch_or(1 << peer, Ordering::Relaxed) & 1 << peer == 0
     }
@@ -164,32 +165,33 @@ impl PeerSessions {
 
     /// The incarnation of a peer that is known to live, if there is one.
     pub fn incarnation(&self, peer: NodeIndex) -> Option<u64> {
-        self.life(peer)?.1.map(|life| life.incarnation)
+        self.session(peer)?.1.map(|session| session.incarnation)
     }
 
     /// Whether a node of that number is a peer.
     pub(super) fn is_peer(&self, node: NodeIndex) -> bool {
-        node < self.who.nodes && node != self.who.own
+        node < self.router.nodes && node != self.router.own
     }
 
     /// Grows with each incarnation that begins.
     pub(super) fn version(&self, peer: NodeIndex) -> u32 {
-        self.peer(peer).life.version.version()
+        self.peer(peer).session.version.version()
     }
 
     /// None while it is being written: then it is to be looked at again.
-    pub(super) fn life(&self, peer: NodeIndex) -> Option<(u32, Option<PeerIncarnation>)> {
-        self.peer(peer).life.read()
+    pub(super) fn session(&self, peer: NodeIndex) -> Option<(u32, Option<PeerIncarnation>)> {
+        self.peer(peer).session.read()
     }
 
-    pub(super) fn begin(&self, peer: NodeIndex, life: PeerIncarnation) {
-        self.peer(peer).life.write(life);
+    pub(super) fn begin(&self, peer: NodeIndex, session: PeerIncarnation) {
+        self.peer(peer).session.write(session);
         // ORDERING (E): the incarnation was written before. Pairs with (F).
         self.known.fetch_or(1 << peer, Ordering::Release);
         self.doubts.fetch_and(!(1 << peer), Ordering::Relaxed);
     }
 
-    /// Something came of another incarnation of a peer, or to another of ours: perhaps it has another by now. It is to be asked soon.
+    /// Something came of another incarnation of a peer, or to another of ours: perhaps it has another by now. It is to
+    /// be asked soon.
     pub(super) fn doubt(&self, peer: NodeIndex) {
         if !self.doubts(peer) {
             self.doubts.fetch_or(1 << peer, Ordering::Relaxed);
@@ -212,7 +214,8 @@ impl PeerSessions {
         self.peer(peer).challenge.store(challenge, Ordering::Relaxed);
     }
 
-    /// Uses up a sequence. Each is used once: a second datagram with the nonce of a first would give away what is in both.
+    /// Uses up a sequence. Each is used once: a second datagram with the nonce of a first would give away what is in
+    /// both.
     ///
     /// # Panics
     /// If it was used before.
@@ -222,23 +225,24 @@ impl PeerSessions {
         next.store(sequence + 1, Ordering::Relaxed);
     }
 
-    /// Key of what one end's incarnation seals to the other's. Time it seals to the node: who begins in time slots must hear it before anybody knows that it
-    /// lives, and takes nothing for proven that was said before the hello by which the other's incarnation began.
+    /// Key between two incarnations. Time is sealed to the node instead: a node that joins time slots must hear it
+    /// before anybody knows that it lives, and takes nothing for proven that was said before the hello by which the
+    /// other's incarnation began.
     pub(super) fn binding(&self, port: Port, from: End, to: End) -> Binding {
         let to = if port == Port::Time { End::any(to.node) } else { to };
-        Binding { purpose: port.purpose(), system: self.who.system, from, to }
+        Binding { purpose: port.purpose(), system: self.router.system, from, to }
     }
 
     pub(super) fn own(&self) -> End {
-        End { node: self.who.own, incarnation: self.who.incarnation }
+        End { node: self.router.own, incarnation: self.router.incarnation }
     }
 
     pub(super) fn hello_from(&self, peer: NodeIndex, key: usize) -> &Seal {
         &self.peer(peer).hello_from[key]
     }
 
-    /// A question to a peer, with one of its keys after the other: which of them the peer has is not known. None
-    /// as long as there is nobody who would take an answer.
+    /// A challenge to a peer, with one of its keys after the other: which of them the peer has is not known. None
+    /// as long as no incarnation of it could take an answer.
     pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
         let question = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
         if question.challenge == 0 {
@@ -256,14 +260,14 @@ impl PeerSessions {
     /// Writes a hello; how long its datagram is.
     ///
     /// # Panics
-    /// If this incarnation has said to a peer as many as it may. Only another incarnation, which has other nonces, can go on. Whoever says a peer's recorded
-    /// questions again without end, and forges what makes us ask and say last words, 200 a second in all, brings that about in 248 days; a peer
-    /// that is away, in 136 years.
+    /// Whether this incarnation has sent a peer all the hellos that it may. Only another incarnation, with other
+    /// nonces, can go on. An attacker that replays a peer's challenges without end, and forges datagrams that make this
+    /// node challenge and answer, 200 a second in all, gets there in 248 days; a peer that is away, in 136 years.
     pub(super) fn hello(&self, peer: NodeIndex, key: usize, hello: Hello, datagram: &mut [u8]) -> usize {
         let number = u32::try_from(self.peer(peer).hellos.fetch_add(1, Ordering::Relaxed));
         let number = number.expect("an incarnation says 2^32 hellos to a peer at most; the router begins another");
         let datagram = &mut datagram[..HELLO_DATAGRAM_BYTES];
-        let Who { system, own, digest, incarnation, .. } = self.who;
+        let RouterIdentity { system, own, digest, incarnation, .. } = self.router;
         let sequence = number.into();
         let head = FrameHead { kind: Kind::Hello, system, from: own, to: peer, digest, incarnation, sequence };
         head.write(self.keys.id(key), datagram);
@@ -287,7 +291,8 @@ const _: () = {
     assert!(rohrpost_network::NODES_MAX <= 64, "peers are the bits of a word");
 };
 
-/// An incarnation that one thread writes and others read, whole. Who reads while it is written gets nothing, and goes on with what it had.
+/// An incarnation that one thread writes and others read, whole. A read during a write gets nothing, and the reader
+/// keeps what it had.
 #[derive(Default)]
 struct Published {
     version: SeqCount,
@@ -297,11 +302,11 @@ struct Published {
 }
 
 impl Published {
-    fn write(&self, life: PeerIncarnation) {
+    fn write(&self, session: PeerIncarnation) {
         self.version.write(|| {
-            self.incarnation.store(life.incarnation, Ordering::Relaxed);
-            self.key.store(life.key as u64, Ordering::Relaxed);
-            self.next.iter().zip(life.next).for_each(|(place, next)| place.store(next, Ordering::Relaxed));
+            self.incarnation.store(session.incarnation, Ordering::Relaxed);
+            self.key.store(session.key as u64, Ordering::Relaxed);
+            self.next.iter().zip(session.next).for_each(|(place, next)| place.store(next, Ordering::Relaxed));
         });
     }
 
@@ -336,10 +341,10 @@ impl<K> Known<K> {
         make: impl FnOnce(&PeerIncarnation) -> K,
     ) -> Option<&mut K> {
         if all.version(peer) != self.version
-            && let Some((version, life)) = all.life(peer)
+            && let Some((version, session)) = all.session(peer)
         {
             self.version = version;
-            self.made = life.as_ref().map(make);
+            self.made = session.as_ref().map(make);
         }
         self.made.as_mut()
     }

@@ -11,7 +11,8 @@ pub enum Rejection {
     Unsealed,
     /// Sealed with a key that is not ours.
     #[error(
-        "it is sealed with a key of an id that we have not; all nodes need the same key file: copy it from the first computer"
+        "it is sealed with a key of an id that we have not; all nodes need the same key file: \
+         copy it from the first computer"
     )]
     OtherKey,
     /// Not from another node of ours to this one.
@@ -25,7 +26,8 @@ pub enum Rejection {
     Replay,
     /// Its seal is not right: made with another key, or altered.
     #[error(
-        "its seal is not right: another key with this id, or someone altered it; all nodes need the same key file: copy it from the first computer"
+        "its seal is not right: another key with this id, or someone altered it; \
+         all nodes need the same key file: copy it from the first computer"
     )]
     Forged,
     /// It comes from another address than the node has that it says it is from.
@@ -49,7 +51,8 @@ impl Rejection {
         Self::Version,
     ];
 
-    /// What it tells of a peer from which nothing else comes, if it is of that: anybody can write a peer's address on a datagram.
+    /// What it tells of a peer from which nothing else comes, if it is of that: anybody can write a peer's address on a
+    /// datagram.
     pub const fn reason(self) -> Option<Reason> {
         match self {
             Self::Unsealed => Some(Reason::Sealed),

@@ -12,7 +12,8 @@ impl Seal {
         Self(key)
     }
 
-    /// Seals what lies between the head and the room for the tag, and writes the check over all of it. No two datagrams have one nonce.
+    /// Seals what lies between the head and the room for the tag, and writes the check over all of it. No two datagrams
+    /// have one nonce.
     pub(super) fn close(&self, nonce: [u8; NONCE_LEN], datagram: &mut [u8]) {
         let (head, sealed) = datagram.split_at_mut(HEAD_BYTES);
         let (text, tag) = sealed.split_at_mut(sealed.len() - TAG_BYTES);
@@ -22,7 +23,8 @@ impl Seal {
         frame::write_check(datagram);
     }
 
-    /// What was sealed; none if it was not sealed with this key, or not as it is now. Then what was in the datagram is spoilt.
+    /// What was sealed; none if it was not sealed with this key, or not as it is now. Then what was in the datagram is
+    /// spoilt.
     pub(super) fn open<'a>(&self, nonce: [u8; NONCE_LEN], datagram: &'a mut [u8]) -> Option<&'a [u8]> {
         let (head, sealed) = datagram.split_at_mut(HEAD_BYTES);
         let nonce = Nonce::assume_unique_for_key(nonce);

@@ -16,7 +16,8 @@ pub struct Sealing {
     all: Arc<PeerSessions>,
     port: Port,
     peers: Box<[Known<PeerSeal>]>,
-    /// By node and place of the key: what any incarnation of it opens. Empty where nothing is sealed to who is not known.
+    /// By node and place of the key: seals that any incarnation of the node opens. Empty where only known peers are
+    /// sealed to.
     strangers: Box<[Vec<Seal>]>,
 }
 
@@ -27,23 +28,26 @@ struct PeerSeal {
     seal: Seal,
 }
 
-/// Of so many datagrams to a peer one is sealed with the other key while there are two: its next incarnation may have only that.
+/// While there are two keys, one in so many datagrams is sealed with the other one: the peer's next incarnation may
+/// have only that.
 const OTHER_KEY_EVERY: u64 = 4;
 
 impl Sealing {
     /// For a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
-        let peers = (0..all.who.nodes).map(|_| Known::default()).collect();
+        let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
         Self { peers, strangers: Box::default(), all: all.clone(), port }
     }
 
-    /// Of time in time slots: seals to whoever has a key, known or not. Whoever begins there must hear it before it may ask who lives.
+    /// For time in time slots: seals to each node that has a key, known or not. A node that joins must hear time before
+    /// it may send a challenge.
     pub fn of_slots(all: &Arc<PeerSessions>) -> Self {
         let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), End::any(node)));
-        Self { strangers: (0..all.who.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
+        Self { strangers: (0..all.router.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
     }
 
-    /// Seals a datagram where it lies: 36 bytes for the head, what follows it, and [`TAG_BYTES`](super::TAG_BYTES) of room.
+    /// Seals a datagram where it lies: 36 bytes for the head, what follows it, and [`TAG_BYTES`](super::TAG_BYTES) of
+    /// room.
     ///
     /// # Errors
     /// [`Unacquainted`]: ask first.
@@ -55,7 +59,7 @@ impl Sealing {
         self.close(datagram)
     }
 
-    /// The same of a datagram whose head was written, with a check or without.
+    /// The same for a datagram with a written head, with a check or without.
     ///
     /// # Errors
     /// [`Unacquainted`]: ask first.
@@ -80,7 +84,8 @@ impl Sealing {
         Ok(())
     }
 
-    /// Which key a peer has whose incarnation may be over, or is not known: mostly that of the known incarnation, else each in turn.
+    /// Place of the key for a peer that is not known, or may have restarted: mostly the key of the known incarnation,
+    /// else each in turn.
     fn key_to_stranger(known: Option<usize>, keys: usize, sequence: u64) -> usize {
         match known {
             Some(key) if !sequence.is_multiple_of(OTHER_KEY_EVERY) => key,
@@ -107,10 +112,10 @@ impl Sealing {
         port: Port,
         to: NodeIndex,
     ) -> Option<&'a mut PeerSeal> {
-        peers[usize::from(to)].of(all, to, |life| {
-            let peer = End { node: to, incarnation: life.incarnation };
-            let seal = all.keys.derive(life.key, &all.binding(port, all.own(), peer));
-            PeerSeal { key: life.key, seal }
+        peers[usize::from(to)].of(all, to, |session| {
+            let peer = End { node: to, incarnation: session.incarnation };
+            let seal = all.keys.derive(session.key, &all.binding(port, all.own(), peer));
+            PeerSeal { key: session.key, seal }
         })
     }
 

@@ -3,12 +3,13 @@
 use super::rejection::Rejection;
 use crate::counts::Count;
 use crate::frame::NodeIndex;
+use rohrpost_mailbox::Throttle;
 use std::sync::Arc;
 
 /// Of each node something is told so often at most, ns; of all addresses that no node has together, too.
 pub const TELL_EVERY_NS: u64 = 1_000_000_000;
 
-/// Counts of one port: by the node whose address it came from, which anybody can write on a datagram.
+/// Counts of one port: by the node with the source address, which any sender can forge.
 #[derive(Debug)]
 pub struct Rejections {
     /// By node, then those of addresses that no node has.
@@ -34,33 +35,19 @@ impl Rejections {
 #[derive(Debug)]
 pub struct Tally {
     counts: Arc<Rejections>,
-    told: Box<[TallyReport]>,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct TallyReport {
-    /// Not before this time again, ns.
-    not_before_ns: u64,
-    since: u64,
+    told: Box<[Throttle]>,
 }
 
 impl Tally {
     /// For a port; there is one.
     pub fn new(counts: &Arc<Rejections>) -> Self {
-        Self { told: vec![TallyReport::default(); counts.sources.len()].into(), counts: counts.clone() }
+        Self { told: vec![Throttle::default(); counts.sources.len()].into(), counts: counts.clone() }
     }
 
     /// Counts a datagram; if it is to be told, how many were not taken since that was done last, with this one.
     pub fn note(&mut self, now_ns: u64, peer: Option<NodeIndex>, why: Rejection) -> Option<u64> {
         let place = self.counts.place(peer);
         self.counts.sources[place][why as usize].add(1);
-        let told = &mut self.told[place];
-        told.since += 1;
-        if now_ns < told.not_before_ns {
-            return None;
-        }
-        let since = told.since;
-        *told = TallyReport { not_before_ns: now_ns + TELL_EVERY_NS, since: 0 };
-        Some(since)
+        self.told[place].note(now_ns, TELL_EVERY_NS)
     }
 }

@@ -1,9 +1,9 @@
-//! Lives of a peer that are not known to live, as their datagrams of time are overheard.
+//! Incarnations of a peer that have not proved that they live, but send datagrams of time that this node opens.
 
 use super::seal::{self, Seal};
 use crate::frame::FrameHead;
 
-/// Lives of one peer that are remembered at a time; of more the one that was overheard longest ago is forgotten.
+/// Number of incarnations of a peer that are remembered; a further one replaces the one that was heard longest ago.
 const INCARNATIONS: usize = 2;
 
 struct UnverifiedIncarnation {
@@ -20,26 +20,28 @@ struct UnverifiedIncarnation {
 pub(super) struct UnverifiedIncarnations([Option<UnverifiedIncarnation>; INCARNATIONS]);
 
 impl UnverifiedIncarnations {
-    /// Opens a datagram that is sealed with the key at a place. Without its seal, which is derived, none takes the place of another.
+    /// Opens a datagram that is sealed with the key at a place. Without its seal, which is derived, none takes the
+    /// place of another.
     pub(super) fn open<'a>(
         &mut self,
         (head, key): (&FrameHead, usize),
         datagram: &'a mut [u8],
         derive: impl FnOnce() -> Seal,
     ) -> Option<&'a [u8]> {
-        let at = self.0.iter().position(|life| life.as_ref().is_some_and(|life| life.incarnation == head.incarnation));
+        let at =
+            self.0.iter().position(|entry| entry.as_ref().is_some_and(|entry| entry.incarnation == head.incarnation));
         let known = at.and_then(|at| self.0[at].as_mut());
         let (nonce, after) = (seal::of_sequence(head.sequence), head.sequence.saturating_add(1));
         let text = match known {
-            Some(life) if life.key == key => {
-                let text = life.seal.open(nonce, datagram)?;
-                life.next = life.next.max(after);
+            Some(entry) if entry.key == key => {
+                let text = entry.seal.open(nonce, datagram)?;
+                entry.next = entry.next.max(after);
                 text
             }
             known => {
                 let seal = derive();
                 let text = seal.open(nonce, datagram)?;
-                let next = known.map_or(after, |life| life.next.max(after));
+                let next = known.map_or(after, |entry| entry.next.max(after));
                 self.0[at.unwrap_or(INCARNATIONS - 1)] =
                     Some(UnverifiedIncarnation { incarnation: head.incarnation, key, seal, next });
                 text
@@ -51,7 +53,7 @@ impl UnverifiedIncarnations {
 
     /// From which sequence on nothing of an incarnation was overheard.
     pub(super) fn next(&self, incarnation: u64) -> u64 {
-        let mut lives = self.0.iter().flatten();
-        lives.find(|life| life.incarnation == incarnation).map_or(0, |life| life.next)
+        let mut entries = self.0.iter().flatten();
+        entries.find(|entry| entry.incarnation == incarnation).map_or(0, |entry| entry.next)
     }
 }

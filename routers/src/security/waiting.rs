@@ -1,4 +1,4 @@
-//! Hellos that wait for a time slot: of each peer the newest question and the newest reply, since who waits for a slot is asked anew meanwhile.
+//! Hellos that wait for a time slot: for each peer the newest challenge and the newest reply.
 
 use super::gate::Said;
 use super::peer_sessions::PeerSessions;
@@ -9,11 +9,11 @@ use std::sync::Arc;
 /// A hello as slots count it: what seals it is around every datagram.
 pub const HELLO_SLOT_BYTES: usize = HELLO_DATAGRAM_BYTES - TAG_BYTES;
 
-/// Whoever sends in time slots has one, in the thread that sends.
+/// Used by the sending thread of a node in time slots.
 pub struct Waiting {
     all: Arc<PeerSessions>,
     peers: Box<[Peer]>,
-    /// Whose turn it is.
+    /// The peer with the next turn.
     next: usize,
 }
 
@@ -36,10 +36,11 @@ struct Word {
 impl Waiting {
     /// Nothing waits.
     pub fn new(all: &Arc<PeerSessions>) -> Self {
-        Self { peers: vec![Peer::default(); all.who.nodes.into()].into(), all: all.clone(), next: 0 }
+        Self { peers: vec![Peer::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
     }
 
-    /// A hello that is to leave. It takes the place of the one before; but a reply by which an incarnation begins gives way to another of that sort alone.
+    /// A hello that is to leave. It takes the place of the one before; but a reply by which an incarnation begins gives
+    /// way to another of that sort alone.
     ///
     /// # Panics
     /// If the datagram is shorter than a hello.
@@ -54,8 +55,8 @@ impl Waiting {
         }
     }
 
-    /// The next that is to leave: replies first, and those to one peer before others; then all in turn. What is too old to be answered is dropped.
-    /// When it has left, [`Self::left`].
+    /// The next that is to leave: replies first, and those to one peer before others; then all in turn. What is too old
+    /// to be answered is dropped. When it has left, [`Self::left`].
     pub fn take(&mut self, now_ns: u64, first: Option<NodeIndex>) -> Option<(Said, [u8; HELLO_DATAGRAM_BYTES])> {
         let (next, peers) = (self.next, self.peers.len());
         let first = first.map(usize::from).filter(|first| *first < peers);

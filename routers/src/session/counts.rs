@@ -1,79 +1,44 @@
-//! What one end of sessions counts: every package comes, and passes, is replaced by a newer one, or is lost with a cause.
+//! Counts of one end of sessions: each package comes, and passes, is replaced by a newer one, or is lost with a cause.
 
 use crate::counts::{self, Count};
 use crate::report::NotDelivered;
 use rohrpost_mailbox::Priority;
 
-/// Why a package was lost at one end of a session.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(usize)]
-pub enum Cause {
-    /// Nobody hosts its mailbox.
-    NoRoute,
-    /// Too much waited, and this was the least important and newest.
-    Full,
-    /// Too much waited, of its sender more than of others.
-    Share,
-    /// It was under way for too long.
-    Stale,
-    /// It waited for a client that has gone.
-    Gone,
-    /// It waited for the server, which is not reached.
-    Offline,
-    /// It was handed on too often: it goes round.
-    Hops,
-    /// Its sender's name is not hosted by who sent it.
-    Foreign,
-    /// Nobody has its mailbox open.
-    NoMailbox,
-    /// Its mailbox was full.
-    MailboxFull,
-    /// Its mailbox has smaller slots.
-    TooLarge,
-    /// Who sent it may not command it.
-    NotAllowed,
-    /// It is from or for a mailbox by which routers carry packages, or for a router of another system.
-    RoutersOwn,
+rohrpost_mailbox::causes! {
+    /// Why a package was lost at one end of a session.
+    pub enum Cause {
+        /// Nobody hosts its mailbox.
+        NoRoute = "no-route",
+        /// Too much waited, and this was the least important and newest.
+        Full = "full",
+        /// Too much waited, of its sender more than of others.
+        Share = "share",
+        /// It was under way for too long.
+        Stale = "stale",
+        /// It waited for a client that has gone.
+        Gone = "gone",
+        /// It waited for the server, which is not reached.
+        Offline = "offline",
+        /// It was handed on too often: it goes round.
+        Hops = "hops",
+        /// Its sending client does not host its sender's name.
+        Foreign = "foreign",
+        /// Nobody has its mailbox open.
+        NoMailbox = "no-mailbox",
+        /// Its mailbox was full.
+        MailboxFull = "mailbox-full",
+        /// Its mailbox has smaller slots.
+        TooLarge = "too-large",
+        /// Its sender may not command it.
+        NotAllowed = "not-allowed",
+        /// It is from or for a mailbox by which routers carry packages, or for a router of another system.
+        RoutersOwn = "routers-own",
+    }
 }
 
 impl Cause {
-    /// All, in their order.
-    pub const ALL: [Self; 13] = [
-        Self::NoRoute,
-        Self::Full,
-        Self::Share,
-        Self::Stale,
-        Self::Gone,
-        Self::Offline,
-        Self::Hops,
-        Self::Foreign,
-        Self::NoMailbox,
-        Self::MailboxFull,
-        Self::TooLarge,
-        Self::NotAllowed,
-        Self::RoutersOwn,
-    ];
-
-    /// A word for people and programs.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::NoRoute => "no-route",
-            Self::Full => "full",
-            Self::Share => "share",
-            Self::Stale => "stale",
-            Self::Gone => "gone",
-            Self::Offline => "offline",
-            Self::Hops => "hops",
-            Self::Foreign => "foreign",
-            Self::NoMailbox => "no-mailbox",
-            Self::MailboxFull => "mailbox-full",
-            Self::TooLarge => "too-large",
-            Self::NotAllowed => "not-allowed",
-            Self::RoutersOwn => "routers-own",
-        }
-    }
-
-    /// What the sender of a command is told, in the words of a router on the LAN. None: nothing, since who is told may not be who sent it.
+    /// The refusal that the sender of a command gets, as from a router on the LAN. None: no refusal, since the name may
+    /// not be the true sender's.
     pub const fn told(self) -> Option<counts::Cause> {
         Some(match self {
             Self::NoRoute | Self::Hops => counts::Cause::NoRoute,

@@ -6,8 +6,8 @@
 //!  client      asked                    heard         nobody knows how they share it, so half of it is the bound
 //! ```
 //!
-//! A stream has no time of arrival: what waits in a buffer makes a way longer, never shorter. So the shortest exchange counts
-//! most, until its age makes it worse than a later one.
+//! A stream has no time of arrival: what waits in a buffer makes a way longer, never shorter. So the shortest exchange
+//! counts most, until its age makes it worse than a later one.
 
 use super::frame::TimeAnswer;
 use crate::broken::broken;

@@ -12,7 +12,7 @@ pub(super) struct Ledger<'a, H> {
     host: &'a mut H,
     /// The client for which they are, where that is known.
     holder: Option<&'a str>,
-    /// Who takes part, where losses are counted by that.
+    /// The client, where losses are counted by client.
     principals: Option<&'a mut Principals>,
     answers: Vec<(Head, Vec<u8>)>,
 }
@@ -22,7 +22,7 @@ impl<'a, H> Ledger<'a, H> {
         Self { counts, host, holder, principals: None, answers: Vec::new() }
     }
 
-    /// It counts whose packages are lost for lack of room, too.
+    /// It also counts losses for lack of room by sender.
     pub(super) fn by_principal(self, principals: &'a mut Principals) -> Self {
         Self { principals: Some(principals), ..self }
     }

@@ -1,17 +1,19 @@
-//! Sessions over streams of bytes: what neither the local nor the LAN layer can deliver goes through one central server (seed 002, 3.2).
+//! Sessions over streams of bytes: what neither the local nor the LAN layer can deliver goes through one central server
+//! (seed 002, 3.2).
 //!
 //! ```text
 //!  a node, a laptop, a foreign program                the server                            another client
-//!  packages ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ Table: whose name? ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ mailboxes
-//!               └── Client: reconnects, registers, asks the time          └── of each client, bounded, most important first
+//!  packages ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ Table: which host? ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ mailboxes
+//!               └── Client: reconnects, registers, asks the time          └── of each client, bounded, by priority
 //! ```
 //!
-//! Neither end knows a socket, a thread or a clock: time comes as an argument, and what the stream brings as bytes, split anywhere. Under
-//! TLS it is the decrypted stream.
+//! Neither end knows a socket, a thread or a clock: time comes as an argument, and what the stream brings as bytes,
+//! split anywhere. Under TLS it is the decrypted stream.
 //!
-//! What holds: a package is handed to a stream once, and never again; what a connection takes along when it breaks is lost. Packages of one
-//! sender, receiver and priority stay in their order. No client can make the server wait, and nobody can use
-//! more than its share of places, ranges, memory or line by connecting more often: shares go by principal.
+//! What holds: a package is handed to a stream once, and never again; what a connection takes along when it breaks is
+//! lost. Packages of one sender, receiver and priority stay in their order. No client can make the server wait, and
+//! nobody can use more than its share of places, ranges, memory or line by connecting more often: shares go by
+//! principal.
 
 pub mod client;
 mod counts;
@@ -36,14 +38,15 @@ pub struct ClientIndex(pub u16);
 
 /// Longest time from the publishing of a package to its leaving by a stream.
 pub const WAIT_MAX_NS: u64 = crate::outbound::WAIT_MAX_NS;
-/// Longest time from the publishing of a package to its delivery, as far as clocks can tell: a tenth of a second less than "at most once"
-/// relies on, for the way into the mailbox.
+/// Longest time from the publishing of a package to its delivery, as far as clocks can tell: a tenth of a second less
+/// than "at most once" relies on, for the way into the mailbox.
 pub const AGE_MAX_NS: u64 = 1_900_000_000;
 /// A client asks for the time this often, which also says that it is there.
 pub const ASK_EVERY_NS: u64 = 1_000_000_000;
 /// An end of which nothing came for so long is gone.
 pub const SILENT_AFTER_NS: u64 = 3_500_000_000;
-/// The same where it is known to be slow: in the middle of a frame, or by how little leaves. What is lost on the way takes seconds there.
+/// The same where it is known to be slow: in the middle of a frame, or by how little leaves. What is lost on the way
+/// takes seconds there.
 pub const SLOW_SILENT_AFTER_NS: u64 = 8_000_000_000;
 /// An end that has taken nothing of what is ready for so long is gone.
 pub const STALLED_AFTER_NS: u64 = 10_000_000_000;
@@ -56,12 +59,13 @@ pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
 /// Writes the answers to commands that go no further: what a fault looks like is not the routers' business.
 pub trait Answers {
-    /// Appends the answer to a command whose body begins with these bytes. `holder`: the client that it was for. False: it gets none.
+    /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for. False:
+    /// it gets none.
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
 }
 
-/// The answer to a command that goes no further, in the name of the module that it was for. None for what nobody waits for, and for what
-/// was handed out before: it may have been run.
+/// The answer to a command that goes no further, in the name of the module that it was for. None for what nobody waits
+/// for, and for what was handed out before: it may have been run.
 fn answer_to(
     head: &Head,
     call: &[u8],

@@ -1,8 +1,8 @@
 //! What leaves by one connection: most important first, in bounded memory, so that a connection that stands still costs
-//! nobody else. Who sends by it has an equal part of memory and line, if others want some too.
+//! no other. Each sender has an equal share of memory and rate, if others want some too.
 //!
 //! ```text
-//!  package ─┬─ nothing waits ──────────────────────▶ ready: bytes for the stream, a batch at most, in their final order
+//!  package ─┬─ nothing waits ──────────────────────▶ ready: bytes for the stream, a batch at most, in final order
 //!           └─ Queue: the least important gives way ──▲ most important first, whenever the stream has taken all
 //! ```
 //!
@@ -16,7 +16,8 @@ use crate::queue::{Place, Queue, Share, Waiting, counts_newest};
 use rohrpost_mailbox::Head;
 use rohrpost_network::LEVELS;
 
-/// Bytes that are made ready at a time, at most: what is more important than they are waits for no more. One frame may exceed it.
+/// Bytes that are made ready at a time, at most: what is more important than they are waits for no more. One frame may
+/// exceed it.
 pub const BATCH_BYTES: usize = 16 * 1024;
 /// A queue that was empty for so many looks gives its memory back.
 const EMPTY_LOOKS: u8 = 50;
@@ -26,12 +27,12 @@ const EMPTY_LOOKS: u8 = 50;
 pub(super) struct Parcel<'a> {
     pub(super) head: &'a Head,
     pub(super) body: &'a [u8],
-    /// By the clock of who sends, ns.
+    /// By the sender's clock, ns.
     pub(super) published_ns: u64,
     pub(super) hops: u8,
     /// 0 goes first.
     pub(super) level: u8,
-    /// In whose part of memory and line it is counted.
+    /// The share of memory and rate that it counts to.
     pub(super) share: Share,
 }
 
@@ -53,7 +54,7 @@ pub(super) struct Outgoing {
     ready: Vec<u8>,
     /// Of `ready`, bytes that the stream has taken.
     taken: usize,
-    /// Of `ready`, bytes of a frame whose beginning was taken before.
+    /// Of `ready`, bytes of a frame that was taken in part before.
     begun: usize,
     /// Of `ready`, bytes up to the end of the last frame that was put before packages.
     hurried: usize,
@@ -132,7 +133,8 @@ impl Outgoing {
         message.write(&mut self.ready);
     }
 
-    /// The same, before all packages that have not begun to leave. What has left when [`sent`](Self::sent) has come so far.
+    /// The same, before all packages that have not begun to leave. What has left when [`sent`](Self::sent) has come so
+    /// far.
     pub(super) fn hurry(&mut self, message: &Message<'_>) -> u64 {
         let mut frame = Vec::new();
         message.write(&mut frame);

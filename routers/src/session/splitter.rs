@@ -1,4 +1,5 @@
-//! Cuts a stream of bytes into frames, wherever it is split. Memory grows with what came, never with what a head promises.
+//! Cuts a stream of bytes into frames, wherever it is split. Memory grows with what came, never with what a head
+//! promises.
 
 use super::frame::{BadFrame, FrameHead, HEAD_BYTES, is_tls};
 use crate::broken::broken;
@@ -15,7 +16,8 @@ pub(super) struct Splitter {
 }
 
 impl Splitter {
-    /// The next whole frame of what is kept and then of `input`, from which it is taken. None: all is taken, and none is whole.
+    /// The next whole frame of what is kept and then of `input`, from which it is taken. None: all is taken, and none
+    /// is whole.
     pub(super) fn next<'a, 'b: 'a>(
         &'a mut self,
         now_ns: u64,
@@ -54,7 +56,8 @@ impl Splitter {
         (!self.partial.is_empty() && !self.is_done).then_some(self.began_ns)
     }
 
-    /// Whether what came last, less than a head, began as TLS does: what its other end says before it closes is that short.
+    /// Whether what came last, less than a head, began as TLS does: what its other end says before it closes is that
+    /// short.
     pub(super) fn hears_tls(&self) -> bool {
         !self.is_done && is_tls(&self.partial)
     }

@@ -1,5 +1,5 @@
-//! Who hosts which names. No two clients host one name: of what one hosts nobody gets a part, however narrow, until
-//! that one gives it up.
+//! Maps names to the clients that host them. No two clients host one name: of what one hosts no other gets a part,
+//! however narrow, until that one gives it up.
 //!
 //! ```text
 //!  ranges   [1.0.0.0 ─── node brain ─── 1.9.255.255]    [1.200.0.0 ─ arm ─ 1.200.0.255]
@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 pub struct Table {
     /// By their first name. None has a name in common with another.
     ranges: BTreeMap<Name, Hosted>,
-    /// The same, by who hosts them.
+    /// The same, by host.
     of_client: BTreeMap<ClientIndex, Box<[Range]>>,
     /// How many ranges there are of each system.
     of_system: [u32; 256],
@@ -42,7 +42,7 @@ pub struct Conflict {
     pub objection: Objection,
     /// The range.
     pub range: Range,
-    /// Who hosts what is in its way, if that is it.
+    /// The host of the range in conflict, if that is the cause.
     pub holder: Option<ClientIndex>,
 }
 
@@ -112,7 +112,7 @@ impl Table {
         }
     }
 
-    /// Who hosts a name.
+    /// The host of a name.
     pub fn client_of(&self, name: Name) -> Option<ClientIndex> {
         let (_, hosted) = self.ranges.range(..=name).next_back()?;
         (hosted.last >= name).then_some(hosted.client)
@@ -138,7 +138,7 @@ impl Table {
         &self.systems
     }
 
-    /// All ranges, each with who hosts it.
+    /// All ranges, each with its host.
     pub fn hosted(&self) -> impl Iterator<Item = (ClientIndex, Range)> {
         self.ranges.iter().map(|(first, hosted)| (hosted.client, Range { first: *first, last: hosted.last }))
     }

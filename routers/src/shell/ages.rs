@@ -1,4 +1,5 @@
-//! How old data are when they come out of the network: from their stamp, by system time, so that the errors of both clocks are in it.
+//! Age of data when they come out of the network: from their stamp, by system time, including the errors of both
+//! clocks.
 //!
 //! One thread counts, any reads. A package without a stamp (a command, a reply) is not counted.
 
@@ -20,7 +21,7 @@ impl Ages {
     /// A package was delivered.
     pub(super) fn note(&self, head: &Head, body: &[u8]) {
         let Some(stamp) = body.first_chunk().filter(|_| head.options.has(Options::STAMPED)) else { return };
-        // One from the future, by clocks that are not together yet, is new.
+        // One from the future, by clocks that are not synchronised yet, counts as new.
         let age_ns = self.clock.now().ns.saturating_sub(u64::from_le_bytes(*stamp));
         self.classes[usize::from(head.priority.0)].note(age_ns);
     }

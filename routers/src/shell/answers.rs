@@ -1,4 +1,4 @@
-//! The answers that senders of undeliverable commands get: so they need not wait for their timeout, and learn why.
+//! Error replies to senders of undeliverable commands: they need not wait for their timeout, and learn the cause.
 
 use super::sender_cache::SenderCache;
 use crate::counts::Cause;
@@ -13,31 +13,31 @@ use std::sync::Arc;
 /// Longest answer.
 const ANSWER_BYTES_MAX: usize = 1024;
 
-/// Why a command goes no further.
+/// Why a command is not delivered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Undelivered<'a> {
     /// What happened.
     pub cause: Cause,
-    /// The node that it was for; of one that came and is not allowed, this one.
+    /// The receiving node; for one that came and is not allowed, this node.
     pub node: Option<&'a str>,
-    /// Of a command that is not allowed: line of the rule.
+    /// For a command that is not allowed: line of the rule.
     pub rule: Option<usize>,
-    /// What differs between that node and this one, if one of them refuses the other.
+    /// The difference between that node and this one, if one of them refuses the other.
     pub mismatch: Option<Mismatch>,
-    /// Of a command too large: bytes of a body that its mailbox takes.
+    /// For a command that is too large: largest body of its mailbox.
     pub takes_bytes: Option<usize>,
 }
 
-/// Writes the bodies of such answers: what a fault looks like is not the routers' business.
+/// Writes the bodies of such replies: routers do not know the format of a fault.
 pub trait Faults: Send + Sync {
-    /// Appends the answer to a command whose body begins with these bytes, [`BEGINNING_BYTES`] of it at least; false when it is not
-    /// one that can be answered.
+    /// Appends the reply to a command with a body that begins with these bytes, at least [`BEGINNING_BYTES`] of it;
+    /// false when it cannot be answered.
     ///
     /// [`BEGINNING_BYTES`]: crate::report::BEGINNING_BYTES
     fn write(&self, call: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool;
 }
 
-/// Answers in the name of modules that cannot.
+/// Replies on behalf of modules that cannot.
 pub(super) struct Answers {
     settings: Arc<Settings>,
     stats: Arc<Stats>,
@@ -66,8 +66,9 @@ impl Answers {
         }
     }
 
-    /// Answers a command that came from another node, unless this incarnation of the router has just begun: then it may be a copy of one that
-    /// the incarnation before has delivered. Its caller's next try brings the truth. Who asks in a name that no node has gets none.
+    /// Replies to a command from another node, unless this incarnation of the router has just begun: then it may be a
+    /// duplicate of one that the incarnation before has delivered, and its caller tries again. A caller with a name of
+    /// no node gets none.
     pub(super) fn answer_arrived(
         &mut self,
         peer: Option<NodeIndex>,
@@ -81,8 +82,8 @@ impl Answers {
         }
     }
 
-    /// Answers a command, of whose body this is the beginning; for all other packages nobody waits. Of one that is handed out again
-    /// nothing is said: the router's incarnation that died with it in its hand may have sent it.
+    /// Replies to a command with this beginning of a body; no other package needs a reply. A command that is repeated
+    /// after a crash gets none: the router's incarnation that died while handling it may have sent it.
     pub(super) fn answer(
         &mut self,
         peer: Option<NodeIndex>,
@@ -116,7 +117,8 @@ impl Answers {
             options: Options::ERROR,
             ..*head
         };
-        // Who has gone, or takes no more answers, waits for its timeout. On other nodes callers choose the name, so that it is not looked for.
+        // A caller that is gone or takes no replies waits for its timeout. Callers on other nodes choose the name, so
+        // that it is not looked up.
         let _ = match settings.node_of(answer.to) {
             Some(_) => self.sender_cache.send_by(self.via, &answer, &self.body),
             None => self.sender_cache.send(&answer, &self.body),
@@ -131,7 +133,7 @@ mod tests {
     use crate::stats::YOUNG_NS;
     use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
 
-    /// Says the cause's word.
+    /// Writes the cause's word.
     struct Words;
 
     impl Faults for Words {
@@ -141,15 +143,15 @@ mod tests {
         }
     }
 
-    /// A router that began so long ago, ns, the mailbox of a caller on its node, and its own, for callers on others.
-    struct Ground {
+    /// A router that began this long ago, ns, the mailbox of a caller on its node, and its own, for callers on others.
+    struct Fixture {
         answers: Answers,
         replies: Receiver,
         transit: Receiver,
         _folder: tempfile::TempDir,
     }
 
-    impl Ground {
+    impl Fixture {
         fn new(age_ns: Option<u64>) -> Self {
             let folder = tempfile::tempdir().unwrap();
             let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
@@ -176,7 +178,7 @@ mod tests {
         module(250, 0).with_local(local::TRANSIT)
     }
 
-    /// Of a command that came: its caller is on the other node.
+    /// A command that came: its caller is on the other node.
     fn arrived(options: Options) -> Head {
         Head { to: module(60, 0), from: module(50, 1).with_local(local::REPLIES), ..command(options) }
     }
@@ -191,7 +193,7 @@ mod tests {
 
     #[test]
     fn of_a_command_that_is_handed_out_again_nothing_is_said() {
-        let mut ground = Ground::new(Some(YOUNG_NS));
+        let mut ground = Fixture::new(Some(YOUNG_NS));
         for cause in Cause::ALL {
             let again = command(Options::default().with(Options::REDELIVERED));
             ground.answers.answer(Some(1), &again, b"call", cause, None);
@@ -204,16 +206,16 @@ mod tests {
     }
 
     #[test]
-    fn who_has_just_begun_says_nothing_of_what_came() {
+    fn a_router_that_has_just_begun_answers_nothing_that_came() {
         let (came, left) = (arrived(Options::default()), command(Options::default()));
-        let mut ground = Ground::new(None);
+        let mut ground = Fixture::new(None);
         for cause in [Cause::NoMailbox, Cause::MailboxFull, Cause::TooLarge, Cause::Stale] {
             ground.answers.answer_arrived(Some(1), &came, b"call", cause, None);
             assert_eq!(ground.answered(), None, "{cause:?}: it may be a copy of what the incarnation before delivered");
         }
         ground.answers.answer(Some(1), &left, b"call", Cause::Stale, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::Stale.word()), "what is to leave is no copy");
-        let mut ground = Ground::new(Some(YOUNG_NS));
+        let mut ground = Fixture::new(Some(YOUNG_NS));
         ground.answers.answer_arrived(Some(1), &came, b"call", Cause::MailboxFull, None);
         assert_eq!(ground.answered().as_deref(), Some(Cause::MailboxFull.word()));
         for from in [caller(), Name::new(2, 50, 1, 1), Name::NONE] {

@@ -1,32 +1,29 @@
-//! Why a datagram could not be sent, as far as it makes a difference, and how often that happened.
+//! Kinds of failures to send a datagram, as far as they make a difference, and their counters.
 
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What the kernel says instead of sending a datagram.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Failure {
-    /// The computer is there, but nobody listens at the port. Told of an earlier datagram; this one was sent.
-    NobodyThere,
-    /// No way to the address: the network is down, the way is missing, or a firewall forbids it.
-    NoWay,
-    /// Longer than what is between can carry.
-    TooLong,
-    /// The kernel or the network card had no room.
-    NoRoom,
-    /// So much waits already for its device that the kernel takes no more; nobody waits for that.
-    Full,
-    /// Nobody is known there that it could be sealed to.
-    Unacquainted,
-    /// Anything else.
-    Other,
+rohrpost_mailbox::causes! {
+    /// What the kernel says instead of sending a datagram.
+    pub enum Failure {
+        /// The computer is there, but nothing listens at the port. Reported for an earlier datagram; this one was sent.
+        NobodyThere = "nobody-there",
+        /// No route to the address: the network is down, the route is missing, or a firewall forbids it.
+        NoWay = "no-way",
+        /// Longer than the path can carry.
+        TooLong = "too-long",
+        /// The kernel or the network card had no room.
+        NoRoom = "no-room",
+        /// The device's queue is full: the kernel takes no more without waiting.
+        Full = "full",
+        /// The peer has no session to seal with.
+        Unacquainted = "unacquainted",
+        /// Anything else.
+        Other = "other",
+    }
 }
 
 impl Failure {
-    /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::NobodyThere, Self::NoWay, Self::TooLong, Self::NoRoom, Self::Full, Self::Unacquainted, Self::Other];
-
     pub(super) fn of(error: &io::Error) -> Self {
         use nix::errno::Errno;
         match Errno::from_raw(error.raw_os_error().unwrap_or(0)) {
@@ -51,33 +48,23 @@ impl Failure {
         !matches!(self, Self::NobodyThere)
     }
 
-    /// One word for people and programs.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::NobodyThere => "nobody-there",
-            Self::NoWay => "no-way",
-            Self::TooLong => "too-long",
-            Self::NoRoom => "no-room",
-            Self::Full => "full",
-            Self::Unacquainted => "unacquainted",
-            Self::Other => "other",
-        }
-    }
-
     /// What happened, and what to do.
     pub const fn words(self) -> &'static str {
         match self {
             Self::NobodyThere => "nobody listens at its port; does its router run?",
             Self::NoWay => {
-                "there is no way to its address; is the network up, and does a firewall forbid it? (`ip route get ADDRESS`)"
+                "there is no way to its address; is the network up, and does a firewall forbid it? (`ip route get \
+                 ADDRESS`)"
             }
             Self::TooLong => "the datagram was too long for the network; lower `mtu` in [network], on all nodes",
             Self::NoRoom => {
-                "the kernel had no room; lower `rate` in [network], or with time slots `link` in [tdma], to what the network can carry"
+                "the kernel had no room; lower `rate` in [network], or with time slots `link` in [tdma], to what the \
+                 network can carry"
             }
             Self::Full => {
-                "its device has not sent what it was given before; does it stand still, or carry less than `rate` in [network], or with time slots \
-                 `link` in [tdma], says (`ethtool DEVICE`), and is net.core.wmem_max enough for a slot (`sysctl`)?"
+                "its device has not sent what it was given before; does it stand still, or carry less than `rate` in \
+                 [network], or with time slots `link` in [tdma], says (`ethtool DEVICE`), and is net.core.wmem_max \
+                 enough for a slot (`sysctl`)?"
             }
             Self::Unacquainted => "its router has not shown yet that it has the same key",
             Self::Other => "the kernel refused it",
@@ -85,7 +72,7 @@ impl Failure {
     }
 }
 
-/// How often each of them happened.
+/// Counters of each of them.
 #[derive(Default, Debug)]
 pub struct Failures([AtomicU64; Failure::ALL.len()]);
 
@@ -94,7 +81,7 @@ impl Failures {
         self.0[failure as usize].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// How often this one did.
+    /// The counter of this one.
     pub fn of(&self, failure: Failure) -> u64 {
         self.0[failure as usize].load(Ordering::Relaxed)
     }

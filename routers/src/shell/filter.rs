@@ -1,12 +1,12 @@
-//! A filter in the kernel: of what comes to a socket, it keeps what nodes of the configuration have sent.
+//! A socket filter in the kernel: it keeps only datagrams from nodes of the configuration.
 //!
 //! ```text
 //!  datagram ─▶ source address among the nodes'? ─┬─ yes ─▶ the socket's queue ─▶ its reader wakes
-//!                                                └─ no: dropped in the kernel, before any thread runs, and counted there
+//!                                                └─ no: dropped and counted in the kernel, no thread runs
 //! ```
 //!
-//! A program of the classic packet filter: it needs no rights, and costs some nanoseconds a datagram. It looks at the address alone; who
-//! writes a node's address into what it sends passes, and is repeated_on_stall as before.
+//! A program of the classic packet filter: it needs no rights, and costs some nanoseconds a datagram. It checks the
+//! address alone. A datagram with a forged node's address passes, and is checked like any other.
 
 use crate::frame::{self, Kind};
 use crate::security::TAG_BYTES;
@@ -23,26 +23,26 @@ const RETURN: u16 = 0x06;
 const LOAD_LENGTH: u16 = 0x80;
 const JUMP_IF_GREATER: u16 = 0x25;
 const JUMP_IF_AT_LEAST: u16 = 0x35;
-/// Places are counted from the IP head from here on (`SKF_NET_OFF`); else from where UDP's begins.
+/// Offsets count from the IP head (`SKF_NET_OFF`), else from the UDP head.
 const IP_HEAD: u32 = -0x0010_0000_i32 as u32;
-/// Where an IP head has the address of its sender.
+/// Offset of the source address in an IP head.
 const SOURCE_V4: u32 = 12;
 const SOURCE_V6: u32 = 8;
 /// Verdicts: how many bytes are kept.
 const WHOLE: u32 = u32::MAX;
 const NOTHING: u32 = 0;
 
-/// From now on the socket takes nothing but what comes from these addresses. All are of the socket's family; others match nothing. What it
-/// holds already stays.
+/// From now on the socket takes only datagrams from these addresses. All are of the socket's family; others match
+/// nothing. Datagrams that it already holds stay.
 ///
 /// # Errors
-/// What the system said: mostly that it has no memory for it.
+/// The system's error: mostly that it has no memory for it.
 pub(super) fn take_only_from(socket: &impl AsFd, addresses: &[IpAddr]) -> io::Result<()> {
     SockRef::from(socket).attach_filter(&program(addresses))
 }
 
-/// The same of a socket of time. Taken is besides, from anywhere, what says what time it is by another configuration than that with this digest: whoever
-/// hears that must know it, and be told. Junk of strangers that looks so is read.
+/// The same for a socket of time. It also takes, from anywhere, frames of time with another digest than this: a node
+/// that hears these must know it, and refuse. Forged frames of that form are read, too.
 ///
 /// # Errors
 /// As [`take_only_from`].
@@ -54,7 +54,7 @@ pub(super) fn take_time_only_from(socket: &impl AsFd, addresses: &[IpAddr], dige
     SockRef::from(socket).attach_filter(&program)
 }
 
-/// Keeps frames of time, sealed or not, whose digest is not this one.
+/// Keeps frames of time, sealed or not, with another digest than this.
 fn time_of_others(digest: u64) -> [SockFilter; 12] {
     const UDP_HEAD: u32 = 8;
     let lengths = [TIME_BYTES, TIME_BYTES + TAG_BYTES].map(|bytes| UDP_HEAD + bytes as u32);
@@ -87,7 +87,7 @@ fn program(addresses: &[IpAddr]) -> Vec<SockFilter> {
             bytes.chunks_exact(4).map(|word| u32::from_be_bytes([word[0], word[1], word[2], word[3]])).collect();
         let last = words.len() - 1;
         let compared = words.into_iter().enumerate().flat_map(move |(index, word)| {
-            // What differs goes on behind this address's verdict.
+            // A mismatch continues behind this address's verdict.
             let behind = (2 * (last - index) + 1) as u8;
             let at = IP_HEAD.wrapping_add(place + 4 * index as u32);
             [SockFilter::new(LOAD, 0, 0, at), SockFilter::new(JUMP_IF_EQUAL, 0, behind, word)]
@@ -109,7 +109,7 @@ mod tests {
     const PEER: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 2);
     const STRANGER: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 3);
 
-    /// As many nodes as there may be; those in `last` stand behind all.
+    /// As many nodes as there may be; those in `last` come after all others.
     fn nodes(last: &[IpAddr]) -> Vec<IpAddr> {
         let many = (0..NODES_MAX as u8 - last.len() as u8).map(|node| IpAddr::V4(Ipv4Addr::new(127, 9, 9, node)));
         many.chain(last.iter().copied()).collect()

@@ -1,4 +1,5 @@
-//! From the thread that reads the router's mailbox to the one that sends what is not real time: a few batches of packages that go round.
+//! Handover from the thread that reads the router's mailbox to the one that sends what is not real time: a few batches
+//! of packages in a ring.
 //!
 //! ```text
 //!  mailbox ─▶ tx_thread: Giver ── full ──▶ rest: Taker ─▶ Outbound
@@ -6,7 +7,8 @@
 //!                         └────── empty ◀─────┘      none empty: what is not real time stays in the mailbox
 //! ```
 //!
-//! Neither waits for the other, and nothing is taken from the heap: who has nothing to fill goes on with what is real time.
+//! Neither thread waits for the other, and nothing is taken from the heap. Without an empty batch the reader continues
+//! with real-time packages.
 
 use super::threads::Shared;
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Head};
@@ -15,9 +17,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// As many as keep the one busy while the other fills.
+/// Enough to keep one thread busy while the other fills.
 const BATCHES: usize = 3;
-/// A batch is full from here on: to copy so much takes a few microseconds, in a thread that stands above all modules.
+/// A batch is full from here on: copying this much takes a few microseconds, in a thread above all modules.
 const BATCH_BYTES: usize = 16 * 1024;
 /// Before each body: the package's head, and when it was published.
 const RECORD_HEAD_BYTES: usize = HEAD_BYTES + 8;
@@ -25,11 +27,11 @@ const RECORD_HEAD_BYTES: usize = HEAD_BYTES + 8;
 /// Packages, one behind the other.
 type Batch = Vec<u8>;
 
-/// What both ends see.
+/// State that both ends share.
 struct Room {
     /// Batches on their way back.
     empty: AtomicUsize,
-    /// The giver wants to know when there is one.
+    /// The giver waits for an empty one.
     wanted: AtomicBool,
 }
 
@@ -45,7 +47,7 @@ pub(super) struct Giver {
 pub(super) struct Taker {
     full: Receiver<Batch>,
     empty: SyncSender<Batch>,
-    /// The one that is read, and how far.
+    /// The batch in use, and the offset in it.
     reading: Option<(Batch, usize)>,
     room: Arc<Room>,
     shared: Arc<Shared>,
@@ -86,17 +88,18 @@ impl Giver {
         }
     }
 
-    /// Nothing more is given for the moment.
+    /// No more packages for the moment.
     pub(super) fn finish(&mut self) {
         if let Some(batch) = self.filling.take_if(|batch| !batch.is_empty()) {
-            // There is room for all; and who has gone is missed by who looks after the threads.
+            // There is room for all; a missing taker is noticed by the thread watch.
             let _ = self.full.try_send(batch);
         }
     }
 
-    /// From now on it is told when it may take again: its bell is rung.
+    /// From now on its bell is rung when it may take again.
     pub(super) fn wants_room(&self) {
-        // ORDERING: SeqCst, before the look at `empty`. Of this and who gives a batch back at least one sees the other.
+        // ORDERING: SeqCst, before the load of `empty`. At least one side sees the other: this one, or the one that
+        // returns a batch.
         self.room.wanted.store(true, Ordering::SeqCst);
     }
 
@@ -111,7 +114,7 @@ impl Giver {
 pub(super) enum Waited {
     /// Some came, or time passed.
     Enough,
-    /// Nobody gives any more.
+    /// The giver is gone.
     Ended,
 }
 
@@ -133,12 +136,12 @@ impl Taker {
         Some((package, u64::from_le_bytes(*published.first_chunk()?), body, *at >= batch.len()))
     }
 
-    /// Whether there is more in hand.
+    /// Whether the batch in use has more.
     pub(super) fn has_next(&self) -> bool {
         self.reading.as_ref().is_some_and(|(batch, at)| *at < batch.len())
     }
 
-    /// Waits until there is something, or for so long.
+    /// Waits until there is a batch, or for this long.
     pub(super) fn wait(&mut self, time: Duration) -> Waited {
         if self.has_next() {
             return Waited::Enough;
@@ -210,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn who_takes_nothing_is_given_so_much_and_no_more() {
+    fn a_full_handover_takes_no_more() {
         let (_folder, mut giver, mut taker) = ends();
         let mut given = 0;
         while giver.takes() {

@@ -1,7 +1,8 @@
-//! The names that configuration gives a node, and which of them have no mailbox now: nothing else is ever looked for.
+//! The names that configuration gives a node, and which of them have no mailbox now: no other name is ever looked up.
 //!
-//! A look for a mailbox is a system call, and what others write in heads decides how often one is made. So each name is looked for once
-//! until a mailbox of the node comes or goes, however many names there are, and one that the node does not host never.
+//! A lookup of a mailbox is a system call, and remote senders decide how often one is made. So each name is looked up
+//! once until a mailbox of the node comes or goes, however many names there are, and a name that the node does not host
+//! never.
 
 use rohrpost_mailbox::Name;
 
@@ -10,7 +11,7 @@ pub(crate) struct Hosted {
     /// First and last name of each range, and where its bits begin; sorted.
     ranges: Box<[(u32, u32, usize)]>,
     absent: Box<[u64]>,
-    /// Of the registry, when the bits were set.
+    /// Epoch of the registry when the bits were set.
     epoch: u32,
 }
 
@@ -29,7 +30,7 @@ impl Hosted {
         Self { ranges, absent: vec![0; bits.div_ceil(64)].into(), epoch: 0 }
     }
 
-    /// Whether it is worth a look. `epoch`: of the registry, now.
+    /// Whether a lookup is worthwhile. `epoch`: of the registry, now.
     pub(crate) fn may_be_there(&mut self, name: Name, epoch: u32) -> bool {
         if self.epoch != epoch {
             self.absent.fill(0);
@@ -38,7 +39,7 @@ impl Hosted {
         self.place(name).is_some_and(|bit| self.absent[bit / 64] & 1 << (bit % 64) == 0)
     }
 
-    /// It was looked for, and was not there.
+    /// A lookup did not find it.
     pub(crate) fn is_absent(&mut self, name: Name) {
         if let Some(bit) = self.place(name) {
             self.absent[bit / 64] |= 1 << (bit % 64);

@@ -4,17 +4,18 @@
 //!                              ┌──────────────── tx_thread ────────────────┐
 //!  modules ─▶ router.I.3 ─────▶│ Outbound: at once, or by levels and pace   │─▶ a socket to each peer ═▶
 //!                              └─────────────▲──────────────────────────────┘
-//!                     errors, by the mailbox │ Stats: who is there, what was heard (atomics)
+//!                     errors, by the mailbox │ Stats: live peers, what was heard (atomics)
 //!                              ┌─────────────┴── rx_thread ──────────────────┐
-//!  modules ◀─ their mailboxes ◀│ Inbound: gaps, copies, parts, order        │◀─ one socket for all ◀═
+//!  modules ◀─ their mailboxes ◀│ Inbound: loss, duplicates, fragments, order │◀─ one socket for all ◀═
 //!                              └────────────────────────────────────────────┘
 //! ```
 //!
-//! Where there are time slots, the thread of [`slots`] stands in the place of tx_thread, and has the clock besides; else that has a thread
+//! With time slots, the thread of [`slots`] replaces tx_thread, and has the clock besides; else the clock has a thread
 //! of its own ([`clock`]).
 //!
-//! Each thread is a participant of its own, since a participant has one bell. Neither waits for the other, takes from the heap for a
-//! package, or makes a system call but for the datagram, for sleep, and to wake whom it brings a package.
+//! Each thread is a participant of its own, since a participant has one bell. Neither waits for the other or takes
+//! memory from the heap for a package. System calls are made only for the datagram, for sleep, and to wake the receiver
+//! of a package.
 
 mod ages;
 mod answers;
@@ -40,13 +41,15 @@ pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
 pub use news::difference;
-pub use slots::spin_ns;
 pub use socket::{SocketError, listen};
 
+use crate::driver::spin_ns;
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
-use crate::security::{self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, Sealing, Waiting, Who};
+use crate::security::{
+    self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing, Waiting,
+};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{SlotScheduler, Table};
@@ -83,15 +86,16 @@ pub enum ShellError {
     /// Its clock.
     #[error(transparent)]
     Clock(#[from] ClockError),
-    /// Time slots without a master of time, by which they are counted.
+    /// Time slots without a master of time.
     #[error("time slots need the time of a master; write `source = \"master\"` in [time]")]
     NoTime,
-    /// What passes between nodes is to be sealed, and there is nothing to seal it with, or the other way round.
+    /// The configuration demands sealed datagrams and there is no key, or the other way round.
     #[error(
-        "configuration says `security = \"keys\"`, and the router was given no keys; or it says `none`, and there are some"
+        "configuration says `security = \"keys\"`, and the router was given no keys; or it says `none`, and there are \
+         some"
     )]
     Keys,
-    /// No incarnation that nobody has had before.
+    /// No unused incarnation number was found.
     #[error(transparent)]
     Random(#[from] NoRandom),
     /// The system has no thread for it.
@@ -99,17 +103,17 @@ pub enum ShellError {
     Thread(io::Error),
 }
 
-/// What a router is made of.
+/// Inputs of a router.
 pub struct Parts<'a> {
     /// The node that it serves.
     pub node: &'a Arc<Node>,
     /// Its name, `router.I`.
     pub name: Name,
-    /// Who it is, who the others are.
+    /// Its node and the other nodes.
     pub settings: Settings,
-    /// How commands are answered that cannot be delivered.
+    /// Writes replies to undeliverable commands.
     pub faults: Arc<dyn Faults>,
-    /// Its sockets, if they are kept for it ([`listen`]), in that order; it makes those that are missing.
+    /// Its sockets, if they are kept for it ([`listen`]), in that order; it makes the missing ones.
     pub sockets: Vec<OwnedFd>,
     /// A bad network between it and its sockets.
     pub impair: Option<impair::Settings>,
@@ -117,16 +121,16 @@ pub struct Parts<'a> {
     pub clock: Option<ClockParts>,
 }
 
-/// A router at work; dropped, it ends. What waits in its mailbox stays there.
+/// A router at work; dropped, it ends. Packages in its mailbox stay there.
 pub struct Shell {
     settings: Arc<Settings>,
     stats: Arc<Stats>,
     failures: Arc<Failures>,
     ages: Arc<Ages>,
     shared: Arc<Shared>,
-    /// Of what is not real time, where that goes its own way.
+    /// For what is not real time, where that has its own threads.
     rest_stats: Option<Arc<Stats>>,
-    /// That of packages stands first.
+    /// The socket for packages comes first.
     sockets: Vec<Arc<InSocket>>,
     clock: Option<Arc<ClockState>>,
     slots: Option<Arc<slots::State>>,
@@ -139,7 +143,7 @@ pub struct Shell {
 }
 
 impl Shell {
-    /// Binds the addresses, makes the mailbox, tells the node what is elsewhere, and starts all threads.
+    /// Binds the addresses, makes the mailbox, registers the routes at the node, and starts all threads.
     ///
     /// # Errors
     /// [`ShellError`]
@@ -147,8 +151,8 @@ impl Shell {
         Self::start_with(parts, None)
     }
 
-    /// The same of a router that seals what it sends, and takes only what is sealed. In place of the incarnation in its settings it draws one:
-    /// two incarnations with one incarnation would have one key.
+    /// The same for a router that seals its datagrams, and takes only sealed ones. It draws a new incarnation instead
+    /// of the one in its settings: two runs with one incarnation would have one key.
     ///
     /// # Errors
     /// [`ShellError`]
@@ -170,7 +174,7 @@ impl Shell {
         let mut sockets = sockets.into_iter();
         let has_tunnel = settings.tdma.as_ref().is_some_and(|tdma| tdma.tunnel.is_some());
         if has_tunnel && !settings.senders.iter().flatten().any(|sender| sender.module() == name.module()) {
-            // What comes through the tunnel comes from the router, and is not to share the quota of those whom nobody knows.
+            // Packets of the tunnel come from the router, and must not share the quota of unknown senders.
             settings.senders.push(vec![name]);
         }
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.port).into();
@@ -185,7 +189,7 @@ impl Shell {
         }
         let settings = Arc::new(settings);
         let stats = Stats::new(&settings, monotonic_ns());
-        let all = keys.map(|keys| PeerSessions::new(Who::of(&settings), keys));
+        let all = keys.map(|keys| PeerSessions::new(RouterIdentity::of(&settings), keys));
         let mut outbound = Outbound::new(&settings, stats.clone());
         if let Some(all) = &all {
             outbound = outbound.sealed(all.clone());
@@ -225,7 +229,7 @@ impl Shell {
             answers: None,
             is_rest: false,
         };
-        // From here on, whatever fails ends what has begun.
+        // From here on, a failure ends the threads that have begun.
         let mut shell = Self {
             settings,
             stats,
@@ -252,8 +256,8 @@ impl Shell {
             shell.begin("tx_thread", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                     tracing::warn!(
-                        "the router's threads run as modules do, and not before them: {error}; allow it with a limit `rtprio` of {} \
-                         for this user (limits.conf) or CAP_SYS_NICE",
+                        "the router's threads run as modules do, and not before them: {error}; allow it with a limit \
+                         `rtprio` of {} for this user (limits.conf) or CAP_SYS_NICE",
                         threads::ARRIVALS_FIFO
                     );
                 }
@@ -261,14 +265,14 @@ impl Shell {
             })?;
         }
         shell.begin("rx_thread", move || {
-            // A refusal was told by the other.
+            // A refusal was reported by the other.
             let _ = threads::schedule(threads::ARRIVALS_FIFO);
             rx_thread.run();
         })?;
         Ok(shell)
     }
 
-    /// Starts the thread that sends in time slots, from what else would send as packages come; the way there for refusals and hellos.
+    /// Starts the thread that sends in time slots; returns its queue for refusals and hellos.
     fn send_in_slots(
         &mut self,
         name: Name,
@@ -280,7 +284,7 @@ impl Shell {
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
         let works = Works::new(clock)?.sealed_in_slots(self.peer_sessions.as_ref()).in_slots(table.for_clock());
-        let spin_ns = slots::spin_ns(table.cycle_ns());
+        let spin_ns = spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(slots::ANSWERS);
         let hellos = self.peer_sessions.as_ref().map(Waiting::new);
         let line = slots::AnswerQueue::new(waiting, hellos, self.sockets[0].clone(), settings.clone());
@@ -292,8 +296,8 @@ impl Shell {
         Ok(answers)
     }
 
-    /// Where there are time slots, ordinary traffic may cross the network through them alone. Without the right to a device it is told, and all
-    /// else goes on.
+    /// With time slots, ordinary traffic may cross the network through them alone. Without the right to a device that
+    /// is reported, and all else continues.
     fn open_tunnel(&mut self, node: &Arc<Node>, name: Name) -> Result<(), ShellError> {
         let settings = self.settings.clone();
         let Some(wanted) = settings.tdma.as_ref().and_then(|tdma| tdma.tunnel) else { return Ok(()) };
@@ -317,38 +321,38 @@ impl Shell {
         Ok(())
     }
 
-    /// How it stands with system time; none unless that comes from a master.
+    /// State of system time; none unless that comes from a master.
     pub fn clock(&self) -> Option<&Arc<ClockState>> {
         self.clock.as_ref()
     }
 
-    /// How it stands with time slots, where there are any.
+    /// State of the time slots, if there are any.
     pub fn slots(&self) -> Option<&Arc<slots::State>> {
         self.slots.as_ref()
     }
 
-    /// What went through the tunnel for ordinary traffic, where there is one.
+    /// Counters of the tunnel for ordinary traffic, if there is one.
     pub fn tunnel(&self) -> Option<&Arc<tunnel::Passed>> {
         self.tunnel.as_ref()
     }
 
-    /// Who it is, who the others are.
+    /// Its node and the other nodes.
     pub fn settings(&self) -> &Arc<Settings> {
         &self.settings
     }
 
-    /// What was not taken at a port, since it was not sealed as it must be; none where nothing is sealed.
+    /// Datagrams rejected at a port because of their seal; none where nothing is sealed.
     pub fn rejections(&self, port: Port) -> Option<&Arc<Rejections>> {
         self.peer_sessions.as_ref().map(|all| all.rejections(port))
     }
 
-    /// What it counts.
+    /// Its counters.
     pub fn stats(&self) -> &Arc<Stats> {
         &self.stats
     }
 
-    /// The same of what is not real time, where that goes by threads and a port of its own: packages by class are counted in either, datagrams
-    /// and what waits in both.
+    /// The same for what is not real time, where that has threads and a port of its own: packages by class are counted
+    /// in either, datagrams and waiting packages in both.
     pub fn rest_stats(&self) -> Option<&Arc<Stats>> {
         self.rest_stats.as_ref()
     }
@@ -358,7 +362,7 @@ impl Shell {
         &self.failures
     }
 
-    /// How old data are that come from other nodes.
+    /// Age of data from other nodes.
     pub fn ages(&self) -> &Arc<Ages> {
         &self.ages
     }
@@ -375,7 +379,7 @@ impl Drop for Shell {
         self.shared.end();
         self.sockets.iter().for_each(|socket| socket.close());
         for thread in self.threads.drain(..) {
-            // One that panicked has said so.
+            // A thread that panicked has said so.
             let _ = thread.join();
         }
     }

@@ -1,4 +1,4 @@
-//! What a router says of its peers, in words: each once, until it is over.
+//! Messages of a router about its peers: each once, until it is over.
 
 use super::failure::Failure;
 use crate::frame::{self, NodeIndex, Reason};
@@ -6,7 +6,7 @@ use crate::report::{Event, Mismatch};
 use crate::settings::Settings;
 use std::sync::Arc;
 
-/// What is the matter between two nodes that refuse each other, and what would be right. `digest` is this node's.
+/// The difference between two nodes that refuse each other, and the remedy. `digest` is this node's.
 pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
     match (mismatch.reason, mismatch.digest) {
         (Reason::Version, _) => format!(
@@ -15,19 +15,20 @@ pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
             frame::VERSION
         ),
         (Reason::Digest, Some(theirs)) => format!(
-            "its configuration has the digest {theirs:016x}, this node's {digest:016x}; launch all nodes from the same file \
-             (`rohrpost check`, on both)"
+            "its configuration has the digest {theirs:016x}, this node's {digest:016x}; launch all nodes from the same \
+             file (`rohrpost check`, on both)"
         ),
         (Reason::Digest, None) => {
             format!("its configuration is another than this node's, {digest:016x}; launch all nodes from the same file")
         }
         (Reason::Sealed, _) => {
-            "one of both seals what it sends (`security = \"keys\"`), the other does not (`security = \"none\"`); launch all nodes from the \
-             same file"
+            "one of both seals what it sends (`security = \"keys\"`), the other does not (`security = \"none\"`); \
+             launch all nodes from the same file"
                 .into()
         }
-        (Reason::Key, _) => "what comes from its address is sealed with another key than this node's; copy the folder of keys from the first \
-                             computer of the installation to this one or to that (`rohrpost keys show`, on both, tells which differ)"
+        (Reason::Key, _) => "what comes from its address is sealed with another key than this node's; copy the folder \
+                             of keys from the first computer of the installation to this one or to that (`rohrpost \
+                             keys show`, on both, tells which differ)"
             .into(),
         (Reason::Stranger, _) => {
             "its packages come from another address than the configuration has for it, or are for another \
@@ -37,10 +38,10 @@ pub fn difference(mismatch: &Mismatch, digest: u64) -> String {
     }
 }
 
-/// Speaks of peers by their names.
+/// Reports about peers by their names.
 pub(super) struct News {
     settings: Arc<Settings>,
-    /// Of each peer: why nothing could be sent there.
+    /// For each peer: why nothing could be sent there.
     failing: Box<[Option<Failure>]>,
 }
 
@@ -49,14 +50,15 @@ impl News {
         Self { settings: settings.clone(), failing: settings.nodes.iter().map(|_| None).collect() }
     }
 
-    /// Something happened that the receiving half has noticed.
+    /// An event of the receiving half.
     pub(super) fn event(&self, event: Event) {
         let digest = self.settings.digest;
         match event {
             Event::Heard { peer } => tracing::info!("{} is heard", self.node(peer)),
             Event::Restarted { peer } => tracing::info!("the router of {} was started anew", self.node(peer)),
             Event::Silent { peer } => tracing::warn!(
-                "{} is silent: nothing came for a second; is it on, does its router run, and does the network reach it?",
+                "{} is silent: nothing came for a second; is it on, does its router run, and does the network reach \
+                 it?",
                 self.node(peer)
             ),
             Event::Unheard { peer } => tracing::warn!(
@@ -77,7 +79,8 @@ impl News {
                 tracing::warn!("takes nothing from {from}: {why} (datagrams: {datagrams})");
             }
             Event::Twice { peer } => tracing::error!(
-                "two routers send as {}: its address is used twice, or an old router there did not end; end one of them",
+                "two routers send as {}: its address is used twice, or an old router there did not end; end one of \
+                 them",
                 self.node(peer)
             ),
         }
@@ -86,13 +89,13 @@ impl News {
     /// A datagram could not be sent.
     #[cold]
     pub(super) fn fails(&mut self, to: NodeIndex, failure: Failure) {
-        // That nobody listens is no news: a peer that does not run is silent, and that is told.
+        // That nothing listens is not reported: a peer that does not run is silent, and that is reported.
         if failure.is_loss() && self.failing[usize::from(to)].replace(failure) != Some(failure) {
             tracing::warn!("cannot send to {}: {}", self.node(to), failure.words());
         }
     }
 
-    /// One could.
+    /// A datagram could be sent.
     pub(super) fn works(&mut self, to: NodeIndex) {
         if self.failing[usize::from(to)].take().is_some() {
             tracing::info!("sends to {} again", self.node(to));

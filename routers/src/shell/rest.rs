@@ -1,7 +1,8 @@
-//! The thread that sends what is not real time: scheduled as the modules are whose packages it carries, below all that is real time.
+//! The thread that sends what is not real time: scheduled like the modules that it serves, below all real-time threads.
 //!
-//! It has a queue, sockets and a port of its own, and shares the wire's rate with what is real time, which goes first. Beside it stands one that
-//! receives at that port: so the kernel parts both kinds before any thread runs, and no flood of the one takes room or time from the other.
+//! It has a queue, sockets and a port of its own. It shares the wire's rate with real time, which goes first. A second
+//! thread receives at that port. So the kernel separates both kinds before any thread runs, and a flood of one takes no
+//! room or time from the other.
 
 use super::answers::{Answers, Faults};
 use super::handover::{Giver, Taker, Waited, handover};
@@ -24,12 +25,12 @@ use std::time::Duration;
 
 /// Packages taken before the wire has its turn.
 const BURST: usize = 64;
-/// The router's end is looked for so often.
+/// The end of the router is checked this often.
 const LOOK: Duration = Duration::from_millis(100);
-/// What waits while its peer does not hear this incarnation yet is looked at so often.
+/// Packages for a peer that does not hear this incarnation yet are checked this often.
 const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
-/// What the thread has.
+/// State of the thread.
 pub(super) struct Rest {
     pub(super) shared: Arc<Shared>,
     pub(super) taker: Taker,
@@ -47,7 +48,8 @@ impl Rest {
             let look = if self.sending.outbound.waits() { LOOK_AGAIN } else { LOOK };
             let time = Duration::from_nanos(until_ns.saturating_sub(now_ns)).min(look);
             if self.sending.outbound.has_plenty() {
-                // The pace holds the wire, and what more there is waits where it gives way to what is more important.
+                // The rate limit holds the wire. More packages wait in the mailbox, where less important ones are
+                // displaced.
                 std::thread::sleep(time);
             } else if self.taker.wait(time) == Waited::Ended {
                 return;
@@ -55,7 +57,7 @@ impl Rest {
         }
     }
 
-    /// Takes what was handed over, as long as there is use for it.
+    /// Takes packages from the handover while they are of use.
     fn take(&mut self) {
         for _ in 0..BURST {
             if self.sending.outbound.has_plenty() {
@@ -68,8 +70,8 @@ impl Rest {
 }
 
 impl Shell {
-    /// Where what is not real time goes its own way: opens its port and starts its two threads. The way there for the thread that reads the
-    /// mailbox.
+    /// Opens the port and starts the two threads for what is not real time, if that is separate. Returns the handover
+    /// for the thread that reads the mailbox.
     pub(super) fn begin_rest(
         &mut self,
         (node, name): (&Arc<Node>, Name),
@@ -90,7 +92,7 @@ impl Shell {
             outbound = outbound.sealed(all.clone());
         }
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
-        // Whether a peer is there is known by what is real time.
+        // The real-time half knows whether a peer is there.
         let via = transit::name(name);
         let answers = |participant| Answers::new(&settings, &self.stats, faults, participant, via);
         let (giver, taker) = handover(&shared);

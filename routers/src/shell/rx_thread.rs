@@ -1,4 +1,4 @@
-//! The thread that reads the socket and puts what came from other nodes into the mailboxes of this one.
+//! The thread that reads the socket and puts packages from other nodes into the mailboxes of this one.
 
 use super::ages::Ages;
 use super::answers::Answers;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 
-/// Room for the largest that UDP carries.
+/// Room for the largest UDP datagram.
 const DATAGRAM_BYTES: usize = 1 << 16;
 
 const _: () = assert!(HELLO_DATAGRAM_BYTES <= REFUSAL_BYTES, "a hello leaves as a refusal does");
@@ -27,7 +27,7 @@ const _: () = assert!(HELLO_DATAGRAM_BYTES <= REFUSAL_BYTES, "a hello leaves as 
 /// The other thread is rung this often at most.
 const RING_EVERY_NS: u64 = 20_000_000;
 
-/// What the receiving thread has.
+/// State of the receiving thread.
 pub(super) struct RxThread {
     pub(super) shared: Arc<Shared>,
     pub(super) socket: Arc<InSocket>,
@@ -35,11 +35,11 @@ pub(super) struct RxThread {
     pub(super) delivery: PackageDelivery,
     pub(super) settings: Arc<Settings>,
     pub(super) stats: Arc<Stats>,
-    /// Where datagrams are sealed: opens them, and knows who lives.
+    /// Where datagrams are sealed: opens them, and tracks live peers.
     pub(super) guard: Option<Gate>,
-    /// Where there are time slots, refusals and hellos leave through them.
+    /// With time slots, refusals and hellos leave through them.
     pub(super) answers: Option<SyncSender<Answer>>,
-    /// At the port of what is not real time: nobody is greeted or refused there.
+    /// At the port for what is not real time: no hello or refusal leaves there.
     pub(super) is_rest: bool,
 }
 
@@ -48,7 +48,8 @@ impl RxThread {
     pub(super) fn run(mut self) {
         let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
         let (mut awake, mut ring_ns, mut seen_dropped) = (Awake::default(), 0, 0);
-        // What waited for this router before it began, in a socket that outlives routers, says nothing of who lives now.
+        // A socket that outlives routers may hold datagrams from before this router began. These say nothing of which
+        // peers live now.
         let mut is_of_before = true;
         loop {
             let began_ns = monotonic_ns();
@@ -75,7 +76,7 @@ impl RxThread {
             while let Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.delivery) {
                 match &self.answers {
                     _ if self.is_rest => {}
-                    // With no room in the line it is lost, and said again a second later.
+                    // Without room in the queue it is lost, and sent again a second later.
                     Some(slots) => drop(slots.try_send(Answer::Refusal { to, bytes, datagram: refusal })),
                     None => self.socket.answer(to, &refusal[..bytes]),
                 }
@@ -98,14 +99,14 @@ impl RxThread {
         if let Some(said) = gate.take(now_ns, came, datagram, inbound, delivery, &mut reply) {
             self.say(said, reply);
         }
-        // After the last word: what leaves before it would not be taken.
+        // After the hello: earlier packages would not be taken.
         if self.guard.as_mut().is_some_and(|gate| gate.begin(now_ns)) {
-            // What waits for this peer may leave.
+            // Packages for this peer may leave.
             self.shared.ring();
         }
     }
 
-    /// Asks who is not known, or not heard, where datagrams are sealed.
+    /// Sends challenges to peers without a session or without a sign of life, where datagrams are sealed.
     fn ask(&mut self, now_ns: u64) {
         let mut question = [0; REFUSAL_BYTES];
         while let Some(gate) = &mut self.guard
@@ -115,26 +116,27 @@ impl RxThread {
         }
     }
 
-    /// Says a hello. In time slots it waits for one, and what is sealed to an incarnation that begins by it waits for the hello.
+    /// Sends a hello. In time slots it waits for one, and packages sealed to an incarnation that begins by it wait for
+    /// the hello.
     fn say(&self, said: Said, datagram: [u8; REFUSAL_BYTES]) {
         let Some(slots) = &self.answers else {
             return self.socket.answer(self.settings.nodes[usize::from(said.to)].address, &datagram[..said.bytes]);
         };
-        // With no room in the line it is lost: whoever is not known is asked again.
+        // Without room in the queue it is lost: a peer without a session is asked again.
         if let Some(gate) = &self.guard {
             gate.waits(said, || slots.try_send(Answer::Hello { said, datagram }).is_ok());
         }
     }
 }
 
-/// Hands packages out, and answers for those that nobody takes.
+/// Delivers packages, and replies for undeliverable ones.
 pub(super) struct PackageDelivery {
     pub(super) sender_cache: SenderCache,
     pub(super) answers: Answers,
-    /// None where another thread tells the same.
+    /// None where another thread reports the same.
     pub(super) news: Option<News>,
     pub(super) ages: Arc<Ages>,
-    /// Bytes that the mailbox takes which refused the last one.
+    /// Largest body of the mailbox that refused the last package.
     pub(super) takes_bytes: Option<usize>,
 }
 

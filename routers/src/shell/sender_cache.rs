@@ -1,19 +1,20 @@
-//! The mailboxes that a thread of the router sends to, kept open: finding one again takes a search of a small table, no system call.
+//! Open mailboxes that a thread of the router sends to: a search in a small table replaces a system call.
 
 use super::hosted::Hosted;
 use rohrpost_mailbox::{Head, Label, Name, Participant, SendError, Sender};
 use std::sync::Arc;
 
-/// Mailboxes kept open; the one not used for longest gives way.
+/// Mailboxes kept open; the least recently used is closed first.
 const WAYS_MAX: usize = 512;
-/// Names of others known to lead nowhere; those beyond are looked for each time.
+/// Remembered names without a mailbox; others are looked up each time.
 const ABSENT_MAX: usize = 64;
 
 /// Where packages may go.
 enum Reach {
-    /// To mailboxes that configuration gives this node: what came from other nodes must not go back.
+    /// To mailboxes that configuration gives this node: packages from other nodes must not go back.
     Here(Hosted),
-    /// Also through this node's own router. Programs of this node choose the names. These lead nowhere while the registry has this epoch.
+    /// Also through this node's own router. Programs of this node choose the names. The absent ones hold while the
+    /// registry has this epoch.
     Everywhere { absent: Vec<Name>, epoch: u32 },
 }
 
@@ -23,15 +24,15 @@ struct CachedSender {
     used: u64,
 }
 
-/// SenderCache to mailboxes.
+/// Cache of senders to mailboxes.
 pub(crate) struct SenderCache {
     participant: Arc<Participant>,
     reach: Reach,
     /// By name.
     sender_cache: Vec<CachedSender>,
-    /// Counts packages, to tell which way was not used for longest.
+    /// Counts packages, to find the least recently used sender.
     packages: u64,
-    /// Looks for mailboxes so far.
+    /// Lookups of mailboxes so far.
     #[cfg(test)]
     looks: u64,
 }
@@ -58,12 +59,12 @@ impl SenderCache {
         }
     }
 
-    /// Sends a package on, as it is, to the mailbox that its head names.
+    /// Sends a package on, unchanged, to the mailbox in its head.
     pub(crate) fn send(&mut self, head: &Head, body: &[u8]) -> Result<(), SendError> {
         self.send_by(head.to, head, body)
     }
 
-    /// The same by a mailbox of which it is known that it leads there: nothing is looked for but that one.
+    /// The same through a mailbox that is known to lead there: only that one is looked up.
     pub(crate) fn send_by(&mut self, router: Name, head: &Head, body: &[u8]) -> Result<(), SendError> {
         let Head { to, from, kind, id, priority, options, .. } = *head;
         let at = match self.sender_cache.binary_search_by_key(&router, |way| way.to) {
@@ -75,7 +76,7 @@ impl SenderCache {
         self.sender_cache[at].sender.readdress(to);
         let sent = self.sender_cache[at].sender.send(&Label { from, kind, id, priority, options }, &[body]);
         if let Err(SendError::NoMailbox(_) | SendError::NoRouter { .. } | SendError::Bad(..)) = sent {
-            // Its memory is nobody's any more.
+            // Its memory has no owner any more.
             self.sender_cache.remove(at);
         }
         sent
@@ -83,7 +84,7 @@ impl SenderCache {
 
     #[cold]
     fn open(&mut self, to: Name, at: usize) -> Result<usize, SendError> {
-        // Before it is looked for: what comes in between makes this number an old one.
+        // Read before the lookup: a change meanwhile makes this epoch an old one.
         let now = self.participant.node().registry_epoch();
         let may_be_there = match &mut self.reach {
             Reach::Here(hosted) => hosted.may_be_there(to, now),
@@ -120,7 +121,7 @@ impl SenderCache {
         Ok(at)
     }
 
-    /// Gives up the way not used for longest; where that of `to` belongs now.
+    /// Closes the least recently used sender; returns where that of `to` belongs now.
     fn make_room(&mut self, to: Name) -> usize {
         if let Some((oldest, _)) = self.sender_cache.iter().enumerate().min_by_key(|(_, way)| way.used) {
             self.sender_cache.remove(oldest);
@@ -134,12 +135,12 @@ mod tests {
     use super::*;
     use rohrpost_mailbox::{Node, Priority, Receiver, Shape, Type};
 
-    struct Ground {
+    struct Fixture {
         _folder: tempfile::TempDir,
         node: Arc<Node>,
     }
 
-    impl Ground {
+    impl Fixture {
         fn new() -> Self {
             let folder = tempfile::tempdir().unwrap();
             let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
@@ -166,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_package_is_sent_on_as_it_is() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let mut receiver = ground.mailbox(name(0));
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
         sender_cache.send(&head(name(0)), b"body").unwrap();
@@ -176,7 +177,7 @@ mod tests {
 
     #[test]
     fn what_is_absent_is_found_when_it_comes_and_forgotten_when_it_goes() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
         for _ in 0..2 {
             assert!(matches!(sender_cache.send(&head(name(0)), b"body"), Err(SendError::NoMailbox(_))));
@@ -189,7 +190,7 @@ mod tests {
 
     #[test]
     fn whatever_names_others_write_each_is_looked_for_once_and_those_of_nobody_never() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let (first, last) = (name(0), name(999));
         let mut sender_cache = SenderCache::here(&ground.join(), &[(first, last)]);
         for _ in 0..3 {
@@ -205,7 +206,7 @@ mod tests {
 
     #[test]
     fn names_that_a_router_leads_to_are_not_looked_for() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let router = Name::new(1, 250, 0, 3);
         let mut transit = ground.mailbox(router);
         let mut sender_cache = SenderCache::everywhere(&ground.join());
@@ -218,13 +219,13 @@ mod tests {
 
     #[test]
     fn more_mailboxes_than_are_kept_open_are_all_reached() {
-        let ground = Ground::new();
+        let ground = Fixture::new();
         let me = ground.join();
         let shape = Shape { slots: 2, body_bytes_max: 8, ..Shape::default() };
         let count = WAYS_MAX as u16 + 20;
         let mut receivers: Vec<_> = (0..count).map(|number| me.receiver(name(number), shape).unwrap()).collect();
         let mut sender_cache = SenderCache::here(&ground.join(), &[(name(0), name(u16::MAX))]);
-        // The first is in use all the time, so it never gives way.
+        // The first is in use all the time, so it is never closed.
         for number in 0..count {
             sender_cache.send(&head(name(number)), b"body").unwrap();
             assert!(receivers[usize::from(number)].try_receive().is_some());

@@ -1,4 +1,4 @@
-//! What a thread that sends as packages come has: a queue, and the way out of it.
+//! State of a thread that sends as packages come: a queue, and the sockets.
 
 use super::answers::Answers;
 use super::failure::Failure;
@@ -29,7 +29,7 @@ impl Report for Answers {
 }
 
 impl Sending {
-    /// Takes a package: sends it now, or has it wait. `alone`: see [`Outbound::accept`].
+    /// Takes a package: sends or queues it. `alone`: see [`Outbound::accept`].
     pub(super) fn accept(&mut self, package: &Package<'_>, alone: bool) {
         let Self { outbound, answers, wire, datagram, .. } = self;
         let (now_ns, body) = (monotonic_ns(), package.body);
@@ -37,7 +37,7 @@ impl Sending {
         let sent = match wire.seals() {
             false => wire.send(now_ns, to, &[IoSlice::new(&head), IoSlice::new(body)]),
             true => {
-                // The one copy that sealing takes: the body must stay as it is.
+                // The one copy that sealing needs: the body must stay unchanged.
                 datagram[..head.len()].copy_from_slice(&head);
                 datagram[head.len()..head.len() + body.len()].copy_from_slice(body);
                 wire.send_made(now_ns, to, datagram, head.len() + body.len())
@@ -52,7 +52,7 @@ impl Sending {
         self.outbound.displace(package, &mut self.answers);
     }
 
-    /// Sends the next datagram; else when there is one, unless a package comes.
+    /// Sends the next datagram; else returns when there is one, unless a package comes.
     pub(super) fn step(&mut self, now_ns: u64) -> Option<u64> {
         self.wire.retry(now_ns);
         self.outbound.pass_over(self.wire.full().0);
@@ -66,13 +66,13 @@ impl Sending {
         }
     }
 
-    /// Whether something waits for its time, so that it is worth a timer to be there then.
+    /// Whether something waits for its time, so that an exact timer is worthwhile.
     pub(super) fn waits(&self) -> bool {
         self.stats.waiting_bytes.get() > 0 || self.wire.full().0 != 0
     }
 }
 
-/// Says what became of the datagram that was made last, and of the body besides if it left from where it lay.
+/// Reports the result for the last datagram, and for its body if it left without a copy.
 fn settle(sent: Result<(), Failure>, outbound: &mut Outbound, (datagram, body): (&[u8], &[u8]), answers: &mut Answers) {
     if sent.is_err_and(Failure::is_loss) {
         outbound.unsent(datagram, body, answers);

@@ -1,7 +1,6 @@
-//! The sockets of a node's router: one that takes what comes to the node's address and port, and one to each peer.
+//! Sockets of a node's router: one for datagrams to the node's address and port, and one to each peer.
 //!
-//! Those to peers are connected: the kernel keeps the way there, and says when nobody listens. Their own port is any; what tells a
-//! node is its address.
+//! Those to peers are connected: the kernel reports when nothing listens. The address, not the port, identifies a node.
 
 use super::failure::Failure;
 use super::filter;
@@ -17,58 +16,59 @@ use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// What may wait in the kernel for the thread that reads: a hundredth of a second of 10 Gbit/s, small datagrams counted with what
-/// the kernel needs for each.
+/// Receive buffer in the kernel: a hundredth of a second of 10 Gbit/s, including the kernel's overhead for small
+/// datagrams.
 const RECEIVE_BYTES: usize = 8 << 20;
-/// The same for what is not real time: what waits longer than this takes at 100 MiB/s is late, and who reads it may have to wait itself.
+/// The same for what is not real time: packages that wait longer than this takes at 100 MiB/s are late, and the reader
+/// may have to wait itself.
 pub(super) const REST_BYTES: usize = 2 << 20;
-/// Expedited forwarding (RFC 3246), for switches and radios that know it; and the highest priority in this computer's own queues
-/// that needs no rights.
+/// Expedited forwarding (RFC 3246), for switches and radios that know it; and the highest priority in this computer's
+/// own queues that needs no rights.
 const TRAFFIC_CLASS: u32 = 46 << 2;
 const PRIORITY: u32 = 6;
-/// Reading ends after so long without a datagram. The kernel counts it in ticks of its slow timers, which costs less than it
-/// does to sleep.
+/// Reading ends after this long without a datagram. A timeout in the kernel costs less than a sleep.
 pub(super) const LISTEN: Duration = Duration::from_millis(100);
-/// Room for a stamp and a count, and what the kernel puts around them.
+/// Room for a stamp and a count, and the kernel's heads of them.
 const CONTROL_BYTES: usize = 64;
-/// When reading fails.
+/// Pause after a failed read.
 const PAUSE: Duration = Duration::from_millis(1);
 
 /// Why a router cannot use its address.
 #[derive(Debug, thiserror::Error)]
 pub enum SocketError {
-    /// Somebody is there.
+    /// Another process uses it.
     #[error(
-        "{0} is in use: does the router of this node run already, its launch (which keeps this for it), or another program? Stop it, or choose another `port` in \
-         [network], the same on all nodes"
+        "{0} is in use: does the router of this node run already, its launch (which keeps this for it), or another \
+         program? Stop it, or choose another `port` in [network], the same on all nodes"
     )]
     InUse(SocketAddr),
     /// It is another computer's address.
     #[error(
-        "{0} is no address of this computer: launch this node on the computer that has it, or correct its `address` in the \
-         configuration (`ip addr` shows which there are)"
+        "{0} is no address of this computer: launch this node on the computer that has it, or correct its `address` in \
+         the configuration (`ip addr` shows which there are)"
     )]
     NotHere(SocketAddr),
-    /// What was kept for the router is not its socket.
+    /// The inherited socket is not bound to the router's address.
     #[error("the socket that was handed to this router is bound to {1}, and not to {0}; launch the node anew")]
     Strange(SocketAddr, String),
-    /// The system says no for another reason.
+    /// Another error of the system.
     #[error("{1} for {0}: {2}")]
     Io(SocketAddr, &'static str, io::Error),
 }
 
-/// What reading a socket brought.
+/// Result of a read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Received {
     /// A datagram.
     Datagram {
         /// How long it is.
         bytes: usize,
-        /// Who sent it.
+        /// Source address.
         source: IpAddr,
         /// How long it has waited in the kernel until now, ns; 0 if the kernel did not say.
         waited_ns: u64,
-        /// Datagrams that the kernel had dropped at this socket when it came, modulo 2^32: of strangers, or since the socket was full.
+        /// Datagrams that the kernel had dropped at this socket when it came, modulo 2^32: of strangers, or because the
+        /// socket was full.
         dropped: u32,
     },
     /// Nothing came for [`LISTEN`].
@@ -77,9 +77,10 @@ pub(super) enum Received {
     Closed,
 }
 
-/// The sockets of a node's router, for who keeps them while routers come and go ([`Parts::sockets`](super::Parts)): of this port, and of that of what is not
-/// real time. What peers send meanwhile waits in the kernel, with the time at which it came; what has waited for too long is not delivered. From the first on that
-/// cannot be opened now they are missing: each router opens these itself, or says why it cannot.
+/// Sockets of a node's router for a process that keeps them while routers come and go
+/// ([`Parts::sockets`](super::Parts)): of this port, and of the port for what is not real time. Datagrams that come
+/// meanwhile wait in the kernel, with their time of arrival; those that wait too long are dropped. From the first
+/// socket on that cannot be opened now the rest is missing: each router opens these itself, or reports why it cannot.
 pub fn listen(own: IpAddr, (port, rest): (u16, Option<u16>), peers: &[IpAddr]) -> Vec<OwnedFd> {
     let ports = std::iter::once((port, RECEIVE_BYTES)).chain(rest.map(|port| (port, REST_BYTES)));
     let open = |(port, bytes)| InSocket::open((own, port).into(), peers, bytes).map(|inside| inside.socket.into());
@@ -91,18 +92,17 @@ pub(super) struct InSocket {
     socket: UdpSocket,
     port: u16,
     closed: AtomicBool,
-    /// Another process has it too, and keeps it for who comes after.
+    /// Another process has it too, and keeps it for later routers.
     is_kept: bool,
-    /// What may wait in the kernel, bytes; less than asked for if the system's limit is lower.
+    /// Receive buffer in the kernel, bytes; less than asked for if the system's limit is lower.
     pub(super) receive_bytes: usize,
 }
 
 impl InSocket {
-    /// What should be able to wait in the kernel.
+    /// Wanted receive buffer.
     pub(super) const WANTED_BYTES: usize = RECEIVE_BYTES;
 
-    /// Binds the node's own address and port. Not shared with anybody: two routers of one node would each get some datagrams.
-    /// It takes what comes from `peers`, and nothing else.
+    /// Binds the node's own address and port, exclusively. It takes only datagrams from `peers`.
     pub(super) fn open(own: SocketAddr, peers: &[IpAddr], bytes: usize) -> Result<Self, SocketError> {
         let socket = new_socket(own).map_err(|error| SocketError::Io(own, "making a socket", error))?;
         bind(&socket, own)?;
@@ -137,7 +137,7 @@ impl InSocket {
             // Without the right to go beyond the limit, up to the limit.
             socket.set_recv_buffer_size(bytes).map_err(failed("SO_RCVBUF"))?;
         }
-        // The kernel tells twice what was asked for: it counts what it needs itself.
+        // The kernel reports twice the requested size: it includes its own overhead.
         let receive_bytes = socket.recv_buffer_size().map_err(failed("SO_RCVBUF"))? / 2;
         setsockopt(&socket, sockopt::ReceiveTimestampns, &true).map_err(|e| failed("SO_TIMESTAMPNS")(e.into()))?;
         setsockopt(&socket, sockopt::RxqOvfl, &1).map_err(|e| failed("SO_RXQ_OVFL")(e.into()))?;
@@ -157,13 +157,13 @@ impl InSocket {
             Ok(message) => message,
             Err(Errno::EAGAIN | Errno::EINTR) => return Received::Nothing,
             Err(_) => {
-                // The kernel lacks memory, and a real-time thread must not ask it again and again.
+                // The kernel lacks memory, and a real-time thread must not retry at once.
                 std::thread::sleep(PAUSE);
                 return Received::Nothing;
             }
         };
         let source = message.address.as_ref().and_then(address);
-        // Closed meanwhile: then nobody sent what was read.
+        // Closed meanwhile: what was read has no sender.
         let Some(source) = source else { return Received::Nothing };
         let (mut waited_ns, mut dropped) = (0, 0);
         for control in message.cmsgs().into_iter().flatten() {
@@ -179,21 +179,21 @@ impl InSocket {
         Received::Datagram { bytes: message.bytes, source, waited_ns, dropped }
     }
 
-    /// Sends a datagram to the router at an address; never waits, whatever the way there is like.
+    /// Sends a datagram to the router at an address; never waits.
     pub(super) fn answer(&self, to: IpAddr, datagram: &[u8]) {
         let at = SocketAddr::new(to, self.port).into();
-        // A refusal that does not leave is as good as one that was lost: the next one comes a second later.
+        // A refusal that does not leave counts as lost: the next one comes a second later.
         let _ = SockRef::from(&self.socket).send_to_with_flags(datagram, &at, MsgFlags::MSG_DONTWAIT.bits());
     }
 
-    /// Ends the reading, also of a thread that blocks in it; of a socket that is kept, after [`LISTEN`].
+    /// Ends the reading, even of a blocked thread; for a socket that is kept, after [`LISTEN`].
     pub(super) fn close(&self) {
         self.closed.store(true, Ordering::Release);
         if self.is_kept {
-            // It would be shut down for those who come after as well.
+            // A shutdown would also affect later routers.
             return;
         }
-        // An unconnected socket answers that it is not connected, and wakes its readers all the same.
+        // An unconnected socket answers that it is not connected, and wakes its readers nevertheless.
         let _ = SockRef::from(&self.socket).shutdown(Shutdown::Both);
     }
 }
@@ -202,14 +202,14 @@ impl InSocket {
 pub(super) struct OutSocket {
     own: IpAddr,
     peer: SocketAddr,
-    /// So many bytes may wait in the kernel at least; what is more fails.
+    /// At least this many bytes may wait in the kernel; more fail.
     waiting_bytes: usize,
-    /// None while there is no way there, as when the network is down.
+    /// None while there is no route, as when the network is down.
     socket: Option<Socket>,
 }
 
 impl OutSocket {
-    /// With room in the kernel for so many bytes at least, and for what is usual.
+    /// With a send buffer of at least this many bytes, and at least the default.
     pub(super) fn new(own: IpAddr, peer: SocketAddr, waiting_bytes: usize) -> Self {
         Self { own, peer, waiting_bytes, socket: connect(own, peer, waiting_bytes).ok() }
     }
@@ -221,11 +221,11 @@ impl OutSocket {
         !matches!(poll(&mut fds, PollTimeout::ZERO), Ok(0))
     }
 
-    /// Sends these parts as one datagram; never waits. While the network card has more than it can send it fails: what waits then waits in the
-    /// router's queue, where important packages overtake.
+    /// Sends these pieces as one datagram; never waits. It fails while the network card has more than it can send:
+    /// packages then wait in the router's queue, where important ones overtake.
     ///
     /// # Errors
-    /// The datagram was not sent, or not because of what became of an earlier one.
+    /// The datagram was not sent, or not because of an error of an earlier one.
     pub(super) fn send(&mut self, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
         let socket = match &mut self.socket {
             Some(socket) => socket,
@@ -240,13 +240,13 @@ impl OutSocket {
         let Err(error) = sent else { return Ok(()) };
         let failure = Failure::of(&error);
         match failure {
-            // What an earlier datagram brought back. This one was not sent; once more, without the error in its way.
+            // The error of an earlier datagram. This one was not sent: it is sent again, now without the error.
             Failure::NobodyThere => {
                 let again = socket.send_vectored(parts);
                 again.map(drop).map_err(|error| Failure::of(&error)).and(Err(Failure::NobodyThere))
             }
             Failure::NoWay => {
-                // The address may have gone, and come back: begin anew.
+                // The address may have gone and come back: open a new socket.
                 self.socket = None;
                 Err(failure)
             }
@@ -263,15 +263,15 @@ fn address(of: &SockaddrStorage) -> Option<IpAddr> {
 fn connect(own: IpAddr, peer: SocketAddr, waiting_bytes: usize) -> io::Result<Socket> {
     let socket = new_socket(peer)?;
     socket.set_nonblocking(true)?;
-    // The kernel tells twice what was asked for. Never less than what is usual.
+    // The kernel reports twice the requested size. Never less than the default.
     let is_less = socket.send_buffer_size()? < 2 * waiting_bytes;
     if is_less && setsockopt(&socket, sockopt::SndBufForce, &waiting_bytes).is_err() {
         socket.set_send_buffer_size(waiting_bytes)?;
     }
     socket.bind(&SocketAddr::new(own, 0).into())?;
-    // Refusals are not worth a failure: the network then treats these datagrams as all others.
+    // A refusal of the option is no failure: the network then treats these datagrams like others.
     let _ = if peer.is_ipv4() { socket.set_tos_v4(TRAFFIC_CLASS) } else { socket.set_tclass_v6(TRAFFIC_CLASS) };
-    // After the class, which brings a priority along.
+    // After the class, which sets a priority.
     let _ = socket.set_priority(PRIORITY);
     socket.connect(&peer.into())?;
     Ok(socket)
@@ -286,7 +286,7 @@ fn new_socket(of: SocketAddr) -> io::Result<Socket> {
     Ok(socket)
 }
 
-/// Binds; the errors that users can do something about say what.
+/// Binds; errors that users can fix say how.
 fn bind(socket: &Socket, own: SocketAddr) -> Result<(), SocketError> {
     socket.bind(&own.into()).map_err(|error| match error.kind() {
         io::ErrorKind::AddrInUse => SocketError::InUse(own),
@@ -304,7 +304,7 @@ mod tests {
     const ONE: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 1));
     const OTHER: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
 
-    /// A port that nobody uses just now.
+    /// A port that is free now.
     fn free_port(address: IpAddr) -> u16 {
         UdpSocket::bind((address, 0)).unwrap().local_addr().unwrap().port()
     }
@@ -379,7 +379,7 @@ mod tests {
             matches!(error, SocketError::InUse(_)) && error.to_string().contains("choose another `port`"),
             "{error}"
         );
-        // Set aside for documentation (RFC 5737), so nobody has it.
+        // Reserved for documentation (RFC 5737), so no computer has it.
         let error = InSocket::open("192.0.2.1:21117".parse().unwrap(), &[], REST_BYTES).err().unwrap();
         assert!(
             matches!(error, SocketError::NotHere(_)) && error.to_string().contains("correct its `address`"),
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn who_never_waits_has_room_for_what_it_asked_for() {
+    fn a_socket_that_never_waits_has_the_room_it_asked_for() {
         let at = SocketAddr::new(ONE, free_port(ONE));
         let there = InSocket::open(at, &[ONE], REST_BYTES).unwrap();
         let usual = OutSocket::new(ONE, at, 0).socket.unwrap();
@@ -397,7 +397,7 @@ mod tests {
             let mut sender = OutSocket::new(ONE, at, bytes);
             let socket = sender.socket.as_ref().unwrap();
             assert!(socket.nonblocking().unwrap());
-            // Beyond the system's limit it takes a right.
+            // Beyond the system's limit a right is needed.
             let limit = std::fs::read_to_string("/proc/sys/net/core/wmem_max").unwrap().trim().parse().unwrap();
             let least = usual.send_buffer_size().unwrap().max(2 * bytes.min(limit));
             assert!(socket.send_buffer_size().unwrap() >= least, "{bytes}");

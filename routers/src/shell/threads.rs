@@ -1,4 +1,4 @@
-//! What the threads of a router share, and how they are scheduled.
+//! State that the threads of a router share, and their scheduling.
 
 use rohrpost_config::FIFO_MAX;
 use rohrpost_mailbox::{Participant, sys};
@@ -6,26 +6,27 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Above every module: a router that waits for a module's work keeps others' packages waiting. This is the thread that sends.
+/// Of the sending thread. Above every module: a router that waits for a module delays other modules' packages.
 pub(super) const DEPARTURES_FIFO: u8 = FIFO_MAX + 9;
-/// Of the thread that receives: a flood of what leaves must not keep answers from coming in; it sleeps whenever the socket is empty.
+/// Of the receiving thread: a flood of outgoing packages must not keep answers from coming in. It sleeps when the
+/// socket is empty.
 pub(super) const ARRIVALS_FIFO: u8 = DEPARTURES_FIFO + 1;
-/// A thread that has not slept for so long is made to, for this short time. A flood that a processor cannot carry would keep a router
-/// awake for good, and it stands above all modules: so those on its processor get a little of each of these spans, and the kernel,
-/// which ends real-time processes that work without pause (RLIMIT_RTTIME), has no reason to.
+/// A thread that has not slept for this long sleeps for a short time. A flood could keep a router awake forever, and it
+/// runs above all modules. So the modules on its processor get a part of each of these spans, and the kernel, which
+/// kills real-time processes that never sleep (RLIMIT_RTTIME), has no reason to.
 const AWAKE_MAX_NS: u64 = 2_000_000;
 const PAUSE_NS: u64 = 50_000;
-/// Who was away for so long has slept, and others had the processor.
+/// A thread that was off the processor for this long has slept, and others ran.
 const SLEPT_NS: u64 = 10_000;
 
-/// What both threads see.
+/// State that both threads share.
 pub(super) struct Shared {
     ends: AtomicBool,
     /// When the sending thread wants to be woken, ns; it sleeps without a timeout, since that costs less.
     pub(super) departures_due_ns: AtomicU64,
-    /// Bytes of packets from the tunnel that wait in the queue, as the sending thread last saw it.
+    /// Bytes of tunnel packets in the queue, as the sending thread last saw it.
     pub(super) tunnel_bytes: AtomicU64,
-    /// Of the sending thread, whose bell wakes it.
+    /// The sending thread, with the bell that wakes it.
     tx_thread: Arc<Participant>,
 }
 
@@ -44,18 +45,19 @@ impl Shared {
         self.ends.load(Ordering::Acquire)
     }
 
-    /// From now on it does.
+    /// Ends the router.
     pub(super) fn end(&self) {
         self.ends.store(true, Ordering::Release);
         self.tx_thread.ring();
     }
 
-    /// Wakes the sending thread: it has something to send that nobody published.
+    /// Wakes the sending thread: it has something to send that was not published.
     pub(super) fn ring(&self) {
         self.tx_thread.ring();
     }
 
-    /// Wakes the sending thread if its time has come. Said again until that sleeps anew: who is about to sleep may not hear it.
+    /// Wakes the sending thread if it is due. Repeated until it sleeps anew: a thread that is about to sleep may miss a
+    /// ring.
     pub(super) fn ring_if_due(&self, now_ns: u64) {
         if self.departures_due_ns.load(Ordering::Acquire) <= now_ns {
             self.tx_thread.ring();
@@ -63,22 +65,22 @@ impl Shared {
     }
 }
 
-/// Sees to it that a thread sleeps now and then.
+/// Makes a thread sleep now and then.
 #[derive(Default)]
 pub(super) struct Awake {
-    /// Since when; none: since the next look.
+    /// Awake since then; none: since the next look.
     since_ns: Option<u64>,
 }
 
 impl Awake {
-    /// The thread was away for so long; what is very short was no sleep.
+    /// The thread was away for this long; very short spans are no sleep.
     pub(super) fn slept(&mut self, time: Duration) {
         if time.as_nanos() > SLEPT_NS.into() {
             self.since_ns = None;
         }
     }
 
-    /// Called again and again, with the time; pauses if the thread has not slept for long.
+    /// Call it again and again, with the time; it pauses if the thread has not slept for long.
     pub(super) fn pause_if_long(&mut self, now_ns: u64) {
         let since_ns = *self.since_ns.get_or_insert(now_ns);
         if now_ns.saturating_sub(since_ns) > AWAKE_MAX_NS {
@@ -88,16 +90,16 @@ impl Awake {
     }
 }
 
-/// Schedules the calling thread above all modules. If that is not allowed, it runs as the rest of its process does.
+/// Schedules the calling thread above all modules. If that is not allowed, it keeps the scheduling of its process.
 ///
 /// # Errors
-/// What the system said.
+/// The system's error.
 pub(super) fn schedule(fifo: u8) -> std::io::Result<()> {
     sys::schedule(sys::Scheduling::Fifo(fifo))
 }
 
-/// Schedules the calling thread as modules are that are not real time: below all that are, whatever its process is.
+/// Schedules the calling thread like modules that are not real time: below all that are, whatever its process is.
 pub(super) fn schedule_below() {
-    // Who has real time may give it up.
+    // A thread may always give up real time.
     let _ = sys::schedule(sys::Scheduling::Normal(0));
 }

@@ -1,10 +1,10 @@
-//! The router's mailbox: its name, its shape, and the names for which packages go there.
+//! The router's mailbox: its name, its shape, and the names that are routed to it.
 
 use rohrpost_config::TRANSIT;
 use rohrpost_mailbox::{Name, Shape, local};
 use rohrpost_network::Route;
 
-/// The ranges of names that lie on other nodes, as the mailboxes of a node want them; neighbours become one.
+/// The ranges of names on other nodes, as the mailboxes of a node want them; adjacent ones are merged.
 pub(super) fn ranges(routes: &[Route]) -> Vec<(Name, Name)> {
     let mut ranges: Vec<(Name, Name)> = Vec::new();
     for route in routes {
@@ -21,7 +21,7 @@ pub(crate) fn name(router: Name) -> Name {
     router.with_local(local::TRANSIT)
 }
 
-/// What that mailbox is made as: the same in each incarnation of the router, so that what waits there outlives it.
+/// Shape of that mailbox: the same in each incarnation of the router, so that packages in it outlive the router.
 pub(crate) fn shape() -> Shape {
     Shape {
         slots: TRANSIT.slots,

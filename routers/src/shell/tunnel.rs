@@ -1,11 +1,13 @@
-//! Ordinary traffic between nodes in time slots: a TUN device, whose packets go behind all packages of modules.
+//! Ordinary traffic between nodes in time slots: a TUN device with packets that go behind all packages of modules.
 //!
 //! ```text
-//!  ssh, HTTP ─▶ kernel ─▶ rohrpost0 ─ tunnel-out ─▶ router.I.3 ─▶ level 31 ═ slots ═▶ router.J.4 ─ tunnel-in ─▶ rohrpost0 ─▶ kernel
+//!  ssh, HTTP ─▶ kernel ─▶ rohrpost0 ─ tunnel-out ─▶ router.I.3 ─▶ level 31 ═ slots
+//!  slots ═▶ router.J.4 ─ tunnel-in ─▶ rohrpost0 ─▶ kernel
 //! ```
 //!
-//! An IP packet is a package like any other, of the least priority, with a quota of its own. Little of it may wait in the queue: then packets are
-//! dropped, which is how TCP learns how much a network carries. Both threads are ordinary ones.
+//! An IP packet is a package like any other, of the least priority, with a quota of its own. Only a little of it may
+//! wait in the queue: more packets are dropped, which is how TCP learns the capacity of a network. Both threads are
+//! ordinary ones.
 
 use super::sender_cache::SenderCache;
 use super::threads::Shared;
@@ -31,17 +33,17 @@ use std::time::Duration;
 const DEVICE: &str = "rohrpost%d";
 /// Largest packet, where the largest datagram has room for it.
 const MTU_MAX: usize = 1500;
-/// What may wait in the queue, of this node's packets alone: 64 of the largest. More are dropped.
+/// Limit in the queue, for this node's packets alone: 64 of the largest. More are dropped.
 const WAITING_BYTES_MAX: u64 = 64 * (MTU_MAX as u64).next_multiple_of(KEPT_IN_BYTES);
 /// Slots of the mailbox that packets come to.
 const SLOTS: u16 = 64;
-/// The threads look this often whether the router ends.
+/// The threads check this often whether the router ends.
 const LOOK: Duration = Duration::from_millis(100);
 const LOOK_MS: u8 = 100;
 
 const _: () = assert!(WAITING_BYTES_MAX <= QUOTA_BYTES_MIN as u64, "it is dropped here before its quota drops it");
 
-/// What went through the tunnel.
+/// Counters of the tunnel.
 #[derive(Default, Debug)]
 pub struct Passed {
     /// Packets handed to the router for other nodes.
@@ -52,7 +54,7 @@ pub struct Passed {
     pub stray: Count,
     /// Packets from other nodes, handed to the kernel.
     pub received: Count,
-    /// Packets that somebody of this node put there in the name of another, or that the kernel did not take.
+    /// Packets that a program of this node put there in another's name, or that the kernel did not take.
     pub refused: Count,
 }
 
@@ -65,7 +67,7 @@ pub(super) struct Device {
 impl Device {
     /// Makes it, in the network that the calling thread is in, and gives it the node's address.
     pub(super) fn open(settings: &Settings, tunnel: &Tunnel) -> io::Result<Self> {
-        // In one datagram, never in parts.
+        // In one datagram, never in fragments.
         let mtu = MTU_MAX.min(settings.datagram_bytes() - DIRECT_HEAD_BYTES);
         let (file, name) = sys::tun(DEVICE)?;
         let device = nix::net::if_::if_nametoindex(name.as_str())?;
@@ -81,7 +83,7 @@ impl Device {
     }
 }
 
-/// What both threads know.
+/// State of both threads.
 struct Common {
     shared: Arc<Shared>,
     device: Device,
@@ -110,7 +112,8 @@ pub(super) struct In {
 #[derive(Debug, thiserror::Error)]
 pub(super) enum TunnelError {
     #[error(
-        "{0}; it needs CAP_NET_ADMIN, and /dev/net/tun (`modprobe tun`; in a container `--cap-add=NET_ADMIN --device /dev/net/tun`)"
+        "{0}; it needs CAP_NET_ADMIN, and /dev/net/tun (`modprobe tun`; in a container `--cap-add=NET_ADMIN --device \
+         /dev/net/tun`)"
     )]
     Device(#[from] io::Error),
     #[error(transparent)]
@@ -186,7 +189,7 @@ impl In {
         let (Common { shared, device, passed }, admission) = (&mut self.common, &self.admission);
         while !shared.ends() {
             let Some(packet) = self.mailbox.receive_timeout(LOOK) else { continue };
-            // What came from other nodes was looked at on its way in; this mailbox is open to all of this node.
+            // Packets from other nodes were checked on their way in, but this mailbox is open to all of this node.
             let node = admission.tunnel_end(packet.head().from);
             let is_packet = node.is_some_and(|node| admission.is_packet_of(node, packet.body()));
             let taken = is_packet && device.file.write(packet.body()).is_ok();
@@ -196,7 +199,7 @@ impl In {
     }
 }
 
-/// The node that a packet of the own node is for: both have an address of the tunnel.
+/// The node that a packet of this node is for: both have an address of the tunnel.
 fn node_of(ends: &Addresses, tunnel: &Tunnel, own: NodeIndex, nodes: NodeIndex) -> Option<NodeIndex> {
     let is_own = ends.source == IpAddr::from(tunnel.address(own));
     (0..nodes).find(|node| is_own && ends.destination == IpAddr::from(tunnel.address(*node)))

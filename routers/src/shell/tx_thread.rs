@@ -1,10 +1,11 @@
-//! The thread that reads the router's mailbox and sends to other nodes what is real time. The rest it hands to the thread of [`rest`](super::rest).
+//! The thread that reads the router's mailbox and sends what is real time to other nodes. It hands the rest to the
+//! thread of [`rest`](super::rest).
 //!
 //! ```text
-//!  transit mailbox ─┬▶ accept ─┬─ at once: head of the frame + body where it lies ─▶ one sendmsg
-//!                   │          └─ queue ─▶ poll ─▶ datagram ─▶ socket of the peer      between any two, the mailbox is looked at
-//!                   └▶ not real time: a batch, as long as there is an empty one; else it stays in the mailbox, and rings nobody. If it says that
-//!                      it is more urgent than it may, it is lost to its quota
+//!  transit mailbox ─┬▶ accept ─┬─ at once: head of the frame + body without a copy ─▶ one sendmsg
+//!                   │          └─ queue ─▶ poll ─▶ datagram ─▶ socket of the peer      mailbox checked between any two
+//!                   └▶ not real time: a batch, if there is an empty one; else it stays in the mailbox, without a ring.
+//!                      With a claimed priority above the permitted one it is lost to its quota
 //! ```
 
 use super::handover::Giver;
@@ -20,7 +21,7 @@ use std::time::{Duration, Instant};
 /// Packages taken from the mailbox before the wire has its turn: enough to fill a datagram with small ones.
 const BURST: usize = 64;
 
-/// What the sending thread has.
+/// State of the sending thread.
 pub(super) struct TxThread {
     pub(super) shared: Arc<Shared>,
     pub(super) transit: Receiver,
@@ -39,7 +40,7 @@ impl TxThread {
             let now_ns = monotonic_ns();
             match self.sending.step(now_ns) {
                 None => {}
-                // All that was taken has left, or is lost.
+                // All accepted packages have left, or are lost.
                 Some(_) if more && self.sending.stats.waiting_bytes.get() == 0 => {}
                 Some(until_ns) if more => awake.slept(self.rest(now_ns, until_ns)),
                 Some(until_ns) => {
@@ -52,9 +53,10 @@ impl TxThread {
         }
     }
 
-    /// Takes what waits in the mailbox, most important first; whether there may be more for it. With plenty in the queue it takes one: the
-    /// most important of all that came since. A flood that is taken in faster than it leaves would only be lost to its quota there, and
-    /// cost the processor that modules need; in the mailbox its least important gives way by itself.
+    /// Takes packages from the mailbox, most important first; returns whether there may be more. With plenty in the
+    /// queue it takes one: the most important of all that came since. A flood taken in faster than it leaves would only
+    /// be lost to its quota there, and cost processor time that modules need; in the mailbox the least important is
+    /// displaced anyway.
     fn take(&mut self) -> bool {
         let more = self.take_some();
         if let Some(rest) = &mut self.rest {
@@ -78,7 +80,8 @@ impl TxThread {
                 if rest.takes() {
                     rest.give(head, published_ns, body);
                 } else {
-                    // It says that it is real time, and so lies above what is. There it cannot stay, and it does not go as if it were.
+                    // It claims to be real time, and so lies above what is. There it cannot stay, and it is not sent as
+                    // real time.
                     self.sending.displace(&package);
                 }
                 continue;
@@ -92,23 +95,24 @@ impl TxThread {
         true
     }
 
-    /// Whether what is not real time has to stay where it is.
+    /// Whether what is not real time must stay in the mailbox.
     fn lacks_room(&mut self) -> bool {
         self.rest.as_mut().is_some_and(|rest| !rest.takes())
     }
 
-    /// The pace holds the wire, and the mailbox holds more. Only what may leave before all that waits is worth waking up for.
+    /// The rate limit holds the wire, and the mailbox has more. Only a package that may leave before all queued ones is
+    /// worth a wake-up.
     fn rest(&mut self, now_ns: u64, until_ns: u64) -> Duration {
         let until_ns = until_ns.min(self.sending.wire.deliver(now_ns));
         let deadline = Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns));
         wait_above(&mut self.transit, self.sending.outbound.waits_up_to(), Some(deadline), || self.shared.ends())
     }
 
-    /// Sleeps until a package comes that it can take, or until then. If something `waits` to leave, that is exact, and costs a timer of the
-    /// kernel; else the thread that receives rings, within its own patience.
+    /// Sleeps until a package comes that it can take, or until then. If something `waits` to leave, that is exact, and
+    /// costs a timer of the kernel; else the receiving thread rings, within its own period.
     fn sleep(&mut self, now_ns: u64, until_ns: u64, waits: bool) -> Duration {
         let deadline = waits.then(|| Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns)));
-        // Before the look at the mailbox: who rings because of this time changes the bell that is slept on.
+        // Before the look at the mailbox: a thread that rings because of this time changes the bell that is slept on.
         self.shared.departures_due_ns.store(until_ns, Ordering::Release);
         let Self { shared, transit, rest, settings, .. } = self;
         let Some(rest) = rest.as_mut().filter(|rest| !rest.has_room()) else {

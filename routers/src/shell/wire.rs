@@ -1,11 +1,11 @@
-//! The sockets to all peers, and what goes wrong with them.
+//! The sockets to all peers, and their failures.
 //!
 //! ```text
 //!  datagram ─▶ seal ─▶ impair ─▶ socket of the peer ─┬─ taken
 //!                                                    └─ no room: kept; the peer is passed over until it has room again
 //! ```
 //!
-//! No thread ever waits in a socket: a device that stands still keeps up what is for its own peers, and nobody else.
+//! No thread ever waits in a socket: a stalled device delays only its own peers.
 
 use super::failure::{Failure, Failures};
 use super::news::News;
@@ -20,29 +20,30 @@ use rohrpost_network::Tdma;
 use std::io::IoSlice;
 use std::sync::Arc;
 
-/// A peer whose way has no room is looked at so often: in a tenth of the time in which what its socket holds leaves at 100 Mbit/s.
+/// A peer without socket room is checked this often: in a tenth of the time in which its socket's content leaves at 100
+/// Mbit/s.
 const RETRY_NS: u64 = 1_000_000;
-/// A datagram for which there is no room waits so long at most, as in time slots: what may be late is reckoned from when it was made.
+/// A datagram without room waits this long at most, as in time slots: lateness counts from when it was made.
 const STALLED_NS_MAX: u64 = 100_000_000;
-/// For a small datagram that waits the kernel counts about a KiB, and it doubles the room that it is asked for.
+/// For a small waiting datagram the kernel counts about a KiB, and it doubles the requested buffer.
 const DATAGRAM_KEPT_BYTES: usize = 512;
-/// The longest slot of the quickest link fills more than a computer should keep.
+/// The longest slot of the fastest link fills more than a computer should keep.
 const SLOT_BYTES_MAX: usize = 16 << 20;
 
-/// The sockets to all peers, and what goes wrong with them.
+/// The sockets to all peers, and their failures.
 pub(super) struct Wire {
     /// By node; none for the own one.
     sockets: Box<[Option<OutSocket>]>,
     sealing: Option<Sealing>,
     impairment: Option<Impairment<NodeIndex>>,
     failures: Arc<Failures>,
-    /// None where another thread tells the same.
+    /// None where another thread reports the same.
     news: Option<News>,
-    /// By node: what waits there for room; empty in time slots.
+    /// By node: the datagram that waits for room; empty in time slots.
     full: Box<[Stalled]>,
-    /// Whose way has no room, one bit each.
+    /// Peers without room, one bit each.
     full_ones: u64,
-    /// When they are looked at again, ns.
+    /// When they are checked again, ns.
     retry_ns: u64,
     /// A datagram in one piece, for the impairment.
     whole: Vec<u8>,
@@ -80,12 +81,13 @@ impl Wire {
         }
     }
 
-    /// Whether what leaves is sealed: [`Self::send_made`] does.
+    /// Whether datagrams are sealed: [`Self::send_made`] does it.
     pub(super) fn seals(&self) -> bool {
         self.sealing.is_some()
     }
 
-    /// Sends the first bytes of a buffer, with room for a seal behind them; sealed, if that is to be. What could not be sent is as it was.
+    /// Sends the first bytes of a buffer with room for a seal behind them; seals them if configured. An unsent datagram
+    /// is unchanged.
     pub(super) fn send_made(
         &mut self,
         now_ns: u64,
@@ -103,7 +105,7 @@ impl Wire {
         sent
     }
 
-    /// Sends a datagram as it is, or has the impairment keep it for a while.
+    /// Sends a datagram as it is, or lets the impairment delay it.
     pub(super) fn send(&mut self, now_ns: u64, to: NodeIndex, parts: &[IoSlice<'_>]) -> Result<(), Failure> {
         let Some(impairment) = &mut self.impairment else { return self.send_now(to, parts) };
         self.whole.clear();
@@ -113,7 +115,7 @@ impl Wire {
         Ok(())
     }
 
-    /// Sends what the impairment has kept for long enough; when it has more.
+    /// Sends datagrams that the impairment delayed long enough; returns when it has more.
     pub(super) fn deliver(&mut self, now_ns: u64) -> u64 {
         loop {
             let Some(impairment) = &mut self.impairment else { return u64::MAX };
@@ -123,7 +125,7 @@ impl Wire {
                     self.whole.clear();
                     self.whole.extend_from_slice(datagram);
                     let whole = std::mem::take(&mut self.whole);
-                    // As far as anybody knows, the network has lost it.
+                    // For the sender, the network has lost it.
                     let _ = self.send_now(to, &[IoSlice::new(&whole)]);
                     self.whole = whole;
                 }
@@ -137,7 +139,7 @@ impl Wire {
         let sent = if is_full { Err(Failure::Full) } else { socket.send(parts) };
         match (sent, self.full.get_mut(usize::from(to))) {
             (Err(Failure::Full), Some(stalled)) if !is_full => {
-                // Kept, and handed over when there is room. Nothing more is made for this peer until then.
+                // Kept, and sent when there is room. No other datagram is made for this peer until then.
                 stalled.keep(parts);
                 self.full_ones |= 1 << to;
                 self.retry_ns = self.retry_ns.min(stalled.since_ns + RETRY_NS);
@@ -152,12 +154,12 @@ impl Wire {
         sent
     }
 
-    /// The peers whose way has no room, one bit each, and when that is looked at again.
+    /// The peers without room, one bit each, and when they are checked again.
     pub(super) fn full(&self) -> (u64, u64) {
         (self.full_ones, self.retry_ns)
     }
 
-    /// Looks who has room again, if it is time to.
+    /// Checks which peers have room again, if it is due.
     pub(super) fn retry(&mut self, now_ns: u64) {
         if now_ns < self.retry_ns {
             return;
@@ -166,7 +168,7 @@ impl Wire {
         for (to, (socket, stalled)) in (0..).zip(self.sockets.iter_mut().zip(&mut self.full)) {
             let (Some(socket), true) = (socket, self.full_ones & 1 << to != 0) else { continue };
             if stalled.is_old(now_ns) {
-                // It has left as far as its packages' accounts know, and is lost on its way: its receiver will miss it.
+                // For its packages' accounts it has left; it is lost on its way, and its receiver will miss it.
                 stalled.datagram.clear();
                 self.failures.count(Failure::Full);
                 self.news.iter_mut().for_each(|news| news.fails(to, Failure::Full));
@@ -186,7 +188,7 @@ impl Wire {
     }
 }
 
-/// A datagram for which its socket has no room.
+/// A datagram without room in its socket.
 struct Stalled {
     /// Empty once it is lost.
     datagram: Vec<u8>,
@@ -205,7 +207,7 @@ impl Stalled {
     }
 }
 
-/// What the kernel keeps at most of what a node hands over in one of its slots, as it counts: small datagrams with what it needs for each.
+/// Largest kernel buffer for a node's datagrams of one slot, with the kernel's overhead for small ones.
 fn slot_bytes_max(tdma: &Tdma, own: NodeIndex) -> usize {
     let own = tdma.slots.iter().filter(|slot| slot.node == own);
     let longest = own.map(|slot| slot.length).max().unwrap_or_default();

@@ -1,11 +1,12 @@
-//! A bad network between a client and its server, where a test wants one: all bytes go through a thread that makes them late.
+//! A bad network between a client and its server, where a test wants one: all bytes go through a thread that makes them
+//! late.
 //!
 //! ```text
 //!  client ═ loopback ═▶ near ─▶ BandwidthQueue ─▶ far ═ TCP ═▶ server          and back by another BandwidthQueue
 //! ```
 //!
-//! The client and its kernel see what they would see of such a network: what a line does not carry yet is not read, so that it waits where it
-//! was sent from. When the client closes, what has not arrived at the server by then is gone.
+//! The client and its kernel see what they would see of such a network: what a line does not carry yet is not read, so
+//! that it waits where it was sent from. When the client closes, what has not arrived at the server by then is gone.
 
 use crate::impair::{BandwidthQueue, Settings};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
@@ -134,7 +135,8 @@ impl Work {
                 PollFd::new(near.as_fd(), up.wants(now_ns) | down.lacks()),
                 PollFd::new(far.as_fd(), down.wants(now_ns) | up.lacks()),
             ];
-            // What the server has said last may be on its way still. Of a socket that has ended poll would say so all the time.
+            // What the server has said last may be on its way still. Of a socket that has ended poll would say so all
+            // the time.
             let asked = if far_ended { &mut sockets[..1] } else { &mut sockets[..] };
             // Interrupted, it looks as well.
             let _ = poll(asked, millis(wait));
@@ -160,7 +162,7 @@ struct Direction {
     line: BandwidthQueue,
     /// Nothing more comes.
     is_over: bool,
-    /// Who is to get it takes nothing now.
+    /// The receiver takes nothing now.
     is_full: bool,
     /// Nor ever again.
     is_cut: bool,

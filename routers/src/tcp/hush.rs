@@ -1,4 +1,5 @@
-//! Lines about what others bring about: of one cause at most one a second, with how many were held back, so that nobody can fill a log.
+//! Lines about what others bring about: of one cause at most one a second, with how many were held back, so that nobody
+//! can fill a log.
 
 use crate::session::frame::Reason;
 

@@ -6,7 +6,8 @@
 //!                                          └ session::Server says what goes where
 //! ```
 //!
-//! Both are processes of their own, and ordinary ones: nothing here shares a thread with the router of the LAN, or runs before a module.
+//! Both are processes of their own, and ordinary ones: nothing here shares a thread with the router of the LAN, or runs
+//! before a module.
 
 mod bad_line;
 mod client;

@@ -1,17 +1,20 @@
-//! How fast a connection takes bytes, and how many of them the kernel is to hold by that: what it holds can be overtaken by nothing.
+//! How fast a connection takes bytes, and how many of them the kernel is to hold by that: what it holds can be
+//! overtaken by nothing.
 //!
 //! ```text
-//!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if it was wanted all the time
+//!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if always wanted
 //! ```
 //!
-//! As long as nothing is known little is held at a time; a connection that takes much more than that and is never full is fast.
+//! As long as nothing is known little is held at a time; a connection that takes much more than that and is never full
+//! is fast.
 
 use crate::session::BATCH_BYTES;
 
 /// What the kernel may keep before it has sent it: what leaves in so long.
 const UNSENT_NS: u64 = 250_000_000;
-/// The same and what is under way to the other end: what leaves in so long, or in twice the way there and back. With less than that way takes
-/// in, the connection would be no faster than what is held, and so on ever less; twice that lets it grow.
+/// The same and what is under way to the other end: what leaves in so long, or in twice the way there and back. With
+/// less than that way takes in, the connection would be no faster than what is held, and so on ever less; twice that
+/// lets it grow.
 const HELD_NS: u64 = 1_000_000_000;
 const UNSENT_BYTES_MIN: u64 = 4 * 1024;
 const UNSENT_BYTES_MAX: u64 = 32 * 1024;
@@ -24,7 +27,8 @@ const HELD_BYTES_MAX: u64 = 192 * 1024;
 const HELD_BYTES_FREE: u64 = 64 * 1024 * 1024;
 /// With less, a second and more lies between a byte and word of it, however little the kernel holds.
 const SLOW_BYTES_S: u64 = 64 * 1024;
-/// The rate is that over so long, or over the way there and back, or over so many bytes: at first a connection takes more than leaves.
+/// The rate is that over so long, or over the way there and back, or over so many bytes: at first a connection takes
+/// more than leaves.
 const WINDOW_NS: u64 = 500_000_000;
 const WINDOW_BYTES: u64 = 256 * 1024;
 const SECOND_NS: u128 = 1_000_000_000;
@@ -167,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn who_pauses_once_is_soon_as_fast_as_before_and_who_has_little_to_send_is_not_slow() {
+    fn a_connection_is_soon_fast_again_after_a_pause_and_not_slow_for_lack_of_data() {
         let mut pace = Pace::default();
         run(&mut pace, 0, 2000, 1000);
         // It takes nothing for seven seconds.
@@ -182,7 +186,8 @@ mod tests {
         assert_eq!(pace.rate, None);
     }
 
-    /// A line that carries so many bytes a ms, so long there and back, of which no more is under way than is held: what is held at the end.
+    /// A line that carries so many bytes a ms, so long there and back, of which no more is under way than is held: what
+    /// is held at the end.
     fn run_held(bytes_ms: u64, round_trip_ms: u64) -> u64 {
         let (mut pace, mut held) = (Pace::default(), 8 * 1024);
         pace.set_round_trip(Some(round_trip_ms * MS));

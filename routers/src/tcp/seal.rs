@@ -1,5 +1,5 @@
-//! TLS 1.3 under a session, with certificates on both sides: who reads the wire learns nothing, and who takes part has a certificate of the
-//! installation. A certificate says by its DNS name whose it is:
+//! TLS 1.3 under a session, with certificates on both sides: eavesdroppers learn nothing, and each client has a
+//! certificate of the installation. A certificate names its owner by its DNS name:
 //!
 //! ```text
 //!  tcp-router.rohrpost          the TCP router
@@ -20,7 +20,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Whose certificates these are.
+/// Owner of these certificates.
 const REALM: &str = "rohrpost";
 const ROUTER: &str = "tcp-router";
 const SYSTEM: &str = "system-";
@@ -31,7 +31,7 @@ pub const AUTHORITY: &str = "ca";
 /// Plain and sealed bytes that a connection keeps until the socket takes them, at most.
 const KEPT_BYTES: usize = 32 * 1024;
 
-/// Who shows a certificate.
+/// The end that shows a certificate.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Holder {
     /// The TCP router.
@@ -84,7 +84,7 @@ pub enum SealError {
     Unfit(PathBuf, String),
 }
 
-/// Who has signed the certificates of an installation.
+/// The authority that signs the certificates of an installation.
 pub struct Authority {
     /// What people call it.
     pub name: String,
@@ -268,8 +268,8 @@ impl Sealed {
         Ok(())
     }
 
-    /// Takes bytes to be sealed, as long as the socket takes what was sealed before; how many. What was sealed together is opened together,
-    /// and nothing goes before it: of a slow connection that is little.
+    /// Takes bytes to be sealed, as long as the socket takes what was sealed before; how many. What was sealed together
+    /// is opened together, and nothing goes before it: of a slow connection that is little.
     pub(super) fn write(&mut self, bytes: &[u8], together: usize, socket: &mut impl io::Write) -> io::Result<usize> {
         let mut taken = 0;
         self.flush(socket)?;
@@ -303,7 +303,7 @@ impl Sealed {
         }
     }
 
-    /// Who the other end is, by its certificate, as soon as that was shown and holds.
+    /// Identity of the other end, by its certificate, as soon as that was shown and holds.
     pub(super) fn holder(&self) -> Option<Holder> {
         let shown = self.0.peer_certificates().filter(|_| !self.0.is_handshaking())?;
         let certificate = webpki::EndEntityCert::try_from(shown.first()?).ok()?;
@@ -321,7 +321,9 @@ fn words(error: &Error) -> String {
             format!("its certificate has expired; {NEW}")
         }
         Error::InvalidCertificate(CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. }) => {
-            "its certificate is not valid yet; is the date right at both ends?".into()
+            "its certificate is not valid yet; \
+                     is the date right at both ends?"
+                .into()
         }
         Error::InvalidCertificate(CertificateError::UnknownIssuer | CertificateError::BadSignature) => {
             format!("its certificate is foreign: {FOREIGN}")
@@ -338,7 +340,8 @@ fn words(error: &Error) -> String {
             // It says the same of one that does not hold yet.
             AlertDescription::CertificateExpired => {
                 format!(
-                    "it refuses this end's certificate as expired, or not valid yet; is the date right at both ends? If so, {NEW}"
+                    "it refuses this end's certificate as expired, or not valid yet; \
+                     is the date right at both ends? If so, {NEW}"
                 )
             }
             AlertDescription::UnknownCA | AlertDescription::DecryptError => {

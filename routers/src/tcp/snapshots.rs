@@ -1,4 +1,4 @@
-//! How a client and the server are, as their threads last said: for whoever publishes it.
+//! State of a client and the server, as their threads last stored it, for the thread that publishes it.
 
 use crate::session::server::Crowded;
 use crate::session::{Cause, Counts};
@@ -126,7 +126,7 @@ pub struct Member {
     pub age_ns: u64,
     /// Time since something came from it, ns.
     pub heard_ns: u64,
-    /// Packages lost in queues since it, or who connects as the same, sent more than its part of them.
+    /// Packages lost in queues since it, or another connection of its principal, sent more than its share.
     pub lost: u64,
     /// Bytes of memory that it takes up, with what waits for it.
     pub bytes: u64,
@@ -143,7 +143,7 @@ pub struct Members {
     pub left: u64,
     /// Connections that were told why they may not take part, or not any more.
     pub refused: u64,
-    /// Who was the last of them, and why; empty without one.
+    /// The last of them, and why; empty without one.
     pub refusal: String,
     /// What went beyond the part of one certificate, or one address.
     pub crowded: Crowded,

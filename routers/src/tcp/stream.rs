@@ -28,8 +28,8 @@ pub struct Stream {
     pace: Pace,
 }
 
-/// A socket whose kernel is asked before each piece whether it holds enough already: it asks itself only before it begins a piece of its
-/// own, which may have 64 KiB.
+/// A socket. Before each piece the kernel is asked whether it holds enough already: it checks itself only before it
+/// begins a piece of its own, which may have 64 KiB.
 #[derive(Debug)]
 struct Paced {
     socket: TcpStream,
@@ -142,7 +142,8 @@ impl Stream {
         self.pace.is_slow()
     }
 
-    /// How many bytes are made ready for it at a time, so that what comes then waits no longer than it would in the kernel.
+    /// How many bytes are made ready for it at a time, so that what comes then waits no longer than it would in the
+    /// kernel.
     pub(super) fn batch_bytes(&self) -> usize {
         self.pace.batch_bytes()
     }
@@ -160,12 +161,12 @@ impl Stream {
         self.sealed.as_ref().is_some_and(Sealed::has_unsent)
     }
 
-    /// Who the other end is, if it has shown that.
+    /// Identity of the other end, if it has proved one.
     pub(super) fn holder(&self) -> Option<Holder> {
         self.sealed.as_ref().and_then(Sealed::holder)
     }
 
-    /// Whether the other end must show who it is.
+    /// Whether the other end must prove its identity.
     pub(super) fn is_sealed(&self) -> bool {
         self.sealed.is_some()
     }

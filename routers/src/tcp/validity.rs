@@ -1,22 +1,37 @@
 //! Until when a certificate holds, so that it is renewed before.
 
-use rustls::crypto::ring;
+use rustls::pki_types::CertificateDer;
 use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, UnixTime};
 use std::path::Path;
-use std::time::Duration;
+use x509_cert::Certificate;
+use x509_cert::der::Decode;
 
-/// A moment at which none holds any more: what is encoded ends with the year 9999.
-const NEVER: UnixTime = UnixTime::since_unix_epoch(Duration::from_secs(1 << 40));
-
-/// The last second since 1970 in which a certificate holds, whoever has signed it; none if the file is none.
+/// The last second since 1970 in which a certificate holds, regardless of its signature; none if the file is no certificate.
 pub fn holds_until_s(path: &Path) -> Option<u64> {
-    let shown = CertificateDer::from_pem_file(path).ok()?;
-    let shown = webpki::EndEntityCert::try_from(&shown).ok()?;
-    let algorithms = ring::default_provider().signature_verification_algorithms.all;
-    // Nothing reads it out; but what has expired is told with since when, before anybody looks who signed it.
-    match shown.verify_for_usage(algorithms, &[], &[], NEVER, webpki::KeyUsage::client_auth(), None, None) {
-        Err(webpki::Error::CertExpired { not_after, .. }) => Some(not_after.as_secs()),
-        _ => None,
+    let der = CertificateDer::from_pem_file(path).ok()?;
+    let certificate = Certificate::from_der(&der).ok()?;
+    Some(certificate.tbs_certificate().validity().not_after.to_unix_duration().as_secs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::holds_until_s;
+    use rcgen::{CertificateParams, KeyPair, date_time_ymd};
+
+    #[test]
+    fn the_end_of_a_certificate_is_read_and_what_is_none_has_no_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("node.pem");
+        let mut params = CertificateParams::new(["base".into()]).unwrap();
+        // Before 2050 and from then on, the end is written in two sender_cache.
+        for (year, seconds) in [(2031, 1_924_992_000), (2061, 2_871_763_200)] {
+            params.not_after = date_time_ymd(year, 1, 1);
+            let pem = params.self_signed(&KeyPair::generate().unwrap()).unwrap().pem();
+            std::fs::write(&file, &pem).unwrap();
+            assert_eq!(holds_until_s(&file), Some(seconds), "{year}");
+            std::fs::write(&file, pem.replace('M', "N")).unwrap();
+            assert_eq!(holds_until_s(&file), None, "it is damaged");
+        }
+        assert_eq!(holds_until_s(&folder.path().join("absent.pem")), None);
     }
 }

@@ -1,17 +1,17 @@
-//! How long it takes from the call to the wire, so that the call can be made so much earlier.
+//! The lead: the time from the send call to the wire. Calls are made earlier by that much.
 
 use crate::broken::broken;
 use crate::time::Stamp;
 
-/// So many of the latest count for the median.
+/// Latest samples that make the median.
 const HISTORY: usize = 64;
-/// The least of so many and as many before counts for what may be relied on.
+/// The lead is the minimum of this many samples and of as many before.
 const LEAST_OF: u32 = 1024;
-/// Calls are made earlier when so many have been measured: one that is quicker than the least of them is seldom.
+/// Samples before the lead is used: one that is shorter than the minimum is rare by then.
 const KNOWN_FROM: u32 = 256;
-/// What took longer was kept up by something else.
+/// A longer sample was delayed by something else.
 const LEAD_NS_MAX: u64 = 1_000_000;
-/// A stamp that may be further off says too little.
+/// A stamp with a larger error is ignored.
 const DOUBT_NS_MAX: u32 = 2_000;
 
 /// From user call to kernel stamp, of the first datagrams of windows.
@@ -54,12 +54,12 @@ impl Lead {
         }
     }
 
-    /// Half of the latest took no longer, ns.
+    /// The median, ns.
     pub(super) fn median_ns(&self) -> u64 {
         self.median_ns
     }
 
-    /// By how much a call may be earlier, ns, and yet no frame has been seen that would have left too early.
+    /// How much earlier a call may be, ns: no measured frame would have left too early.
     pub(super) fn ns(&self) -> u64 {
         let is_known = self.least[1] < u64::MAX || self.in_span >= KNOWN_FROM;
         if !is_known {

@@ -8,7 +8,7 @@ use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::{Clock, JOINING_SYNCS, Role, Stamp, SyncCounts, TIME_BYTES, TimeEstimate, Unsteady};
 
-/// What comes next.
+/// The next event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next {
     /// A window of this node: see [`Planned`].
@@ -22,12 +22,12 @@ pub enum Next {
     },
 }
 
-/// A window that comes, by the clock of just now. All but the window itself is local monotonic time.
+/// The next window, by the present clock. All but the window itself is local monotonic time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Planned {
-    /// In system time.
+    /// The window, in system time.
     pub window: Window,
-    /// When to wake up, and read what came.
+    /// When to wake up, and to read received datagrams.
     pub wake_ns: u64,
     /// When to validate, and to hand over the first datagram: the lead before the beginning.
     pub call_ns: u64,
@@ -35,28 +35,28 @@ pub struct Planned {
     pub begin_ns: u64,
     /// The last local ns before its guard.
     pub end_ns: u64,
-    /// For what the time is good enough by which it was planned.
+    /// What the time of the plan is good enough for.
     pub carries: Carries,
 }
 
 /// Why a node does not send.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Silent {
-    /// There are nodes that go by another configuration, and so by another table; which, see [`Clock::parted_by`].
+    /// There are nodes of another configuration, so with another table; which, see [`Clock::parted_by`].
     #[error(
-        "{} goes by another configuration, of digest {digest:016x} (this node's: {own:016x}); launch all nodes from the \
-         same file",
+        "{} goes by another configuration, of digest {digest:016x} (this node's: {own:016x}); launch all nodes from \
+         the same file",
         named(*node)
     )]
     OtherTable {
-        /// One of them; none: its address is no node's.
+        /// One of them; none if no node has its address.
         node: Option<NodeIndex>,
         /// Its digest.
         digest: u64,
         /// This node's.
         own: u64,
     },
-    /// Its clock did what bounds exclude.
+    /// Its clock broke its limits.
     #[error("nothing is known of the time: {0}")]
     Unsteady(Unsteady),
     /// It has no system time, and no master is heard.
@@ -68,10 +68,10 @@ pub enum Silent {
         /// Syncs that count, so far.
         heard: u8,
     },
-    /// It has no system time, and hears those only who have not shown that they live.
-    #[error("joining: hears the time, and asks whether who says it lives")]
+    /// It has no system time, and hears unverified peers only.
+    #[error("joining: hears the time from unverified routers, and asks whether they live")]
     Asking,
-    /// It is master, by a time that others may not go by yet.
+    /// It is master, with a time that others may not follow yet.
     #[error(
         "new master without system time of its own: in the first {JOINING_SYNCS} cycles it sends nothing but Syncs"
     )]
@@ -79,9 +79,9 @@ pub enum Silent {
     /// Its time may be too far off: no master was heard for too long, or the network is too slow for such a guard.
     #[error("its clock may be {bound_ns} ns off, and {allowance_ns} ns are allowed: half of the guard")]
     BoundTooLarge {
-        /// At most so far off.
+        /// Its error bound.
         bound_ns: u64,
-        /// So much is allowed.
+        /// The largest bound that is allowed.
         allowance_ns: u64,
     },
     /// The table has no slot for it, and it has nothing to synchronise.
@@ -93,22 +93,22 @@ fn named(node: Option<NodeIndex>) -> String {
     node.map_or_else(|| "a node that this one does not know".into(), |node| format!("node number {node}"))
 }
 
-/// What to do with a window, now that it is there.
+/// The decision on a window at its call.
 #[derive(Clone, Debug)]
 pub enum Verdict {
     /// Use it.
     Send(TransmitWindow),
-    /// The clock was bent meanwhile, or the node goes by another one's time: ask for the next window anew.
+    /// The clock was slewed meanwhile, or the node follows another time: ask for the next window anew.
     Early,
-    /// The wake-up came too late: somebody else's window is too near.
+    /// The wake-up came too late: another node's window is too near.
     Late,
-    /// There is nothing for it: a synchronisation window, and another master has synchronised.
+    /// Nothing to send: a synchronisation window, and another master has synchronised.
     Idle,
     /// This node may not send.
     Silent(Silent),
 }
 
-/// What became of this node's slots, and of synchronisation, since the start.
+/// Counters of this node's slots, and of synchronisation, since the start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Counts {
     /// Slots in which something was sent.
@@ -117,25 +117,25 @@ pub struct Counts {
     pub empty: u64,
     /// Slots not used because the wake-up came too late.
     pub late: u64,
-    /// Slots that went by without any wake-up: the thread stood still.
+    /// Slots that passed without any wake-up: the thread was stalled.
     pub skipped: u64,
-    /// Slots without packages because the time was not sure enough.
+    /// Slots without packages because the time was not exact enough.
     pub silent: u64,
     /// Datagrams in slots and synchronisation windows.
     pub datagrams: u64,
-    /// Bytes of these on the wire, all heads counted.
+    /// Bytes of these on the wire, with all headers.
     pub wire_bytes: u64,
-    /// Hellos that left by the time of who had not shown that it lives.
+    /// Hellos that left by the time of an unverified peer.
     pub unproven: u64,
-    /// Synchronisation windows of a reigning master not used because the wake-up came too late.
+    /// Synchronisation windows of the master not used because the wake-up came too late.
     pub synchronisations_late: u64,
     /// Changes of role.
     pub roles: u64,
-    /// What was sent and heard of synchronisation.
+    /// Counters of synchronisation.
     pub syncs: SyncCounts,
 }
 
-/// Says when this node sends. Holds no clock: that is asked each time.
+/// Decides when this node sends. Holds no clock: the caller passes it.
 #[derive(Debug)]
 pub struct SlotScheduler {
     table: Table,
@@ -144,14 +144,14 @@ pub struct SlotScheduler {
     counts: Counts,
     role: Role,
     silent: Option<Silent>,
-    /// Slots before this are done with, system time of this epoch; none while there is no time.
+    /// Slots before this are counted, system time of this epoch; none without time.
     done: Option<(u64, u64)>,
-    /// Not before this a hello leaves by what is overheard, local ns.
+    /// No hello leaves by an unverified time before this, local ns.
     hello_from_ns: u64,
 }
 
 impl SlotScheduler {
-    /// `spin_ns`: the wake-up comes so much earlier, to spin until the call.
+    /// `spin_ns`: the wake-up comes this much earlier, to spin until the call.
     pub fn new(table: Table, spin_ns: u64) -> Self {
         Self {
             table,
@@ -175,23 +175,23 @@ impl SlotScheduler {
         self.silent
     }
 
-    /// From the call to the wire, ns: the median, and by how much calls are made earlier.
+    /// From the call to the wire, ns: the median, and the lead.
     pub fn lead_ns(&self) -> (u64, u64) {
         (self.lead.median_ns(), self.lead.ns())
     }
 
-    /// What became of slots so far.
+    /// Counters of slots so far.
     pub fn counts(&self, clock: &Clock) -> Counts {
         Counts { syncs: clock.sync_counts(), ..self.counts }
     }
 
-    /// Slots since the start in which no packages left though some may have waited.
+    /// Slots since the start without packages, though some may have waited.
     pub fn left_out(&self) -> u64 {
         let Counts { late, skipped, silent, .. } = self.counts;
         late + skipped + silent
     }
 
-    /// The next window of this node. Whatever came is to be handed to the clock before.
+    /// The next window of this node. Hand received datagrams to the clock before.
     pub fn next(&mut self, now_ns: u64, clock: &Clock) -> Next {
         if self.role != clock.role() {
             self.role = clock.role();
@@ -205,7 +205,7 @@ impl SlotScheduler {
         self.silent = (!carries_all).then(|| self.why_silent(now_ns, clock));
         let planned = sure.and_then(|(estimate, carries)| {
             let from_ns = match (carries, self.done) {
-                // What was done by another time says nothing of one that is overheard.
+                // Progress by another time does not apply to an unverified one.
                 (Carries::Hello, _) => estimate.system_ns(now_ns.max(self.hello_from_ns)),
                 (_, Some((_, done_ns))) => done_ns,
                 (_, None) => estimate.system_ns(now_ns),
@@ -222,14 +222,14 @@ impl SlotScheduler {
         }
     }
 
-    /// Whether a planned window may be used: to be asked at its call, when all that came was handed to the clock. Deduplicator for each window,
-    /// unless it is early.
+    /// Whether a planned window may be used. Call it at the window's call time, after the clock has all received
+    /// datagrams. Once for each window, unless it is early.
     pub fn validate(&mut self, planned: &Planned, now_ns: u64, clock: &Clock) -> Verdict {
         let verdict = self.look(planned, now_ns, clock);
         let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
         match &verdict {
             Verdict::Early => return verdict,
-            // A window of a time that is overheard says nothing of what was done by another.
+            // A window of an unverified time does not count as progress by another.
             _ if planned.carries == Carries::Hello => {
                 self.hello_from_ns = planned.end_ns;
                 return verdict;
@@ -267,7 +267,7 @@ impl SlotScheduler {
         self.lead.add(user_ns, stamp);
     }
 
-    /// By what this node goes, and for what that is good enough.
+    /// The time that this node follows, and what it is good enough for.
     fn reckon(&self, now_ns: u64, clock: &Clock) -> Result<(TimeEstimate, Carries), Silent> {
         let allowance_ns = self.table.allowance_ns();
         let is_sure = |estimate: &TimeEstimate| estimate.bound_ns(now_ns) <= allowance_ns;
@@ -279,7 +279,7 @@ impl SlotScheduler {
         carries.ok_or_else(|| self.why_silent(now_ns, clock))
     }
 
-    /// Why this node does not go by its own time.
+    /// Why this node does not follow its own time.
     fn why_silent(&self, now_ns: u64, clock: &Clock) -> Silent {
         if let Some(why) = clock.unsteady(now_ns) {
             return Silent::Unsteady(why);
@@ -298,7 +298,7 @@ impl SlotScheduler {
         }
     }
 
-    /// Counts the slots that went by since it was asked last.
+    /// Counts the slots that passed since the last call.
     fn pass(&mut self, now_ns: u64, basis: Option<TimeEstimate>, sure: bool) {
         let Some(estimate) = basis else {
             self.done = None;
@@ -307,13 +307,13 @@ impl SlotScheduler {
         let system_ns = estimate.system_ns(now_ns);
         let reached_ns = system_ns.saturating_sub(GATE_NS);
         let done_ns = match self.done {
-            // Who has followed a master that was far off may have been far ahead.
+            // A node that followed a master with a wrong time may have been far ahead.
             Some((epoch, done_ns))
                 if epoch == estimate.epoch() && done_ns <= system_ns.saturating_add(self.table.cycle_ns()) =>
             {
                 done_ns
             }
-            // In another epoch the window of just now may be one that was used.
+            // In another epoch the present window may be one that was used.
             _ => system_ns,
         };
         let passed = self.table.slots_between(done_ns, reached_ns);
@@ -322,7 +322,7 @@ impl SlotScheduler {
         self.done = Some((estimate.epoch(), done_ns.max(reached_ns)));
     }
 
-    /// Own synchronisation windows matter only to who may have to send in them.
+    /// Own synchronisation windows matter only to a node that may have to send in them.
     fn next_window(&self, from_ns: u64, clock: &Clock, carries: Carries) -> Option<Window> {
         if clock.is_beginning() {
             self.table.next_synchronisation(from_ns)
@@ -348,7 +348,7 @@ impl SlotScheduler {
             Ok(sure) => sure,
             Err(why) => return Verdict::Silent(why),
         };
-        // Of what is overheard and what is not, the windows of one are not those of the other.
+        // Windows of an unverified time and of a verified one differ.
         if (carries == Carries::Hello) != (planned.carries == Carries::Hello) {
             return Verdict::Early;
         }
@@ -375,7 +375,7 @@ impl SlotScheduler {
         };
         let Planned { begin_ns, end_ns, .. } = planned;
         let tx_window = TransmitWindow::new(window, begin_ns, end_ns, carries, self.lead.ns(), *self.table.wire());
-        // When in its window a Sync leaves does not matter: it says so itself.
+        // A Sync may leave anywhere in its window: it contains its own time.
         if is_slot || tx_window.fits(now_ns, TIME_BYTES) { Verdict::Send(tx_window) } else { Verdict::Late }
     }
 }

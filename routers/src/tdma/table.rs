@@ -1,13 +1,13 @@
-//! The slot table of a system, as one node reads it: arithmetic over system time, and nothing that remembers.
+//! The slot table of a system as one node sees it: arithmetic over system time, without state.
 //!
 //! ```text
-//!  cycle n begins at n × cycle                                                                                cycle n + 1
-//!  ├── rank 0 ───┬── rank 1 ───┬─ … ─┬──── slot ─────────┬── slot ───────┬─ nobody's ─┬──── slot ────────┬─ … ─┤
-//!  │ send  guard │ send  guard │     │ send        guard │ send    guard │            │ send       guard │
+//!  cycle n begins at n × cycle                                                                       cycle n + 1
+//!  ├── rank 0 ───┬── rank 1 ───┬─ … ─┬──── slot ─────────┬── slot ───────┬── free ──┬──── slot ────────┬─ … ─┤
+//!  │ send  guard │ send  guard │     │ send        guard │ send    guard │          │ send       guard │
 //! ```
 //!
-//! A *window* is what one node may send in, without a pause: that of its synchronisation, or a slot. Here it ends where its guard begins.
-//! The owner of the table has seen to it that windows do not overlap (`rohrpost check`).
+//! A *window* is one node's time to send, without a pause: its synchronisation window, or a slot. Here it ends where
+//! its guard begins. Configuration has checked that windows do not overlap (`rohrpost check`).
 
 use super::wire::Wire;
 use crate::broken::broken;
@@ -17,13 +17,13 @@ use rohrpost_network::Tdma;
 use rohrpost_network::TimeShare;
 use std::time::Duration;
 
-/// By the time of who has not shown that it lives a hello leaves in one of so many cycles: that time may be any.
+/// By an unverified time a hello leaves in one of this many cycles, since that time may be wrong.
 pub const UNPROVEN_CYCLES: u64 = 4;
 
-/// What a window is for.
+/// Purpose of a window.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Kind {
-    /// Of the synchronisation of the master that stands at this place in their order.
+    /// Synchronisation by the master at this place in their order.
     Synchronisation {
         /// From 0.
         rank: u8,
@@ -35,31 +35,31 @@ pub enum Kind {
     },
 }
 
-/// When one node may send, in system time.
+/// A node's time to send, in system time.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Window {
-    /// What for.
+    /// Purpose.
     pub kind: Kind,
     /// Counts cycles of system time since 1970.
     pub cycle: u64,
     /// The first frame is on the wire no earlier than this, system ns.
     pub begin_ns: u64,
-    /// The last frame is off the wire by now, system ns: here the guard begins.
+    /// The last frame is off the wire by then, system ns: here the guard begins.
     pub end_ns: u64,
 }
 
-/// Whose a moment is.
+/// The owner of a moment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Owner {
     /// The node.
     pub node: NodeIndex,
-    /// Which window of its.
+    /// Its window.
     pub window: Window,
-    /// The window is over: it is the guard behind it.
+    /// The moment lies in the guard behind the window.
     pub is_guard: bool,
 }
 
-/// The slots of a system, and which of its windows are this node's.
+/// The slots of a system, and this node's windows among them.
 #[derive(Clone, Debug)]
 pub struct Table {
     own: NodeIndex,
@@ -82,8 +82,8 @@ struct Slot {
 }
 
 impl Table {
-    /// The table of `nodes` nodes as `own` reads it. `masters` in their order. `heads_bytes`: what IP and UDP put before each datagram,
-    /// see [`Settings::overhead_bytes`](crate::settings::Settings::overhead_bytes).
+    /// The table of `nodes` nodes as `own` sees it. `masters` in their order. `heads_bytes`: bytes of IP and UDP
+    /// headers for each datagram, see [`Settings::overhead_bytes`](crate::settings::Settings::overhead_bytes).
     pub fn new(tdma: &Tdma, masters: &[NodeIndex], own: NodeIndex, nodes: u8, heads_bytes: usize) -> Self {
         let slots = tdma.slots.iter().map(|slot| Slot {
             node: slot.node,
@@ -104,7 +104,7 @@ impl Table {
         }
     }
 
-    /// The node that reads it.
+    /// This node.
     pub fn own(&self) -> NodeIndex {
         self.own
     }
@@ -119,7 +119,8 @@ impl Table {
         self.cycle_ns
     }
 
-    /// A node may send while its clock is off by so much at most, ns: with another that is off as much the other way, it is the guard.
+    /// Largest clock error at which a node may send, ns: two nodes that are off in opposite directions then use the
+    /// whole guard.
     pub fn allowance_ns(&self) -> u64 {
         self.guard_ns / 2
     }
@@ -139,7 +140,8 @@ impl Table {
         slots.min_by_key(|window| window.begin_ns)
     }
 
-    /// The first window of this node's synchronisation that begins at `from_ns`, system time, or later. None if it is no master.
+    /// The first window of this node's synchronisation that begins at `from_ns`, system time, or later. None if it is
+    /// no master.
     pub fn next_synchronisation(&self, from_ns: u64) -> Option<Window> {
         let rank = self.rank()?;
         let offset_ns = u64::from(rank) * self.synchronisation_ns;
@@ -158,12 +160,12 @@ impl Table {
         slots.sum()
     }
 
-    /// How many cycles have what lies at this offset before a moment.
+    /// How many cycles have this offset before a moment.
     fn cycles_begun(&self, before_ns: u64, offset_ns: u64) -> u64 {
         before_ns.saturating_sub(offset_ns).div_ceil(self.cycle_ns)
     }
 
-    /// Whose a moment of system time is; nobody's between slots.
+    /// The owner of a moment of system time; none between slots.
     pub fn owner(&self, system_ns: u64) -> Option<Owner> {
         let (cycle, in_cycle_ns) = (system_ns / self.cycle_ns, system_ns % self.cycle_ns);
         let rank = in_cycle_ns.checked_div(self.synchronisation_ns).filter(|rank| *rank < self.masters.len() as u64);
@@ -183,7 +185,7 @@ impl Table {
         &self.wire
     }
 
-    /// What a clock in time slots has to know of them.
+    /// What a clock needs to know of the slots.
     pub fn for_clock(&self) -> InSlots {
         let asks = |node| node == self.own || self.masters.contains(&node);
         InSlots {
@@ -197,7 +199,7 @@ impl Table {
         }
     }
 
-    /// Each of these nodes that has slots has one at least once in so many cycles.
+    /// The longest distance between slots of these nodes, in cycles.
     fn rarest_cycles(&self, of: impl Fn(NodeIndex) -> bool) -> u64 {
         let periods = |node| self.slots.iter().filter(move |slot| slot.node == node).map(|slot| slot.period);
         let nodes = self.slots.iter().map(|slot| slot.node).filter(|node| of(*node));

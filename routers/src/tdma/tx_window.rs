@@ -1,4 +1,4 @@
-//! One window being used: what still fits in it.
+//! One window in use: what still fits in it.
 
 use super::LATE_NS;
 use super::table::{Kind, Window};
@@ -7,34 +7,34 @@ use crate::broken::broken;
 use crate::time::Allowed;
 use rohrpost_network::HAND_OVER;
 
-/// What a window may be used for.
+/// What a window may carry.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Carries {
-    /// A hello alone: the node knows the time by those only who have not shown that they live.
+    /// A hello alone: the node hears unverified peers only.
     Hello,
-    /// Datagrams of time, and a hello in a slot: it is a synchronisation window, or the node knows the time by others' Syncs only.
+    /// Datagrams of time, and a hello in a slot: a synchronisation window, or the node's time is coarse.
     Time,
     /// All that waits, time first.
     All,
 }
 
-/// The wire is this node's, from `begin_ns` to `end_ns`.
+/// The wire belongs to this node from `begin_ns` to `end_ns`.
 #[derive(Clone, Debug)]
 pub struct TransmitWindow {
     /// Which window, in system time.
     pub window: Window,
-    /// From when on, local ns.
+    /// Beginning, local ns.
     pub begin_ns: u64,
-    /// Until when, local ns: here the guard begins.
+    /// End, local ns: here the guard begins.
     pub end_ns: u64,
-    /// For what.
+    /// What it may carry.
     pub carries: Carries,
     /// From the call to the wire, ns.
     pub(super) lead_ns: u64,
     pub(super) wire: Wire,
     /// When the wire has carried what was handed over, local ns.
     free_ns: u64,
-    /// So long what was handed over may have kept the window busy, ns.
+    /// How long the bounds assume the window busy with what was handed over, ns.
     planned_ns: u64,
     datagrams: u64,
     wire_bytes: u64,
@@ -56,7 +56,8 @@ impl TransmitWindow {
         }
     }
 
-    /// The largest datagram that would be off the wire before the guard if it were handed over now, in bytes. None: nothing fits.
+    /// The largest datagram that would be off the wire before the guard if it were handed over now, in bytes. None:
+    /// nothing fits.
     pub fn room_bytes(&self, now_ns: u64) -> Option<usize> {
         let starts_ns = self.starts_ns(now_ns);
         self.wire.datagram_bytes_in(self.end_ns.checked_sub(starts_ns)?)
@@ -76,35 +77,35 @@ impl TransmitWindow {
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
 
-    /// From handing over a datagram now until its last bit is at the other computer, behind a switch that passes it on when it has all of it,
-    /// ns. `to_wire_ns`: how long it takes to the wire, unless that is busy for longer.
+    /// From the handover of a datagram now until its last bit is at the other computer, behind a store-and-forward
+    /// switch, ns. `to_wire_ns`: how long it takes to the wire, unless that is busy for longer.
     pub fn arrives_after_ns(&self, now_ns: u64, datagram_bytes: usize, to_wire_ns: u64) -> u64 {
         self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
     }
 
-    /// For so long the wire is still busy with what was handed over, ns: what is handed over meanwhile leaves no sooner.
+    /// How long the wire is still busy, ns: what is handed over meanwhile leaves no sooner.
     pub fn busy_ns(&self, now_ns: u64) -> u64 {
         self.free_ns.saturating_sub(now_ns.saturating_add(self.lead_ns))
     }
 
-    /// Whether a datagram that is handed over now would be off the wire later than bounds reckon with, after what the window has carried: the
-    /// window began too late, or the thread stood still.
+    /// Whether a datagram handed over now would be off the wire later than the bounds assume: the window began too
+    /// late, or the thread was stalled.
     pub fn is_late(&self, now_ns: u64, datagram_bytes: usize) -> bool {
         let wire_ns = self.wire.ns(datagram_bytes);
         self.starts_ns(now_ns).saturating_add(wire_ns) > self.reckoned_ns().saturating_add(reckoned_ns(wire_ns))
     }
 
-    /// Whether the window has less room left now than bounds reckon with, after what it has carried.
+    /// Whether the window has less room left now than the bounds assume.
     pub fn is_behind(&self, now_ns: u64) -> bool {
         self.starts_ns(now_ns) > self.reckoned_ns()
     }
 
-    /// When bounds have the wire free for the next datagram, at the latest, local ns.
+    /// When the wire is free for the next datagram at the latest, by the bounds, local ns.
     fn reckoned_ns(&self) -> u64 {
         self.begin_ns.saturating_add(LATE_NS + self.planned_ns)
     }
 
-    /// When a datagram is on the wire that is handed over now: not before those that were.
+    /// When a datagram handed over now is on the wire: not before those handed over earlier.
     fn starts_ns(&self, now_ns: u64) -> u64 {
         let at_once_ns = now_ns.saturating_add(self.lead_ns);
         if broken!(ForgetsHandedOver) { at_once_ns } else { self.free_ns.max(at_once_ns) }
@@ -115,7 +116,7 @@ impl TransmitWindow {
         self.datagrams
     }
 
-    /// Bytes on the wire so far, all heads counted.
+    /// Bytes on the wire so far, with all headers.
     pub fn wire_bytes(&self) -> u64 {
         self.wire_bytes
     }
@@ -123,6 +124,11 @@ impl TransmitWindow {
     /// Whether a hello may leave in it.
     pub fn carries_hello(&self) -> bool {
         matches!(self.window.kind, Kind::Slot { .. })
+    }
+
+    /// Whether a refusal may leave in it: who is not sure of the time sends nothing but questions.
+    pub fn carries_refusal(&self) -> bool {
+        self.carries_hello() && self.carries == Carries::All
     }
 
     /// What the clock may send in it.
@@ -137,7 +143,7 @@ impl TransmitWindow {
     }
 }
 
-/// So long bounds have a datagram keep a window busy that takes the wire so long, ns: what is shorter waits for the thread.
+/// How long the bounds assume a datagram to keep a window busy, ns: a short one waits for the thread.
 fn reckoned_ns(wire_ns: u64) -> u64 {
     wire_ns.max(HAND_OVER.as_nanos() as u64)
 }

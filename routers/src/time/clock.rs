@@ -1,4 +1,4 @@
-//! A node's part in keeping time: what the thread with the socket hands it and asks of it.
+//! A node's part in keeping time: the core behind the thread with the socket.
 
 mod master;
 mod mistaken;
@@ -28,7 +28,7 @@ use slots::Slots;
 const EXCHANGES: u64 = 8;
 const EXCHANGE_NS_MIN: u64 = 10_000_000;
 const BUCKET_NS_MIN: u64 = 250_000_000;
-/// Syncs of one slave, and exchanges of one master, that may be on their way.
+/// Syncs of one slave, and exchanges of one master, that may be in flight.
 const PENDING: usize = 4;
 const SECOND_NS: u64 = 1_000_000_000;
 
@@ -51,12 +51,12 @@ struct Left {
 
 /// A Sync that came, and the Request that answers it.
 #[derive(Clone, Copy, Debug, Default)]
-struct Asked {
+struct PendingExchange {
     exchange: Exchange,
     sequence: u64,
 }
 
-/// What is about to be sent; its stamps are taken when it is.
+/// The next datagram; its stamps are taken when it is sent.
 #[derive(Clone, Copy, Debug)]
 enum Draft {
     WarmUp,
@@ -79,15 +79,15 @@ pub struct Clock {
     /// The term that the line follows, and in which this node's own began.
     term: Term,
     began: Term,
-    /// In which term the timeline began that the line goes by; a master that is heard need not be on it yet.
+    /// The term in which the timeline of the line began; a master that is heard need not be on it yet.
     timeline: Term,
-    /// Until when the stated growth of the bound holds; and the span that it was stated for.
+    /// Until when the stated growth of the bound holds, and the span that it was stated for.
     stated: (u64, u64),
-    /// It needs a new epoch.
+    /// This node needs a new epoch.
     far: bool,
     epoch_began_ns: u64,
     slaves: Vec<Slave>,
-    asked: [Asked; PENDING],
+    asked: [PendingExchange; PENDING],
     asked_ns: u64,
     hello_ns: u64,
     drafts: VecDeque<(NodeIndex, Draft)>,
@@ -96,19 +96,20 @@ pub struct Clock {
     last: Option<Exchange>,
     offset_ns: i64,
     contradictions: u64,
-    /// Nodes that go by another configuration.
+    /// Nodes of another configuration.
     others: Others,
-    /// Whether the local clock is what bounds assume.
+    /// Whether the local clock keeps its limits.
     steadiness: Steadiness,
-    /// What time slots need besides; none in free mode.
+    /// State for time slots; none in free mode.
     slots: Option<Box<Slots>>,
     #[cfg(any(test, feature = "broken-variants"))]
     pub(super) broken: Option<Broken>,
 }
 
 impl Clock {
-    /// A clock that has heard nobody yet. `wall_ns` is this computer's wall clock, by which the first epoch begins if this node becomes
-    /// the first master; `page` what the node's time page says, if there is one: an earlier incarnation's time goes on.
+    /// A clock that has heard nothing yet. `wall_ns` is this computer's wall clock; the first epoch begins with it if
+    /// this node becomes the first master. `page` is the node's time page, if there is one: an earlier incarnation's
+    /// time continues.
     pub fn new(settings: TimeSettings, now_ns: u64, wall_ns: u64, page: Option<TimeRecord>) -> Self {
         let interval_ns = u64::try_from(settings.interval.as_nanos()).unwrap_or(u64::MAX).max(1);
         let exchange_ns = (interval_ns / EXCHANGES).max(interval_ns.min(EXCHANGE_NS_MIN));
@@ -136,7 +137,7 @@ impl Clock {
             far: false,
             epoch_began_ns: 0,
             slaves: vec![Slave::default(); nodes],
-            asked: [Asked::default(); PENDING],
+            asked: [PendingExchange::default(); PENDING],
             asked_ns: 0,
             hello_ns: now_ns,
             drafts: VecDeque::with_capacity(2 * nodes + 2 * PENDING),
@@ -181,13 +182,13 @@ impl Clock {
         }
     }
 
-    /// Whether it comes from another node of this system, for this one.
+    /// Whether it comes from another node of this system, to this node.
     fn is_ours(&self, head: &FrameHead) -> bool {
         let TimeSettings { system, own, nodes, digest, .. } = self.settings;
         (head.system, head.digest, head.to) == (system, digest, own) && head.from != own && head.from < nodes
     }
 
-    /// When a datagram that [`Step::Send`] asked to be stamped left.
+    /// A datagram with a stamp id of [`Step::Send`] left.
     pub fn sent(&mut self, id: SentId, stamp: Stamp) {
         let Some(slave) = self.slaves.get_mut(usize::from(id.to)) else { return };
         if let Some(left) = slave.syncs.iter_mut().find(|left| left.id != 0 && left.sequence == id.sequence) {
@@ -202,9 +203,7 @@ impl Clock {
         }
     }
 
-    /// What is to be done now. To be called again after each datagram sent or taken, and when the time has come. `now_ns` goes into the
-    /// datagram: it is to be read just before.
-    /// In time slots it sends nothing so: see [`Self::poll_in`].
+    /// The next step, after each datagram and at the deadline. `now_ns` is sent: read it just before.
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8; TIME_BYTES]) -> Step {
         if self.slots.is_some() {
             return self.poll_in(now_ns, Allowed::Nothing, datagram);
@@ -221,12 +220,13 @@ impl Clock {
         Step::Wait { until_ns: self.deadline_ns(now_ns) }
     }
 
-    /// What the node's page is to say. It changes only within [`Self::handle`], [`Self::poll`] and [`Self::page_says`].
+    /// The record for the node's page. It changes only within [`Self::handle`], [`Self::poll`] and [`Self::page_says`].
     pub fn record(&self) -> &TimeRecord {
         self.line.record()
     }
 
-    /// The page could not be written in time, and says this: time goes on from there, and [`Self::record`] is to be written anew.
+    /// The page was not written in time and still has this record: time continues from there. Write [`Self::record`]
+    /// anew.
     pub fn page_says(&mut self, now_ns: u64, page: &TimeRecord) {
         self.line.go_on_from(now_ns, page);
     }
@@ -241,7 +241,7 @@ impl Clock {
         }
     }
 
-    /// What this node is.
+    /// The role of this node.
     pub fn role(&self) -> Role {
         match self.election.state() {
             State::Listening => Role::Listening,
@@ -250,8 +250,8 @@ impl Clock {
         }
     }
 
-    /// The term of the master that is heard, or of this node's own reign; none while listening. [`Reading::term`] follows when it is
-    /// measured.
+    /// The term of the master that is heard, or of this node as master; none while listening. [`Reading::term`] follows
+    /// when it is measured.
     pub fn term(&self) -> Term {
         match self.election.state() {
             State::Listening => Term::NONE,
@@ -269,7 +269,7 @@ impl Clock {
         }
     }
 
-    /// When the master was heard last, local ns; this node's own time is heard always.
+    /// When the master was last heard, local ns; for a master itself, now.
     pub fn heard_ns(&self, now_ns: u64) -> Option<u64> {
         match self.election.state() {
             State::Listening => None,
@@ -278,7 +278,7 @@ impl Clock {
         }
     }
 
-    /// How far the page lay off the best guess when the master was last measured, ns.
+    /// Distance of the page from the best guess at the last measurement, ns.
     pub fn offset_ns(&self) -> i64 {
         self.offset_ns
     }
@@ -288,22 +288,22 @@ impl Clock {
         (self.usual_rate * 1e9).round() as i64
     }
 
-    /// Delay of both ways together in the best exchange that counts, ns.
+    /// Round-trip delay of the best exchange that counts, ns.
     pub fn delay_ns(&self) -> Option<u64> {
         self.history.delay_ns()
     }
 
-    /// How often a clock did what it must not, so that all samples were thrown away.
+    /// How often contradictory samples were thrown away: a clock broke its limits.
     pub fn contradictions(&self) -> u64 {
         self.contradictions
     }
 
-    /// The last exchange, taken out.
+    /// Takes out the last exchange.
     pub fn take_exchange(&mut self) -> Option<Exchange> {
         self.last.take()
     }
 
-    /// What was measured of another timeline does not count any more.
+    /// Forgets measurements of another timeline.
     fn forget(&mut self) {
         if !self.is(Broken::OldSamples) {
             self.history.clear();
@@ -311,12 +311,12 @@ impl Clock {
         if self.slots.is_some() {
             self.history.fades(2.0 * RATE_MAX);
         }
-        self.asked = [Asked::default(); PENDING];
+        self.asked = [PendingExchange::default(); PENDING];
         self.asked_ns = 0;
         self.far = false;
     }
 
-    /// What the passing of time does.
+    /// Handles the passing of time.
     fn advance(&mut self, now_ns: u64) {
         self.stood_still(now_ns);
         self.line.end_slew(now_ns);
@@ -326,7 +326,7 @@ impl Clock {
             self.forget();
             self.hello_ns = now_ns;
         }
-        // What kept it from speaking may have been a refusal that is over, since its node was heard.
+        // The cause of the wait may be a refusal that is over, since its node was heard.
         if self.election.waits(now_ns) && !self.is_parted(now_ns) && !self.is_unsteady(now_ns) {
             self.election.waits_no_longer(now_ns);
         }
@@ -336,7 +336,7 @@ impl Clock {
         }
     }
 
-    /// By what time this node would reign.
+    /// The time that this node would use as master.
     fn origin(&self, now_ns: u64) -> Origin {
         match &self.slots {
             Some(slots) => self.origin_in_slots(slots, now_ns),
@@ -345,7 +345,7 @@ impl Clock {
         }
     }
 
-    /// What is due without anybody having asked.
+    /// Drafts what is due without a question.
     fn draft(&mut self, now_ns: u64) {
         match self.election.state() {
             State::Listening => self.draft_hello(now_ns),
@@ -361,7 +361,7 @@ impl Clock {
         }
     }
 
-    /// Who hears no master says so.
+    /// A node without a master says so.
     fn draft_hello(&mut self, now_ns: u64) {
         if self.hello_ns <= now_ns {
             self.hello_ns = now_ns.saturating_add(self.interval_ns);
@@ -373,7 +373,7 @@ impl Clock {
 
     fn deadline_ns(&self, now_ns: u64) -> u64 {
         let role_ns = match self.election.state() {
-            // Its windows are somebody else's affair.
+            // In time slots others plan its windows.
             _ if self.slots.is_some() => None,
             State::Master(_) => {
                 let others = self.slaves.iter().enumerate().filter(|(node, _)| *node != usize::from(self.settings.own));
@@ -388,7 +388,7 @@ impl Clock {
         deadlines.into_iter().flatten().min().unwrap_or(now_ns + SECOND_NS).max(now_ns)
     }
 
-    /// Writes a datagram, with stamps of now. None when it is not wanted any more.
+    /// Writes a datagram with the present time. None when it is not needed any more.
     fn write(
         &mut self,
         now_ns: u64,

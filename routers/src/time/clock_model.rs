@@ -1,38 +1,40 @@
-//! The line that a node's system time follows: what stands in its page. It has no corner within an epoch, only bends.
+//! The line that a node's system time follows: the content of its page. Within an epoch it has no jump, only changes of
+//! pace.
 
 use super::{RATE_MAX_PPB, SLEW_MAX_PPB, WANDER_PPB_S};
 use rohrpost_mailbox::{ERROR_UNKNOWN_NS, SystemTime, TimeRecord, TimeSource};
 
-/// A slower line begins so far ahead: readers go by the old one until the new one is in the page.
+/// A slower line begins this much in the future: readers use the old one until the new one is in the page.
 const SLOWER_LEAD_NS: u64 = 1_000_000;
-/// A page whose bound grows so fast, ns a second, may have been bent: its pace says nothing of the clock's rate, and must not be kept.
+/// A page with a faster growing bound, ns a second, may be slewing: its pace does not show the clock's rate, and is
+/// dropped.
 const BENT_NS_S: u64 = 50_000;
-/// What lines may be off by being whole numbers, until the source is heard again.
+/// Rounding error of lines until the source is heard again.
 const ROUNDING_NS: u64 = 4;
 pub(super) const BILLION: i128 = 1_000_000_000;
-/// As the local clock.
+/// The pace of the local clock.
 pub(super) const EVEN_PPB: u64 = 1_000_000_000;
 
-/// The present record, and what it is about to become.
+/// The present record, and its next change.
 #[derive(Debug)]
 pub(super) struct ClockModel {
     record: TimeRecord,
     slew: Option<Slew>,
 }
 
-/// The line is bent for a while.
+/// The line slews for a while.
 #[derive(Clone, Copy, Debug)]
 struct Slew {
-    /// When that is over.
+    /// When slewing ends.
     end_ns: u64,
     /// The pace from then on.
     pace_ppb: u64,
-    /// By how much the bound grows faster until then, ns a second: whoever is to straighten the line may die, or stand still.
+    /// Extra growth of the bound until then, ns a second: the thread that ends the slew may die or stall.
     drift_ns_s: u64,
 }
 
 impl ClockModel {
-    /// The wall clock, of which nothing is known.
+    /// The wall clock, with unknown error.
     pub(super) fn unsynchronised(now_ns: u64, wall_ns: u64, epoch: u64) -> Self {
         let record = TimeRecord {
             epoch,
@@ -46,15 +48,15 @@ impl ClockModel {
         Self { record, slew: None }
     }
 
-    /// What an earlier incarnation of this router left. A slave that nobody heard for long may drift faster than was stated then; a master's time
-    /// is what others go by, and drifts from nothing.
+    /// The page of an earlier incarnation of this router. A slave without updates may drift faster than was stated
+    /// then; a master's time is the reference, and does not drift.
     pub(super) fn adopted(now_ns: u64, record: TimeRecord) -> Self {
         let age_ns = now_ns.saturating_sub(record.monotonic_ns);
         let drift_ns_s = record.drift_ns_s.saturating_add(wander_ns_s(age_ns)).min(2 * RATE_MAX_PPB.unsigned_abs());
         let drift_ns_s = if record.drift_ns_s == 0 { 0 } else { drift_ns_s.max(record.drift_ns_s) };
         let mut line = Self { record: TimeRecord { drift_ns_s, ..record }, slew: None };
         if record.drift_ns_s > BENT_NS_S {
-            // Until the two lines meet the new one is off the old one.
+            // Until the two lines meet, the new one differs from the old one.
             let bent_ppb = u128::from(record.pace_ppb.abs_diff(EVEN_PPB));
             let meets_ns = (bent_ppb * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128) as u64 + ROUNDING_NS;
             let error_ns = line.error_ns(now_ns).saturating_add(meets_ns).min(ERROR_UNKNOWN_NS);
@@ -85,7 +87,7 @@ impl ClockModel {
         u64::try_from(self.at(now_ns).error.as_nanos()).unwrap_or(u64::MAX)
     }
 
-    /// Another epoch, at another time.
+    /// Begins another epoch, at another time.
     pub(super) fn step(
         &mut self,
         now_ns: u64,
@@ -100,13 +102,13 @@ impl ClockModel {
         self.slew = None;
     }
 
-    /// Another epoch, at the same time.
+    /// Begins another epoch, at the same time.
     pub(super) fn rename(&mut self, epoch: u64) {
         self.record.epoch = epoch;
     }
 
-    /// The source was heard. Bends the line so that it has moved by `by_ns` against `pace_ppb` after about `within_ns`, and goes on with
-    /// that pace. The bound holds for where it is and for where it goes.
+    /// The source was heard. Slews the line by `by_ns` against `pace_ppb` within about `within_ns`, then continues with
+    /// that pace. The bound holds for the present place and for the target.
     pub(super) fn bend(
         &mut self,
         now_ns: u64,
@@ -118,7 +120,7 @@ impl ClockModel {
     ) {
         let slew_ppb = i128::from(by_ns) * BILLION / i128::from(within_ns.max(1));
         let slew_ppb = slew_ppb.clamp(-i128::from(SLEW_MAX_PPB), i128::from(SLEW_MAX_PPB)) as i64;
-        // It begins late by a lead, and may end late by one.
+        // The slew begins a lead late, and may end one late.
         let overshoot_ns =
             (u128::from(slew_ppb.unsigned_abs()) * 2 * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128);
         let error_ns = error_ns.saturating_add(overshoot_ns as u64).saturating_add(ROUNDING_NS);
@@ -132,14 +134,14 @@ impl ClockModel {
         });
     }
 
-    /// Straightens the line when slewing is over.
+    /// Ends the slew when it is complete.
     pub(super) fn end_slew(&mut self, now_ns: u64) {
         if self.slew.is_some_and(|slew| slew.end_ns <= now_ns) {
             self.stop_slew(now_ns);
         }
     }
 
-    /// Stops slewing, however far it came: beyond where it was to go, if this node stood still meanwhile.
+    /// Stops slewing wherever it is: past its target, if this node was stalled meanwhile.
     pub(super) fn stop_slew(&mut self, now_ns: u64) {
         if let Some(Slew { end_ns, pace_ppb, drift_ns_s }) = self.slew.take() {
             self.turn(now_ns, self.record.monotonic_ns, pace_ppb);
@@ -150,19 +152,19 @@ impl ClockModel {
         }
     }
 
-    /// From now on it is the line by which the others go: it cannot drift from itself.
+    /// From now on this line is the reference of the others: it cannot drift from itself.
     pub(super) fn become_reference(&mut self, now_ns: u64) {
         let error_ns = self.error_ns(now_ns).saturating_add(ROUNDING_NS).min(ERROR_UNKNOWN_NS - 1);
         self.turn(now_ns, now_ns, self.record.pace_ppb);
         self.restate(error_ns, 0);
     }
 
-    /// States from now on another growth of the bound.
+    /// Sets the growth of the bound.
     pub(super) fn restate(&mut self, error_ns: u64, drift_ns_s: u64) {
         self.record = TimeRecord { error_ns, drift_ns_s, ..self.record };
     }
 
-    /// The page was not written in time, and still says this: the line goes on from there.
+    /// The page was not written in time, and still has this record: the line continues from there.
     pub(super) fn go_on_from(&mut self, now_ns: u64, page: &TimeRecord) {
         let wanted = self.record;
         if page.epoch == wanted.epoch {
@@ -171,19 +173,20 @@ impl ClockModel {
         }
     }
 
-    /// Another pace, where the present line is just now. Written as if it had been so since `base_ns`, when the source was heard.
+    /// Changes the pace at the present point of the line. Written as if the pace was so since `base_ns`, when the
+    /// source was heard.
     fn turn(&mut self, now_ns: u64, base_ns: u64, pace_ppb: u64) {
         let lead_ns = if pace_ppb < self.record.pace_ppb { SLOWER_LEAD_NS } else { 0 };
         let meet_ns = now_ns.max(base_ns) + lead_ns;
         let since_base_ns = i128::from(meet_ns - base_ns) * i128::from(pace_ppb) / BILLION;
-        // Two lines that meet are rounded differently: one more, and it is never one less.
+        // Two lines that meet are rounded differently: with one more it is never one less.
         let system_ns = i128::from(self.at(meet_ns).ns) + 1 - since_base_ns;
         let system_ns = u64::try_from(system_ns).unwrap_or(0);
         self.record = TimeRecord { monotonic_ns: base_ns, system_ns, pace_ppb, ..self.record };
     }
 }
 
-/// How much faster a bound grows, ns a second, if nobody looks for so long: the rate may change meanwhile.
+/// Growth of a bound, ns a second, without an update for so long: the rate may change meanwhile.
 pub(super) fn wander_ns_s(span_ns: u64) -> u64 {
     let ns_s = u128::from(span_ns) * WANDER_PPB_S as u128 / 2 / BILLION as u128;
     u64::try_from(ns_s).unwrap_or(u64::MAX).saturating_add(1)
@@ -202,7 +205,7 @@ mod tests {
             line.bend(begin_ns, by_ns, within_ns, EVEN_PPB, by_ns.unsigned_abs(), 0);
             let now_ns = begin_ns + within_ns + late_ns;
             line.end_slew(now_ns);
-            // The bound is for where it was and for where it was to go; the truth may be at either.
+            // The bound covers start and target: the truth may be at either.
             let off_ns = line.at(now_ns).ns.abs_diff(now_ns);
             assert!(off_ns >= by_ns.unsigned_abs() + late_ns / 1_000, "it went too far: {off_ns}");
             assert!(line.error_ns(now_ns) >= off_ns, "{off_ns} ns off after {late_ns} ns: {:?}", line.record());

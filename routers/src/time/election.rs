@@ -1,4 +1,4 @@
-//! Who is master: the order, the silence after which the next takes over, and which of two masters yields.
+//! Election of the master: the order of candidates, the silence that ends a reign, and which of two masters yields.
 
 use super::message::{Request, Sync};
 use super::unverified::UnverifiedPeers;
@@ -6,23 +6,23 @@ use super::{TAKEOVER_HALF_INTERVALS, Term};
 use crate::broken::broken;
 use crate::frame::NodeIndex;
 
-/// So long a master is given at least to answer: it takes an exchange, and some of its datagrams may be lost.
+/// Minimum time in which a master must answer: one exchange, some datagrams of which may be lost.
 const DEAF_NS_MIN: u64 = 200_000_000;
-/// The same in slots of who asks and who answers.
+/// The same in time slots, in slots of the node that asks and of the master.
 const DEAF_SLOTS: u64 = 4;
-/// In time slots others may be unheard for so long since the last frame was due, and send by a time that they have.
+/// In time slots: wait after the last frame was due before a new time. Unheard nodes may still send by theirs.
 const BEGINS_AFTER_NS: u64 = 100_000_000;
-/// In time slots a master that misses three Syncs has a successor in the third cycle: one that misses two may still be heard.
+/// In time slots a master that misses three Syncs has a successor in the third cycle; after two it may still be heard.
 const SUCCEEDED_HALF_INTERVALS: u64 = 5;
 
-/// By what time a node would reign.
+/// The time that a node would use as master.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Origin {
-    /// Its own, which is that of the others.
+    /// Its own, which the others follow.
     Own,
-    /// That of the others, as it heard it.
+    /// The others' time, as this node heard it.
     Heard,
-    /// One that nobody else may have.
+    /// A new time, different from any that other nodes may have.
     New,
 }
 
@@ -36,13 +36,13 @@ pub(super) struct Followed {
     pub(super) epoch: u64,
     pub(super) error_ns: u64,
     pub(super) heard_ns: u64,
-    /// When it last answered this node, or said that it is followed; at first when it was found.
+    /// When it last answered this node, or said that it has followers; at first when it was found.
     answered_ns: u64,
     followed: bool,
     id: u64,
 }
 
-/// What a node is at the moment.
+/// Election state of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum State {
     /// Hears no master.
@@ -55,11 +55,11 @@ pub(super) enum State {
 /// What a Sync changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Heard {
-    /// Late, twice, or of a master that must yield.
+    /// Late, a duplicate, or from a master that must yield.
     Ignored,
-    /// Of the master that this node follows.
+    /// From the master that this node follows.
     Followed,
-    /// Of another master, or another timeline of the same: what was measured before does not count any more.
+    /// From another master, or another timeline of the same one: earlier measurements are void.
     Turned,
 }
 
@@ -68,26 +68,27 @@ pub(super) struct Election {
     own: NodeIndex,
     masters: Vec<NodeIndex>,
     interval_ns: u64,
-    /// So long a master is given to answer.
+    /// How long a master has to answer.
     deaf_ns: u64,
-    /// Who would begin a time hears nobody that has one for so long before; 0: its turn is enough.
+    /// How long a node must hear no time at all before it begins one; 0: its turn is enough.
     begins_after_ns: u64,
-    /// Whoever has not heard its master for so long turns to a later one, though nobody may follow that yet.
+    /// A node that has not heard its master for this long turns to a later one, even if that has no followers yet.
     succeeded_after_ns: u64,
     state: State,
-    /// Since when no master is heard, and who was the last.
+    /// Since when no master is heard, and which one was heard last.
     quiet_since_ns: u64,
     lost: Option<NodeIndex>,
-    /// The highest term and epoch that anybody spoke of.
+    /// The highest term and epoch seen in any frame.
     highest: Term,
     highest_epoch: u64,
-    /// When somebody that has time said that it hears no master.
+    /// When a node that has time last said that it hears no master.
     timed_heard_ns: Option<u64>,
-    /// Until when somebody was heard that may have time, if it lives: as long as that is a reason to wait.
+    /// Until when unverified frames are a reason to wait: their sender may be alive and have time.
     overheard_ns: u64,
-    /// As long as it was no reason to wait any more: who begins a time does so this much after who could before it; else 0.
+    /// Once unverified frames are no reason to wait any more: the extra distance between two nodes that begin a time;
+    /// else 0.
     apart_ns: u64,
-    /// This node stood still before.
+    /// This node was stalled before this moment.
     awake_since_ns: u64,
 }
 
@@ -112,8 +113,9 @@ impl Election {
         }
     }
 
-    /// A slave takes so many intervals until it asks, and it asks and is answered in slots, which come this often: a master must not be replaced
-    /// before that for not having answered. A time begins only where for so long nobody that has one was heard. A successor speaks before the silence of its master is over.
+    /// Sets the delays that depend on slots. A slave needs `intervals` to ask; question and answer wait for slots, so a
+    /// master must not be replaced earlier for not answering. A new time begins only after no time was heard for long
+    /// enough. A successor sends before the silence of its master is over.
     pub(super) fn asks_after(&mut self, intervals: u64, asks_every_ns: u64) {
         self.succeeded_after_ns = self.interval_ns.saturating_mul(SUCCEEDED_HALF_INTERVALS) / 2;
         let asks_ns = self.interval_ns.saturating_mul(2 * intervals);
@@ -142,7 +144,7 @@ impl Election {
         u8::try_from(rank).ok()
     }
 
-    /// Whether somebody else may act for the master of a term.
+    /// Whether another node may act for the master of a term.
     pub(super) fn stands_in(&self, node: NodeIndex, term: Term) -> bool {
         self.rank_of(node).is_some_and(|rank| rank != term.rank())
     }
@@ -152,13 +154,13 @@ impl Election {
         self.rank().is_some_and(|rank| rank > term.rank())
     }
 
-    /// How many others would take the place of a master before this node does.
+    /// How many other nodes replace a master before this node does.
     pub(super) fn before(&self, last: Option<NodeIndex>) -> usize {
         let before = self.masters.iter().take_while(|master| **master != self.own);
         before.filter(|master| Some(**master) != last).count()
     }
 
-    /// Whether a master that was heard last then has had the time to tell, and has not.
+    /// Whether a master that was last heard then had time to show that it has followers, and did not.
     pub(super) fn is_succeeded(&self, master: &Followed, now_ns: u64) -> bool {
         now_ns.saturating_sub(master.heard_ns) >= self.succeeded_after_ns
     }
@@ -167,7 +169,7 @@ impl Election {
         self.interval_ns.saturating_mul(TAKEOVER_HALF_INTERVALS) / 2
     }
 
-    /// A master's Sync. `followed`: whether slaves answer this node, should it be a master itself.
+    /// Handles a master's Sync. `followed`: whether slaves would answer this node if it were master.
     pub(super) fn sync(
         &mut self,
         from: NodeIndex,
@@ -198,7 +200,7 @@ impl Election {
             State::Listening => Heard::Turned,
             State::Master(own) if theirs.claim() > (followed, own) => Heard::Turned,
             State::Master(own) => {
-                // It will yield. So that nobody who heard it takes this term for an older one, this becomes the later.
+                // The other will yield. A higher own term: no node that heard the other takes this one for older.
                 if let (true, Some(rank)) = (theirs.term > own, self.rank()) {
                     self.state = State::Master(self.next_term(rank));
                 }
@@ -229,14 +231,14 @@ impl Election {
         heard
     }
 
-    /// The master's answer says more lately what its Sync said.
+    /// The master's answer repeats, more recently, what its Sync said.
     pub(super) fn reply(&mut self, epoch: u64, error_ns: u64, received_ns: u64) {
         if let State::Slave(master) = &mut self.state {
             (master.epoch, master.error_ns, master.answered_ns) = (master.epoch.max(epoch), error_ns, received_ns);
         }
     }
 
-    /// Something else came than a Sync. If it was of the master that this node follows: when that was heard last, local ns.
+    /// A frame other than a Sync came. If it is from this node's master: when that was last heard, local ns.
     pub(super) fn speaks(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) -> Option<u64> {
         match &mut self.state {
             State::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
@@ -247,7 +249,7 @@ impl Election {
         }
     }
 
-    /// Somebody that hears no master.
+    /// A node reports that it hears no master.
     pub(super) fn hello(&mut self, request: &Request, received_ns: u64) {
         self.is_told(request);
         if request.timed {
@@ -255,8 +257,7 @@ impl Election {
         }
     }
 
-    /// Somebody asks, and says by which term it goes. A master whose term is not the latest begins another, so that all take it for the
-    /// latest.
+    /// A node asks and names its term. A master with an older term begins another, so that its term is the latest.
     pub(super) fn is_told(&mut self, request: &Request) {
         self.speaks_of(request.term, request.epoch);
         if let (State::Master(own), Some(rank)) = (self.state, self.rank())
@@ -266,51 +267,50 @@ impl Election {
         }
     }
 
-    /// This node stood still until now: that it heard nobody says nothing of the others. What they sent is still to be read. Who waits to
-    /// begin a time has waited so much less.
+    /// After a stall frames of others may still be in the socket. A wait before a new time is extended by the stall.
     pub(super) fn awakes(&mut self, stood_since_ns: u64, now_ns: u64) {
         self.awake_since_ns = now_ns;
         let stood_ns = now_ns.saturating_sub(stood_since_ns);
         for since_ns in std::iter::once(&mut self.quiet_since_ns).chain(&mut self.timed_heard_ns) {
-            // Who must not speak before a time that comes does not sooner.
+            // A wait that lies in the future does not end sooner.
             *since_ns = since_ns.saturating_add(stood_ns).min(now_ns.max(*since_ns));
         }
     }
 
-    /// Whether this node is a master that stood still for so long that others may have begun another time meanwhile. They may have done so in new
-    /// lives; with keys this node does not hear these before they have greeted each other.
+    /// Whether this node is a master that was stalled so long that others may have begun another time, perhaps in new
+    /// incarnations; with keys this node hears these only after a handshake.
     pub(super) fn may_be_forgotten(&self, stood_ns: u64) -> bool {
         let is_alone = self.masters.len() < 2;
         matches!(self.state, State::Master(_)) && !is_alone && stood_ns > self.begins_after_ns
     }
 
-    /// Somebody that has time sent in the place of the master.
+    /// Another node that has time sent in place of the master.
     pub(super) fn replaced(&mut self, received_ns: u64) {
         self.timed_heard_ns = Some(received_ns);
     }
 
-    /// Somebody was heard that may live.
+    /// An unverified frame came: its sender may be alive.
     pub(super) fn overhears(&mut self, overheard: &UnverifiedPeers) {
         (self.overheard_ns, self.apart_ns) = (overheard.until_ns(), overheard.apart_ns());
     }
 
-    /// Whether this node, as a master, would yield to a Sync if its sender is known to live.
+    /// Whether this node, as a master, would yield to a Sync if its sender is verified.
     pub(super) fn would_yield(&self, from: NodeIndex, sync: &Sync, followed: bool) -> bool {
         let is_masters = self.masters.get(usize::from(sync.term.rank())) == Some(&from) && !sync.replacement;
         matches!(self.state, State::Master(own) if is_masters && (sync.followed, sync.term) > (followed, own))
     }
 
-    /// It is no master any more, and hears none.
+    /// This node is no master any more, and hears none.
     pub(super) fn steps_back(&mut self, now_ns: u64) {
         (self.state, self.quiet_since_ns, self.lost) = (State::Listening, now_ns, None);
     }
 
-    /// Whether it begins to listen only at some time to come.
+    /// Whether this node must wait before it listens.
     pub(super) fn waits(&self, now_ns: u64) -> bool {
         self.state == State::Listening && self.quiet_since_ns > now_ns
     }
 
-    /// Nothing keeps it from speaking any more: it listens from now on.
+    /// The wait is over: it listens from now on.
     pub(super) fn waits_no_longer(&mut self, now_ns: u64) {
         self.quiet_since_ns = self.quiet_since_ns.min(now_ns);
     }
@@ -347,14 +347,14 @@ impl Election {
         self.succeeds()
     }
 
-    /// Takes over: it is known to be this node's turn.
+    /// Takes over without a check: the caller knows that it is this node's turn.
     pub(super) fn succeeds(&mut self) -> Option<Term> {
         let term = self.next_term(self.rank()?);
         self.state = State::Master(term);
         Some(term)
     }
 
-    /// When something changes without a datagram.
+    /// When the state changes without a datagram.
     pub(super) fn deadline_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
         let takeover_ns = self.takeover_ns(now_ns, origin);
         match self.state {
@@ -367,7 +367,7 @@ impl Election {
         }
     }
 
-    /// When it is this node's turn. A master that is heard, but answers nobody, hears nobody: it has to be replaced as well.
+    /// When it is this node's turn. A master that is heard but answers nobody is deaf, and is replaced as well.
     fn takeover_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
         self.rank()?;
         if broken!(BeginsAtOnce) && (origin, self.state) == (Origin::New, State::Listening) {
@@ -378,11 +378,11 @@ impl Election {
             State::Slave(master) => (master.answered_ns, self.silence_ns().max(self.deaf_ns), Some(master.node)),
             State::Master(_) => return None,
         };
-        // Who has no time leaves it to who has, as long as there is one.
+        // A node without time waits for one that has time.
         let recently_ns = self.interval_ns.saturating_mul(4);
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
-        // Who is deaf to others until they are known to live leaves the time to get known to who begins before it.
+        // A node that cannot hear others until they are verified lets a node that began earlier finish the handshake.
         let is_deaf = (origin, self.state) == (Origin::New, State::Listening) && self.apart_ns > 0;
         let apart_ns = if is_deaf { self.apart_ns.saturating_add(self.begins_after_ns) } else { self.interval_ns };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
@@ -401,7 +401,7 @@ impl Election {
 }
 
 impl Followed {
-    /// Who has the greater one is the master. A master that nobody follows may be one that hears nobody.
+    /// The greater claim is the master. A master without followers may be deaf.
     fn claim(&self) -> (bool, Term) {
         (self.followed, self.term)
     }

@@ -1,10 +1,10 @@
-//! How system time follows from local time for one who sends in time slots, and the other way round.
+//! Conversion between system time and local time for a node that sends in time slots.
 
 use super::clock_model::BILLION;
 use rohrpost_mailbox::TimeRecord;
 
-/// A line by which a node finds its slots. Its bound is about the time of the master that all nodes of a term follow: what that may be off
-/// the time of an earlier term is not in it, since all are off alike.
+/// The line by which a node finds its slots. Its bound is the distance from the time of the present master. That
+/// master's error against an earlier term is not in it, since all nodes of a term share it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct TimeEstimate {
     record: TimeRecord,

@@ -1,32 +1,32 @@
-//! The time of a node that no master's Sync reaches: it goes by what the TCP router tells, and knows how far off that is at most.
+//! Time of a node that no master's Sync reaches: it follows the answers of the TCP router, and knows its error bound.
 //!
-//! SenderCache through a stream are long, unequal and seldom twice the same, so nothing is measured of the rate of the clock: the line goes on as
-//! the local clock does, and is bent when an answer knows better than it does.
+//! Delays through a stream are long and uneven. So the rate of the clock is not measured: the line continues at the
+//! pace of the local clock, and is slewed when an answer is more exact than it is.
 
 use super::RATE_MAX_PPB;
 use super::clock_model::{ClockModel, EVEN_PPB};
 use crate::broken::broken;
 use rohrpost_mailbox::TimeRecord;
 
-/// The first answers are often slow; so many are waited for before the line begins.
+/// The first answers are often slow; the line begins after this many.
 const HEARD_MIN: u8 = 4;
-/// The line is bent towards an answer within so long, or longer if that would be too fast.
+/// The line is slewed to an answer within this time, or longer if that would be too fast.
 const MEND_NS: u64 = 2_000_000_000;
 
-/// What the node takes for system time.
+/// The node's estimate of system time.
 #[derive(Debug)]
 pub struct Follower {
     line: ClockModel,
-    /// Answers since the line has another epoch than theirs.
+    /// Answers since the line has another epoch than they.
     heard: u8,
-    /// How many answers there were when one was looked at last.
+    /// Number of answers at the last look.
     answers: u64,
-    /// The last that the line was compared with.
+    /// The last record that the line was compared with.
     last: Option<TimeRecord>,
 }
 
 impl Follower {
-    /// Goes on from the page that an earlier incarnation has left; else from the wall clock, of which nothing is known.
+    /// Continues the page of an earlier incarnation; else begins with the wall clock, with unknown error.
     pub fn new(now_ns: u64, wall_ns: u64, page: Option<TimeRecord>) -> Self {
         let line = match page {
             Some(page) if page.error_ns < super::UNSYNCHRONISED_NS => ClockModel::adopted(now_ns, page),
@@ -36,12 +36,12 @@ impl Follower {
         Self { line, heard: 0, answers: 0, last: None }
     }
 
-    /// What is in the page.
+    /// The content of the page.
     pub fn record(&self) -> &TimeRecord {
         self.line.record()
     }
 
-    /// The best that is known of the time after so many answers; it may be the same for long, since the best one counts.
+    /// Takes the best record after this many answers. It may stay the same for long, since the best one counts.
     pub fn told(&mut self, now_ns: u64, told: &TimeRecord, answers: u64) {
         self.line.end_slew(now_ns);
         let is_new = std::mem::replace(&mut self.answers, answers) != answers;
@@ -58,7 +58,7 @@ impl Follower {
             if by_ns.unsigned_abs() > error_ns.saturating_add(self.line.error_ns(now_ns)) && !broken!(TakesSmallest) {
                 return self.distrusts(now_ns);
             }
-            // Where the line is surer of itself, it goes on.
+            // The line continues where it is more exact.
             if whole_ns < self.line.error_ns(now_ns) {
                 self.line.bend(now_ns, by_ns, MEND_NS, EVEN_PPB, whole_ns, drift_ns_s);
             }
@@ -71,19 +71,19 @@ impl Follower {
         }
     }
 
-    /// The local clock did what bounds exclude, or two that cannot both be true say what time it is: nothing is known, and it begins as one that has
-    /// heard nobody.
+    /// The local clock broke its limits, or two contradictory times were received: the time is unknown, and it begins
+    /// anew.
     pub fn distrusts(&mut self, now_ns: u64) {
         self.line = ClockModel::unsynchronised(now_ns, self.line.at(now_ns).ns, 0);
         (self.heard, self.last) = (0, None);
     }
 
-    /// Nobody tells anything.
+    /// No answer comes.
     pub fn goes_on(&mut self, now_ns: u64) {
         self.line.end_slew(now_ns);
     }
 
-    /// The page was not written in time, and still says this.
+    /// The page was not written in time, and still has this record.
     pub fn page_says(&mut self, now_ns: u64, page: &TimeRecord) {
         self.line.go_on_from(now_ns, page);
     }
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn it_begins_when_it_has_heard_enough_and_steps_with_the_epoch() {
         let mut follower = Follower::new(0, 5, None);
-        // The first exchange is the best of all, so what is told stays the same while answers come.
+        // The first exchange is the best of all, so the record stays the same while answers come.
         let best = told(7, 1, AHEAD_NS + 1, 1_000);
         for answers in 1..u64::from(HEARD_MIN) {
             follower.told(answers, &best, answers);
@@ -161,7 +161,7 @@ mod tests {
         };
         begin(&mut follower, 100, AHEAD_NS, 1);
         assert!(follower.record().error_ns < UNSYNCHRONISED_NS);
-        // The computer slept for an hour, and its clock stood still meanwhile.
+        // The computer slept for an hour, and its clock stopped meanwhile.
         let ahead_ns = AHEAD_NS + 3_600 * SECOND_NS;
         follower.told(SECOND_NS, &told(7, SECOND_NS, SECOND_NS + ahead_ns, 10_000_000), 9);
         assert_eq!((follower.record().epoch, follower.record().error_ns), (0, UNSYNCHRONISED_NS), "nothing is known");
@@ -179,7 +179,7 @@ mod tests {
             let mut follower = Follower::new(0, 0, None);
             let (mut now_ns, mut last_ns) = (0, 0);
             for ((pause_ns, off_ns, early), count) in answers.into_iter().zip(1..) {
-                // Between two answers the line is looked at, as readers do.
+                // Between two answers the line is read, as readers do.
                 for _ in 0..10 {
                     now_ns += pause_ns / 10;
                     let there = follower.record().at(now_ns);

@@ -1,20 +1,20 @@
-//! What a slave measured, and what follows from it: an interval that holds the truth, and the best guess within it.
+//! A slave's measurements, and what follows from them: an interval that holds the truth, and the best guess within it.
 //!
-//! A sample is an interval for `system time − local time`: the frame to us cannot have arrived before it left, nor ours at the master.
-//! Of each *bucket* of time only the narrowest is kept: the one whose frames waited least. (In time slots the bound of each moment matters, so a
-//! newer one is narrower if it is by the time that it came: what is old has drifted.) From these follow
-//! the rate and the guess (medians, so single bad ones do not matter), and an interval for both, which assumes nothing of delays.
+//! A sample is an interval for `system time − local time`: no frame arrives before it left, in either direction. Each
+//! *bucket* of time keeps the narrowest sample, which is the one with the least queueing. (In time slots the bound of
+//! each moment matters. So samples are compared as of now, with the drift since they came.) Rate and guess are medians,
+//! so single bad samples do not matter. The interval assumes nothing of delays.
 
 use super::{RATE_MAX_PPB, WANDER_PPB_S};
 
-/// Buckets that bound the truth, and how many of the newest the guess is made of.
+/// Buckets that bound the truth, and the number of the newest that make the guess.
 const BUCKETS: usize = 16;
 const GUESS_BUCKETS: usize = 8;
 const SLOPES: usize = GUESS_BUCKETS * (GUESS_BUCKETS - 1) / 2;
-/// A bucket whose best frames took so many times as long as the best of all, and so much more, is not asked for a guess.
+/// A bucket is left out of the guess if its best delay is this many times the best of all, and this much more.
 const WAITED_TIMES: i64 = 2;
 const WAITED_NS: i64 = 1_000;
-/// Of 1.
+/// As a fraction of 1.
 pub(super) const RATE_MAX: f64 = RATE_MAX_PPB as f64 * 1e-9;
 /// Per nanosecond, so that times a span in ns it is a rate.
 const WANDER: f64 = WANDER_PPB_S as f64 * 1e-18;
@@ -57,7 +57,7 @@ pub(super) struct History {
     /// Oldest first; the last is still being filled.
     buckets: Vec<Sample>,
     samples: u32,
-    /// By how much a sample grows wider as it ages, for the choice of the narrowest.
+    /// How fast a sample widens with age when the narrowest is chosen.
     fade: f64,
 }
 
@@ -71,7 +71,7 @@ impl History {
         self.samples = 0;
     }
 
-    /// From now on samples grow wider by so much as they age, of 1.
+    /// From now on samples widen by this fraction of their age.
     pub(super) fn fades(&mut self, fade: f64) {
         self.fade = fade;
     }
@@ -81,7 +81,7 @@ impl History {
         self.samples
     }
 
-    /// Delay of both ways together in the best exchange that is kept, ns.
+    /// Round-trip delay of the best exchange that is kept, ns.
     pub(super) fn delay_ns(&self) -> Option<u64> {
         self.buckets.iter().map(|sample| sample.width_ns().unsigned_abs()).min()
     }
@@ -105,8 +105,8 @@ impl History {
         }
     }
 
-    /// What is known at a moment that is not before the last sample. None without samples, or when they contradict each other: then a
-    /// clock did what [`LIMITS`](super::LIMITS) exclude.
+    /// The estimate for a moment that is not before the last sample. None without samples, or when they contradict each
+    /// other: then a clock broke its [`LIMITS`](super::LIMITS).
     pub(super) fn estimate(&self, local_ns: u64, usual_rate: f64) -> Option<Estimate> {
         let newest = self.buckets.last()?;
         let (rate_low, rate_high) = self.rate_interval(local_ns)?;
@@ -116,7 +116,7 @@ impl History {
         let rate = self.slope(recent).unwrap_or(usual_rate).clamp(rate_low, rate_high);
         let mut guesses = [0.0; GUESS_BUCKETS];
         for (guess, sample) in guesses.iter_mut().zip(recent) {
-            // Relative to the newest: as whole numbers these are larger than a double counts.
+            // Relative to the newest: a double cannot hold the absolute values.
             let middle = sample.middle_ns().saturating_sub(newest.low_ns) as f64;
             *guess = middle + rate * span_ns(sample.local_ns, local_ns);
         }
@@ -124,7 +124,8 @@ impl History {
         Some(Estimate { offset_ns: guess_ns.clamp(low_ns, high_ns), low_ns, high_ns, rate, rate_low, rate_high })
     }
 
-    /// The newest, without those of a time in which all frames waited: these say little of where in their interval the truth is.
+    /// The newest buckets, without those in which all frames were delayed: these say little of where in their interval
+    /// the truth is.
     fn recent<'a>(&self, room: &'a mut [Sample; GUESS_BUCKETS]) -> &'a [Sample] {
         let newest = &self.buckets[self.buckets.len().saturating_sub(GUESS_BUCKETS)..];
         let narrowest_ns = newest.iter().map(Sample::width_ns).min().unwrap_or(0);
@@ -144,7 +145,7 @@ impl History {
         for (at, later) in recent.iter().enumerate() {
             for earlier in &recent[..at] {
                 let span = span_ns(earlier.local_ns, later.local_ns);
-                // Two that lie at an edge between buckets say nothing of the rate.
+                // Two samples at one edge between buckets say nothing of the rate.
                 if span >= self.bucket_ns as f64 / 2.0 {
                     slopes[count] = later.middle_ns().saturating_sub(earlier.middle_ns()) as f64 / span;
                     count += 1;
@@ -154,7 +155,7 @@ impl History {
         (count > 0).then(|| median(&mut slopes[..count]))
     }
 
-    /// Between which the rate lies now: what any two samples allow, and how much it may have changed since.
+    /// The interval of the rate now: what any two samples allow, and its possible change since.
     fn rate_interval(&self, local_ns: u64) -> Option<(f64, f64)> {
         let (mut rate_low, mut rate_high) = (-RATE_MAX, RATE_MAX);
         for (at, later) in self.buckets.iter().enumerate() {
@@ -170,7 +171,7 @@ impl History {
         (rate_low <= rate_high).then_some((rate_low, rate_high))
     }
 
-    /// Between which `system − local` lies now: what each sample allows, carried forward.
+    /// The interval of `system − local` now: what each sample allows, carried forward.
     fn interval(&self, local_ns: u64, rate_low: f64, rate_high: f64) -> Option<(i64, i64)> {
         let (mut low_ns, mut high_ns) = (i64::MIN, i64::MAX);
         for sample in &self.buckets {

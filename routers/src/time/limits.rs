@@ -1,26 +1,28 @@
-//! What bounds assume of the clocks of computers, in one place. Who keeps them is watched: see `steadiness`.
+//! The assumptions of bounds about the computers' clocks, in one place. `steadiness` watches that they hold.
 
 use rohrpost_network::RATE_MAX_PER;
 
-/// What a computer's clock does at most.
+/// Limits of a computer's clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ClockLimits {
-    /// How much faster or slower than system time it may be, ns a second: two clocks of 100 ppm, and some room.
+    /// Largest rate against system time, ns a second: two clocks of 100 ppm, and some margin.
     pub rate_ppb: i64,
-    /// How much that may change in a second, ns a second: measured clocks in a moving robot change by a tenth of it.
+    /// Largest change of the rate in a second, ns a second: clocks measured in a moving robot change by a tenth of it.
     pub wander_ppb_s: i64,
-    /// How much faster or slower somebody may make it than its oscillator is, for good, ns a second: what an oscillator is off, and some room. A time
-    /// daemon that corrects an error goes beyond it; what it corrects for good is within it, and is a part of `rate_ppb`.
+    /// Largest permanent rate correction against the oscillator, ns a second: the error of an oscillator, and some
+    /// margin. A time daemon that corrects an offset exceeds it; its permanent correction is within it, and is a part
+    /// of `rate_ppb`.
     pub slewed_ppb: i64,
-    /// How much that may change from one look to the next, ns a second: what daemons change that correct nothing but the oscillator.
+    /// Largest change of that from one look to the next, ns a second: the changes of a daemon that corrects only the
+    /// oscillator.
     pub slewed_change_ppb: i64,
-    /// How far off two readings of clocks, one after the other, seem to be at most, ns.
+    /// Largest apparent distance of two clock readings, one after the other, ns.
     pub reading_ns: u64,
-    /// For how long the computer must have slept for it to have slept, ns.
+    /// A shorter sleep of the computer counts as none, ns.
     pub slept_ns: u64,
 }
 
-/// They are assumed of all.
+/// The limits of all nodes.
 pub const LIMITS: ClockLimits = ClockLimits {
     rate_ppb: 1_000_000_000 / RATE_MAX_PER as i64,
     wander_ppb_s: 500,

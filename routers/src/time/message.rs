@@ -1,4 +1,4 @@
-//! What the datagrams of time say, behind the frame's head: 72 bytes each, whichever kind it is.
+//! Datagrams of time, behind the frame's head: 72 bytes each, of every kind.
 //!
 //! ```text
 //!           0    8         16        24       32      40      48     56      64      65      68       72
@@ -10,7 +10,8 @@
 //!           └────┴─────────┴─────────┴────────┴───────┴───────┴──────┴───────┴───────┴───────┴────────┘
 //! ```
 //!
-//! All of one length, so that the way there takes as long as the way back. Times are system time, ns since 1970, by the sender's page.
+//! All have one length, so that both directions take equally long. Times are system time, ns since 1970, by the
+//! sender's page.
 
 use super::Term;
 use crate::frame::{BadFrame, Kind};
@@ -27,14 +28,14 @@ const TIMED: u8 = 4;
 const SYNC_BY_KERNEL: u8 = 1;
 const REQUEST_BY_KERNEL: u8 = 2;
 
-/// What a datagram of time says.
+/// A datagram of time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Message {
-    /// The master: it is now …
+    /// From the master: its present time.
     Sync(Sync),
-    /// Nothing; the next frame finds the way warm.
+    /// Empty: it warms the path for the next frame.
     WarmUp,
-    /// A slave, at once after a [`Sync`]: when did that leave, when did this come?
+    /// From a slave, after a [`Sync`]: it asks when that left and when this came.
     Request(Request),
     /// The master's answer.
     Reply(Reply),
@@ -43,7 +44,7 @@ pub enum Message {
 /// The master's time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Sync {
-    /// Matches what belongs together; never 0, never twice in one incarnation of a master.
+    /// Matches Sync, Request and Reply; never 0, never twice in one incarnation of a master.
     pub id: u64,
     /// Counts intervals of system time since 1970, so that every master counts the same.
     pub cycle: u64,
@@ -51,17 +52,17 @@ pub struct Sync {
     pub nominal_ns: u64,
     /// Just before it was handed to the kernel, system ns. When it really left is in the [`Reply`].
     pub sent_ns: u64,
-    /// How far the master may be off the epoch's time, ns.
+    /// The master's largest distance from the epoch's time, ns.
     pub error_ns: u64,
     /// The system's epoch.
     pub epoch: u64,
-    /// The sender's term, which has its rank.
+    /// The sender's term, which contains its rank.
     pub term: Term,
-    /// The term in which this timeline of the sender began: another one must not be mixed with it.
+    /// The term in which this timeline of the sender began: samples of different ones must not be mixed.
     pub began: Term,
     /// Whether slaves answer this master.
     pub followed: bool,
-    /// A backup master sends it, in the place of the master of this term: the cycle lives. Nobody goes by its times.
+    /// A backup master sends it in place of the master of this term: the cycle lives. Its times are not used.
     pub replacement: bool,
 }
 
@@ -70,7 +71,7 @@ pub struct Sync {
 pub struct Request {
     /// Of the [`Sync`]; 0: hears no master.
     pub id: u64,
-    /// Who hears no master, has system time and sends in time slots says so what time it is; else 0.
+    /// The time of a sender in time slots that has system time and hears no master; else 0.
     pub sent_ns: u64,
     /// The sender's error bound, ns.
     pub error_ns: u64,
@@ -78,11 +79,11 @@ pub struct Request {
     pub epoch: u64,
     /// The term that the sender follows, or followed last.
     pub term: Term,
-    /// It has too few samples, and wants the next soon.
+    /// The sender has too few samples, and wants the next soon.
     pub eager: bool,
-    /// It is too far off to slew: there must be another epoch.
+    /// The sender is too far off to slew: it needs a new epoch.
     pub far: bool,
-    /// It has system time.
+    /// The sender has system time.
     pub timed: bool,
 }
 
@@ -97,7 +98,7 @@ pub struct Reply {
     pub request_ns: u64,
     /// Just before this was handed to the kernel, system ns.
     pub sent_ns: u64,
-    /// How far the master may be off the epoch's time, ns.
+    /// The master's largest distance from the epoch's time, ns.
     pub error_ns: u64,
     /// The system's epoch.
     pub epoch: u64,
@@ -105,11 +106,11 @@ pub struct Reply {
     pub term: Term,
     /// See [`Sync::began`].
     pub began: Term,
-    /// How far off each of the first two may be, ns.
+    /// Largest error of each of the first two, ns.
     pub doubt_ns: u32,
-    /// The kernel saw the [`Sync`] leave; else it is when it was handed over.
+    /// The kernel stamped the [`Sync`] when it left; else it is when it was handed over.
     pub sync_by_kernel: bool,
-    /// The kernel saw the [`Request`] come; else it is when it was read.
+    /// The kernel stamped the [`Request`] when it came; else it is when it was read.
     pub request_by_kernel: bool,
 }
 
@@ -124,7 +125,7 @@ impl Message {
         }
     }
 
-    /// What goes behind the frame's head.
+    /// The bytes behind the frame's head.
     pub fn to_bytes(&self) -> [u8; MESSAGE_BYTES] {
         let mut fields = Fields::default();
         match *self {
@@ -146,7 +147,7 @@ impl Message {
         fields.to_bytes()
     }
 
-    /// Reads what follows a frame's head of a kind of time. Whoever has a message need not check it again.
+    /// Reads the rest of a frame of time. A message is valid: it needs no further check.
     ///
     /// # Errors
     /// [`BadFrame::Damaged`]
@@ -183,7 +184,7 @@ impl Message {
                 return Err(BadFrame::Damaged("no frame of time"));
             }
         };
-        // What it does not say must be 0: so another version can say more.
+        // Unused bytes must be 0: another version can use them.
         if message.to_bytes() != *rest {
             return Err(BadFrame::Damaged("a frame of time says what its kind does not"));
         }

@@ -1,54 +1,55 @@
-//! Nodes that go by another configuration: of another digest. Where there are time slots, their table is another, and so two times on one wire
-//! are slots that overlap.
+//! Nodes of another configuration, that is, with another digest. With time slots they have another slot table: two
+//! times on one wire are slots that overlap.
 //!
-//! Whoever hears the time of such nodes has a *claim* of its own: whether a time of its configuration is followed, then the greater digest. The
-//! lesser claim yields at once: it says nothing, and listens anew when nothing of the others was heard for [`YIELDS_NS`]. The greater one goes
-//! on for as long as the others need to hear it; if they go on nevertheless, they do not hear it, and it says nothing either.
+//! A node that hears the time of such nodes has a *claim*, compared in this order: whether a time of its configuration
+//! is followed, then the greater digest. The lesser claim yields at once: it is silent, and listens anew when it heard
+//! nothing of the others for [`YIELDS_NS`]. The greater claim continues until the others must have heard it. If they
+//! continue nevertheless, they do not hear it, and it falls silent, too.
 
 use crate::broken::broken;
 use crate::frame::NodeIndex;
 
-/// Who yields says nothing for so long after it heard the others last.
+/// Silence of a node that yields, after it last heard the others.
 const YIELDS_NS: u64 = 1_000_000_000;
-/// The same after a refusal: whoever refuses says so only when it hears something.
+/// The same after a refusal: a node refuses only when it receives something.
 const REFUSED_NS: u64 = 10_000_000_000;
-/// Frames of one node that come so far apart say nothing of the time between.
+/// Frames of one node with a larger gap say nothing of the time between.
 const APART_NS: u64 = 1_000_000_000;
 
-/// Who has the greater one goes on: whether its time is followed, and its digest.
+/// The greater one continues: whether its time is followed, and its digest.
 pub(super) type Claim = (bool, u64);
 
-/// A node that goes by another configuration.
+/// A node of another configuration.
 #[derive(Clone, Copy, Debug)]
 struct Other {
     digest: u64,
-    /// Frames came of it from then to then, local ns.
+    /// First and last frame, local ns.
     since_ns: u64,
     heard_ns: u64,
-    /// This node says nothing before that, local ns.
+    /// This node is silent until then, local ns.
     until_ns: u64,
-    /// The same because of what it said of time alone: who follows it goes on sending for a while, also if it stops.
+    /// The same because of its frames of time alone: its followers go on sending for a while, even when it stops.
     follows_until_ns: u64,
-    /// When it has shown last that it lives and says what time it is, and this node yielded, local ns; 0: never.
+    /// When a verified frame of time last made this node yield, local ns; 0: never.
     told_ns: u64,
 }
 
 impl Other {
-    /// It said at that time what time it is.
+    /// It sent a frame of time then.
     fn follows(&mut self, local_ns: u64) {
         self.follows_until_ns = local_ns.saturating_add(YIELDS_NS);
         self.until_ns = self.until_ns.max(self.follows_until_ns);
     }
 }
 
-/// Those that were heard.
+/// All nodes of another configuration.
 #[derive(Debug)]
 pub(super) struct Others {
     /// By node; the last is for all addresses that no node has.
     all: Box<[Option<Other>]>,
-    /// A lesser claim is given so long to yield.
+    /// How long a lesser claim has to yield.
     grace_ns: u64,
-    /// Refusals up to then are known, monotonic ns.
+    /// Refusals until then are known, monotonic ns.
     refusals_ns: u64,
 }
 
@@ -57,12 +58,12 @@ impl Others {
         Self { all: vec![None; usize::from(nodes) + 1].into(), grace_ns: 0, refusals_ns: 0 }
     }
 
-    /// From now on a lesser claim is given so long.
+    /// Sets how long a lesser claim has to yield.
     pub(super) fn gives(&mut self, grace_ns: u64) {
         self.grace_ns = grace_ns;
     }
 
-    /// A node, or one whose address no node has, says what time it is by another configuration.
+    /// A node, or an address that no node has, sends time of another configuration.
     pub(super) fn hears(&mut self, node: Option<NodeIndex>, local_ns: u64, theirs: Claim, own: Claim) {
         let grace_ns = self.grace_ns;
         let other = self.other(node, theirs.1, local_ns);
@@ -76,8 +77,8 @@ impl Others {
         }
     }
 
-    /// The same, of a node that has not shown now that it lives. It counts if the node has shown that lately, and this one says nothing because of it:
-    /// so what somebody has kept of it silences this node no longer than a refusal.
+    /// The same for an unverified frame. It counts only if a verified one of that node came lately and this node is
+    /// silent because of it. So a replayed frame silences this node no longer than a refusal.
     pub(super) fn overhears(&mut self, node: NodeIndex, local_ns: u64, digest: u64) {
         let other = self.all.get_mut(usize::from(node)).and_then(Option::as_mut);
         let told_lately = |other: &&mut Other| local_ns.saturating_sub(other.told_ns) < REFUSED_NS - YIELDS_NS;
@@ -86,19 +87,19 @@ impl Others {
         }
     }
 
-    /// A node takes nothing from this one, since it goes by another configuration.
+    /// A node refuses this one's packets because of the digest.
     pub(super) fn refuses(&mut self, node: NodeIndex, local_ns: u64, digest: u64) {
         let other = self.other(Some(node), digest, local_ns);
         other.heard_ns = local_ns;
         other.until_ns = local_ns.saturating_add(REFUSED_NS);
     }
 
-    /// A node goes by this configuration.
+    /// A node has this configuration.
     pub(super) fn agrees(&mut self, node: NodeIndex) {
         self.is_heard(node, u64::MAX);
     }
 
-    /// A node was heard, by this configuration, at that time: what it refused before is over. Who followed it before may not know yet.
+    /// A frame of this configuration came from a node: its earlier refusals are void. Its followers may not know yet.
     pub(super) fn is_heard(&mut self, node: NodeIndex, local_ns: u64) {
         let other = self.all.get_mut(usize::from(node)).and_then(Option::as_mut);
         if let Some(other) = other.filter(|other| other.heard_ns < local_ns) {
@@ -106,7 +107,7 @@ impl Others {
         }
     }
 
-    /// Whether refusals of this moment are news, monotonic ns; from now on they are none.
+    /// Whether refusals of this moment are new, monotonic ns; from now on they are known.
     pub(super) fn is_news(&self, refused_ns: u64) -> bool {
         refused_ns > self.refusals_ns
     }
@@ -115,13 +116,13 @@ impl Others {
         self.refusals_ns = self.refusals_ns.max(until_ns);
     }
 
-    /// Until when this node says nothing, if it does not.
+    /// Until when this node is silent, if it is.
     pub(super) fn silent_until_ns(&self, local_ns: u64) -> Option<u64> {
         let until_ns = self.all.iter().flatten().map(|other| other.until_ns).max();
         until_ns.filter(|until_ns| local_ns < *until_ns)
     }
 
-    /// Because of whom: which node, none if its address is no node's; and its digest.
+    /// The cause of the silence: the node, none if no node has the address, and its digest.
     pub(super) fn because_of(&self, local_ns: u64) -> impl Iterator<Item = (Option<NodeIndex>, u64)> {
         let last = self.all.len() - 1;
         let all = self.all.iter().enumerate().filter_map(move |(at, other)| Some((at, (*other)?)));
@@ -193,7 +194,7 @@ mod tests {
         refused.is_heard(0, MS + 1);
         assert!(silent(&refused, MS), "another goes by it still");
         refused.agrees(2);
-        assert!(silent(&refused, MS), "who followed it may go on for a while");
+        assert!(silent(&refused, MS), "its followers may go on for a while");
         assert!(!silent(&refused, MS + YIELDS_NS));
         let mut refused = others();
         refused.refuses(0, MS, 9);
@@ -202,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_shown_that_it_lives_is_overheard_for_no_longer_than_a_refusal() {
+    fn a_replay_of_a_verified_node_counts_no_longer_than_a_refusal() {
         let mut lesser = others();
         lesser.overhears(1, MS, 9);
         assert!(!silent(&lesser, MS), "it has shown nothing");

@@ -1,4 +1,5 @@
-//! Whether the local clock keeps what [`LIMITS`] say of it: seen by a clock that nobody slews, and by how long the computer has slept.
+//! Whether the local clock keeps its [`LIMITS`]: by comparison with a clock that nothing slews, and with the time that
+//! the computer has slept.
 //!
 //! ```text
 //!  local less unslewed ▲            ┌ slewed: further off the line than the change that is allowed
@@ -11,46 +12,49 @@ use super::limits::LIMITS;
 use crate::broken::broken;
 use rohrpost_mailbox::Watched;
 
-/// The line is drawn anew after so long: readings are then worth a few ppm.
+/// The line is fitted anew after this long: readings are then exact to a few ppm.
 const SPAN_NS: u64 = 100_000_000;
-/// Who was not steady is believed again after so long without anything of the kind.
+/// An unsteady clock is trusted again after this long without a new finding.
 const STEADY_AFTER_NS: u64 = 3 * SPAN_NS;
 const BILLION: i128 = 1_000_000_000;
 
 /// The clocks of a computer at one moment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Looked {
-    /// The local clock, ns: somebody may slew it.
+    /// The local clock, ns; it may be slewed.
     pub local_ns: u64,
-    /// One that nobody slews, ns.
+    /// A clock that nothing slews, ns.
     pub unslewed_ns: u64,
-    /// How long the two readings lay apart at most, ns.
+    /// Longest time between the two readings, ns.
     pub apart_ns: u64,
-    /// For how long the computer has slept, ns.
+    /// How long the computer has slept, ns.
     pub slept_ns: u64,
 }
 
-/// Why a clock is not to be believed.
+/// Why a clock is not trusted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Unsteady {
-    /// The computer slept: how long, its clocks do not know exactly.
+    /// The computer slept; its clocks do not know exactly how long.
     #[error("the computer slept for {} s", slept_ns / 1_000_000_000)]
     Slept {
-        /// About so long.
+        /// Approximate.
         slept_ns: u64,
     },
     /// Shortly before this router was started, its earlier incarnation found one of the others.
     #[error("shortly before this router was started the computer slept, or its clock was slewed")]
     Before,
     /// A time daemon slews it.
-    #[error("its clock is slewed, by {} ppm: end the time daemon of this computer (`rohrpost doctor` names it)", rate_ppb / 1_000)]
+    #[error(
+        "its clock is slewed, by {} ppm: end the time daemon of this computer (`rohrpost doctor` names it)",
+        rate_ppb / 1_000
+    )]
     Slewed {
         /// How much faster than its oscillator, ns a second.
         rate_ppb: i64,
     },
 }
 
-/// What was seen.
+/// Observed state.
 #[derive(Debug, Default)]
 pub(crate) struct Steadiness {
     /// Where the present span began.
@@ -58,13 +62,13 @@ pub(crate) struct Steadiness {
     /// How much faster than its oscillator the clock was in the last span, ns a second.
     rate_ppb: Option<i64>,
     slept_ns: Option<u64>,
-    /// Until when it is not believed, local ns; and why.
+    /// Until when the clock is not trusted, local ns; and why.
     until_ns: u64,
     why: Option<Unsteady>,
 }
 
 impl Steadiness {
-    /// Goes on from what an earlier incarnation has seen.
+    /// Continues from what an earlier incarnation observed.
     pub(crate) fn of(watched: Option<Watched>) -> Self {
         let Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns: until_ns }) =
             watched
@@ -75,14 +79,14 @@ impl Steadiness {
         Self { began, rate_ppb, slept_ns: Some(slept_ns), until_ns, why: Some(Unsteady::Before) }
     }
 
-    /// What the next incarnation goes on from.
+    /// State for the next incarnation.
     pub(crate) fn watched(&self) -> Option<Watched> {
         let Looked { local_ns, unslewed_ns, apart_ns, .. } = self.began?;
         let (slept_ns, rate_ppb, unsteady_until_ns) = (self.slept_ns?, self.rate_ppb, self.until_ns);
         Some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns })
     }
 
-    /// Looks at the clocks; what is wrong, if this look shows that something is.
+    /// Reads the clocks. Returns the fault, if this look shows one.
     pub(crate) fn look(&mut self, now: Looked) -> Option<Unsteady> {
         let found = self.slept(now).or_else(|| self.slewed(now));
         if found.is_some() {
@@ -92,7 +96,7 @@ impl Steadiness {
         found
     }
 
-    /// Why the clock is not to be believed now, and until when; none if it is.
+    /// Why the clock is not trusted now, and until when; none if it is.
     pub(crate) fn why(&self, local_ns: u64) -> Option<(Unsteady, u64)> {
         self.why.filter(|_| local_ns < self.until_ns).map(|why| (why, self.until_ns))
     }
@@ -103,7 +107,7 @@ impl Steadiness {
         if slept_ns < LIMITS.slept_ns {
             return None;
         }
-        // The other clock stood still meanwhile.
+        // The other clock stopped meanwhile.
         (self.began, self.rate_ppb) = (Some(now), None);
         (!broken!(SleepsUnnoticed)).then_some(Unsteady::Slept { slept_ns })
     }
@@ -123,7 +127,7 @@ impl Steadiness {
         if !is_off && since_ns < i128::from(SPAN_NS) {
             return None;
         }
-        // A reading between which and the next the thread was held up says little: another comes.
+        // The thread was held up between this reading and the next, so it says little: another comes.
         if is_off || now.apart_ns <= LIMITS.reading_ns {
             let is_known = since_ns >= i128::from(SPAN_NS);
             (self.began, self.rate_ppb) = (Some(now), if is_known { Some(rate_ppb) } else { None });
@@ -139,7 +143,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// A clock that shows `slept_ns` more than the other, and is so much fast.
+    /// A clock that shows `slept_ns` more than the other, and is this fast.
     struct Computer {
         now: Looked,
         steadiness: Steadiness,
@@ -150,7 +154,7 @@ mod tests {
             Self { now: Looked { local_ns: 9, unslewed_ns: 5, ..Looked::default() }, steadiness: Steadiness::default() }
         }
 
-        /// Looks every 5 ms, for so long; how long it took until something was found, ns.
+        /// Looks every 5 ms for this long. Returns how long it took until something was found, ns.
         fn runs(&mut self, for_ns: u64, fast_ppb: i64) -> Option<(u64, Unsteady)> {
             for n in 1..=for_ns / (5 * MS) {
                 self.now.unslewed_ns += 5 * MS;
@@ -199,7 +203,7 @@ mod tests {
         assert!(slewed.runs(SPAN_NS, 300_000).is_some());
         let next = Steadiness::of(slewed.steadiness.watched());
         let now_ns = slewed.now.local_ns;
-        assert_eq!(next.why(now_ns).map(|(why, _)| why), Some(Unsteady::Before), "who slewed it may go on");
+        assert_eq!(next.why(now_ns).map(|(why, _)| why), Some(Unsteady::Before), "the time daemon may go on");
         assert_eq!(next.why(now_ns + STEADY_AFTER_NS + MS), None);
         assert_eq!(Steadiness::of(None).watched(), None);
     }

@@ -1,37 +1,37 @@
-//! What goes into a clock and comes out of it.
+//! Inputs and outputs of a clock.
 
 use super::{Stamp, Term};
 use crate::frame::{BadFrame, NodeIndex};
 use rohrpost_mailbox::SystemTime;
 use std::time::Duration;
 
-/// What a clock knows before the first datagram.
+/// Settings of a clock.
 #[derive(Clone, Debug)]
 pub struct TimeSettings {
     /// First byte of the names of this system.
     pub system: u8,
-    /// Which node it runs on.
+    /// This node.
     pub own: NodeIndex,
-    /// Nodes of the system.
+    /// Number of nodes of the system.
     pub nodes: u8,
-    /// Which of them may be master, in order.
+    /// The nodes that may be master, in order.
     pub masters: Vec<NodeIndex>,
-    /// Of synchronisation, 1 ms to 10 s; the same on all nodes.
+    /// Interval of synchronisation, 1 ms to 10 s; the same on all nodes.
     pub interval: Duration,
-    /// What must be equal on both ends of a wire.
+    /// Digest of the configuration; equal on all nodes.
     pub digest: u64,
-    /// Tells this incarnation of the router from its others; not 0.
+    /// Distinguishes this incarnation of the router from its others; not 0.
     pub incarnation: u64,
 }
 
-/// What a node is for the others.
+/// Role of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Role {
-    /// Hears no master; if it has time, it goes on by its own clock.
+    /// Hears no master; if it has time, its own clock continues it.
     Listening,
     /// Follows a master.
     Slave,
-    /// Is followed.
+    /// Has or seeks followers.
     Master,
 }
 
@@ -40,49 +40,50 @@ pub enum Role {
 pub enum Step {
     /// The buffer has a datagram for this node. If it is to be stamped, its id comes back with [`Clock::sent`].
     Send {
-        /// To whom.
+        /// Receiver.
         to: NodeIndex,
-        /// Which it is, if its stamp matters.
+        /// Its id, if its stamp matters.
         stamp: Option<SentId>,
     },
-    /// Nothing before this moment, local monotonic ns, unless a datagram comes.
+    /// Nothing to do before this moment, local monotonic ns, unless a datagram comes.
     Wait {
         /// Until then.
         until_ns: u64,
     },
 }
 
-/// Which datagram left.
+/// A datagram that left.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SentId {
-    /// To whom.
+    /// Receiver.
     pub to: NodeIndex,
     /// The sequence in its head.
     pub sequence: u64,
 }
 
-/// Why a datagram was not taken. Counted; none of these is an error of this node.
+/// Why a datagram was ignored. Counted; none of these is an error of this node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Ignored {
     /// Not of this system, for another node, or of another configuration.
     #[error("from or for somebody else")]
     Stranger,
-    /// Of another configuration, or of this one while another is heard: see [`Clock::parted_by`](super::Clock::parted_by).
+    /// Of another configuration, or of this one while another is heard: see
+    /// [`Clock::parted_by`](super::Clock::parted_by).
     #[error("there are nodes of another configuration")]
     OtherTable,
-    /// Nothing is measured by a clock that is not steady: see [`Clock::unsteady`](super::Clock::unsteady).
+    /// An unsteady clock measures nothing: see [`Clock::unsteady`](super::Clock::unsteady).
     #[error("this computer's clock is not steady")]
     Unsteady,
-    /// Wrong in itself.
+    /// Malformed.
     #[error(transparent)]
     Bad(#[from] BadFrame),
-    /// Of a master that must yield, late, or twice.
+    /// From a master that must yield, late, or a duplicate.
     #[error("late, twice, or of a master that must yield")]
     Late,
-    /// A reply to a question that nobody asked, or that was answered.
+    /// A reply to no open question.
     #[error("no such question")]
     Unasked,
-    /// Of who has not shown that it lives, and of no use.
+    /// From an unverified sender, and of no use.
     #[error("of a router that has not shown that it lives")]
     Unproven,
     /// The frames arrived before they left: a wrong stamp.
@@ -90,7 +91,7 @@ pub enum Ignored {
     NegativeDelay,
 }
 
-/// What [`Clock::reading`] says.
+/// Result of [`Clock::reading`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reading {
     /// System time, its epoch and its bound, by the node's page.
@@ -99,11 +100,11 @@ pub struct Reading {
     pub term: Term,
     /// System nanoseconds in a billion local ones.
     pub pace_ppb: u64,
-    /// Whether the bound says anything at all.
+    /// Whether the bound is known at all.
     pub synchronised: bool,
 }
 
-/// One exchange, for who wants to look at it: stamps of both ends.
+/// One exchange with the stamps of both ends, for diagnosis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Exchange {
     /// Of Sync, Request and Reply.
@@ -124,30 +125,30 @@ pub struct Exchange {
     pub reply_sent_ns: u64,
     /// Reply came: local.
     pub reply_came: Stamp,
-    /// All four stamps that count are the kernel's.
+    /// All four relevant stamps are the kernel's.
     pub by_kernel: bool,
 }
 
-/// What a clock in time slots has to know of them; see [`TimeShare`](rohrpost_network::TimeShare).
+/// What a clock needs to know of the time slots; see [`TimeShare`](rohrpost_network::TimeShare).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct InSlots {
     /// A warm-up goes before each Sync.
     pub warm_ups: bool,
     /// Replies go in the synchronisation window alone.
     pub replies_in_synchronisation: bool,
-    /// The quickest of a few Syncs is taken to be on its way for no longer, ns.
+    /// Assumed longest delay of the fastest of a few Syncs, ns.
     pub delay_max_ns: u64,
-    /// Who sends may be off by so much at most, ns.
+    /// Largest error of a node that may send, ns.
     pub allowance_ns: u64,
-    /// Each node that has slots has one at least this often, ns.
+    /// Each node with slots has one at least this often, ns.
     pub slot_every_ns: u64,
-    /// So have this node and all that may be master: it asks, and is answered.
+    /// This node and all that may be master have one this often: for questions and answers.
     pub asks_every_ns: u64,
-    /// Each node may say a hello at least this often, ns.
+    /// Each node may send a hello at least this often, ns.
     pub hello_every_ns: u64,
 }
 
-/// What was sent and heard of synchronisation in time slots.
+/// Counters of synchronisation in time slots.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct SyncCounts {
     /// Cycles in which this node sent Syncs as the master.
@@ -158,6 +159,6 @@ pub struct SyncCounts {
     pub missed: u64,
     /// Cycles in which this node sent Syncs in the master's place.
     pub replacements_sent: u64,
-    /// Cycles in which another did.
+    /// Cycles in which another node did.
     pub replacements_heard: u64,
 }

@@ -1,26 +1,26 @@
-//! Frames of time that some incarnation of a peer said at some time: whether it was now, nobody has shown. Where datagrams are sealed, this is all that a
-//! node hears which joins a network with time slots.
+//! Frames of time from peers that are not verified: some incarnation sent them at some time, perhaps not now. Where
+//! datagrams are sealed, a node that joins a network with time slots hears only these.
 
 use super::TimeEstimate;
 use super::coarse::{Coarse, JOINING_SYNCS};
 use crate::broken::broken;
 use crate::frame::NodeIndex;
 
-/// Lives of one node that are told apart at a time; of more the one that has been silent for longest is forgotten.
+/// Incarnations of one node that are kept apart; of more, the one that was silent for longest is forgotten.
 const INCARNATIONS: usize = 2;
-/// For so long, and so many cycles, what nobody vouches for may keep a node from beginning a time: meanwhile who lives has answered. For longer if
-/// that takes longer.
+/// How long, and for how many cycles, unverified frames may keep a node from beginning a time: a live peer has answered
+/// by then. Longer if the handshake takes longer.
 const PATIENCE_NS: u64 = 2_000_000_000;
 const PATIENCE_CYCLES: u64 = 64;
-/// So many hellos to and of each other node may go before the two know each other.
+/// Hellos to and from each other node until the two know each other.
 const HELLOS: u64 = 4;
 
-/// An incarnation that is heard.
+/// Samples of one incarnation.
 #[derive(Clone, Debug, Default)]
 struct SyncSample {
-    /// 0: nobody's.
+    /// 0: none.
     incarnation: u64,
-    /// The latest that was heard of it: what is repeated says nothing.
+    /// The latest frame of it: repeated ones say nothing.
     sequence: u64,
     heard_ns: u64,
     coarse: Coarse,
@@ -31,18 +31,18 @@ struct SyncSample {
 pub(super) struct TimeReport {
     pub(super) epoch: u64,
     pub(super) system_ns: u64,
-    /// Its sender may be so far off what others go by.
+    /// The sender's largest distance from the time of the others.
     pub(super) error_ns: u64,
 }
 
-/// What was overheard since the time was known last.
+/// Unverified samples since the time was last known.
 #[derive(Clone, Debug)]
 pub(super) struct UnverifiedPeers {
-    /// By node, [`INCARNATIONS`] of each: who speaks often takes nobody else's place.
+    /// By node, [`INCARNATIONS`] of each: a busy sender takes no other node's place.
     voices: Box<[SyncSample]>,
-    /// Whose turn it is.
+    /// The next one to ask.
     turn: usize,
-    /// Whoever lives has answered after so long.
+    /// A live peer has answered after this long.
     joins_ns: u64,
     patience_ns: u64,
     /// When the first and the last frame came, ns.
@@ -50,7 +50,7 @@ pub(super) struct UnverifiedPeers {
 }
 
 impl UnverifiedPeers {
-    /// Of so many nodes, each of which may say a hello at least once in `hello_every_ns`.
+    /// For this many nodes, each of which may send a hello at least once in `hello_every_ns`.
     pub(super) fn new(nodes: NodeIndex, cycle_ns: u64, hello_every_ns: u64) -> Self {
         let others = u64::from(nodes.saturating_sub(1));
         let joins_ns = hello_every_ns.saturating_mul(u64::from(JOINING_SYNCS) + HELLOS * others);
@@ -64,15 +64,15 @@ impl UnverifiedPeers {
         }
     }
 
-    /// The time is known: whatever is overheard from now on counts anew.
+    /// The time is known: unverified frames count anew from now on.
     pub(super) fn forget(&mut self) {
         if self.span_ns.take().is_some() {
             self.voices.fill(SyncSample::default());
         }
     }
 
-    /// A frame of an incarnation of one of the nodes came, the `sequence`th. One that tells no time takes no place. Whether it is a later one than
-    /// all that are known of that incarnation.
+    /// Takes the frame with this `sequence` of an incarnation of a node. A frame without time takes no place. Returns
+    /// whether it is later than all known frames of that incarnation.
     pub(super) fn hears(
         &mut self,
         (from, incarnation, sequence): (NodeIndex, u64, u64),
@@ -98,12 +98,12 @@ impl UnverifiedPeers {
         true
     }
 
-    /// This node stood still for so long: what it has heard tells nothing of that.
+    /// This node was stalled for this long: silence during the stall says nothing.
     pub(super) fn awakes(&mut self, stood_ns: u64) {
         self.span_ns = self.span_ns.map(|(first_ns, last_ns)| (first_ns + stood_ns, last_ns + stood_ns));
     }
 
-    /// Until when somebody was heard that may live; 0: nobody was.
+    /// Until when a frame of a peer that may be alive counts; 0: there was none.
     pub(super) fn until_ns(&self) -> u64 {
         if broken!(IgnoresUnproven) {
             return 0;
@@ -111,7 +111,7 @@ impl UnverifiedPeers {
         self.span_ns.map_or(0, |(first_ns, last_ns)| last_ns.min(self.ends_ns(first_ns)))
     }
 
-    /// Whether what is overheard now still counts.
+    /// Whether unverified frames still count.
     pub(super) fn is_patient(&self, now_ns: u64) -> bool {
         self.span_ns.is_none_or(|(first_ns, _)| now_ns < self.ends_ns(first_ns)) && !broken!(IgnoresUnproven)
     }
@@ -120,13 +120,14 @@ impl UnverifiedPeers {
         if broken!(WaitsForEver) { u64::MAX } else { first_ns.saturating_add(self.patience_ns) }
     }
 
-    /// If frames came when patience was over already: so long after one that may begin a time another may, so that it hears of the first.
+    /// If frames came after patience was over: the distance between two nodes that begin a time, so that the second
+    /// hears the first.
     pub(super) fn apart_ns(&self) -> u64 {
         let is_over = |(first_ns, last_ns): (u64, u64)| last_ns >= self.ends_ns(first_ns);
         if self.span_ns.is_some_and(is_over) { self.joins_ns } else { 0 }
     }
 
-    /// Whose time it is the turn of, and which that is: of those of which enough was heard to be off by so much at most.
+    /// The next node to ask, and its time, among those with enough samples for this bound.
     pub(super) fn estimate(
         &self,
         now_ns: u64,
@@ -137,7 +138,7 @@ impl UnverifiedPeers {
         Some(((place / INCARNATIONS) as NodeIndex, estimate))
     }
 
-    /// It was asked by [`Self::estimate`]: another one's turn is next.
+    /// [`Self::estimate`] was used to ask: the next call is about another node.
     pub(super) fn next_turn(&mut self, now_ns: u64, delay_max_ns: u64, allowance_ns: u64) {
         if let Some((place, _)) = self.turn(now_ns, delay_max_ns, allowance_ns) {
             self.turn = (place + 1) % self.voices.len();
@@ -165,14 +166,14 @@ mod tests {
         UnverifiedPeers::new(7, CYCLE_NS, 4 * CYCLE_NS)
     }
 
-    /// Of an incarnation that says it is `ahead_ns` later than here.
+    /// A frame of an incarnation with a clock `ahead_ns` later than here.
     fn tell(overheard: &mut UnverifiedPeers, from: NodeIndex, incarnation: u64, sequence: u64, ahead_ns: u64) -> bool {
         let local_ns = (sequence + 1) * CYCLE_NS;
         let told = TimeReport { epoch: 1, system_ns: local_ns + ahead_ns, error_ns: 0 };
         overheard.hears((from, incarnation, sequence), local_ns, Some(told))
     }
 
-    fn who(overheard: &UnverifiedPeers, now_ns: u64) -> Option<NodeIndex> {
+    fn next_peer(overheard: &UnverifiedPeers, now_ns: u64) -> Option<NodeIndex> {
         overheard.estimate(now_ns, DELAY_NS, ALLOWED_NS).map(|(from, _)| from)
     }
 
@@ -181,12 +182,12 @@ mod tests {
         let mut overheard = new();
         assert!((0..7).all(|sequence| tell(&mut overheard, 2, 9, sequence, 1000)));
         assert!((0..7).all(|sequence| !tell(&mut overheard, 2, 9, sequence, 99_000_000)), "each once");
-        assert_eq!(who(&overheard, 8 * CYCLE_NS), None);
+        assert_eq!(next_peer(&overheard, 8 * CYCLE_NS), None);
         assert!(tell(&mut overheard, 2, 9, 7, 1000));
         let (from, estimate) = overheard.estimate(8 * CYCLE_NS, DELAY_NS, ALLOWED_NS).unwrap();
         assert_eq!(from, 2);
         assert!(estimate.system_ns(8 * CYCLE_NS).abs_diff(8 * CYCLE_NS + 1000) <= DELAY_NS);
-        assert_eq!(who(&overheard, 200 * CYCLE_NS), None, "what is old may have drifted");
+        assert_eq!(next_peer(&overheard, 200 * CYCLE_NS), None, "what is old may have drifted");
     }
 
     #[test]
@@ -196,9 +197,9 @@ mod tests {
             (0..=6).for_each(|node| assert!(tell(&mut overheard, node, 9, sequence, 0)));
         }
         let turns = [(); 8].map(|()| {
-            let who = who(&overheard, 8 * CYCLE_NS);
+            let peer = next_peer(&overheard, 8 * CYCLE_NS);
             overheard.next_turn(8 * CYCLE_NS, DELAY_NS, ALLOWED_NS);
-            who
+            peer
         });
         assert_eq!(turns, [0, 1, 2, 3, 4, 5, 6, 0].map(Some));
         assert!(
@@ -219,7 +220,7 @@ mod tests {
         for sequence in 0..8 {
             (10..13).for_each(|life| assert!(overheard.hears((2, life, sequence), 9 * CYCLE_NS, None)));
         }
-        assert_eq!((who(&overheard, 8 * CYCLE_NS), overheard.until_ns()), (Some(2), 9 * CYCLE_NS));
+        assert_eq!((next_peer(&overheard, 8 * CYCLE_NS), overheard.until_ns()), (Some(2), 9 * CYCLE_NS));
         assert!(
             overheard.hears((2, 9, 8), 9 * CYCLE_NS, None) && !tell(&mut overheard, 2, 9, 8, 0),
             "of a known incarnation each counts once"

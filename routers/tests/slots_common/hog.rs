@@ -15,8 +15,8 @@ const MS: u64 = 1_000_000;
 /// A burst, and from one to the next: cycles are not so long, so each window is met by some.
 const BURST_NS: u64 = 24 * MS / 10;
 const EVERY_NS: u64 = 65 * MS / 10;
-/// Of two threads that have reserved their time the one goes first that has to be through earlier: routers have 10 ms. After this it may
-/// begin anew.
+/// Of two threads that have reserved their time the one goes first that has to be through earlier: routers have 10 ms.
+/// After this it may begin anew.
 const DEADLINE_NS: u64 = 5 * MS;
 /// Above that of routers, where they could not reserve any.
 const FIFO: u8 = 90;
@@ -27,8 +27,8 @@ pub(crate) struct Hog {
 }
 
 impl Hog {
-    /// Starts it, and waits until it is at work. `test` is the test of this program that calls [`be_a_hog`], `routers` what routers were
-    /// granted. None where it may not go before them.
+    /// Starts it, and waits until it is at work. `test` is the test of this program that calls [`be_a_hog`], `routers`
+    /// what routers were granted. None where it may not go before them.
     pub(crate) fn start(test: &str, routers: Granted) -> Option<Self> {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command

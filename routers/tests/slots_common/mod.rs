@@ -1,4 +1,5 @@
-//! Nodes that send in time slots: each in a namespace of its own, all joined by a bridge, on which a capture sees what crosses it and when.
+//! Nodes that send in time slots: each in a namespace of its own, all joined by a bridge, on which a capture sees what
+//! crosses it and when.
 
 #![allow(dead_code, reason = "each test uses a part")]
 
@@ -30,13 +31,14 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 pub(crate) const NODES: u8 = 3;
-/// Who may be master, in order.
+/// The possible masters, in order.
 pub(crate) const MASTERS: [u8; 2] = [0, 1];
 const PORT: u16 = 21_117;
 /// What takes longer does not come any more, however busy the computer is.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Slots of 1 ms in a cycle of 10 ms; guards are wide, since all nodes share the processors of one computer with its other work.
+/// Slots of 1 ms in a cycle of 10 ms; guards are wide, since all nodes share the processors of one computer with its
+/// other work.
 pub(crate) fn table() -> Tdma {
     let us = Duration::from_micros;
     let slot =
@@ -376,7 +378,7 @@ pub(crate) struct Outside {
     pub(crate) in_cycle_us: u64,
 }
 
-/// Whose slots these frames were in, by the time of a master.
+/// The nodes with these frames' slots, by the time of a master.
 #[derive(Default, Debug)]
 pub(crate) struct Judged {
     pub(crate) frames: usize,
@@ -386,8 +388,8 @@ pub(crate) struct Judged {
     pub(crate) starts_ns: Vec<i64>,
 }
 
-/// A frame is its sender's if it starts in a window of it or in the guard behind, or so little before that the guard of who was there
-/// before still holds: half of it, which is what a node's clock may be off.
+/// A frame is its sender's if it starts in a window of it or in the guard behind, or so little before that the guard of
+/// the slot before still holds: half of it, which is what a node's clock may be off.
 pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
     let table = Table::new(&table(), &MASTERS, 0, NODES, 28);
     let mut repeated_on_stall = Judged { frames: crossed.len(), ..Judged::default() };
@@ -410,8 +412,9 @@ pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
     repeated_on_stall
 }
 
-/// Of the frames, one and so many in a thousand may be outside of their sender's slots: the thread looks at the clock before each, and may lose
-/// its processor between that and the system call. TDMA.md found 0.03 % to 0.5 % of wake-ups that late on a computer that works.
+/// Of the frames, one and so many in a thousand may be outside of their sender's slots: the thread looks at the clock
+/// before each, and may lose its processor between that and the system call. TDMA.md found 0.03 % to 0.5 % of wake-ups
+/// that late on a computer that works.
 const OUTSIDE_PER_THOUSAND: usize = 3;
 
 fn tell(what: &str, repeated_on_stall: &Judged) {
@@ -422,7 +425,8 @@ fn tell(what: &str, repeated_on_stall: &Judged) {
             .map_or(f64::NAN, |ns| *ns as f64 / 1e3)
     };
     println!(
-        "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us after their nominal time",
+        "{what}: {} frames, {} outside; slots begin p1 {:.1} p50 {:.1} p99 {:.1} p99.9 {:.1} us \
+         after their nominal time",
         repeated_on_stall.frames,
         repeated_on_stall.outside.len(),
         at(10),

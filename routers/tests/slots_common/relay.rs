@@ -1,4 +1,5 @@
-//! What a node sends and hears goes through a relay on the bridge, which holds every frame back for the same time, or keeps some from the node.
+//! What a node sends and hears goes through a relay on the bridge, which holds every frame back for the same time, or
+//! keeps some from the node.
 
 use super::{NODES, Segment, name};
 use nix::net::if_::if_nametoindex;
@@ -17,7 +18,8 @@ use std::time::Duration;
 
 /// As `packet(7)` has it: it leaves by this port.
 const OUTGOING: u8 = 4;
-/// Where UDP over IPv4 has its checksum. The kernel fills it in when a frame leaves the computer, which this one does not.
+/// Where UDP over IPv4 has its checksum. The kernel fills it in when a frame leaves the computer, which this one does
+/// not.
 const CHECKSUM_AT: std::ops::Range<usize> = 40..42;
 const UDP_AT: usize = 23;
 const UDP: u8 = 17;

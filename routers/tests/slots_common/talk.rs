@@ -51,7 +51,7 @@ pub(crate) fn talkers(segment: &Segment, nodes: &[u8]) -> Vec<Talker> {
 pub(crate) struct Listeners {
     receivers: Vec<Receiver>,
     heard: Vec<Vec<Vec<u16>>>,
-    /// Whom each was greeted by since the last acquaintance began.
+    /// By receiver, the nodes that greeted it since the last handshake began.
     greeted: Vec<Vec<bool>>,
 }
 
@@ -85,13 +85,13 @@ impl Listeners {
         }
     }
 
-    /// All of them speak until each has heard each. Before, one may take another for silent, on a computer that is slow to join; then it loses
-    /// what is for that one, as it has to.
+    /// All of them speak until each has heard each. Before, one may take another for silent, on a computer that is slow
+    /// to join; then it loses what is for that one, as it has to.
     pub(crate) fn acquaint(&mut self, talkers: &mut [Talker]) {
         let began = Instant::now();
         self.greeted.iter_mut().flatten().for_each(|greeted| *greeted = false);
         while !talkers.iter().all(|talker| self.greeted[usize::from(talker.to)][usize::from(talker.from)]) {
-            assert!(began.elapsed() < PATIENCE, "who has heard whom: {:?}", self.greeted);
+            assert!(began.elapsed() < PATIENCE, "nodes that greeted each node: {:?}", self.greeted);
             talkers.iter_mut().for_each(|talker| talker.say(GREETING));
             std::thread::sleep(PAUSE);
             self.listen();
@@ -100,8 +100,8 @@ impl Listeners {
         self.heard.iter_mut().flatten().for_each(Vec::clear);
     }
 
-    /// Waits until all these numbers have come from each of the nodes to each other. That one does not come is known once a later number has: between
-    /// two nodes nothing changes its order.
+    /// Waits until all these numbers have come from each of the nodes to each other. That one does not come is known
+    /// once a later number has: between two nodes nothing changes its order.
     pub(crate) fn hear_all(&mut self, nodes: &[u8], numbers: &[u16]) {
         let began = Instant::now();
         for (from, to) in nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to))) {

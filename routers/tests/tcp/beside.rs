@@ -1,4 +1,5 @@
-//! Packages on the LAN while as much as fits goes through a TCP router on the same computer: they come, and not much later.
+//! Packages on the LAN while as much as fits goes through a TCP router on the same computer: they come, and not much
+//! later.
 
 use crate::ground::{PATIENCE, wait};
 use crate::hostile::Target;
@@ -14,7 +15,8 @@ use std::time::{Duration, Instant};
 /// Quiet and flooded by turns: of each the best counts, since other work of the computer comes and goes.
 const ROUNDS: usize = 6;
 const PACKAGES: usize = 150;
-/// So many times later than without a flood, and this, packages may be: the threads of both share the processors, here without priorities.
+/// So many times later than without a flood, and this, packages may be: the threads of both share the processors, here
+/// without priorities.
 const TIMES: u64 = 10;
 const SLACK_NS: u64 = 20_000_000;
 /// A flood brings more than this in a round.

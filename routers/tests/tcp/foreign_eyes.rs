@@ -1,4 +1,5 @@
-//! What crosses a network, as Wireshark reads it: without security all of it, with security the heads of datagrams and TLS, and nothing else.
+//! What crosses a network, as Wireshark reads it: without security all of it, with security the heads of datagrams and
+//! TLS, and nothing else.
 
 use crate::ground::{System, node, start_sealed, wait};
 use crate::lan::Side;
@@ -19,7 +20,7 @@ const ADDRESSES: [IpAddr; 2] =
     [IpAddr::V4(std::net::Ipv4Addr::new(10, 77, 0, 1)), IpAddr::V4(std::net::Ipv4Addr::new(10, 77, 0, 2))];
 /// So many packages cross in each way.
 const PACKAGES: usize = 100;
-/// What clients say who they are.
+/// Identities that clients send.
 const CLIENTS: [&str; 2] = ["the client of the arm", "the client of the tower"];
 /// In each body, by datagrams and by TCP, between bytes that recur.
 const WORDS: [&str; 2] = ["the safe is behind the picture", "its combination is 4711"];
@@ -91,7 +92,8 @@ fn body() -> Vec<u8> {
     [WORDS[0].as_bytes(), &RECURRING, WORDS[1].as_bytes()].concat()
 }
 
-/// Two nodes whose routers exchange datagrams, and the TCP router on one of them with a client on each. None where namespaces cannot be made.
+/// Two nodes with routers that exchange datagrams, and the TCP router on one of them with a client on each. None where
+/// namespaces cannot be made.
 fn recorded(authority: Option<&Authority>) -> Option<Read> {
     let spec = |name: &str, address| NodeSpec { name: name.into(), address };
     let lab = match Lab::new(&[spec("base", ADDRESSES[0]), spec("far", ADDRESSES[1])], 1500) {
@@ -201,7 +203,8 @@ fn wireshark_reads_all_without_security_and_of_what_is_sealed_nothing() {
     for secret in secrets() {
         assert_eq!(sealed.frames(&secret), 0, "with security {secret} finds frames");
     }
-    // All datagrams are data of nothing that Wireshark knows, and all that a session sends is TLS 1.3, whose handshake shows no certificate.
+    // All datagrams are data of nothing that Wireshark knows, and all that a session sends is TLS 1.3; its handshake
+    // shows no certificate.
     let (datagrams, data) = (sealed.frames(&lan("udp.length > 8")), sealed.frames(&lan("data")));
     assert!(datagrams > PACKAGES / 20 && datagrams == data, "{data} of {datagrams} datagrams are data");
     let versions = sealed.fields("tls.handshake.type == 2", "tls.handshake.extensions.supported_version");

@@ -42,8 +42,8 @@ impl Faults for Words {
     }
 }
 
-/// An address that nobody has: of this process and this call alone. Not a port that the kernel chose and has back: until it is used, it
-/// may be another's, or still open in a child that another test starts.
+/// An address that nobody has: of this process and this call alone. Not a port that the kernel chose and has back:
+/// until it is used, it may be another's, or still open in a child that another test starts.
 pub(crate) fn address() -> SocketAddr {
     static COUNT: AtomicU8 = AtomicU8::new(1);
     let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
@@ -56,24 +56,24 @@ pub(crate) fn node() -> (tempfile::TempDir, Arc<Node>) {
     (folder, node)
 }
 
-pub(crate) fn start(address: SocketAddr, node: &Arc<Node>, life: u64) -> Result<ServerShell, ServerError> {
-    start_sealed(address, node, life, None)
+pub(crate) fn start(address: SocketAddr, node: &Arc<Node>, incarnation: u64) -> Result<ServerShell, ServerError> {
+    start_sealed(address, node, incarnation, None)
 }
 
 pub(crate) fn start_sealed(
     address: SocketAddr,
     node: &Arc<Node>,
-    life: u64,
+    incarnation: u64,
     seal: Option<ServerSeal>,
 ) -> Result<ServerShell, ServerError> {
-    start_for(address, node, life, seal, None)
+    start_for(address, node, incarnation, seal, None)
 }
 
-/// Whose own system is 1, if it is said what the nodes of that host.
+/// Starts one for system 1, if the names that its nodes host are given.
 pub(crate) fn start_for(
     address: SocketAddr,
     node: &Arc<Node>,
-    life: u64,
+    incarnation: u64,
     seal: Option<ServerSeal>,
     names: Option<BTreeMap<String, Names>>,
 ) -> Result<ServerShell, ServerError> {
@@ -82,7 +82,7 @@ pub(crate) fn start_for(
         common: COMMON,
         system: names.is_some().then_some((1, 1)),
         own_nodes: OwnNodes::default(),
-        life,
+        incarnation,
         clients_max: 16,
         greetings_max: 16,
         quota_bytes: 256 << 10,
@@ -135,7 +135,7 @@ impl System {
             reaches_own: false,
             common: COMMON,
             system_digest: id.into(),
-            life: monotonic_ns(),
+            incarnation: monotonic_ns(),
             quota_bytes: 256 << 10,
             levels: [0; 256],
             admission,

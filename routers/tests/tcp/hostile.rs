@@ -1,4 +1,5 @@
-//! A TCP router in a process of its own, and who means it harm: others are served all the while, and its memory stays what it was.
+//! A TCP router in a process of its own, and attackers: others are served all the while, and its memory stays what it
+//! was.
 
 use crate::ground::{COMMON, System, address, node, start_sealed, wait};
 use crate::sealed::{Authority, Holds};
@@ -24,7 +25,8 @@ const PLACES: u64 = 32;
 /// More than an allocator keeps of what was freed, and far less than frames that were believed would take.
 const GROWTH_BYTES_MAX: u64 = 48 << 20;
 
-/// Attacks of each kind: for a long run, `ROHRPOST_ATTACKS=1000000 cargo test --release -p rohrpost-routers --test tcp hostile`.
+/// Attacks of each kind: for a long run, `ROHRPOST_ATTACKS=1000000 cargo test --release -p rohrpost-routers --test tcp
+/// hostile`.
 fn attacks() -> u64 {
     std::env::var("ROHRPOST_ATTACKS").ok().map_or(300, |attacks| attacks.parse().unwrap())
 }
@@ -52,7 +54,7 @@ fn in_a_process_of_its_own() {
 pub(crate) struct Target {
     child: Child,
     pub(crate) address: SocketAddr,
-    /// Of one whose handshakes are whole, and whose certificate another authority has signed.
+    /// A client with whole handshakes, and a certificate that another authority has signed.
     stranger: Option<ClientSeal>,
     /// Connections, their bytes, and how many were refused, at most so far.
     most: Arc<Mutex<[u64; 3]>>,
@@ -117,10 +119,10 @@ impl Chance {
     }
 }
 
-fn hello(life: u64) -> Vec<u8> {
+fn hello(incarnation: u64) -> Vec<u8> {
     let (system, system_digest) = (9, 9);
     let (reaches_own, attempt, asked_ns, name) = (false, 1, 0, "hostile");
-    let hello = Hello { system, reaches_own, common: COMMON, system_digest, life, attempt, asked_ns, name };
+    let hello = Hello { system, reaches_own, common: COMMON, system_digest, incarnation, attempt, asked_ns, name };
     let mut bytes = Vec::new();
     Message::Hello(hello).write(&mut bytes);
     bytes
@@ -243,7 +245,8 @@ fn others_are_served(authority: Option<&Authority>) {
     let mut serve = |one: &System, two: &mut System| {
         number += 1;
         one.say(&mut sender, number);
-        // Each comes, and in order. Who gets no time for seconds loses its connection, and what that took along: then it is said again.
+        // Each comes, and in order. A client without time for seconds loses its connection, and what that took along:
+        // then it is said again.
         wait("a package beside attacks", || {
             let links = [one.client.link(), two.client.link()];
             let connections = links.iter().map(|link| link.connections).sum::<u64>();
@@ -283,14 +286,15 @@ fn others_are_served(authority: Option<&Authority>) {
             served += 1;
             most = most.max(target.resident_bytes());
         }
-        // Who comes now is let in, too.
+        // A new client is let in, too.
         let three = System::sealed(3, "three", target.address, seal(3));
         three.wait_up();
         ends.store(true, Ordering::Relaxed);
     });
     let [connections, bytes, refused] = *target.most.lock().unwrap();
     eprintln!(
-        "{served} served beside; RSS {before} to {most} B; most: {connections} connections, {bytes} B; {refused} refused"
+        "{served} served beside; RSS {before} to {most} B; most: {connections} connections, {bytes} B; \
+         {refused} refused"
     );
     assert!(served > 0 && refused > attacks() / 10, "{served} served, {refused} refused");
     assert!(connections <= PLACES, "{connections} connections");
@@ -300,14 +304,14 @@ fn others_are_served(authority: Option<&Authority>) {
 }
 
 #[test]
-fn who_is_well_behaved_is_served_while_others_attack() {
+fn a_well_behaved_client_is_served_while_others_attack() {
     repeated_on_stall(Watched::Ordinary, || {
         others_are_served(None);
     });
 }
 
 #[test]
-fn who_has_a_certificate_is_served_while_those_without_attack() {
+fn a_client_with_a_certificate_is_served_while_those_without_attack() {
     repeated_on_stall(Watched::Ordinary, || {
         others_are_served(Some(&Authority::new()));
     });

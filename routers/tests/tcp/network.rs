@@ -1,4 +1,4 @@
-//! Sessions over a network of their own: a line that takes little, and what somebody sees who watches.
+//! Sessions over a network of their own: a line with a low rate, and what an eavesdropper sees.
 
 use crate::ground::{System, module, node, start_sealed, wait};
 use crate::sealed::{Authority, Holds};
@@ -111,7 +111,7 @@ fn a_sealed_line_of_64_kbit_a_second_stays_up_too() {
     a_slow_uplink_stays_up(Some(&Authority::new()));
 }
 
-/// What of it somebody reads who watches the network: the bodies of packages, the names of clients, the words that sessions begin with.
+/// What an eavesdropper reads of it: the bodies of packages, the names of clients, the words that sessions begin with.
 fn seen_on_the_wire(authority: Option<&Authority>) -> Option<[usize; 3]> {
     let mut network = Network::new(authority, None)?;
     let mut capture = network.lab.capture().unwrap();
@@ -139,7 +139,7 @@ fn seen_on_the_wire(authority: Option<&Authority>) -> Option<[usize; 3]> {
 }
 
 #[test]
-fn who_watches_the_network_reads_nothing_of_a_sealed_session_and_all_of_one_that_is_not() {
+fn an_eavesdropper_reads_nothing_of_a_sealed_session_and_all_of_one_that_is_not() {
     let Some([bodies, names, words]) = seen_on_the_wire(None) else { return };
     assert!(bodies > 20 && names > 0 && words > 0, "{bodies} bodies, {names} names, {words} beginnings");
     assert_eq!(seen_on_the_wire(Some(&Authority::new())), Some([0; 3]));

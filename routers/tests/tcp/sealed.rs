@@ -1,4 +1,4 @@
-//! Sealed sessions: who has the right certificate takes part, and each other end learns why it does not.
+//! Sealed sessions: a client with the right certificate takes part, and each other end learns why it does not.
 
 use crate::ground::{System, address, module, node, start_for, start_sealed, wait};
 use rcgen::{CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, date_time_ymd};
@@ -46,7 +46,7 @@ impl Authority {
         self.issue_as(holder, &holder.dns_name(), holds);
     }
 
-    /// Whose files they are, and what the certificate says.
+    /// The owner of these files, and what the certificate says.
     fn issue_as(&self, holder: &Holder, dns_name: &str, holds: Holds) {
         let (key, mut params) = (KeyPair::generate().unwrap(), CertificateParams::new([dns_name.to_owned()]).unwrap());
         params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ClientAuth, ExtendedKeyUsagePurpose::ServerAuth];
@@ -69,7 +69,7 @@ impl Authority {
         ClientSeal::load(self.path(), &holder).unwrap()
     }
 
-    /// Of one who believes in this authority, but whose own certificate is of another.
+    /// A client that trusts this authority, with a certificate of another.
     pub(crate) fn forged(&self, system: u8) -> ClientSeal {
         let foreign = Self::new();
         foreign.issue(&holder(system), Holds::Now);
@@ -83,7 +83,7 @@ fn holder(system: u8) -> Holder {
 }
 
 #[test]
-fn who_has_a_certificate_takes_part_under_the_name_in_it() {
+fn a_client_with_a_certificate_takes_part_under_the_name_in_it() {
     let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
     let server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
     let seal = |system| Some(authority.seal(system, Holds::Now));
@@ -101,7 +101,7 @@ fn who_has_a_certificate_takes_part_under_the_name_in_it() {
 }
 
 #[test]
-fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
+fn what_is_wrong_with_a_certificate_is_told_to_its_owner() {
     let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
     let server = start_sealed(address, &own, 1, Some(ServerSeal::load(authority.path()).unwrap())).unwrap();
     let other_system = {
@@ -135,7 +135,7 @@ fn what_is_wrong_with_a_certificate_is_told_to_whom_it_belongs() {
 }
 
 #[test]
-fn who_seals_at_a_tcp_router_that_does_not_is_told_so_at_both_ends() {
+fn a_client_that_seals_at_a_tcp_router_that_does_not_is_told_so_at_both_ends() {
     let (authority, address, (_folder, own)) = (Authority::new(), address(), node());
     let server = start_sealed(address, &own, 1, None).unwrap();
     let client = System::sealed(1, "one", address, Some(authority.seal(1, Holds::Now)));
@@ -160,7 +160,7 @@ fn a_certificate_of_the_own_system_hosts_what_its_file_gives_that_node_and_no_mo
     drop(server);
     // That it went away is told, and when it is there again what it says.
     wait("away", || one.client.link().why.contains("is not reached").then_some(()));
-    let again = |life, ranges: Vec<Range>| start_for(address, &own, life, seal(), with(ranges)).ok();
+    let again = |incarnation, ranges: Vec<Range>| start_for(address, &own, incarnation, seal(), with(ranges)).ok();
     let server = wait("its port is free", || again(2, others.to_vec()));
     wait("why again", || one.client.link().why.contains("or of its node").then_some(()));
     drop(server);
@@ -197,7 +197,8 @@ fn files_that_are_not_there_are_named() {
     let authority = Authority::new();
     let error = ClientSeal::load(authority.path(), &holder(4)).unwrap_err();
     assert!(
-        matches!(&error, SealError::File(path, _) if path.ends_with("base.system-4.pem") || path.ends_with("base.system-4.key")),
+        matches!(&error, SealError::File(path, _)
+            if path.ends_with("base.system-4.pem") || path.ends_with("base.system-4.key")),
         "{error}"
     );
     assert!(error.to_string().contains("`rohrpost keys "), "{error}");

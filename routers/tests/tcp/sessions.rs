@@ -1,4 +1,4 @@
-//! What crosses, what a dead server costs, and who holds up whom.
+//! What crosses, what a dead server costs, and which client holds up which.
 
 use crate::ground::{COMMON, System, address, module, node, start, wait};
 use rohrpost_config as config;
@@ -17,7 +17,7 @@ pub(crate) fn hello(system: u8, common: u64) -> Hello<'static> {
         reaches_own: false,
         common,
         system_digest: system.into(),
-        life: 1000 + u64::from(system),
+        incarnation: 1000 + u64::from(system),
         attempt: 1,
         asked_ns: 0,
         name: "raw",
@@ -118,7 +118,7 @@ fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
     one.wait_up();
     two.wait_up();
     let (mut sender, mut number, mut last) = (one.sender(2), 0, None);
-    for life in 2..6 {
+    for incarnation in 2..6 {
         // Under load until some came, then without a server while the load goes on.
         let before = last;
         wait("packages that cross", || {
@@ -136,7 +136,7 @@ fn a_server_that_dies_and_lives_again_costs_a_gap_and_nothing_else() {
             one.say(&mut sender, number);
             std::thread::sleep(Duration::from_millis(1));
         }
-        server = Some(wait("its port is free", || start(address, &own, life).ok()));
+        server = Some(wait("its port is free", || start(address, &own, incarnation).ok()));
         one.wait_up();
         two.wait_up();
     }
@@ -168,11 +168,11 @@ fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
 }
 
 #[test]
-fn who_is_of_another_installation_or_no_client_at_all_is_told_and_closed() {
+fn a_client_of_another_installation_or_no_client_at_all_is_told_and_closed() {
     let (address, (_folder, own)) = (address(), node());
     let server = start(address, &own, 1).unwrap();
     let told = Raw::new(address, 1, COMMON + 1).rest();
-    assert!(told.windows(14).any(|bytes| bytes == b"the TCP router"), "a refusal that says whose digest differs");
+    assert!(told.windows(14).any(|bytes| bytes == b"the TCP router"), "a refusal that names the end that differs");
     let mut stranger = Raw(TcpStream::connect(address).unwrap());
     stranger.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
     stranger.0.write_all(b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n").unwrap();
@@ -238,7 +238,8 @@ fn what_is_for_all_systems_comes_once_to_each() {
     let mut to_all = systems[0].sender(ALL_SYSTEMS);
     let mut to_each = [1, 2, 3].map(|id| systems[0].sender(id));
     systems[0].say(&mut to_all, 7);
-    // What is sent behind it shows that nothing else comes. In its own system that goes another way, and may be quicker.
+    // What is sent behind it shows that nothing else comes. In its own system that goes another way, and may be
+    // quicker.
     to_each.iter_mut().for_each(|sender| systems[0].say(sender, 8));
     for system in &mut systems {
         let mut heard = [system.hear_within("one for all"), system.hear_within("one for each")];

@@ -63,7 +63,7 @@ fn a_client_says_what_a_tcp_router_of_another_version_or_installation_objects_to
 }
 
 #[test]
-fn of_two_installations_both_ends_say_whose_digests_differ() {
+fn of_two_installations_both_ends_name_the_digests_that_differ() {
     let (address, (_folder, own)) = (address(), node());
     let server = start(address, &own, 1).unwrap();
     let mut client = TcpStream::connect(address).unwrap();

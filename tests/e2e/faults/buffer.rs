@@ -34,7 +34,7 @@ fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_afte
             sink.take(Duration::from_millis(10));
             (!sink.came.is_empty()).then_some(())
         });
-        let before = field.peer("arm", "base").lost;
+        let before = field.peer("arm", "base").counters.lost;
         // A busy computer may fail to flood it in the second until it counts as silent; then it tries again.
         wait("the buffer runs over", || {
             field.wait_for_state("base", "arm", LinkState::Alive);
@@ -61,7 +61,7 @@ fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_afte
         let dropped = dropped(&field, "arm");
         assert!(accounts.wire > 0 && accounts.wire <= dropped, "{accounts:?}, dropped: {dropped}");
         let counted = wait("the router counts what the kernel dropped", || {
-            Some(field.peer("arm", "base").lost - before).filter(|lost| *lost >= dropped)
+            Some(field.peer("arm", "base").counters.lost - before).filter(|lost| *lost >= dropped)
         });
         assert_eq!(counted, dropped);
         let numbers = sink.numbers(PLAIN);

@@ -3,7 +3,7 @@
 use super::Field;
 use crate::harness::wait;
 use crate::probe::{COUNT, ProbingInterface};
-use rohrpost::macro_support::{append, from_bytes};
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Name, ToolLink};
 use std::collections::BTreeSet;
 use std::time::Duration;

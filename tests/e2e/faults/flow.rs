@@ -122,7 +122,7 @@ pub(super) fn balance(field: &Field, source: &Source, sink: &mut Sink, class: Cl
         let mailbox = lost_in_mailbox(arm, mailbox_on("arm"), class);
         let accounts = Accounts {
             wire: of_base.sent.checked_sub(of_arm.came)?,
-            datagrams_lost: inn.peers[0].lost,
+            datagrams_lost: inn.peers[0].counters.lost,
             datagrams_other: out.peers[0].sent.datagrams.saturating_sub(of_base.sent),
             arm: of_arm,
         };

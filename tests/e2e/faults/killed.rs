@@ -87,7 +87,7 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
         for round in 0..rounds() {
             // The other node's probe is called, so that commands wait in the mailbox of the killed router.
             let (node, other, probe) = if round % 2 == 0 { ("base", "arm", 1) } else { ("arm", "base", 0) };
-            let (before, stale_before) = (field.peer(other, node).restarts, stale(&field, node));
+            let (before, stale_before) = (field.peer(other, node).counters.restarts, stale(&field, node));
             // The pause before a restart grows if there were others within a second.
             wait(format!("{node} ran for a while"), || (field.links(node).uptime_ms > 1000).then_some(()));
             let module = format!("probe.{probe}");
@@ -121,7 +121,9 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
             answers[probe].extend(waiting.close());
             answers[probe].extend(under_way.close());
             field.robot(node).wait_restarted(&router_of(node), pid);
-            wait(format!("{other} has heard of it"), || (field.peer(other, node).restarts > before).then_some(()));
+            wait(format!("{other} has heard of it"), || {
+                (field.peer(other, node).counters.restarts > before).then_some(())
+            });
         }
         field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
         field.wait_told("router.1", &["the router of node base", "was started anew"], 1);

@@ -23,7 +23,7 @@ fn a_cut_link_is_reported_at_both_ends_and_carries_as_before_once_it_is_fixed() 
         field.wait_told("router.0", &["node arm", "is heard"], round + 1);
     }
     for (node, peer) in [("base", "arm"), ("arm", "base")] {
-        assert_eq!(field.peer(node, peer).restarts, 0, "the same routers as before");
+        assert_eq!(field.peer(node, peer).counters.restarts, 0, "the same routers as before");
     }
     for module in ["probe.0", "probe.1"] {
         assert!(!field.counted(module).contains(&super::NEVER), "{module}: what was answered with a fault was run");

@@ -78,7 +78,7 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
             "all of the second from then on, and nothing else"
         );
         // Only its own router knows how many there were: a busy computer cannot send a whole burst.
-        wait("those of the first are counted", || (field.peer("base", "arm").refused > 0).then_some(()));
+        wait("those of the first are counted", || (field.peer("base", "arm").counters.refused > 0).then_some(()));
         // The first notices that its peer accepts another router.
         wait("arm is not heard", || {
             second.send();
@@ -101,7 +101,7 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
         );
         field.wait_counted("base", "probe.1", 2);
         field.wait_counted("arm", "probe.0", 3);
-        wait("to the second, and back", || (field.peer("base", "arm").restarts == 2).then_some(()));
+        wait("to the second, and back", || (field.peer("base", "arm").counters.restarts == 2).then_some(()));
         assert_eq!(field.lines("router.0", &words).len(), 1, "told once");
         drop((first, sink));
         field.stop();

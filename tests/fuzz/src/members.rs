@@ -143,7 +143,7 @@ fn hello(bytes: &mut Bytes<'_>) -> Message<'static> {
         reaches_own: odd & 4 != 0,
         common: if odd & 0x18 == 0x18 { 8 } else { 7 },
         system_digest: if odd & 0x60 == 0x60 { 9 } else { 1 },
-        life: 1 + u64::from(bytes.byte() % 6),
+        incarnation: 1 + u64::from(bytes.byte() % 6),
         attempt: 1 + u64::from(bytes.byte() % 6),
         asked_ns: bytes.long(),
         name: "client",

@@ -6,8 +6,8 @@ use crate::frames::checked;
 use crate::split::Bytes;
 use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
 use rohrpost_routers::security::{
-    HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Sealing,
-    TAG_BYTES, Who,
+    HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port,
+    RouterIdentity, Sealing, TAG_BYTES,
 };
 use std::num::NonZeroU8;
 use std::sync::Arc;
@@ -43,9 +43,9 @@ struct Router {
 impl Router {
     fn new(own: NodeIndex, life: u64, step: usize) -> Self {
         let incarnation = life << 8 | u64::from(own);
-        let who = Who { system: 1, own, nodes: 2, digest: 7, incarnation };
+        let router = RouterIdentity { system: 1, own, nodes: 2, digest: 7, incarnation };
         let key = |id| InstallationKey::new(KeyId(NonZeroU8::MIN.saturating_add(id)), &[id; 32]);
-        let all = PeerSessions::new(who, KeyRing::new(key(1), Some(key(0))));
+        let all = PeerSessions::new(router, KeyRing::new(key(1), Some(key(0))));
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
         Self {

@@ -1,4 +1,5 @@
-//! Mistakes in the analysis that tests switch on, one at a time and for one thread: the simulation must notice each of them.
+//! Mistakes in the analysis that tests switch on, one at a time and for one thread: the simulation must notice each of
+//! them.
 
 /// Whether a mistake is switched on.
 #[cfg(test)]
@@ -28,7 +29,7 @@ mod switch {
         static ON: Cell<Option<Mistake>> = const { Cell::new(None) };
     }
 
-    /// What the analysis does wrong.
+    /// A planted mistake in the analysis.
     #[derive(Clone, Copy, PartialEq, Eq, Debug)]
     pub(crate) enum Mistake {
         /// A package catches the slot in which it is published.
@@ -41,13 +42,13 @@ mod switch {
         ForgetsEqual,
         /// More important packages come once, however long it takes.
         ComesOnce,
-        /// Only the first package after slot v is looked at.
+        /// Only the first package after slot v is examined.
         FirstOnly,
         /// Only the first slot of a round is taken for slot v.
         OneSlotFirst,
-        /// Routers say nothing to each other, and slots are begun in time.
+        /// Routers send no messages of their own, and slots begin on time.
         SaysNothing,
-        /// The time of the slots goes as fast as the clocks of the computers.
+        /// Slot time and the computers' clocks have the same rate.
         ForgetsBend,
     }
 
@@ -69,7 +70,7 @@ mod switch {
         ON.get() == Some(mistake)
     }
 
-    /// Does something with a mistake switched on.
+    /// Runs something with a mistake switched on.
     pub(crate) fn with<T>(mistake: Option<Mistake>, what: impl FnOnce() -> T) -> T {
         let before = ON.replace(mistake);
         let done = what();

@@ -1,8 +1,10 @@
-//! Bounds: how late a package of a flow can be, known before anything runs. The book's chapter "Time slots and bounds" derives it.
+//! Bounds: the longest delay of a flow's packages, known before anything runs. The book's chapter "Time slots and
+//! bounds" derives them.
 //!
-//! What is bounded is the time from publishing, into the mailbox of the node's router, to the arrival of the last bit at the other computer.
-//! It holds as long as flows send no more than they say, nothing else is sent at their priority or above (tools, calls and
-//! replies included), no slot is left out, nothing is lost, and every slot begins at most [`LATE`] late. What a process takes to wake up and to read is not in it.
+//! A bound covers the time from publishing, into the mailbox of the node's router, to the arrival of the last bit at
+//! the other computer. It holds under these conditions: flows send no more than they declare; nothing else is sent at
+//! their priority or above (tools, calls and replies included); no slot is left out; nothing is lost; every slot begins
+//! at most [`LATE`] late. The time in which a process wakes up and reads is not included.
 
 mod mistakes;
 mod response;
@@ -20,12 +22,12 @@ use response::{Ahead, Never, Stream, Supply, Window};
 use rohrpost_mailbox::Priority;
 use std::time::Duration;
 
-/// What is published less than this before a slot begins may have to wait for the next one.
+/// A package published later than this before a slot may have to wait for the next one.
 pub const TAKEN_BEFORE: Duration = Duration::from_micros(100);
-/// Whatever waits longer in a router is dropped.
+/// A package that waits longer in a router is dropped.
 const LONGEST: Duration = Duration::from_millis(1500);
 
-/// How late a flow's packages can be.
+/// The longest delay of a flow's packages.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlowBound {
     /// The flow, by its place in [`Plan::flows`].
@@ -41,21 +43,21 @@ pub struct FlowBound {
 pub struct Bound {
     /// All of it.
     pub latency: Duration,
-    /// The slot in which the package leaves then, by its place in [`Tdma::slots`].
+    /// The slot in which the package leaves in that case, by its place in [`Tdma::slots`].
     pub slot: usize,
     /// From publishing to the beginning of that slot.
     pub waits: Duration,
-    /// Slots of its node that begin meanwhile, that one included.
+    /// Slots of its node that begin until then, that one included.
     pub slots: u64,
-    /// What other flows send before it meanwhile.
+    /// Time for packages of other flows before it.
     pub others: Duration,
-    /// Packages of its own flow that leave before it meanwhile.
+    /// Packages of its own flow that leave before it.
     pub own_earlier: u64,
-    /// What routers say to each other at the beginning of a slot.
+    /// Time for the routers' own messages at the beginning of a slot.
     pub said: Duration,
     /// Its own datagrams.
     pub own: Duration,
-    /// How many these are.
+    /// Number of these.
     pub datagrams: u64,
     /// The last datagram once more, from a switch to the other node.
     pub forward: Duration,
@@ -67,17 +69,18 @@ pub enum Unbounded {
     /// Its priority is below `bulk-below`, so that it waits behind everything, ordinary traffic included.
     #[error("it is not real time")]
     NotRealTime,
-    /// No slot of its node has room for a datagram of it, or of what goes before it.
+    /// No slot of its node has room for a datagram of it, or of a package before it.
     #[error("a datagram has no room in any slot of its node")]
     TooShort,
-    /// More comes than leaves.
+    /// The demand exceeds the capacity.
     #[error(
-        "with all that goes before it, it asks for {asked_permille} thousandths of the time, and the slots carry {carried_permille}"
+        "with all that goes before it, it asks for {asked_permille} thousandths of the time, and the slots carry \
+         {carried_permille}"
     )]
     TooMuch {
-        /// Thousandths of the time of the link that it and all before it ask for.
+        /// Demand of this flow and all before it, in thousandths of the link's time.
         asked_permille: u64,
-        /// Those that slots are sure to carry.
+        /// Guaranteed capacity of the slots, in the same unit.
         carried_permille: u64,
     },
     /// Packages would be dropped before they leave.
@@ -182,7 +185,8 @@ impl PlannedFlow {
         if self.node != own.node || level(self.most) > level(own.least) {
             return None;
         }
-        // What is to another peer may leave in company of what is ahead; of one level the more important leave the mailbox first.
+        // What is to another peer may leave in company of what is ahead; of one level the more important leave the
+        // mailbox first.
         let is_beside = self.peer == own.peer && level(self.most) == level(own.least);
         Some(if is_beside && !self.most.outranks(own.least) { Ahead::Earlier } else { Ahead::Always })
     }

@@ -1,43 +1,43 @@
-//! How long a package of a stream waits and takes at worst: response-time analysis of one node.
+//! Longest wait and transmission time of a package of a stream: response-time analysis of one node.
 //!
 //! ```text
-//!        ▼ published just after this slot took what it sends
+//!        ▼ published just after this slot's packages were taken
 //!  ──┬───────────┬───────────────────────┬───────────┬───────────────────────┬───────────┬──
 //!    │ slot v    │                       │ slot v+1  │                       │ slot v+2  │
 //!  ──┴───────────┴───────────────────────┴───────────┴───────────────────────┴───────────┴──
 //!                                         ███ ▓▓▓▓▓░░                         ██ ▒▒▒
-//!                           said by routers ┘   │   └ the next head does not fit   └ the package
+//!                        routers' messages ┘   │   └ the next head does not fit   └ the package
 //!                                  ahead of it ─┘
 //! ```
 //!
-//! A *chain* is a series of slots each of which leaves something of what it found. Before it comes slot v, which left nothing; so whatever
-//! is ahead of our package was published after slot v took what it sends. A slot of a chain carries at least its room less the largest
-//! datagram (and one ns), and as many datagrams as would fit if all were largest ones: had it carried less, the head that ended it would have
-//! fitted. The chain ends with the slot that has room for all that is left and our package. Which slot was v, and how long after it our
-//! package was published, are tried out.
+//! A *chain* is a series of slots, each of which leaves something waiting. Slot v before it left nothing: so all
+//! packages ahead of ours were published after slot v took its packages. A slot of a chain carries at least its room
+//! less the largest datagram (and one ns), and as many datagrams as would fit if all were largest ones: had it carried
+//! less, the head that ended it would have fitted. The chain ends with the slot that has room for all that is left and
+//! our package. All choices of slot v are tried, and all relevant times from it to the publishing of our package.
 
 use super::mistakes::mistake;
 
-/// Moments at which a package may come that are tried for one slot v: whatever takes more has no bound worth knowing.
+/// Moments of publishing that are tried for one slot v: a flow that needs more has no useful bound.
 const TRIES_MAX: usize = 5_000;
 /// Slots of a chain, at most, for the same reason.
 const CHAIN_MAX: usize = 20_000;
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// What slots of a node have room for, over and over.
+/// Room in the slots of a node, repeated forever.
 #[derive(Clone, Debug)]
 pub(crate) struct Supply {
     /// By their beginning; none overlaps the next.
     pub(crate) windows: Vec<Window>,
     /// From one round of them to the next, ns.
     pub(crate) repeats_ns: u64,
-    /// Taken at the beginning of each slot by what routers say to each other, ns.
+    /// Time of the routers' own messages at the beginning of each slot, ns.
     pub(crate) said_ns: u64,
-    /// What is published less than this before a slot may miss it, ns.
+    /// A package published later than this before a slot may miss it, ns.
     pub(crate) taken_before_ns: u64,
-    /// A slot may be begun so late, ns.
+    /// Latest beginning of a slot, ns.
     pub(crate) late_ns: u64,
-    /// Slots keep to a time that is bent: by the clock of what publishes it may go so much slower, or faster, ns a second.
+    /// Largest rate between slot time, which is slewed, and the publisher's clock, ns a second.
     pub(crate) bends_ns_s: u64,
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct Window {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stream {
     pub(crate) period_ns: u64,
-    /// What one takes, see [`Parcel`](crate::Parcel).
+    /// Time of one, see [`Parcel`](crate::Parcel).
     pub(crate) takes_ns: u64,
     pub(crate) datagrams: u64,
     pub(crate) largest_ns: u64,
@@ -64,7 +64,7 @@ pub(crate) struct Stream {
     pub(crate) last_ns: u64,
 }
 
-/// What there is to carry, or what a slot carries at least. What is more than can be told is told as the most that can: no slot carries that.
+/// Work that waits, or the least that a slot carries. It saturates: no slot carries the largest value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Work {
     ns: u64,
@@ -87,42 +87,42 @@ impl std::iter::Sum for Work {
     }
 }
 
-/// How other packages stand to ours.
+/// Order of other packages against ours.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Ahead {
     /// They go first, even those that are published later.
     Always,
-    /// Those go first that are published before.
+    /// Packages that were published before go first.
     Earlier,
 }
 
-/// The worst that can happen to a package.
+/// The worst case of a package.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Worst {
     /// From its publishing to the end of its last datagram, ns.
     pub(crate) latency_ns: u64,
     /// Up to the beginning of the slot in which it ends, ns.
     pub(crate) waits_ns: u64,
-    /// Which window of the round that is.
+    /// The window of the round.
     pub(crate) window: usize,
     /// How many slots began while it waited, this one included.
     pub(crate) slots: u64,
-    /// What of others went before it since slot v, ns.
+    /// Time for other packages before it since slot v, ns.
     pub(crate) others_ns: u64,
-    /// How many packages of its own stream went before it.
+    /// Packages of its own stream before it.
     pub(crate) own_earlier: u64,
 }
 
-/// Why there is no worst.
+/// Why there is no worst case.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Never {
     /// No slot has room for one of its datagrams, or of those before it.
     NoRoom,
-    /// More comes than leaves; both in ns a second.
+    /// The demand exceeds the capacity; both in ns a second.
     Overload {
-        /// Comes.
+        /// Demand.
         asked_ns_s: u64,
-        /// Leaves.
+        /// Capacity.
         carried_ns_s: u64,
     },
     /// It takes longer than any package may wait.
@@ -130,10 +130,10 @@ pub(crate) enum Never {
 }
 
 impl Supply {
-    /// By a clock that goes as much faster than the time of the slots as it can: then most is published between two, and it waits longest.
+    /// By the fastest clock against slot time: then most is published between two slots, and it waits longest.
     fn begin_ns(&self, index: usize) -> u64 {
         let round = index / self.windows.len();
-        // One round ahead, so that what is taken before the first slot is no negative time.
+        // One round ahead, so that the publishing before the first slot has no negative time.
         let begin_ns = (round as u64 + 1) * self.repeats_ns + self.windows[index % self.windows.len()].begin_ns;
         begin_ns + self.bent_by_ns(begin_ns)
     }
@@ -143,18 +143,18 @@ impl Supply {
         (u128::from(for_ns) * u128::from(bends_ns_s)).div_ceil(u128::from(SECOND_NS)) as u64
     }
 
-    /// Up to this time, what is published is found by a slot.
+    /// A slot takes packages published until then.
     fn takes_until_ns(&self, index: usize) -> u64 {
         self.begin_ns(index).saturating_sub(self.taken_before_ns)
     }
 
-    /// By a clock that goes as much slower: what a slot holds then is least.
+    /// By the slowest clock: then a slot holds least.
     fn sends_ns(&self, index: usize) -> u64 {
         let sends_ns = self.windows[index % self.windows.len()].sends_ns;
         sends_ns - self.bent_by_ns(sends_ns)
     }
 
-    /// When a slot's guard begins at the latest, counted from its beginning.
+    /// Latest beginning of a slot's guard, counted from the slot's beginning.
     fn ends_ns(&self, index: usize) -> u64 {
         let sends_ns = self.windows[index % self.windows.len()].sends_ns;
         sends_ns + self.bent_by_ns(sends_ns)
@@ -173,7 +173,7 @@ impl Stream {
     }
 }
 
-/// The worst for a package of a stream beside others of the same node; none waits longer than `longest_ns`.
+/// The worst case of a package of a stream beside others of the same node; none waits longer than `longest_ns`.
 pub(crate) fn worst(
     supply: &Supply,
     own: &Stream,
@@ -195,7 +195,7 @@ fn worse(one: Option<Worst>, other: Worst) -> Option<Worst> {
     Some(one.filter(|one| one.latency_ns >= other.latency_ns).unwrap_or(other))
 }
 
-/// Thousandths of what comes or leaves in a second, since there may be less than one datagram, rounded by `divide`.
+/// Work in a second, in thousandths since there may be less than one datagram, rounded by `divide`.
 fn a_second(work: Work, period_ns: u64, divide: impl Fn(u128, u128) -> u128) -> Work {
     let thousandths = |all: u64| {
         let all = divide(u128::from(all) * u128::from(1000 * SECOND_NS), period_ns.into());
@@ -213,14 +213,14 @@ struct Analysis<'a> {
     longest_ns: u64,
 }
 
-/// Where a chain has come to.
+/// State of a chain.
 #[derive(Clone, Copy)]
 struct Chain {
-    /// Until when slot v took what it sent, ns.
+    /// Slot v took packages published until then, ns.
     from_ns: u64,
     /// The next slot.
     index: usize,
-    /// What those before it carried.
+    /// Work that the slots before carried.
     carried: Work,
 }
 
@@ -229,20 +229,20 @@ impl Analysis<'_> {
         self.others.iter().map(|(stream, _)| stream).chain([self.own])
     }
 
-    /// What a slot of a chain carries at least.
+    /// The least that a slot of a chain carries.
     fn carries(&self, index: usize) -> Work {
         let room_ns = self.supply.room_ns(index);
         let wasted_ns = if mistake!(WastesNothing) { 0 } else { self.largest_ns - 1 };
         Work { ns: room_ns.saturating_sub(wasted_ns), datagrams: room_ns / self.largest_ns }
     }
 
-    /// What may be left of work after some was carried, ns.
+    /// The most that may be left of work after some was carried, ns.
     fn left_ns(&self, all: Work, carried: Work) -> u64 {
         let datagrams = all.datagrams.saturating_sub(carried.datagrams);
         all.ns.saturating_sub(carried.ns).min(datagrams.saturating_mul(self.largest_ns))
     }
 
-    /// Whether all that comes can leave in the long run.
+    /// Whether the capacity suffices in the long run.
     fn validate(&self) -> Result<(), Never> {
         let count = self.supply.windows.len();
         let carried: Work = (0..count).map(|index| self.carries(index)).sum();
@@ -259,7 +259,7 @@ impl Analysis<'_> {
         Ok(())
     }
 
-    /// The worst if the slot before the chain is this one.
+    /// The worst case if this slot precedes the chain.
     fn after(&self, first: usize) -> Result<Worst, Never> {
         let misses = usize::from(!mistake!(CatchesTheSlot));
         let from_ns = self.supply.takes_until_ns(first);
@@ -267,7 +267,7 @@ impl Analysis<'_> {
         let (mut worst, mut later_ns) = (None, 0_u64);
         for _ in 0..TRIES_MAX {
             let published_ns = from_ns.saturating_add(later_ns);
-            // What slots found and left before ours was published.
+            // Slots that ended before our package was published.
             while self.supply.takes_until_ns(chain.index) < published_ns.saturating_add(misses as u64) {
                 if chain.index - first > CHAIN_MAX {
                     return Err(Never::Late);
@@ -291,7 +291,8 @@ impl Analysis<'_> {
         Err(Never::Late)
     }
 
-    /// When the next package could be published that goes before later ones of ours: nothing else makes it worse to be later.
+    /// The next time of publishing at which another package gets ahead of ours: between these a later time is never
+    /// worse.
     fn next_ns(&self, later_ns: u64) -> u64 {
         let earlier = self.others.iter().filter(|(_, ahead)| *ahead == Ahead::Earlier).map(|(stream, _)| stream);
         let next = |stream: &Stream| (later_ns / stream.period_ns + 1).saturating_mul(stream.period_ns);
@@ -303,7 +304,8 @@ impl Analysis<'_> {
         self.streams().map(|stream| stream.work(within_ns.div_ceil(stream.period_ns))).sum()
     }
 
-    /// The end of the package that is published `later_ns` after slot v took what it sends, if the chain's next slot is the first to find it.
+    /// The end of our package, published `later_ns` after slot v took its packages, if the chain's next slot is the
+    /// first to find it.
     fn ends(&self, chain: Chain, later_ns: u64) -> Result<Worst, Never> {
         let published_ns = chain.from_ns + later_ns;
         let own_earlier = if mistake!(ForgetsOwn) { 0 } else { later_ns / self.own.period_ns };
@@ -329,8 +331,8 @@ impl Analysis<'_> {
         }
     }
 
-    /// Whether all that is left, and our package, have room in the next slot; what of others was ahead, and when its last datagram starts at
-    /// the latest, counted from the slot's beginning.
+    /// Whether all that is left, and our package, fit into the next slot. Returns the others' work ahead, and the
+    /// latest start of our last datagram, counted from the slot's beginning.
     fn fits(&self, chain: Chain, later_ns: u64, own_earlier: u64) -> Option<(u64, u64)> {
         let (begin_ns, room_ns) = (self.supply.begin_ns(chain.index), self.supply.room_ns(chain.index));
         let said_ns = if mistake!(SaysNothing) { 0 } else { self.supply.said_ns + self.supply.late_ns };
@@ -352,7 +354,7 @@ impl Analysis<'_> {
         }
     }
 
-    /// What others published that goes before our package, if its last datagram starts `within_ns` after slot v.
+    /// Others' work that goes before our package, if our last datagram starts `within_ns` after slot v.
     fn others_ahead(&self, within_ns: u64, later_ns: u64) -> Work {
         let ahead = |(stream, ahead): &(Stream, Ahead)| {
             stream.work(match ahead {

@@ -1,35 +1,37 @@
-//! One node and its slots, played through: written apart from the analysis, to hold it to its word.
+//! Simulation of one node and its slots, written independently of the analysis, to test it.
 
 use super::response::{Supply, Window};
 
-/// A system to play.
+/// A system to simulate.
 #[derive(Clone, Debug)]
 pub(super) struct System {
     pub(super) supply: Supply,
     pub(super) flows: Vec<Sent>,
-    /// A datagram of nothing, the shortest and the longest one, ns.
+    /// An empty datagram, the shortest and the longest one, ns.
     pub(super) head_ns: u64,
     pub(super) least_ns: u64,
     pub(super) most_ns: u64,
 }
 
-/// What a stream sends.
+/// A stream of packages.
 #[derive(Clone, Debug)]
 pub(super) struct Sent {
     pub(super) period_ns: u64,
     /// 0 goes first.
     pub(super) level: u8,
     pub(super) peer: u8,
-    /// Bytes, as the time that they take.
+    /// Size, as transmission time.
     pub(super) size_ns: u64,
 }
 
-/// How a play differs from others.
+/// Parameters of one run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Play {
-    /// The first package of any stream comes just after the slot that begins so long after the first round took what it sends, ns.
+    /// The first package of each stream comes just after the slot at this offset in the first round took its packages,
+    /// ns.
     pub(super) from_ns: u64,
-    /// Shifts the streams against each other and draws what is left open; 0: all come at once, and all is as bad as can be.
+    /// Shifts the streams against each other and makes the open choices; 0: all come at once, and all choices are the
+    /// worst.
     pub(super) seed: u64,
     /// Packages that come during a slot may leave in it.
     pub(super) looks_again: bool,
@@ -38,7 +40,7 @@ pub(super) struct Play {
 }
 
 impl Play {
-    /// When it is some time of the slots, by the clock of the computer.
+    /// The local clock of the computer at a slot time.
     fn local_ns(&self, supply: &Supply, system_ns: u64) -> u64 {
         let by_ns = (u128::from(system_ns) * u128::from(supply.bends_ns_s) / 1_000_000_000) as u64;
         match self.seed % 3 {
@@ -52,13 +54,13 @@ impl Play {
 struct Waiting {
     flow: usize,
     published_ns: u64,
-    /// What is not sent yet, ns.
+    /// Rest to send, ns.
     left_ns: u64,
     parts: bool,
 }
 
 impl System {
-    /// Bytes of a part of a package too large for a datagram, ns.
+    /// Size of a fragment of a package too large for a datagram, ns.
     fn part_ns(&self) -> u64 {
         self.most_ns - self.head_ns
     }
@@ -67,7 +69,7 @@ impl System {
         flow.size_ns <= self.part_ns()
     }
 
-    /// A datagram of so many bytes, ns.
+    /// A datagram of this size, ns.
     pub(super) fn datagram_ns(&self, size_ns: u64) -> u64 {
         (self.head_ns + size_ns).max(self.least_ns)
     }
@@ -107,7 +109,8 @@ impl System {
         worst
     }
 
-    /// All packages by time; of those at one time the last stream's first, so that the first stream finds all others ahead of it.
+    /// All packages by time; of those at one time the last stream's first, so that the first stream has all others
+    /// ahead of it.
     fn published(&self, play: Play, draw: &mut Draw) -> Vec<(u64, usize)> {
         let end_ns = play.local_ns(&self.supply, play.rounds.saturating_sub(1) * self.supply.repeats_ns);
         let from_ns = play.local_ns(&self.supply, self.supply.repeats_ns + play.from_ns);
@@ -155,7 +158,7 @@ impl System {
             }
             let is_filled = !waiting[0].parts && inside.len() == waiting.len() && draw.below(2) == 0;
             let filled_ns = if is_filled { self.part_ns() } else { size_ns };
-            // Bytes of a level below, if nothing else wants to leave.
+            // Packages of a lower level, if nothing else is to leave.
             let takes_ns = self.datagram_ns(filled_ns).min(guard_ns - now_ns).max(self.datagram_ns(size_ns));
             now_ns += takes_ns;
             for at in inside.into_iter().rev() {
@@ -172,7 +175,8 @@ impl System {
         }
     }
 
-    /// Who goes in the same datagram as the first that waits: to the same peer, and not less important than what waits for others.
+    /// Packages in the same datagram as the first that waits: to the same peer, and not less important than those that
+    /// wait for others.
     fn company(&self, peer: u8, size_ns: u64, room_ns: u64, waiting: &[Waiting], inside: &mut Vec<usize>) -> u64 {
         let level = |package: &Waiting| self.flows[package.flow].level;
         let is_its = |package: &Waiting| self.flows[package.flow].peer == peer;
@@ -191,11 +195,11 @@ impl System {
     }
 }
 
-/// Chance from a seed.
+/// Random numbers from a seed.
 struct Draw(u64);
 
 impl Draw {
-    /// Below the limit; 0 in the play that is as bad as can be.
+    /// Below the limit; 0 in the worst run.
     fn below(&mut self, limit: u64) -> u64 {
         if self.0 == 0 {
             return 0;
@@ -206,7 +210,7 @@ impl Draw {
         self.0 % limit.max(1)
     }
 
-    /// At most this, and exactly this in one of two cases and in the play that is as bad as can be.
+    /// At most this, and exactly this in one of two cases and in the worst run.
     fn most(&mut self, most: u64) -> u64 {
         if self.0 == 0 || self.below(2) == 0 { most } else { self.below(most + 1) }
     }

@@ -29,7 +29,7 @@ fn systems() -> impl Strategy<Value = System> {
             }
             windows.sort_by_key(|window| window.begin_ns);
             let flows = flows.into_iter().map(|(period, is_round, level, peer, size_us)| Sent {
-                // Round ones meet slots again and again in the same way, the others in all ways.
+                // Round periods meet slots again and again in the same way, the others in all ways.
                 period_ns: period * MS + if is_round { 0 } else { 137_911 },
                 level,
                 peer,
@@ -66,7 +66,7 @@ fn stream(system: &System, flow: &Sent) -> Stream {
     }
 }
 
-/// What the analysis says of a stream.
+/// The bound of a stream by the analysis.
 fn bound(system: &System, index: usize) -> Result<u64, Never> {
     let own = &system.flows[index];
     let others = system.flows.iter().enumerate().filter(|(other, flow)| *other != index && flow.level <= own.level);
@@ -79,14 +79,14 @@ fn bound(system: &System, index: usize) -> Result<u64, Never> {
     worst(&system.supply, &stream(system, own), &others, LONGEST_NS).map(|worst| worst.latency_ns)
 }
 
-/// The longest latency of each stream in several plays, with the beginning of packages just after each slot took what it sends.
+/// The longest latency of each stream in several runs; packages begin just after each slot took its packages.
 fn played(system: &System, seeds: u64) -> Vec<u64> {
     let mut longest = vec![0; system.flows.len()];
     let supply = &system.supply;
     let rounds = (400 * MS).div_ceil(supply.repeats_ns);
     for window in &supply.windows {
         for seed in 0..seeds {
-            // Of the streams each is once the last of those that come at once.
+            // Each stream is once the last of those that come at once.
             let play = Play { from_ns: window.begin_ns, seed, looks_again: seed % 2 == 1, rounds };
             for turn in 0..if seed == 0 { system.flows.len() } else { 1 } {
                 let mut turned = system.clone();
@@ -100,7 +100,7 @@ fn played(system: &System, seeds: u64) -> Vec<u64> {
     longest
 }
 
-/// The first stream that takes longer than it may.
+/// The first stream that exceeds its bound.
 fn broken_promise(system: &System, longest: &[u64]) -> Option<String> {
     longest.iter().enumerate().find_map(|(index, longest_ns)| match bound(system, index) {
         Ok(bound_ns) if bound_ns < *longest_ns => Some(format!("flow {index}: {longest_ns} ns, bound {bound_ns} ns")),
@@ -123,7 +123,7 @@ proptest! {
     }
 }
 
-/// What no file says, and the ends of what files can say.
+/// Values beyond those in files, and the limits of files.
 fn extremes() -> impl Strategy<Value = u64> {
     prop_oneof![Just(1), Just(2), 1..1000_u64, 1..3 * MS, Just(u64::MAX / 2), u64::MAX - 5..=u64::MAX]
 }
@@ -137,7 +137,8 @@ proptest! {
     ) {
         let windows = vec![Window { begin_ns: 50 * US, sends_ns: sends_us * US, slot: 0 }];
         let (repeats_ns, said_ns) = (repeats_ms * MS, 20 * US);
-        let supply = Supply { windows, repeats_ns, said_ns, taken_before_ns: 50 * US, late_ns: 20 * US, bends_ns_s: BENDS_NS_S };
+        let (taken_before_ns, late_ns, bends_ns_s) = (50 * US, 20 * US, BENDS_NS_S);
+        let supply = Supply { windows, repeats_ns, said_ns, taken_before_ns, late_ns, bends_ns_s };
         let streams: Vec<_> = streams
             .into_iter()
             .map(|(period_ns, takes_ns, datagrams, always)| {
@@ -148,7 +149,7 @@ proptest! {
             })
             .collect();
         if let Ok(worst) = worst(&supply, &streams[0].0, &streams[1..], LONGEST_NS) {
-            // What waits for as long at most has begun to leave by then.
+            // A package with the longest wait has begun to leave by then.
             prop_assert!(worst.latency_ns <= LONGEST_NS + repeats_ns + streams[0].0.takes_ns, "{worst:?}");
         }
     }

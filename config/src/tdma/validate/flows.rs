@@ -1,4 +1,4 @@
-//! Whether every flow keeps its deadline with a table, and what waits has room.
+//! Validates that every flow keeps its deadline with a table, and that waiting packages have room.
 
 use super::{Validator, period_text};
 use crate::flow::Flow;
@@ -8,7 +8,7 @@ use rohrpost_network::{FlowBound, KEPT_IN_BYTES, Remedy, TAKEN_BEFORE, TRANSIT_L
 use std::time::Duration;
 
 impl Validator<'_> {
-    /// No flow publishes so quickly that a package could not even be sure of a slot that begins when the next one comes.
+    /// No flow publishes so fast that a package could miss each slot before the next package comes.
     pub(super) fn periods_of_flows(&self) {
         let node = |name| self.installation.node_of(name);
         let is_too_quick = |flow: &Flow| flow.period < TAKEN_BEFORE && node(flow.from) != node(flow.to);
@@ -20,8 +20,8 @@ impl Validator<'_> {
             );
             let text = |name| self.installation.classes.format(name);
             let message = format!(
-                "[[flow]] from `{}` to `{}`: `period` {} is less than the {} that a package must be there before its slot, and a cycle is {}; put \
-                 what comes meanwhile into one package, and write {right}",
+                "[[flow]] from `{}` to `{}`: `period` {} is less than the {} that a package must be there before its \
+                 slot, and a cycle is {}; put what comes meanwhile into one package, and write {right}",
                 text(flow.from),
                 text(flow.to),
                 duration_decimal(flow.period),
@@ -57,17 +57,17 @@ impl Validator<'_> {
         }
     }
 
-    /// What to write so that a flow keeps its deadline.
+    /// The remedy with which a flow keeps its deadline.
     fn remedy(&self, flow: usize) -> String {
         match self.plan.remedy(self.tdma, flow) {
             Remedy::Longer(slot, longer) => {
                 let by = duration_decimal(longer.length - self.tdma.slots[slot].length);
-                let (whose, length) = (self.whose(slot), duration_decimal(longer.length));
-                format!("lengthen {whose} by {by}: `length = \"{length}\"`")
+                let (described, length) = (self.described(slot), duration_decimal(longer.length));
+                format!("lengthen {described} by {by}: `length = \"{length}\"`")
             }
             Remedy::Oftener(slot, oftener) => {
                 let period = period_text(&oftener, &self.tdma.slots[slot]);
-                format!("let {} come oftener: {period}", self.whose(slot))
+                format!("let {} come oftener: {period}", self.described(slot))
             }
             Remedy::Another(slot) => {
                 let (offset, length) = (duration_decimal(slot.offset), duration_decimal(slot.length));
@@ -87,7 +87,8 @@ impl Validator<'_> {
         }
     }
 
-    /// Of each flow one package may wait: it is there before the next. All those of a module have room, since what gives way has no bound.
+    /// Of each flow one package may wait: it is there before the next. All packages of a module have room, since
+    /// displaced ones have no bound.
     pub(super) fn quotas(&self) {
         let quota = self.installation.network.map_or(usize::MAX, |network| network.quota_bytes) as u64;
         let flows = self.plan.bounds(self.tdma).into_iter().map(|bound| &self.installation.flows[bound.flow]);
@@ -97,8 +98,8 @@ impl Validator<'_> {
             let bytes: u64 = own().map(|flow| kept_bytes(flow.size)).sum();
             if let Some(flow) = own().next().filter(|_| bytes > quota) {
                 let message = format!(
-                    "[[flow]]s of `{}`: {} of them may wait at once, and its router keeps {} of a sender; write `quota = \"{}\"` in \
-                     [network]",
+                    "[[flow]]s of `{}`: {} of them may wait at once, and its router keeps {} of a sender; write `quota \
+                     = \"{}\"` in [network]",
                     self.installation.classes.format(module.name),
                     size_text(bytes.next_multiple_of(1 << 10)),
                     size_text(quota),
@@ -109,8 +110,9 @@ impl Validator<'_> {
         }
     }
 
-    /// Of the flows of a node as many packages may wait for its slots at once as the mailbox of its router holds: either all that can be
-    /// under way, or, since the router takes all when more than half of the mailbox is full, what comes between two looks at it.
+    /// The mailbox of a node's router holds all packages of the node's flows that may wait for slots at once. That is
+    /// either all in transit or, since the router takes all when more than half of the mailbox is full, all that come
+    /// between two checks.
     pub(super) fn mailboxes(&self) {
         let bounds = self.plan.bounds(self.tdma);
         for (index, node) in (0..).zip(self.installation.lan_nodes()) {
@@ -130,7 +132,9 @@ impl Validator<'_> {
             let most = under_way.min(behind_half + u128::from(TRANSIT.slots / 2));
             if let Some((flow, _)) = own().next().filter(|_| most > TRANSIT.slots.into()) {
                 let message = format!(
-                    "[[flow]]s from `{}`: {most} of their packages may wait for its slots at once, and the mailbox of its router holds {}; declare fewer, with one package for what goes to one module, or let slots of `{}` come oftener",
+                    "[[flow]]s from `{}`: {most} of their packages may wait for its slots at once, and the mailbox of \
+                     its router holds {}; declare fewer, with one package for what goes to one module, or let slots of \
+                     `{}` come oftener",
                     node.name, TRANSIT.slots, node.name
                 );
                 self.reader.report(self.installation.flows[flow].line, message);
@@ -139,7 +143,7 @@ impl Validator<'_> {
     }
 }
 
-/// What a router takes of a quota for a body.
+/// Bytes of a router's quota for a body.
 fn kept_bytes(body_bytes: u32) -> u64 {
     u64::from(body_bytes).next_multiple_of(KEPT_IN_BYTES).max(KEPT_IN_BYTES)
 }

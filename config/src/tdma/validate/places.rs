@@ -1,4 +1,5 @@
-//! Where slots are and how long: each lies in the cycle, behind synchronisation, and alone, and each node has one.
+//! Validates places and lengths of slots: each lies in the cycle, behind synchronisation, without overlap, and each
+//! node has one.
 
 use super::Validator;
 use crate::units::duration_decimal;
@@ -6,7 +7,7 @@ use rohrpost_network::TimeSlot;
 use std::time::Duration;
 
 impl Validator<'_> {
-    /// Each slot has room for a largest datagram. That others are in its way then is said to them.
+    /// Each slot has room for a largest datagram. Slots that then overlap have a message of their own.
     pub(super) fn lengths(&mut self) {
         let needed = self.length_min();
         for index in 0..self.fixed.slots.len() {
@@ -19,7 +20,8 @@ impl Validator<'_> {
                 format!("is {length} long, all of it guard: nobody ever sends in the last {guard} of a slot")
             } else {
                 format!(
-                    "is {length} long, {guard} of it guard, which leaves no room for what routers say to each other and one largest datagram"
+                    "is {length} long, {guard} of it guard, which leaves no room for what routers say to each other \
+                     and one largest datagram"
                 )
             };
             let lacking = duration_decimal(needed - slot.length);
@@ -54,11 +56,11 @@ impl Validator<'_> {
         }
     }
 
-    /// No two slots are there at once.
+    /// No two slots overlap.
     pub(super) fn collisions(&mut self) {
         for (first, second) in self.fixed.collisions() {
             let (a, b) = (self.fixed.slots[first], self.fixed.slots[second]);
-            // What was told to go elsewhere need not be told again.
+            // A slot with a new place needs no second message.
             if !a.collides(&b) {
                 continue;
             }
@@ -76,8 +78,8 @@ impl Validator<'_> {
                 format!("write {shorter_text}")
             };
             let (over, when) = (duration_decimal(a.end() - b.offset), when.unwrap_or_default());
-            let (whose, once) = (self.whose(first), self.once_longer(first));
-            self.report(second, format!("begins {over} before {whose} ends{once}{when}; {right}"));
+            let (first_text, once) = (self.described(first), self.once_longer(first));
+            self.report(second, format!("begins {over} before {first_text} ends{once}{when}; {right}"));
         }
     }
 
@@ -109,7 +111,7 @@ impl Validator<'_> {
         }
     }
 
-    /// Moves a slot to the nearest place where it has room; how to write that.
+    /// Moves a slot to the nearest place with room; returns how to write that.
     pub(super) fn moved(&mut self, index: usize) -> Option<String> {
         let slot = self.fixed.slots[index];
         let offset = self.fixed.without(index).nearest_room(&slot, self.masters())?;
@@ -117,7 +119,7 @@ impl Validator<'_> {
         Some(format!("`offset = \"{}\"`", duration_decimal(offset)))
     }
 
-    /// Said of the end of a slot that was told to be longer.
+    /// Added to messages about the end of a slot that must become longer.
     pub(super) fn once_longer(&self, index: usize) -> &'static str {
         if self.fixed.slots[index].length > self.tdma.slots[index].length { " once it is long enough" } else { "" }
     }

@@ -1,5 +1,4 @@
-//! The models. Loom runs each small program in every order of its threads' steps and with every stale value. This file is
-//! compiled beside the real slot core and beside each broken one.
+//! The models: small programs that loom runs in every order of their threads' steps, with the real and each broken core.
 
 use crate::full::OverflowPolicy;
 use crate::name::Priority;

@@ -1,4 +1,5 @@
-//! The bytes of each kind of type, both ways; what is refused; what counts in a hash. The bytes are those of `docs/src/wire.md`.
+//! The bytes of each kind of type, both ways; what is refused; what counts in a hash. The bytes are those of
+//! `docs/src/wire.md`.
 
 use crate::bytes::PLAIN;
 use crate::{DEPTH_MAX, DataItem, Description, Field, Function, Members, Named, Schema, SchemaError, TYPES_MAX, Type};

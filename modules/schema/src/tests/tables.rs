@@ -212,7 +212,7 @@ fn types_and_values_read_well() {
     assert_eq!(paths, ["pose.x_m", "pose.y_m", "ranges_m[0]", "ranges_m[1]", "mode.Go.speed_m_s"]);
 }
 
-/// Nobody writes such types, and whoever describes itself so is shown all the same.
+/// No program has such types; a module that describes them is shown all the same.
 #[test]
 fn what_has_no_name_or_no_value_is_shown() {
     for (bytes, expected) in [

@@ -1,13 +1,14 @@
-//! Which lines are taken: those said in the sender's own name, as many as its share, and of what they say of time and losses what can be.
-//! Knows no clock and no mailbox.
+//! Which lines are taken: those said in the sender's own name, as many as its share, and of what they say of time and
+//! losses what can be. Knows no clock and no mailbox.
 
 use crate::interfaces::RefusedLines;
 use crate::output::{Bucket, LANES, OutputLine, WAITING_LINES, cut, iso};
 use rohrpost_config::{Installation, Principal};
-use rohrpost_mailbox::Name;
+use rohrpost_mailbox::{Name, Throttle};
 
 const SECOND_NS: u64 = 1_000_000_000;
-/// How far ahead of the collector's a line's time may be: clocks of nodes differ by less, as long as they have one time.
+/// How far ahead of the collector's a line's time may be: clocks of nodes differ by less, as long as they have one
+/// time.
 const AHEAD_MAX_NS: u64 = SECOND_NS;
 /// Each refusal is told at most so often.
 const TELL_NS: u64 = 5 * SECOND_NS;
@@ -29,38 +30,19 @@ pub(super) struct Admission {
     /// As many as modules and nodes in the file, twice, and those for names that it does not know.
     writers: Vec<Writer>,
     pub(super) counts: RefusedLines,
-    names: Untold,
-    unreadable: Untold,
+    names: Throttle,
+    unreadable: Throttle,
 }
 
-/// Who says lines: a principal, by itself or through launch, which passes on what it prints. Each of both ways has an allowance where the
-/// lines come from, and so it has here.
+/// Who says lines: a principal, by itself or through launch, which passes on what it prints. Each of both ways has an
+/// allowance where the lines come from, and so it has here.
 struct Writer {
     principal: Principal,
     by_launch: bool,
     share: Bucket,
     /// When its last line came.
     heard_ns: u64,
-    beyond: Untold,
-}
-
-/// What was refused and not told yet.
-#[derive(Default)]
-struct Untold {
-    lines: u64,
-    told_ns: Option<u64>,
-}
-
-impl Untold {
-    /// Counts one; how many are to be told now, if any.
-    fn add(&mut self, now_ns: u64) -> Option<u64> {
-        self.lines += 1;
-        if self.told_ns.is_some_and(|told_ns| now_ns < told_ns + TELL_NS) {
-            return None;
-        }
-        self.told_ns = Some(now_ns);
-        Some(std::mem::take(&mut self.lines))
-    }
+    beyond: Throttle,
 }
 
 /// A line that is not taken; what is to be said of that, if it is time.
@@ -77,7 +59,7 @@ impl Admission {
     /// Counts what is no line.
     pub(super) fn unreadable(&mut self, from: Name, now_ns: u64) -> NotTaken {
         self.counts.unreadable += 1;
-        let told = self.unreadable.add(now_ns);
+        let told = self.unreadable.note(now_ns, TELL_NS);
         NotTaken(
             told.map(|lines| format!("{lines} packages are no lines and were dropped, the last of them from {from}")),
         )
@@ -107,7 +89,7 @@ impl Admission {
         let writer = self.writer(principal, by_launch);
         let quiet_ns = came.mono_ns.saturating_sub(std::mem::replace(&mut writer.heard_ns, came.mono_ns));
         if !writer.share.take(came.mono_ns) {
-            let told = writer.beyond.add(came.mono_ns);
+            let told = writer.beyond.note(came.mono_ns, TELL_NS);
             self.counts.beyond_share += 1;
             let who = installation.classes.format(named);
             let told =
@@ -120,7 +102,7 @@ impl Admission {
     }
 
     fn foreign(&mut self, from: Name, named: Name, now_ns: u64) -> NotTaken {
-        let told = self.names.add(now_ns);
+        let told = self.names.note(now_ns, TELL_NS);
         NotTaken(told.map(|lines| {
             format!(
                 "{lines} lines in the name of others were dropped, the last of them from {from} in the name of {named}"
@@ -134,15 +116,15 @@ impl Admission {
             // All that it may say by its own allowances, and what waited while this collector was away.
             let (lanes, waiting) = (LANES as u32, WAITING_LINES as u32);
             let share = Bucket::new(self.rate * lanes, self.burst * lanes + waiting);
-            let beyond = Untold::default();
+            let beyond = Throttle::default();
             self.writers.push(Writer { principal, by_launch, share, heard_ns: 0, beyond });
             self.writers.len() - 1
         });
         &mut self.writers[at]
     }
 
-    /// A line cannot be later than now, nor tell of more lines than its module can have said since the last one; of the first in this incarnation
-    /// of the collector, since the computer started. What it said stands in its text.
+    /// A line cannot be later than now, nor tell of more lines than its module can have said since the last one; of the
+    /// first in this incarnation of the collector, since the computer started. What it said stands in its text.
     fn bound(&mut self, line: &mut OutputLine, now_ns: u64, lost_max: u64, quiet_ns: u64) {
         let mut marks = String::new();
         if line.time_ns > now_ns.saturating_add(AHEAD_MAX_NS) {

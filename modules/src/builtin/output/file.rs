@@ -1,4 +1,5 @@
-//! The collector's file. A line is one write, as soon as it comes: nothing is kept back that a killed collector could lose.
+//! The collector's file. A line is one write, as soon as it comes: nothing is kept back that a killed collector could
+//! lose.
 
 use super::sink::{SinkChange, SinkHealth};
 use std::ffi::OsString;
@@ -26,7 +27,7 @@ pub(super) struct LogFile {
 struct Open {
     file: File,
     len: u64,
-    /// Its last line has no end: whoever wrote it was killed, or the disk was full.
+    /// Its last line has no end: its writer was killed, or the disk was full.
     torn: bool,
 }
 

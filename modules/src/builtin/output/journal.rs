@@ -1,7 +1,7 @@
 //! Lines for the journal of systemd, in its own protocol: <https://systemd.io/JOURNAL_NATIVE_PROTOCOL/>.
 //!
-//! A line is one datagram of fields. The socket never blocks: a journal that hangs costs its own lines, not ours. The crates
-//! that speak this protocol bring a logger of their own, or cryptography for other things systemd does.
+//! A line is one datagram of fields. The socket never blocks: a journal that hangs costs its own lines, not ours. The
+//! crates that speak this protocol bring a logger of their own, or cryptography for other things systemd does.
 
 use super::sink::{SinkChange, SinkHealth};
 use crate::common::OutputLevel;

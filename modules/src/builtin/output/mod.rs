@@ -1,5 +1,5 @@
-//! `output`: collects what all modules of the node say; keeps the last lines, writes them to a file and to the system's journal,
-//! passes them on.
+//! `output`: collects what all modules of the node say; keeps the last lines, writes them to a file and to the system's
+//! journal, passes them on.
 
 mod admission;
 mod file;
@@ -80,7 +80,7 @@ fn open(path: &Path, output: &Output) -> Result<LogFile, ModuleError> {
 }
 
 impl OutputModule {
-    /// The line in a package, and whose share it uses.
+    /// The line in a package, and the principal that is charged for it.
     fn admit(&mut self, context: &Context, data: &Received<'_>) -> Result<(Principal, OutputLine), NotTaken> {
         let came = Came { mono_ns: monotonic_ns(), time_ns: context.now().ns };
         let read = postcard::from_bytes(data.value);
@@ -89,8 +89,8 @@ impl OutputModule {
         Ok((principal, line))
     }
 
-    /// Passes a line to what keeps it for longer. A full disk or a journal that hangs must not end the collector: the ring
-    /// and the subscribers go on.
+    /// Passes a line to what keeps it for longer. A full disk or a journal that hangs must not end the collector: the
+    /// ring and the subscribers go on.
     fn write(&mut self, line: &OutputLine, context: &Context) {
         let (installation, now) = (context.installation(), Instant::now());
         if let Some(file) = &mut self.file {

@@ -1,12 +1,13 @@
-//! The newest lines, numbered as they came. Who says much loses its own lines first: of all who said something, the one with the most lines
-//! gives way, so that nobody says so much that what others said is gone.
+//! The newest lines, numbered as they came. Who says much loses its own lines first: of all who said something, the one
+//! with the most lines gives way, so that nobody says so much that what others said is gone.
 
 use crate::output::OutputLine;
 use rohrpost_config::Principal;
 use std::collections::VecDeque;
 
 pub(super) struct Ring {
-    /// What each said, with its number. There are as many as modules and nodes in the file, and one for names that it does not know.
+    /// What each said, with its number. There are as many as modules and nodes in the file, and one for names that it
+    /// does not know.
     said: Vec<(Principal, VecDeque<(u64, OutputLine)>)>,
     kept: usize,
     max: usize,
@@ -38,7 +39,8 @@ impl Ring {
         self.next
     }
 
-    /// The lines that follow each other without a gap from the first one on that is kept of this number or a later one; and its number.
+    /// The lines that follow each other without a gap from the first one on that is kept of this number or a later one;
+    /// and its number.
     pub(super) fn run(&self, number: u64) -> (u64, impl Iterator<Item = &OutputLine>) {
         let mut rests: Vec<_> =
             self.said.iter().map(|(_, lines)| (lines, lines.partition_point(|l| l.0 < number))).collect();

@@ -66,8 +66,8 @@ fn readings_that_are_none_change_nothing() {
 
 #[test]
 fn a_wall_that_many_beams_graze_stays() {
-    // Along a corridor wall, far beams pass through the squares in which near ones end. The wall lies off the borders of
-    // the map's squares, where a rounding would decide which one is hit.
+    // Along a corridor wall, far beams pass through the squares in which near ones end. The wall lies off the borders
+    // of the map's squares, where a rounding would decide which one is hit.
     let world =
         World::parse("rohrpost-map 1\ncell_m 0.99\nmap\n##############\n#>           #\n##############\n").unwrap();
     let scanner = Scanner { range_noise_m: 0.0, range_max_m: 30.0, ..Scanner::default() };

@@ -1,4 +1,4 @@
-//! Peers that begin, fall silent, are started anew, or do not hear us.
+//! Peers that begin, fall silent, restart, or do not hear us.
 
 use super::*;
 use crate::counts::Cause;
@@ -33,12 +33,12 @@ pub(super) fn check_silence() {
 }
 
 #[test]
-fn who_says_nothing_for_a_second_is_silent() {
+fn a_peer_without_a_datagram_for_a_second_is_silent() {
     check_silence();
 }
 
 #[test]
-fn who_stood_still_itself_waits_for_others_anew() {
+fn a_stalled_router_waits_for_its_peers_anew() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
     base.refusals(START);
@@ -65,10 +65,10 @@ pub(super) fn check_restart() {
     base.take(START + MS, 1, &new[1]);
     assert_eq!(base.log.ids(), [0, 1], "nothing of the old incarnation, nothing twice");
     let received = &base.stats.peer(1).received;
-    assert_eq!((received.restarts.get(), received.old.get(), received.copies.get()), (1, 2, 1));
+    assert_eq!((received.restarts.get(), received.old.get(), received.duplicates.get()), (1, 2, 1));
     assert_eq!(received.lost.get(), 1, "the first incarnation's first, which only said that it is there");
 
-    // A second router that goes on as the same node is noticed, and kept out.
+    // A second router with the same node number is noticed, and kept out.
     for step in 0..30 {
         let now_ns = START + step * 100 * MS;
         second.hears(0, now_ns);
@@ -116,7 +116,7 @@ fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
     old[1..4].iter().for_each(|datagram| base.take(START, 1, datagram));
     new[..2].iter().for_each(|datagram| base.take(START, 1, datagram));
     let before = base.log.delivered.len();
-    // The second incarnation is silent, and the wire or a stranger has kept what the first one sent.
+    // The second incarnation is silent, and the wire or an attacker replays what the first one sent.
     let now_ns = START + 3 * S;
     old[..4].iter().for_each(|datagram| base.take(now_ns, 1, datagram));
     let stats = base.stats.clone();
@@ -170,7 +170,7 @@ fn a_one_way_link_is_noticed() {
 }
 
 #[test]
-fn who_is_heard_again_has_a_second_to_hear_us() {
+fn a_peer_that_is_heard_again_has_a_second_to_hear_us() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
     (0..40).for_each(|step| drop(base.refusals(START + step * 100 * MS)));
@@ -226,14 +226,14 @@ pub(super) fn check_jump() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, quick));
     let mut send = || arm.send(START, data(1, 0), b"", true).unwrap().1;
     (0..3).for_each(|_| base.take(START, 1, &send()));
-    // A copy of it says nothing more; nor does another one that is far from it.
+    // A duplicate says nothing more; nor does another one that is far from it.
     [LAST, LAST, LAST / 2, 5000].iter().for_each(|sequence| base.take(START, 1, &forged(101, *sequence)));
     base.take(START, 1, &send());
     assert_eq!(base.log.delivered.len(), 4);
     let stats = base.stats.clone();
     let received = &stats.peer(1).received;
-    assert_eq!((received.missing(), received.old.get(), received.copies.get()), (0, 4, 0));
-    // Who was not reached for long is far ahead, and says so again.
+    assert_eq!((received.missing(), received.old.get(), received.duplicates.get()), (0, 4, 0));
+    // A peer that did not reach us for long is far ahead, and says so again.
     (0..2 * WINDOW).for_each(|_| drop(send()));
     (0..2).for_each(|_| base.take(START, 1, &send()));
     assert_eq!((base.log.delivered.len(), received.old.get()), (5, 5));

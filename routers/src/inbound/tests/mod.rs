@@ -69,7 +69,7 @@ fn a_window_knows_gaps_and_copies() {
 }
 
 #[test]
-fn who_joins_late_misses_nothing_of_what_was_before() {
+fn a_router_that_joins_late_misses_nothing_sent_before() {
     let mut lost = 0;
     let mut window = Window::joining(5000);
     assert_eq!(window.arrive(5000, &mut lost), Arrival::Newest);
@@ -123,7 +123,7 @@ fn a_full_table_costs_packages_but_not_the_order() {
     check_floor();
 }
 
-/// A large package, then packages of so many flows besides, then its last part.
+/// A large package, then packages of many flows, then its last fragment.
 fn check_whole() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, lives::quick));
     let large = head(module(50, 0), module(200, 1), 90);
@@ -137,7 +137,7 @@ fn check_whole() {
     }
     base.take(START, 1, last);
     assert_eq!(base.log.delivered.len(), 901, "nothing of its flow was delivered after it began");
-    // And where something was, it is late, though it is long forgotten what.
+    // A package of a used place is late, even when the place is long forgotten.
     arm.queue(START, large, &[2; 4000]);
     let parts: Vec<_> = arm.leave(START).into_iter().map(|(_, part)| part).collect();
     base.take(START, 1, &parts[0]);
@@ -191,9 +191,9 @@ proptest! {
     }
 }
 
-/// Of two routers that claim one node, the one that is heard at the port of what is real time is heard at the other, too.
+/// Two routers claim one node: the one that is heard at the real-time port is heard at the other, too.
 #[test]
-fn who_lives_is_found_out_at_the_port_of_what_is_real_time() {
+fn the_real_time_port_decides_which_incarnation_lives() {
     let mut end = End::new(0, |_| {});
     let rest = Stats::of_rest(&end.settings, &end.stats);
     let mut inbound = Inbound::new(&end.settings, rest.clone());

@@ -1,4 +1,4 @@
-//! Whose names come from whom, and who may command whom.
+//! Which node may send from which names, and which sender may command which receiver.
 
 use crate::admission::{Access, Admission, PACKET, v4};
 use crate::counts::Cause;
@@ -17,7 +17,7 @@ fn datagram(sequence: u64, package: &Head) -> (FrameHead, Vec<u8>) {
     (head, package.to_bytes().to_vec())
 }
 
-/// What became of packages that came from node 1, each in a datagram that was sealed.
+/// Results for packages from node 1, each in a datagram that was sealed.
 fn causes(end: &mut End, packages: &[Head]) -> Vec<Option<Cause>> {
     let mut all = Vec::new();
     for (sequence, package) in (0..).zip(packages) {
@@ -143,7 +143,7 @@ fn what_a_peer_said_before_it_had_our_configuration_does_not_part_us() {
     let mut end = End::new(0, |settings| settings.network.security = Security::Keys);
     let old = FrameHead { digest: 8, ..datagram(0, &head(module(200, 0), module(60, 1), 60)).0 };
     assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));
-    assert!(matches!(end.stats.state(1, START), State::Refused(_)), "of whom nothing else is known");
+    assert!(matches!(end.stats.state(1, START), State::Refused(_)), "nothing else is known of it");
     assert_eq!(causes(&mut end, &[head(module(200, 0), module(60, 1), 60)]), [None]);
     assert_eq!(end.stats.state(1, START), State::Alive);
     assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));

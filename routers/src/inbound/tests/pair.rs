@@ -1,4 +1,4 @@
-//! Two routers and a wire that loses, copies and reorders.
+//! Two routers and a wire that loses, duplicates and reorders.
 
 use super::*;
 use crate::counts::Cause;
@@ -9,20 +9,20 @@ use std::collections::HashMap;
 
 /// What the wire does with the datagram that leaves next.
 #[derive(Clone, Copy, Debug)]
-enum Wire {
+enum WireFate {
     Passes,
     Loses,
     Copies,
-    /// It is overtaken by so many.
+    /// This many others overtake it.
     Holds(usize),
 }
 
-fn wire() -> impl Strategy<Value = Wire> {
+fn wire() -> impl Strategy<Value = WireFate> {
     prop_oneof![
-        6 => Just(Wire::Passes),
-        1 => Just(Wire::Loses),
-        1 => Just(Wire::Copies),
-        2 => (1usize..100).prop_map(Wire::Holds),
+        6 => Just(WireFate::Passes),
+        1 => Just(WireFate::Loses),
+        1 => Just(WireFate::Copies),
+        2 => (1usize..100).prop_map(WireFate::Holds),
     ]
 }
 
@@ -34,7 +34,8 @@ proptest! {
         wire in prop::collection::vec(wire(), 64),
     ) {
         let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
-        let (mut now_ns, mut busy_ns, mut on_wire, mut left, mut lost_on_wire) = (START, START, Vec::new(), 0usize, 0u64);
+        let (mut now_ns, mut busy_ns) = (START, START);
+        let (mut on_wire, mut left, mut lost_on_wire) = (Vec::new(), 0usize, 0u64);
         let mut bodies = HashMap::new();
         let mut steps = packages.into_iter();
         loop {
@@ -56,11 +57,11 @@ proptest! {
                 if to != 0 {
                     continue;
                 }
-                match if step.is_some() { wire[left % wire.len()] } else { Wire::Passes } {
-                    Wire::Passes => on_wire.push((left, datagram)),
-                    Wire::Loses => lost_on_wire += 1,
-                    Wire::Copies => on_wire.extend([(left, datagram.clone()), (left + 7, datagram)]),
-                    Wire::Holds(by) => on_wire.push((left + by, datagram)),
+                match if step.is_some() { wire[left % wire.len()] } else { WireFate::Passes } {
+                    WireFate::Passes => on_wire.push((left, datagram)),
+                    WireFate::Loses => lost_on_wire += 1,
+                    WireFate::Copies => on_wire.extend([(left, datagram.clone()), (left + 7, datagram)]),
+                    WireFate::Holds(by) => on_wire.push((left + by, datagram)),
                 }
             }
             on_wire.sort_by_key(|(at, _)| *at);
@@ -71,7 +72,7 @@ proptest! {
             if step.is_some() || !on_wire.is_empty() {
                 busy_ns = now_ns;
             }
-            // Long after the last, so that all that is missing was given up, and every part.
+            // Long after the last, so that all that is missing was given up, and every fragment.
             if now_ns > busy_ns + 3 * S {
                 break;
             }
@@ -80,7 +81,7 @@ proptest! {
         base.assert_balanced();
         prop_assert_eq!((arm.stats.waiting_in_all(), base.inbound.partial()), (0, 0));
         prop_assert_eq!(arm.log.lost.len(), 0);
-        // The very first was said to nobody.
+        // No peer took the very first one.
         let received = &base.stats.peer(1).received;
         prop_assert_eq!(received.missing(), lost_on_wire + 1);
         prop_assert_eq!(received.datagrams.get() + received.missing(), arm.stats.peer(0).sent.datagrams.get());

@@ -1,4 +1,4 @@
-//! Datagrams that are not taken, and who learns of it.
+//! Refused datagrams, and which node learns of it.
 
 use super::super::refusing::write_refusal;
 use super::*;
@@ -41,7 +41,7 @@ pub(super) fn check_digest() {
     assert!(base.log.delivered.is_empty() && arm.refusals(now_ns).is_empty(), "a refusal is not refused");
     assert_eq!(base.stats.peer(1).received.refused.get(), 25);
 
-    // Its configuration is fixed: it is started anew.
+    // Its configuration is fixed: it restarts.
     base.take(now_ns, 1, &datagram(|settings| settings.incarnation = 999));
     assert_eq!((base.stats.state(1, now_ns), base.log.delivered.len()), (State::Alive, 1));
     assert!(base.stats.state(1, now_ns + 10 * S) == State::Silent, "and a refusal holds for a while only");
@@ -103,7 +103,7 @@ fn strangers_are_refused() {
 }
 
 #[test]
-fn who_does_not_know_our_address_takes_nothing_though_it_is_heard() {
+fn a_peer_that_does_not_know_our_address_takes_nothing_though_it_is_heard() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
     let own = arm.send(START, head(module(50, 0), module(200, 1), 90), b"", true).unwrap().1;
@@ -128,7 +128,11 @@ pub(super) fn check_forged_refusals() {
         let take = |base: &mut End, ms: u64| base.take(START + ms * MS, 1, &forged[..bytes]);
         for ms in [0, 1, 999] {
             take(&mut base, ms);
-            assert_eq!(state(&base, START + ms * MS), State::Alive, "{reason:?} after {ms} ms, of who hears us");
+            assert_eq!(
+                state(&base, START + ms * MS),
+                State::Alive,
+                "{reason:?} after {ms} ms, from a peer that hears us"
+            );
         }
         assert_eq!((base.stats.peer(1).received.old.get(), &base.log.events[..]), (3, &[][..]));
         take(&mut base, 1000);
@@ -155,7 +159,7 @@ pub(super) fn check_damaged() {
     base.take_from(START, std::net::Ipv4Addr::LOCALHOST.into(), &good[..40]);
     base.take(START, 1, b"GET / HTTP/1.1");
     assert!(base.log.delivered.is_empty() && base.log.events.is_empty() && base.refusals(START).is_empty());
-    // Two bytes say that it is ours.
+    // Two bytes mark it as ours.
     assert_eq!(base.stats.peer(1).received.damaged.get(), good.len() as u64 - 2);
     assert_eq!(base.stats.foreign.get(), 4);
     base.take(START, 1, &good);

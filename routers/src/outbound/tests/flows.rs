@@ -1,4 +1,4 @@
-//! How late packages of declared flows were, and which were lost.
+//! Delays and losses of packages of declared flows.
 
 use super::slot::table;
 use super::to;
@@ -9,7 +9,7 @@ use crate::outbound::{DIRECT_HEAD_BYTES, WAIT_MAX_NS};
 use crate::settings::Settings;
 use std::time::Duration;
 
-/// Of module 200 to module 50 of node 1: 10 ms, of which 5 are sure.
+/// From module 200 to module 50 of node 1: deadline 10 ms, bound 5 ms.
 fn declare(settings: &mut Settings) {
     settings.flows = vec![flow(module(200, 0), module(50, 1), 6000)];
 }
@@ -18,7 +18,8 @@ fn counts(end: &End) -> &FlowCounts {
     &end.stats.flows.counts()[0]
 }
 
-/// How many were sent, how long the slowest of them took, ms, how many took longer than the bound and the deadline, and how many were lost.
+/// How many were sent, how long the slowest took, ms, how many took longer than the bound and the deadline, and how
+/// many were lost.
 fn assert_counts(end: &End, expected: (u64, u128, u64, u64, u64), why: &str) {
     let (counts, latency) = (counts(end), counts(end).latency());
     let late = (counts.over_bound.get(), counts.over_deadline.get());
@@ -77,7 +78,7 @@ fn a_datagram_that_is_held_for_another_slot_is_measured_with_its_later_time() {
     let mut make =
         |end: &mut End, now_ns| end.outbound.poll_slot(now_ns, (1472, &mut datagram), None, &mut end.log).unwrap();
     make(&mut end, START + MS);
-    // It missed the end. Until the next slot others come, and what waits is looked through.
+    // It missed the end. Until the next slot others come, and the waiting packages are checked.
     end.queue(START + 2 * MS, to(1, 90), b"came meanwhile");
     end.outbound.tidy(START + 3 * MS, &mut end.log);
     end.outbound.sent(START + 11 * MS);
@@ -107,7 +108,7 @@ fn what_is_lost_is_counted_with_its_cause_and_not_measured() {
 #[test]
 fn a_bound_says_nothing_of_what_was_published_before_a_slot_was_left_out() {
     let mut end = End::new(0, declare);
-    // Peers are told once more that we are there.
+    // Peers get another keep-alive.
     end.leave(START + 10 * MS);
     for (published_ms, left_ms, kept) in [(10, 14, (4, 0)), (20, 28, (4, 0)), (26, 32, (6, 1)), (40, 43, (6, 1))] {
         end.queue(START + published_ms * MS, to(1, 90), b"one");

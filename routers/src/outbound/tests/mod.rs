@@ -24,7 +24,7 @@ pub(crate) const CHECKS: &[fn()] = &[
     slot::check_company_behind,
 ];
 
-/// The packages of a datagram, by their ids; a part stands for its package.
+/// The packages of a datagram, by their ids; a fragment stands for its package.
 fn ids(datagram: &[u8]) -> Vec<u16> {
     match Frame::parse(datagram).unwrap().1 {
         Frame::Packages(packages) => packages.map(|(head, _)| head.id).collect(),
@@ -88,7 +88,7 @@ fn check_order_on_the_wire() {
     assert_eq!(
         sent(&mut end, START),
         [
-            (2, vec![1, 6]),    // Has waited longest of the first level; with it what there is for that peer.
+            (2, vec![1, 6]),    // Has waited longest of the first level; with it all for that peer that fits.
             (1, vec![3, 7, 5]), // 0 does not fit, so nothing else of its level may go; 5 does.
             (1, vec![0]),
             (1, vec![2, 4]),
@@ -148,7 +148,7 @@ fn check_what_does_not_go() {
     check_cause(|end| end.stats.peer(1).link.refuse(START + 3 * S, mismatch), Cause::Refused);
 }
 
-/// What goes to a peer that is not there is lost with a cause: new or waiting, and of whatever kind.
+/// A package to an absent peer is lost with a cause: new or waiting, and of any kind.
 fn check_cause(set: impl Fn(&End), cause: Cause) {
     let mut end = End::new(0, |_| {});
     // Waits since a moment, so it is not stale.
@@ -183,7 +183,7 @@ fn names_that_nobody_has_and_names_of_this_node_have_no_route() {
 
 fn check_waiting_too_long() {
     let mut end = End::new(0, |settings| settings.network.rate_bytes_s = 70_000);
-    // A seventh of a second each: what is less important never has its turn.
+    // A seventh of a second each: less important ones never have their turn.
     for _ in 0..12 {
         end.queue(START, to(1, 90), &[0; 10_000]);
     }
@@ -226,7 +226,7 @@ fn check_packages_do_not_hurry() {
 }
 
 #[test]
-fn a_package_is_no_more_urgent_than_its_sender_or_who_asked_for_it() {
+fn a_package_is_no_more_urgent_than_its_sender_or_its_caller() {
     check_packages_do_not_hurry();
 }
 
@@ -257,7 +257,7 @@ fn the_rate_is_kept() {
     check_pace();
 }
 
-/// While a flood keeps the wire busy, each of these may leave before its time: those that are more important than what left last.
+/// While a flood keeps the wire busy, a package more important than the last one may leave before its time.
 fn check_advance() {
     let mut end = End::new(0, |settings| settings.network.rate_bytes_s = 1_000_000);
     end.hears(1, START);
@@ -336,7 +336,7 @@ fn an_idle_peer_hears_every_200_ms_and_a_busy_one_every_500_ms_what_we_heard() {
     assert_eq!(
         (of(1, 0, 2 * S), of(2, 0, 2 * S), of(2, 2 * S, 4 * S)),
         (11, 10, 10),
-        "and once more 10 ms after the first, and to who begins an incarnation"
+        "and once more 10 ms after the first, and to a peer that begins an incarnation"
     );
     assert_eq!(of(1, 2 * S, 4 * S), 4, "a busy one");
     assert_eq!((ALIVE_EVERY_NS, TELL_EVERY_NS), (200 * MS, S / 2));
@@ -410,7 +410,7 @@ fn a_way_without_room_is_passed_over() {
     assert!(std::panic::catch_unwind(broken).is_err(), "a mistake is noticed");
 }
 
-/// What is for the one waits, in its order; what is for the other leaves meanwhile, also at once, and it is told that we are there.
+/// Packages to the one wait, in order; those to the other leave meanwhile, also at once, and it gets keep-alives.
 fn check_one_way_without_room() {
     let mut end = End::new(0, |_| {});
     end.hears(1, START);

@@ -1,4 +1,4 @@
-//! What leaves in a time slot.
+//! Datagrams in a time slot.
 
 use super::{ids, to};
 use crate::counts::Cause;
@@ -35,12 +35,12 @@ fn in_slots(lengths_us: &'static [u64]) -> End {
 }
 
 impl End {
-    /// What leaves in a slot in which each datagram may have so many bytes, and all together so many.
+    /// Datagrams of a slot with this limit of each, and this limit of all together.
     fn slot(&mut self, now_ns: u64, room_bytes: usize) -> Vec<(NodeIndex, Vec<u8>)> {
         self.slot_before(now_ns, room_bytes, None)
     }
 
-    /// The same while the first in the mailbox is as important as this.
+    /// The same while the first in the mailbox has this priority.
     fn slot_before(
         &mut self,
         now_ns: u64,
@@ -70,11 +70,12 @@ pub(super) fn check_strict_order() {
     for (peer, priority, len) in [(1, 10, 10), (1, 90, 900), (2, 90, 600), (2, 20, 10)] {
         end.queue(START, to(peer, priority), &vec![0; len]);
     }
-    // 1 leaves alone, since 2 waits for the other peer. 2 does not fit behind it; 0 and 3 would, and are less important.
+    // 1 leaves alone, since 2 waits for the other peer. 2 does not fit behind it; 0 and 3 would, and are less
+    // important.
     assert_eq!(end.ids_in_slot(START, 1472), [(1, vec![1])]);
     assert_eq!(end.ids_in_slot(START, DIRECT_HEAD_BYTES + 599), []);
     assert_eq!(end.ids_in_slot(START, 1472), [(2, vec![2, 3]), (1, vec![0])]);
-    // Behind the first of its level that does not fit into the datagram nothing goes either.
+    // Behind the first of its level that does not fit into the datagram nothing else goes.
     for (priority, len) in [(90, 700), (90, 800), (10, 10)] {
         end.queue(START, to(1, priority), &vec![0; len]);
     }
@@ -111,7 +112,7 @@ pub(super) fn check_company() {
     for (peer, priority) in [(1, 200), (1, 90), (1, 40), (2, 90), (2, 10)] {
         end.queue(START, to(peer, priority), b"small");
     }
-    // What is as important as what waits for another goes along; what is less important does not.
+    // A package as important as the one that waits for another peer goes along; a less important one does not.
     assert_eq!(end.ids_in_slot(START, 1472), [(1, vec![0, 1]), (2, vec![3]), (1, vec![2]), (2, vec![4])]);
     end.assert_balanced();
 }
@@ -128,7 +129,7 @@ pub(super) fn check_company_behind() {
     }
     let all = end.slot_before(START, 1472, Some(Priority(90)));
     let ids: Vec<_> = all.iter().map(|(_, datagram)| ids(datagram)).filter(|ids| !ids.is_empty()).collect();
-    // What is of the level of the first in the mailbox goes along; the rest is asked for again when that was taken.
+    // Packages of the level of the first in the mailbox go along; the rest is asked for again when that was accepted.
     assert_eq!(ids, [vec![0, 1, 2], vec![3]]);
     end.assert_balanced();
 }
@@ -146,7 +147,8 @@ fn parts_go_on_in_the_next_slot_and_the_urgent_goes_between_them() {
     assert_eq!(end.ids_in_slot(START, 1471), [], "a part is as long as the others, or waits");
     assert_eq!(end.ids_in_slot(START, 2 * 1472), [(1, vec![0]), (1, vec![0])]);
     end.queue(START, to(2, 250), b"urgent");
-    // The last part is short. The urgent one has no company, since the parts are more important than what waits for that peer.
+    // The last fragment is short. The urgent one leaves alone, since the fragments are more important than what waits
+    // for that peer.
     assert_eq!(end.ids_in_slot(START + MS, 5000), [(2, vec![2]), (1, vec![0]), (1, vec![0]), (2, vec![1])]);
     assert_eq!(end.stats.peer(1).sent.fragments.get(), 4);
     end.assert_balanced();
@@ -154,7 +156,8 @@ fn parts_go_on_in_the_next_slot_and_the_urgent_goes_between_them() {
 
 #[test]
 fn datagrams_are_as_long_as_each_own_slot_holds() {
-    // 12.5 B a µs but for the guard of 100 µs, and 50 µs that it may begin late; 66 B for the heads of Ethernet, IP and UDP.
+    // 12.5 B a µs except for the guard of 100 µs and 50 µs of a late beginning; 66 B for the headers of Ethernet, IP
+    // and UDP.
     for (lengths_us, bytes) in
         [(&[1000][..], 1472), (&[250], 1250 - 66), (&[1000, 200], 625 - 66), (&[110], 528), (&[], 1472)]
     {

@@ -58,7 +58,7 @@ fn a_router_that_was_started_anew_is_known_after_it_has_asked() {
 }
 
 #[test]
-fn until_the_new_life_has_answered_the_old_one_is_heard() {
+fn until_the_new_incarnation_has_answered_the_old_one_is_heard() {
     let (mut a, mut b) = pair();
     let hello = Router::new(0, 101).ask(1);
     assert!(!b.greet(&hello).unwrap().0);
@@ -67,11 +67,11 @@ fn until_the_new_life_has_answered_the_old_one_is_heard() {
 }
 
 /// All hellos that ever were, said again to a router that lives, begin nothing and end nothing.
-pub(super) fn check_only_who_lives_begins() {
+pub(super) fn check_only_a_living_incarnation_begins() {
     let mut kept = Vec::new();
     let mut b = Router::new(1, 200);
-    for life in 0..40 {
-        let mut a = Router::new(0, 100 + life);
+    for incarnation in 0..40 {
+        let mut a = Router::new(0, 100 + incarnation);
         kept.extend(acquaint(&mut a, &mut b));
     }
     // B itself begins anew as well, and A once more.
@@ -89,12 +89,12 @@ pub(super) fn check_only_who_lives_begins() {
 }
 
 #[test]
-fn only_who_lives_begins() {
-    check_only_who_lives_begins();
+fn only_a_living_incarnation_begins() {
+    check_only_a_living_incarnation_begins();
 }
 
 #[test]
-fn an_answer_serves_once_and_only_to_whom_it_was_given() {
+fn a_response_serves_once_and_only_its_receiver() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
     let answer = b.greet(&a.ask(1)).unwrap().1.unwrap();
     let mut other = Router::new(0, 101);
@@ -108,7 +108,7 @@ fn an_answer_serves_once_and_only_to_whom_it_was_given() {
 }
 
 #[test]
-fn a_life_that_comes_back_is_heard_from_where_it_is_now() {
+fn an_incarnation_that_comes_back_is_heard_from_where_it_is_now() {
     let (mut a, mut b) = pair();
     let taken = a.seal(Port::Packages, 1, b"taken").unwrap();
     let kept_back = a.seal(Port::Packages, 1, b"kept back").unwrap();
@@ -219,7 +219,7 @@ fn an_answer_that_is_kept_back_begins_nothing() {
 }
 
 #[test]
-fn nothing_is_sealed_to_a_life_before_the_last_word_has_left() {
+fn nothing_is_sealed_to_an_incarnation_before_the_last_word_has_left() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
     let mut answer = b.greet(&a.ask(1)).unwrap().1.unwrap();
     let mut room = [0; HELLO_DATAGRAM_BYTES];
@@ -242,7 +242,7 @@ fn hellos_are_counted_for_each_peer() {
 
 #[test]
 #[should_panic(expected = "2^32 hellos")]
-fn a_life_that_has_said_all_its_hellos_ends() {
+fn an_incarnation_that_has_said_all_its_hellos_ends() {
     let a = Router::new(0, 100);
     a.all.has_said(1, u32::MAX.into());
     assert_eq!(FrameHead::read(&a.ask(1)).unwrap().0.sequence, u64::from(u32::MAX), "the last one");
@@ -250,7 +250,7 @@ fn a_life_that_has_said_all_its_hellos_ends() {
 }
 
 #[test]
-fn recorded_questions_do_not_keep_from_answering_who_lives() {
+fn replayed_challenges_do_not_keep_a_living_peer_from_its_response() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
     let recorded = Router::new(0, 99).ask(1);
     for _ in 0..1000 {

@@ -29,7 +29,7 @@ impl Router {
     }
 
     fn with_keys(end: End, keys: KeyRing, own: u8) -> Self {
-        let all = PeerSessions::new(Who::of(&end.settings), keys);
+        let all = PeerSessions::new(RouterIdentity::of(&end.settings), keys);
         Self { gate: Gate::new(&all, [own; 32]), all, end }
     }
 
@@ -55,7 +55,7 @@ impl Router {
 }
 
 #[test]
-fn who_is_not_known_is_asked_again_and_again_and_who_speaks_of_another_life_soon() {
+fn an_unknown_peer_is_challenged_again_and_again_and_one_with_another_incarnation_soon() {
     let (mut a, mut b) = (Router::new(0), Router::new(1));
     let asked = a.ask(START);
     assert_eq!(asked.iter().map(|(to, _)| *to).collect::<Vec<_>>(), [1, 2]);
@@ -76,13 +76,13 @@ fn who_is_not_known_is_asked_again_and_again_and_who_speaks_of_another_life_soon
     again.ask(now_ns);
     assert!(again.take(now_ns, 0, &datagram).is_none());
     assert_eq!(again.all.rejections(Port::Packages).of(Some(0), Rejection::OtherIncarnation), 1);
-    assert_eq!(again.ask(now_ns + 20 * MS).len(), 1, "sooner than who says nothing");
+    assert_eq!(again.ask(now_ns + 20 * MS).len(), 1, "sooner than a silent peer");
     let told = again.end.log.events.iter().filter(|event| matches!(event, Event::Rejected { .. })).count();
     assert_eq!(told, 1);
 }
 
 #[test]
-fn another_wire_format_is_told_by_who_gets_it_and_changes_nothing() {
+fn another_wire_format_is_reported_by_its_receiver_and_changes_nothing() {
     let (mut a, mut b) = (Router::new(0), Router::new(1));
     let (_, mut question) = a.ask(START).swap_remove(0);
     question[2] = 2;
@@ -96,7 +96,7 @@ fn another_wire_format_is_told_by_who_gets_it_and_changes_nothing() {
 }
 
 #[test]
-fn who_is_asked_again_after_long_can_answer() {
+fn a_peer_that_is_challenged_again_after_long_can_answer() {
     let (mut a, mut b) = (Router::new(0), Router::new(1));
     a.ask(START);
     let late_ns = START + 50 * CHALLENGE_MAX_NS;
@@ -107,7 +107,7 @@ fn who_is_asked_again_after_long_can_answer() {
 }
 
 #[test]
-fn who_is_away_for_long_is_asked_seldom() {
+fn a_peer_that_is_away_for_long_is_challenged_seldom() {
     let mut a = Router::new(0);
     let mut asked_in = |seconds: std::ops::Range<u64>| {
         let mut times_ns = (seconds.start * S..seconds.end * S).step_by((10 * MS) as usize);
@@ -157,7 +157,7 @@ fn what_is_lost_before_the_first_that_comes_is_counted() {
 }
 
 #[test]
-fn who_sends_what_others_said_from_an_address_of_a_third_parts_nobody_from_it() {
+fn replays_from_the_address_of_a_third_node_separate_no_node_from_it() {
     let (mut a, mut b) = (Router::with_digest(0, 8), Router::new(1));
     let recorded = a.ask(START)[0].1.clone();
     assert_eq!(b.take(START, 2, &recorded), None);
@@ -225,7 +225,7 @@ fn what_is_longer_than_any_of_ours_is_not_opened() {
     assert_eq!((rejected(Rejection::NotOurs), rejected(Rejection::Forged)), (1, 1));
 }
 
-/// Whoever hears what is said, and is quicker.
+/// An attacker that reads all datagrams, and is faster than the peers.
 #[test]
 fn what_is_brought_from_a_wrong_address_is_not_used_up_by_that() {
     let (mut a, mut b) = (Router::new(0), Router::new(1));

@@ -1,4 +1,4 @@
-//! Someone who has recorded all that ever passed, and sends what he likes: replays, alterations, mixtures. Nothing of it is taken.
+//! An attacker that has recorded all datagrams, and sends replays, alterations and mixtures. None of it is taken.
 
 use super::*;
 use crate::frame::SEQUENCE_MAX;
@@ -75,8 +75,8 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
     let mut hostile = Hostile { chance: ChaCha8Rng::seed_from_u64(4), recorded: Vec::new() };
     // Earlier incarnations, which said much that was never delivered; then two that stay.
     let mut routers = None;
-    for life in 0..20 {
-        let (mut a, mut b) = (Router::new(0, 100 + life), Router::new(1, 200 + life / 3));
+    for incarnation in 0..20 {
+        let (mut a, mut b) = (Router::new(0, 100 + incarnation), Router::new(1, 200 + incarnation / 3));
         hostile.recorded.extend(acquaint(&mut a, &mut b).into_iter().map(|hello| (Port::Packages, hello)));
         hostile.recorded.push((Port::Packages, a.ask(1)));
         for n in 0..50 {

@@ -1,4 +1,4 @@
-//! Two routers that seal, a wire that keeps all that ever passed, and whoever has it.
+//! Two routers that seal, a wire that keeps all datagrams, and an attacker with access to it.
 
 mod acquaintance;
 mod gate;
@@ -48,8 +48,8 @@ impl Router {
     }
 
     pub(super) fn with_keys(own: NodeIndex, incarnation: u64, keys: KeyRing) -> Self {
-        let who = Who { system: SYSTEM, own, nodes: 3, digest: DIGEST, incarnation };
-        let all = PeerSessions::new(who, keys);
+        let router = RouterIdentity { system: SYSTEM, own, nodes: 3, digest: DIGEST, incarnation };
+        let all = PeerSessions::new(router, keys);
         let mut seed = [own; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
         Self {
@@ -138,7 +138,7 @@ fn mistakes_are_noticed() {
     let checks: [(Broken, fn()); 3] = [
         (Broken::OpensTwice, sealed::check_each_opens_once),
         (Broken::BelievesUnopened, gate::check_a_cause_is_believed_of_the_silent_alone),
-        (Broken::BeginsUnproven, acquaintance::check_only_who_lives_begins),
+        (Broken::BeginsUnproven, acquaintance::check_only_a_living_incarnation_begins),
     ];
     for (broken, check) in checks {
         let noticed = with(broken, || catch_unwind(AssertUnwindSafe(check)));

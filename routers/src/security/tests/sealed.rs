@@ -1,4 +1,4 @@
-//! What is sealed: who can read it, and what becomes of it when it is altered, sent again or sent elsewhere.
+//! Sealed datagrams: which nodes can read them, and what happens to those that are altered, replayed or sent elsewhere.
 
 use super::*;
 use std::collections::BTreeSet;
@@ -57,14 +57,14 @@ fn each_opens_once_in_whatever_order_within_the_window() {
 }
 
 #[test]
-fn what_is_for_another_node_port_or_life_does_not_open() {
+fn what_is_for_another_node_port_or_incarnation_does_not_open() {
     let (mut a, mut b) = pair();
     let mut c = Router::new(2, 300);
     acquaint(&mut c, &mut a);
     let for_b = a.seal(Port::Packages, 1, b"text").unwrap();
     let rejected = |why: Rejection| Err(NotOpened::from(why));
     assert_eq!(c.open(Port::Packages, &for_b), rejected(Rejection::NotOurs));
-    assert_eq!(a.open(Port::Packages, &for_b), rejected(Rejection::NotOurs), "sent back to who sealed it");
+    assert_eq!(a.open(Port::Packages, &for_b), rejected(Rejection::NotOurs), "sent back to its sender");
     let mut readdressed = for_b.clone();
     readdressed[6] = 2;
     assert_eq!(c.open(Port::Packages, &checked(readdressed)), rejected(Rejection::Forged));
@@ -154,7 +154,7 @@ fn what_is_not_taken_is_counted_by_cause_and_told_once_a_second() {
 }
 
 #[test]
-fn what_could_not_be_sent_can_be_read_again_whoever_lives_by_then() {
+fn what_could_not_be_sent_can_be_read_again_in_any_later_incarnation() {
     let (mut a, _) = pair();
     let mut datagram = a.seal(Port::Packages, 1, b"a package").unwrap();
     acquaint(&mut Router::new(1, 201), &mut a);
@@ -162,10 +162,10 @@ fn what_could_not_be_sent_can_be_read_again_whoever_lives_by_then() {
     assert_eq!(&datagram[HEAD_BYTES..][..9], b"a package");
 }
 
-/// At the port of what is not real time no hello says what comes first; still nothing is opened twice, also when an incarnation begins again, and when
-/// another was taken for its successor meanwhile.
+/// At the port of what is not real time no hello says what comes first; still nothing is opened twice, also when an
+/// incarnation begins again, and when another was taken for its successor meanwhile.
 #[test]
-fn what_is_not_real_time_opens_once_however_often_its_life_begins() {
+fn what_is_not_real_time_opens_once_however_often_its_incarnation_begins() {
     let (mut a, mut b) = pair();
     let seal = |a: &mut Router| a.seal(Port::Rest, 1, b"text").unwrap();
     let early = seal(&mut a);

@@ -1,4 +1,4 @@
-//! Time slots: time is sealed to whoever has the key, since who begins must hear it; and hellos wait for a slot.
+//! Time slots: time is sealed to each holder of the key, since a joining node must hear it. Hellos wait for a slot.
 
 use super::*;
 
@@ -23,7 +23,7 @@ fn is_strange(router: &mut Router, datagram: &[u8]) -> bool {
 }
 
 #[test]
-fn who_is_not_known_is_overheard_and_proves_nothing() {
+fn an_unknown_peer_is_heard_unverified_and_proves_nothing() {
     let [mut a, mut b, mut c] = three();
     let before = a.seal(Port::Time, 1, b"now").unwrap();
     assert_eq!(b.open(Port::Time, &before), Err(Rejection::OtherIncarnation.into()));
@@ -49,7 +49,7 @@ fn who_is_not_known_is_overheard_and_proves_nothing() {
 }
 
 #[test]
-fn another_life_of_who_is_known_is_overheard_and_the_known_one_goes_on() {
+fn another_incarnation_of_a_known_peer_is_heard_unverified_and_the_known_one_goes_on() {
     let [mut a, mut b, _] = three();
     acquaint(&mut b, &mut a);
     let mut next = in_slots(Router::new(0, 101));
@@ -66,7 +66,7 @@ fn another_life_of_who_is_known_is_overheard_and_the_known_one_goes_on() {
 }
 
 #[test]
-fn while_keys_are_changed_who_has_either_hears_enough() {
+fn while_keys_are_changed_a_peer_with_either_hears_enough() {
     for (ids, known, least) in [(&[1][..], false, 8), (&[2], false, 8), (&[1], true, 4), (&[2], true, 4)] {
         let mut a = in_slots(Router::with_keys(0, 100, ring(&[2, 1])));
         let mut b = in_slots(Router::with_keys(1, 200, ring(ids)));
@@ -88,7 +88,7 @@ fn said(to: NodeIndex, is_reply: bool, begins: bool) -> Said {
     Said { to, bytes: HELLO_DATAGRAM_BYTES, is_reply, begins }
 }
 
-/// What leaves next: to whom, whether it is a reply, and its first byte.
+/// What leaves next: its receiver, whether it is a reply, and its first byte.
 fn next(waiting: &mut Waiting, now_ns: u64, first: Option<NodeIndex>) -> Option<(NodeIndex, bool, u8)> {
     waiting.take(now_ns, first).map(|(said, datagram)| (said.to, said.is_reply, datagram[0]))
 }
@@ -105,7 +105,7 @@ fn the_newest_hellos_wait_and_replies_go_first() {
     put(2, said(1, true, false), 5);
     put(2, said(9, true, false), 6);
     assert_eq!(next(&mut waiting, 2, Some(2)), Some((1, true, 4)), "an incarnation begins by it; nobody is node 9");
-    assert_eq!(next(&mut waiting, 2, Some(1)), Some((1, false, 2)), "the newest, and to whom is to be asked first");
+    assert_eq!(next(&mut waiting, 2, Some(1)), Some((1, false, 2)), "the newest, and the given peer's first");
     assert_eq!(next(&mut waiting, 2, Some(1)), Some((2, false, 3)));
     assert_eq!(next(&mut waiting, 2, None), None);
     waiting.put(0, said(1, true, true), &[7; HELLO_DATAGRAM_BYTES]);
@@ -116,7 +116,7 @@ fn the_newest_hellos_wait_and_replies_go_first() {
 }
 
 #[test]
-fn nothing_is_sealed_to_a_life_while_the_reply_waits_by_which_it_can_be_opened() {
+fn nothing_is_sealed_to_an_incarnation_while_the_reply_waits_by_which_it_can_be_opened() {
     let [mut a, mut b, _] = three();
     acquaint(&mut b, &mut a);
     let waiting = Waiting::new(&a.all);

@@ -53,7 +53,8 @@ impl Asking {
         self.left_ns = None;
     }
 
-    /// Whether the server has not said anything for too long that it could have said. `moved_ns`: when the stream last took something.
+    /// Whether the server has not said anything for too long that it could have said. `moved_ns`: when the stream last
+    /// took something.
     pub(super) fn is_silent(&self, now_ns: u64, heard_ns: u64, moved_ns: u64, is_slow: bool) -> bool {
         let after_ns = if is_slow { SLOW_SILENT_AFTER_NS } else { SILENT_AFTER_NS };
         let is_past = |past_ns: u64, after_ns: u64| now_ns.saturating_sub(past_ns) > after_ns;
@@ -73,7 +74,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     #[test]
-    fn who_was_not_asked_yet_is_not_silent_as_long_as_the_stream_moves() {
+    fn a_server_that_was_not_asked_yet_is_not_silent_as_long_as_the_stream_moves() {
         let mut asking = Asking::begin(0);
         assert!(asking.is_due(0));
         asking.asks(0, 1000);

@@ -49,8 +49,8 @@ impl Client {
             let refusal = Refusal { version: VERSION, reason: Reason::Common, yours, ours, text };
             return self.refused(now_ns, &refusal, host);
         }
-        if welcome.life != self.server_incarnation {
-            self.server_incarnation = welcome.life;
+        if welcome.incarnation != self.server_incarnation {
+            self.server_incarnation = welcome.incarnation;
             self.estimate = ServerClockEstimate::default();
         }
         self.estimate.heard(now_ns, &welcome.time);
@@ -102,7 +102,7 @@ impl Client {
 
     fn validate(&self, carried: &Carried<'_>, host: &mut impl Host) -> Result<(), Cause> {
         let (head, admission) = (&carried.head, &self.settings.admission);
-        // The server knows who hosts a name, and brings nothing back to who sent it.
+        // The server knows which client hosts a name, and brings nothing back to the sender.
         let is_our_name = self.ranges.iter().any(|range| range.has(head.from));
         admission.validate(ArrivalPath::Beyond { is_our_name }, head, carried.body).map_err(|why| {
             if why == Refused::NotAllowed {

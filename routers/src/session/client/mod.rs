@@ -30,7 +30,7 @@ use rohrpost_mailbox::{Head, TimeRecord};
 const CONNECT_MAX_NS: u64 = 5_000_000_000;
 /// A connection that holds for so long is no failure.
 const LASTING_NS: u64 = 5_000_000_000;
-/// What the server objected to is registered again after so long: who had it may have gone.
+/// Interval after which a refused range is registered again: the client that had it may have gone.
 const REGISTER_AGAIN_NS: u64 = 500_000_000;
 /// A look that comes so late says that this client stood still itself.
 const STOOD_STILL_NS: u64 = 4 * LOOK_EVERY_NS;
@@ -49,7 +49,7 @@ pub struct ClientSettings {
     /// Digest of what must be equal inside a system.
     pub system_digest: u64,
     /// Tells this incarnation from others; not 0. Also what its waits are drawn from.
-    pub life: u64,
+    pub incarnation: u64,
     /// Bytes of packages that wait.
     pub quota_bytes: usize,
     /// Level of each priority; 0 goes first.
@@ -67,7 +67,7 @@ pub struct Package<'a> {
     pub body: &'a [u8],
     /// When its sender published it, ns of the monotonic clock.
     pub published_ns: u64,
-    /// How often it was handed on before: 0, but for who hands on what came from a server.
+    /// How often it was forwarded before: 0, except for a package that came from a server.
     pub hops: u8,
 }
 
@@ -102,9 +102,9 @@ pub enum Event<'a> {
     Damaged(super::frame::BadFrame),
 }
 
-/// What a client asks of who runs it.
+/// What a client needs from the code that runs it.
 pub trait Host: Answers {
-    /// Puts a package that came into its mailbox. Its `published_ns` is by the monotonic clock here, as far as that can be told.
+    /// Puts a package that came into its mailbox. Its `published_ns` is an estimate by the monotonic clock here.
     ///
     /// # Errors
     /// [`NotDelivered`]
@@ -157,7 +157,7 @@ pub struct Client {
     is_blocked: bool,
     is_slow: bool,
     estimate: ServerClockEstimate,
-    /// Whose clocks that is about.
+    /// The end with these clocks.
     server_incarnation: u64,
     out: Counts,
     inn: Counts,
@@ -190,7 +190,7 @@ impl Client {
             registration: Registration::Due(0),
             number: 0,
             attempt: 0,
-            backoff: Backoff::new(settings.life),
+            backoff: Backoff::new(settings.incarnation),
             splitter: Splitter::default(),
             outgoing: Outgoing::new(settings.quota_bytes),
             is_blocked: false,
@@ -287,13 +287,13 @@ impl Client {
         self.splitter = Splitter::default();
         self.outgoing.cut();
         (self.heard_ns, self.moved_ns) = (now_ns, now_ns);
-        let ClientSettings { name, system, reaches_own, common, system_digest, life, .. } = &self.settings;
+        let ClientSettings { name, system, reaches_own, common, system_digest, incarnation, .. } = &self.settings;
         self.outgoing.say(&Message::Hello(Hello {
             system: *system,
             reaches_own: *reaches_own,
             common: *common,
             system_digest: *system_digest,
-            life: *life,
+            incarnation: *incarnation,
             attempt: self.attempt,
             asked_ns: now_ns,
             name,
@@ -347,8 +347,8 @@ impl Client {
         self.is_blocked = false;
     }
 
-    /// What is known of how fast the stream takes bytes: whether so slowly that an answer may be long on its way, and how many are made ready
-    /// for it at a time.
+    /// What is known of how fast the stream takes bytes: whether so slowly that an answer may be long on its way, and
+    /// how many are made ready for it at a time.
     pub fn set_pace(&mut self, is_slow: bool, batch_bytes: usize) {
         self.is_slow = is_slow;
         self.outgoing.set_batch(batch_bytes);

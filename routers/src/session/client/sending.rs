@@ -32,8 +32,8 @@ impl Client {
         });
     }
 
-    /// A package for all systems came to its own system without the server, or was lost here. That nobody has its mailbox open is a loss only
-    /// where this client hosts the name: the server counts on it then, and says nothing.
+    /// A package for all systems came to its own system without the server, or was lost here. That nobody has its
+    /// mailbox open is a loss only where this client hosts the name: the server counts on it then, and says nothing.
     pub fn reached_itself(&mut self, to: Name, priority: Priority, delivered: Result<(), NotDelivered>) {
         let hosts = self.ranges.iter().any(|range| range.has(to));
         if delivered == Err(NotDelivered::NoMailbox) && !hosts {
@@ -46,15 +46,16 @@ impl Client {
         }
     }
 
-    /// From our clock to the server's session clock, as long as packages may leave: to the earliest that it may be there, so that no
-    /// package looks younger than it is.
+    /// From our clock to the server's session clock, as long as packages may leave: to the earliest that it may be
+    /// there, so that no package looks younger than it is.
     fn shift_ns(&self, now_ns: u64) -> Option<i64> {
         let session = self.session(now_ns).filter(|_| self.is_up())?;
         let earliest_ns = session.ns.saturating_sub(session.error_ns);
         Some((i128::from(earliest_ns) - i128::from(now_ns)).clamp(i64::MIN.into(), i64::MAX.into()) as i64)
     }
 
-    /// Asks for the time, also while the stream takes nothing: packages that have not begun to leave go behind the question.
+    /// Asks for the time, also while the stream takes nothing: packages that have not begun to leave go behind the
+    /// question.
     pub(super) fn ask(&mut self, now_ns: u64) {
         if self.state == State::Member && self.asking.is_due(now_ns) {
             let end = self.outgoing.hurry(&Message::Ask(now_ns));
@@ -87,7 +88,7 @@ impl Client {
         let mut ledger = Ledger::new(&self.out, &mut *host, None);
         work(&mut self.outgoing, &mut ledger);
         for (head, body) in ledger.into_answers() {
-            // Who has gone, or takes no more answers, waits for its timeout.
+            // A sender that has gone, or takes no more answers, waits for its timeout.
             let _ = host.deliver(&Carried { hops: 0, published_ns: now_ns, head, body: &body });
         }
     }

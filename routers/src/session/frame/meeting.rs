@@ -7,7 +7,7 @@ const MAGIC: [u8; 4] = *b"RpTc";
 /// Bytes of a name that people read, at most.
 pub const NAME_BYTES_MAX: usize = 64;
 
-/// Who a client is.
+/// Identity of a client.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hello<'a> {
     /// First byte of the names that it may host.
@@ -19,7 +19,7 @@ pub struct Hello<'a> {
     /// Digest of what must be equal inside a system.
     pub system_digest: u64,
     /// Tells this incarnation of the client from others; not 0.
-    pub life: u64,
+    pub incarnation: u64,
     /// Counts the connections of this incarnation, from 1: of two the later is the true one.
     pub attempt: u64,
     /// Its own time, ns: the first question for the time.
@@ -43,13 +43,13 @@ impl<'a> Hello<'a> {
             reaches_own: flags == 1,
             common: fields.long()?,
             system_digest: fields.long()?,
-            life: fields.long()?,
+            incarnation: fields.long()?,
             attempt: fields.long()?,
             asked_ns: fields.long()?,
             name: fields.text(NAME_BYTES_MAX)?,
         };
         let is_one = system != 0 && system != rohrpost_mailbox::ALL_SYSTEMS;
-        if !is_one || flags > 1 || hello.life == 0 || hello.attempt == 0 {
+        if !is_one || flags > 1 || hello.incarnation == 0 || hello.attempt == 0 {
             return Err(BadFrame::Damaged("a hello of nobody"));
         }
         Ok(hello)
@@ -58,7 +58,7 @@ impl<'a> Hello<'a> {
     pub(super) fn write(&self, into: &mut Vec<u8>) {
         into.extend(MAGIC);
         into.extend([VERSION, self.system, u8::from(self.reaches_own), 0]);
-        for long in [self.common, self.system_digest, self.life, self.attempt, self.asked_ns] {
+        for long in [self.common, self.system_digest, self.incarnation, self.attempt, self.asked_ns] {
             into.extend(long.to_le_bytes());
         }
         into.extend(self.name.as_bytes());
@@ -71,7 +71,7 @@ pub struct Welcome {
     /// Digest of what must be equal everywhere.
     pub common: u64,
     /// Tells this incarnation of the server from others: times of two incarnations have nothing to do with each other.
-    pub life: u64,
+    pub incarnation: u64,
     /// To the question of the hello.
     pub time: TimeAnswer,
 }
@@ -86,14 +86,14 @@ impl Welcome {
             return Err(BadFrame::Version(version));
         }
         fields.zeroes::<3>()?;
-        Ok(Self { common: fields.long()?, life: fields.long()?, time: TimeAnswer::parse(fields)? })
+        Ok(Self { common: fields.long()?, incarnation: fields.long()?, time: TimeAnswer::parse(fields)? })
     }
 
     pub(super) fn write(&self, into: &mut Vec<u8>) {
         into.extend(MAGIC);
         into.extend([VERSION, 0, 0, 0]);
         into.extend(self.common.to_le_bytes());
-        into.extend(self.life.to_le_bytes());
+        into.extend(self.incarnation.to_le_bytes());
         self.time.write(into);
     }
 }
@@ -158,7 +158,7 @@ impl Reason {
 /// "I take nothing from you, since …"
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Refusal<'a> {
-    /// Version of who refuses.
+    /// Version of the refusing end.
     pub version: u8,
     /// Why.
     pub reason: Reason,
@@ -166,7 +166,7 @@ pub struct Refusal<'a> {
     pub yours: u64,
     /// The one that it should be, else 0.
     pub ours: u64,
-    /// Who has that digest; else what was wrong.
+    /// The end that has that digest; else what was wrong.
     pub text: &'a str,
 }
 
@@ -197,18 +197,18 @@ impl std::fmt::Display for Refusal<'_> {
         match self.reason {
             Reason::Version => write!(
                 f,
-                "the TCP router speaks session format {version}, this end {VERSION}; run the same version of Rohrpost at both ends \
-                 (`rohrpost version`)"
+                "the TCP router speaks session format {version}, this end {VERSION}; \
+                 run the same version of Rohrpost at both ends (`rohrpost version`)"
             ),
             Reason::Common => write!(
                 f,
-                "the common digest here is {yours:016x}, that of {text} {ours:016x}; give both configurations the same classes \
-                 (`rohrpost check`, on both)"
+                "the common digest here is {yours:016x}, that of {text} {ours:016x}; \
+                 give both configurations the same classes (`rohrpost check`, on both)"
             ),
             Reason::System => write!(
                 f,
-                "the system's digest here is {yours:016x}, that of {text} {ours:016x}; start all of a system from the same file \
-                 (`rohrpost check`, on both)"
+                "the system's digest here is {yours:016x}, that of {text} {ours:016x}; \
+                 start all of a system from the same file (`rohrpost check`, on both)"
             ),
             Reason::Full if text.is_empty() => {
                 write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some")

@@ -1,4 +1,5 @@
-//! The frames of a session: what stands in the stream of bytes between a client and the server. The page `docs/src/wire.md` is exact.
+//! The frames of a session: what stands in the stream of bytes between a client and the server. The page
+//! `docs/src/wire.md` is exact.
 //!
 //! ```text
 //!  0        4      5      6   8
@@ -8,8 +9,8 @@
 //!  client: hello, then register, then package and ask       server: welcome or refusal, registered, package, answer
 //! ```
 //!
-//! All fields of ours are little-endian; the head of a package is in the order that its own options tell. Each frame is checked once,
-//! as a whole; then no accessor can fail.
+//! All fields of ours are little-endian; the head of a package is in the order that its own options tell. Each frame is
+//! checked once, as a whole; then no accessor can fail.
 
 mod bad;
 mod carried;
@@ -29,7 +30,7 @@ use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES as PACKAGE_HEAD_BYTES};
 pub const HEAD_BYTES: usize = 8;
 /// Bytes behind a frame's head, at most: the largest package, and when it was published.
 pub const LENGTH_MAX: usize = PUBLISHED_BYTES + PACKAGE_HEAD_BYTES + BODY_BYTES_MAX;
-/// The same of who has not said hello.
+/// The same before the hello.
 pub const GREETING_LENGTH_MAX: usize = 256;
 /// A package passes so many servers and programs that hand it on, at most.
 pub const HOPS_MAX: u8 = 8;
@@ -40,7 +41,7 @@ pub(super) const PUBLISHED_BYTES: usize = 8;
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
 pub enum Kind {
-    /// Client: who it is. The first frame of each connection.
+    /// Client: its identity. The first frame of each connection.
     Hello = 1,
     /// Server: it may take part.
     Welcome = 2,
@@ -105,7 +106,8 @@ impl FrameHead {
     }
 }
 
-/// Whether bytes begin as a record of TLS does: its type, and a version. As a head they would be of a frame that is too long.
+/// Whether bytes begin as a record of TLS does: its type, and a version. As a head they would be of a frame that is too
+/// long.
 pub(super) const fn is_tls(bytes: &[u8]) -> bool {
     matches!(bytes, [20..=23, 3, 1..=4, ..])
 }
@@ -115,7 +117,7 @@ const _: () = assert!(LENGTH_MAX < 0x01_03_14, "no head begins as a record of TL
 /// A frame, read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Message<'a> {
-    /// Who a client is.
+    /// Identity of a client.
     Hello(Hello<'a>),
     /// It may take part.
     Welcome(Welcome),

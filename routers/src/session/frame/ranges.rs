@@ -121,7 +121,7 @@ pub struct Verdict<'a> {
     pub objection: Option<Objection>,
     /// Of which range.
     pub range: Range,
-    /// Who hosts what is in its way.
+    /// The host of the range in conflict.
     pub holder: &'a str,
 }
 
@@ -160,8 +160,8 @@ impl std::fmt::Display for Verdict<'_> {
             }
             Some(Objection::NotOwn) => write!(
                 f,
-                "{range} is no range of names of this client's system, or of its node, if the file of the TCP router has that; start it from that \
-                 file, or take other names"
+                "{range} is no range of names of this client's system, or of its node, if the file of the TCP router has that; \
+                 start it from that file, or take other names"
             ),
             Some(Objection::TooMany) => {
                 write!(f, "the TCP router has no room for more ranges from here; register wider ones")

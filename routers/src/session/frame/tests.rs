@@ -25,7 +25,7 @@ fn each(check: impl Fn(&Message<'_>)) {
         reaches_own: true,
         common: 2,
         system_digest: 3,
-        life: 4,
+        incarnation: 4,
         attempt: 5,
         asked_ns: 6,
         name: "node brain",
@@ -35,7 +35,7 @@ fn each(check: impl Fn(&Message<'_>)) {
         Head { to: range.first, from: Name::new(1, 16, 0, 1), len: 3, kind: Type::command(16), ..Head::default() };
     for message in [
         Message::Hello(hello),
-        Message::Welcome(Welcome { common: 1, life: 2, time: TIME }),
+        Message::Welcome(Welcome { common: 1, incarnation: 2, time: TIME }),
         Message::Refusal(refusal),
         Message::Register(ranges),
         Message::Registered(Verdict { number: 9, objection: None, range, holder: "" }),

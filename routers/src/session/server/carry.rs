@@ -16,7 +16,7 @@ impl Server {
     /// Hands a package of a client on.
     pub(super) fn carry(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
         let head = capped(&carried.head);
-        // Who does not know when, or says in the future, has published it now.
+        // A sender without a publishing time, or with one in the future, has published it now.
         let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
         let hops = if broken!(KeepsHops) { carried.hops } else { carried.hops.saturating_add(1) };
         let carried = Carried { head, published_ns, hops, ..*carried };
@@ -48,13 +48,14 @@ impl Server {
         }
     }
 
-    /// Each system gets it once, by the client that hosts the name there. Who reaches the other nodes of its own system does that itself.
+    /// Each system gets it once, by the client that hosts the name there. A client that reaches its own system's other
+    /// nodes does that itself.
     fn carry_to_all(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
         let Some((own, reaches_own)) = self.member(from).map(|member| (member.system, member.reaches_own)) else {
             return;
         };
         let systems: Vec<u8> = self.table.systems().to_vec();
-        // Who hosts the name in its own system itself knows whether anybody is there: that is counted at its end.
+        // A client that hosts the name in its own system knows whether a receiver is there: that is counted at its end.
         let mut is_reached = false;
         for system in systems {
             let to = in_system(carried.head.to, system);
@@ -81,7 +82,7 @@ impl Server {
         self.say_all(now_ns, answer.into_iter().collect(), host);
     }
 
-    /// `from`: whose part of the queue it takes up.
+    /// `from`: the share of the queue that it takes up.
     fn hand_over(
         &mut self,
         now_ns: u64,
@@ -104,11 +105,11 @@ impl Server {
 
     /// Makes ready what is to be written next.
     pub(super) fn refill(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
-        let (time, life, common) = (self.time, self.settings.life, self.settings.common);
+        let (time, incarnation, common) = (self.time, self.settings.incarnation, self.settings.common);
         let Some(member) = self.member_mut(client) else { return };
         if let Some(asked) = member.asked.take() {
             let time = time_answer(now_ns, &asked, time);
-            let welcome = Message::Welcome(Welcome { common, life, time });
+            let welcome = Message::Welcome(Welcome { common, incarnation, time });
             if asked.by_hello {
                 member.round_trip = RoundTrip::Since(now_ns);
             }
@@ -148,7 +149,7 @@ impl Server {
             match self.table.client_of(head.to) {
                 Some(to) => {
                     self.counts.came(head.priority);
-                    // Whoever sent the command has brought it about.
+                    // The sender of the command has caused it.
                     self.hand_over(now_ns, to, to, &carried, host);
                 }
                 None => self.lose(now_ns, &carried, Cause::NoRoute, host),

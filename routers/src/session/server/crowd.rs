@@ -1,9 +1,9 @@
-//! Who has how many connections, so that of too many those of whoever has most give way.
+//! Counts connections by owner. At the limit, the owner with most connections gives way.
 
 use crate::session::ClientIndex;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Connections, by whose they are.
+/// Connections by owner.
 #[derive(Debug)]
 pub(super) struct Crowd<K> {
     /// Of each, from the oldest on.
@@ -21,27 +21,27 @@ impl<K> Default for Crowd<K> {
 
 impl<K: Ord + Clone> Crowd<K> {
     /// One more; it began then, ns.
-    pub(super) fn add(&mut self, whose: &K, began_ns: u64, client: ClientIndex) {
-        let of = self.of.entry(whose.clone()).or_default();
+    pub(super) fn add(&mut self, owner: &K, began_ns: u64, client: ClientIndex) {
+        let of = self.of.entry(owner.clone()).or_default();
         let before = of.len();
         if of.insert((began_ns, client)) {
             self.len += 1;
-            self.sizes.remove(&(before, whose.clone()));
-            self.sizes.insert((before + 1, whose.clone()));
+            self.sizes.remove(&(before, owner.clone()));
+            self.sizes.insert((before + 1, owner.clone()));
         }
     }
 
     /// One less.
-    pub(super) fn remove(&mut self, whose: &K, began_ns: u64, client: ClientIndex) {
-        let Some(of) = self.of.get_mut(whose) else { return };
+    pub(super) fn remove(&mut self, owner: &K, began_ns: u64, client: ClientIndex) {
+        let Some(of) = self.of.get_mut(owner) else { return };
         let before = of.len();
         if of.remove(&(began_ns, client)) {
             self.len -= 1;
-            self.sizes.remove(&(before, whose.clone()));
+            self.sizes.remove(&(before, owner.clone()));
             if before > 1 {
-                self.sizes.insert((before - 1, whose.clone()));
+                self.sizes.insert((before - 1, owner.clone()));
             } else {
-                self.of.remove(whose);
+                self.of.remove(owner);
             }
         }
     }
@@ -52,18 +52,18 @@ impl<K: Ord + Clone> Crowd<K> {
     }
 
     /// Connections of one.
-    pub(super) fn count_of(&self, whose: &K) -> usize {
-        self.of.get(whose).map_or(0, BTreeSet::len)
+    pub(super) fn count_of(&self, owner: &K) -> usize {
+        self.of.get(owner).map_or(0, BTreeSet::len)
     }
 
-    /// Whoever has most, and how many.
+    /// The owner with most connections, and how many.
     pub(super) fn largest(&self) -> Option<(&K, usize)> {
-        self.sizes.last().map(|(count, whose)| (whose, *count))
+        self.sizes.last().map(|(count, owner)| (owner, *count))
     }
 
     /// The oldest of one's connections, and the newest.
-    pub(super) fn ends_of(&self, whose: &K) -> Option<(ClientIndex, ClientIndex)> {
-        let of = self.of.get(whose)?;
+    pub(super) fn ends_of(&self, owner: &K) -> Option<(ClientIndex, ClientIndex)> {
+        let of = self.of.get(owner)?;
         Some((of.first()?.1, of.last()?.1))
     }
 }
@@ -73,10 +73,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_knows_who_has_most_and_since_when() {
+    fn it_knows_the_owner_with_most_and_since_when() {
         let mut crowd = Crowd::default();
-        for (whose, began_ns, client) in [("a", 5, 0), ("b", 9, 1), ("b", 7, 2), ("a", 6, 3), ("b", 8, 4)] {
-            crowd.add(&whose, began_ns, ClientIndex(client));
+        for (owner, began_ns, client) in [("a", 5, 0), ("b", 9, 1), ("b", 7, 2), ("a", 6, 3), ("b", 8, 4)] {
+            crowd.add(&owner, began_ns, ClientIndex(client));
         }
         assert_eq!((crowd.len(), crowd.largest()), (5, Some((&"b", 3))));
         assert_eq!(crowd.ends_of(&"b"), Some((ClientIndex(2), ClientIndex(1))));

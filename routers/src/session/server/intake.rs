@@ -1,4 +1,4 @@
-//! What comes from clients, and who may take part.
+//! Handles frames from clients, and decides which clients may take part.
 
 use super::member::{Asked, Refused, RoundTrip, State};
 use super::{Event, Host, Server};
@@ -6,10 +6,10 @@ use crate::broken::broken;
 use crate::session::frame::{BadFrame, GREETING_LENGTH_MAX, Hello, LENGTH_MAX, Message, NAME_BYTES_MAX, Reason};
 use crate::session::{ClientIndex, LOOK_EVERY_NS};
 
-/// Who is refused has so long to read why.
+/// Time that a refused client has to read the reason.
 const LEAVE_WITHIN_NS: u64 = 5 * LOOK_EVERY_NS;
 
-/// What differs, and who has what it should be.
+/// What differs, and the end that has the right one.
 struct Difference {
     reason: Reason,
     digests: (u64, u64),
@@ -77,7 +77,7 @@ impl Server {
         if let Some(Difference { reason, digests, holder }) = self.difference(hello) {
             return self.refuse(now_ns, client, reason, digests, &holder, host);
         }
-        let older = self.places.of_incarnation(hello.life);
+        let older = self.places.of_incarnation(hello.incarnation);
         if let Some((older, attempt)) = older.and_then(|older| Some((older, self.member(older)?.attempt))) {
             if attempt >= hello.attempt {
                 return self.refuse(now_ns, client, Reason::Replaced, (0, 0), "", host);

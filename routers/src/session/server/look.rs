@@ -1,4 +1,5 @@
-//! What time alone brings about: who is silent, stands still or takes too long; and what waited in vain.
+//! Handles what time alone causes: clients that are silent, stand still or take too long, and packages that waited in
+//! vain.
 
 use super::member::{Member, State};
 use super::work::WORK_SHARE;

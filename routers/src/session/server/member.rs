@@ -72,16 +72,16 @@ pub(super) struct Member {
     pub(super) rights: Rights,
     /// Where it comes from.
     pub(super) address: Principal,
-    /// Whose it is: that, or its certificate's.
+    /// The owner: that, or its certificate's.
     pub(super) principal: Principal,
     /// The same by its number, as long as it takes part.
     pub(super) principal_id: PrincipalId,
-    /// With whom it takes turns on lines: the nodes of a system, which trust each other, are one party, and anybody
+    /// The party that it takes turns as: the nodes of a system, which trust each other, are one party, and anybody
     /// else is one by itself.
     pub(super) party: u32,
     pub(super) system_digest: u64,
     pub(super) reaches_own: bool,
-    pub(super) life: u64,
+    pub(super) incarnation: u64,
     pub(super) attempt: u64,
     pub(super) splitter: Splitter,
     pub(super) outgoing: Outgoing,
@@ -117,7 +117,7 @@ impl Member {
             party: 0,
             system_digest: 0,
             reaches_own: false,
-            life: 0,
+            incarnation: 0,
             attempt: 0,
             splitter: Splitter::default(),
             outgoing: Outgoing::new(quota_bytes),
@@ -143,7 +143,7 @@ impl Member {
         self.system = hello.system;
         self.system_digest = hello.system_digest;
         self.reaches_own = hello.reaches_own;
-        self.life = hello.life;
+        self.incarnation = hello.incarnation;
         self.attempt = hello.attempt;
         self.asked = Some(Asked { asked_ns: hello.asked_ns, came_ns: now_ns, by_hello: true });
     }

@@ -47,7 +47,7 @@ pub struct ServerSettings {
     /// rights](Server::certify).
     pub own_nodes: OwnNodes,
     /// Tells this incarnation from others; not 0.
-    pub life: u64,
+    pub incarnation: u64,
     /// Clients that may take part at a time.
     pub clients_max: u16,
     /// Connections that have not said hello yet; of more the oldest gives way.
@@ -119,7 +119,7 @@ pub enum Event<'a> {
         reason: Reason,
         /// What differs: its, and what it should be.
         digests: (u64, u64),
-        /// Who has that, or what was wrong.
+        /// The end that has it, or what was wrong.
         text: &'a str,
     },
     /// A client may not host what it says.
@@ -131,7 +131,7 @@ pub enum Event<'a> {
     },
 }
 
-/// What the server asks of who runs it.
+/// What the server needs from the code that runs it.
 pub trait Host: Answers {
     /// Something happened.
     fn event(&mut self, event: Event<'_>);
@@ -175,7 +175,7 @@ impl Server {
         &self.counts
     }
 
-    /// Who hosts what.
+    /// Hosts of names.
     pub fn table(&self) -> &Table {
         &self.table
     }
@@ -244,7 +244,7 @@ impl Server {
         }
     }
 
-    /// What a client has shown, before its hello, names nobody who may take part; it is told.
+    /// The certificate that a client shows before its hello does not admit it; it is told.
     pub fn names_nobody(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
         self.refuse(now_ns, client, Reason::Certificate, (0, 0), "it names no node", host);
     }

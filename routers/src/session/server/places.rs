@@ -1,5 +1,5 @@
-//! Who is there: places for connections, shared out by principal, and what must be found quickly of those that have
-//! one.
+//! The connected clients: places for connections, shared out by principal, and what must be found quickly of those that
+//! have one.
 //!
 //! ```text
 //!  accept ─▶ greeting: of too many the oldest of the address that has most gives way
@@ -25,7 +25,7 @@ const STRANGERS: u32 = 256;
 pub struct Crowded {
     /// Connections before their hello that gave way, since their address had most.
     pub greetings: u64,
-    /// Clients that gave way to others who had fewer, or were not let in while they had most.
+    /// Clients that gave way to others with fewer, or were not let in while they had most.
     pub clients: u64,
     /// Registrations with more ranges than a principal may have.
     pub ranges: u64,
@@ -36,13 +36,13 @@ pub struct Crowded {
 pub(super) struct Places {
     /// Places that were left.
     free: BTreeSet<u16>,
-    /// Who has not said hello, by address.
+    /// Clients without a hello yet, by address.
     greetings: Crowd<Principal>,
-    /// Who takes part.
+    /// Admitted clients.
     pub(super) principals: Principals,
-    /// Who takes part, by its incarnation.
-    lives: BTreeMap<u64, ClientIndex>,
-    /// Who takes part, by its system.
+    /// Admitted clients, by incarnation.
+    incarnations: BTreeMap<u64, ClientIndex>,
+    /// Admitted clients, by system.
     systems: BTreeSet<(u8, ClientIndex)>,
     pub(super) crowded: Crowded,
 }
@@ -54,17 +54,17 @@ impl Places {
         self.systems.range(least..).next().filter(|(of, _)| *of == system).map(|(_, client)| *client)
     }
 
-    /// Who takes part in this incarnation.
-    pub(super) fn of_incarnation(&self, life: u64) -> Option<ClientIndex> {
-        self.lives.get(&life).copied()
+    /// The client with this incarnation.
+    pub(super) fn of_incarnation(&self, incarnation: u64) -> Option<ClientIndex> {
+        self.incarnations.get(&incarnation).copied()
     }
 
     /// It does not take part any more.
     pub(super) fn leaves(&mut self, now_ns: u64, client: ClientIndex, member: &Member) {
         self.principals.leaves(now_ns, member.principal_id, member.began_ns, client);
         self.systems.remove(&(member.system, client));
-        if self.lives.get(&member.life) == Some(&client) {
-            self.lives.remove(&member.life);
+        if self.incarnations.get(&member.incarnation) == Some(&client) {
+            self.incarnations.remove(&member.incarnation);
         }
     }
 
@@ -106,8 +106,8 @@ impl Server {
             let greeting = |(_, member): &(ClientIndex, &Member)| member.state == State::Greeting;
             return self.present().filter(greeting).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
         }
-        let whose = if greetings.count_of(address) == most { address } else { largest };
-        greetings.ends_of(whose).map(|(oldest, _)| oldest)
+        let owner = if greetings.count_of(address) == most { address } else { largest };
+        greetings.ends_of(owner).map(|(oldest, _)| oldest)
     }
 
     /// A client said hello, and nothing speaks against it: whether there is a place for it.
@@ -118,16 +118,16 @@ impl Server {
         hello: &Hello<'_>,
         host: &mut impl Host,
     ) -> bool {
-        let Some(whose) = self.member(client).map(|member| member.principal.clone()) else { return false };
+        let Some(owner) = self.member(client).map(|member| member.principal.clone()) else { return false };
         if self.places.principals.members.len() >= self.settings.clients_max.into() {
-            let Some(newest) = self.gives_way_to(&whose) else { return false };
+            let Some(newest) = self.gives_way_to(&owner) else { return false };
             self.places.crowded.clients += 1;
-            let text = "who has most connections gives way to who has fewer";
+            let text = "the principal with most connections gives way to one with fewer";
             self.refuse(now_ns, newest, Reason::Full, (0, 0), text, host);
         }
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return false };
         self.places.greets_no_more(client, member);
-        member.principal_id = self.places.principals.joins(&whose, member.began_ns, client, WORK_SHARE);
+        member.principal_id = self.places.principals.joins(&owner, member.began_ns, client, WORK_SHARE);
         member.joins(now_ns, hello);
         let is_own = self.settings.system.is_some_and(|(system, _)| system == hello.system);
         if member.certified.is_none() && is_own {
@@ -136,15 +136,15 @@ impl Server {
         }
         let is_node = member.certified.is_some() || is_own && self.settings.own_nodes.has(hello.name);
         member.party = if is_node { hello.system.into() } else { STRANGERS + member.principal_id };
-        self.places.lives.insert(member.life, client);
+        self.places.incarnations.insert(member.incarnation, client);
         self.places.systems.insert((member.system, client));
         true
     }
 
     /// The newest client of the principal that has most, if a further one of another's still leaves that with fewer.
-    fn gives_way_to(&mut self, whose: &Principal) -> Option<ClientIndex> {
+    fn gives_way_to(&mut self, owner: &Principal) -> Option<ClientIndex> {
         let members = &self.places.principals.members;
-        let own = self.places.principals.id_of(whose).map_or(0, |id| members.count_of(&id));
+        let own = self.places.principals.id_of(owner).map_or(0, |id| members.count_of(&id));
         let (largest, most) = members.largest()?;
         let newest = members.ends_of(largest).map(|(_, newest)| newest);
         if own > 1 && own == most {
@@ -153,7 +153,7 @@ impl Server {
         newest.filter(|_| most >= own + 2 && !broken!(CrowdsOut))
     }
 
-    /// The place is free; whoever comes into it is another.
+    /// The place is free; the next client in it is another.
     pub(super) fn free(&mut self, client: ClientIndex) {
         let Some(member) = self.members.get_mut(usize::from(client.0)).and_then(Option::take) else { return };
         if member.state == State::Greeting {

@@ -1,4 +1,5 @@
-//! As whom a connection uses what is bounded. Shares go by principal, so that nobody has more by connecting more often.
+//! The party that a connection counts to. Limits hold for each principal, so that more connections give no larger
+//! share.
 
 use super::crowd::Crowd;
 use crate::session::{ClientIndex, WAIT_MAX_NS};
@@ -8,12 +9,12 @@ use std::net::IpAddr;
 /// Bits of an IPv6 address that the network gives; the rest each computer chooses as it likes.
 const IPV6_NETWORK_BITS: u32 = 64;
 
-/// Whose a connection is.
+/// The owner of a connection.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Principal {
     /// It has shown no certificate: the address that it comes from, or its network.
     Address(IpAddr),
-    /// Of whom its certificate is.
+    /// The name in its certificate.
     Certificate(String),
 }
 
@@ -35,7 +36,7 @@ pub(in crate::session) type PrincipalId = u32;
 /// What a principal that takes part uses.
 #[derive(Debug)]
 pub(in crate::session) struct Uses {
-    whose: Principal,
+    owner: Principal,
     /// Ranges of names that its clients host.
     pub(super) ranges: usize,
     /// Work on its registrations before the next look, at most.
@@ -53,18 +54,18 @@ pub(in crate::session) struct Principals {
     uses: BTreeMap<PrincipalId, Uses>,
     /// Their connections.
     pub(super) members: Crowd<PrincipalId>,
-    /// Who had no connection any more, and since when, ns.
+    /// Principals without a connection, and since when, ns.
     gone: VecDeque<(u64, PrincipalId)>,
     next: PrincipalId,
 }
 
 impl Principals {
     /// One of its connections takes part.
-    pub(super) fn joins(&mut self, whose: &Principal, began_ns: u64, client: ClientIndex, work: usize) -> PrincipalId {
-        let id = self.id_of(whose).unwrap_or_else(|| {
+    pub(super) fn joins(&mut self, owner: &Principal, began_ns: u64, client: ClientIndex, work: usize) -> PrincipalId {
+        let id = self.id_of(owner).unwrap_or_else(|| {
             self.next = self.next.wrapping_add(1);
-            self.ids.insert(whose.clone(), self.next);
-            let uses = Uses { whose: whose.clone(), ranges: 0, work_left: work, lost: 0, gone_ns: 0 };
+            self.ids.insert(owner.clone(), self.next);
+            let uses = Uses { owner: owner.clone(), ranges: 0, work_left: work, lost: 0, gone_ns: 0 };
             self.uses.insert(self.next, uses);
             self.next
         });
@@ -81,8 +82,8 @@ impl Principals {
         }
     }
 
-    pub(super) fn id_of(&self, whose: &Principal) -> Option<PrincipalId> {
-        self.ids.get(whose).copied()
+    pub(super) fn id_of(&self, owner: &Principal) -> Option<PrincipalId> {
+        self.ids.get(owner).copied()
     }
 
     pub(super) fn uses(&self, id: PrincipalId) -> Option<&Uses> {
@@ -93,8 +94,8 @@ impl Principals {
         self.uses.get_mut(&id)
     }
 
-    /// A new look: each may bring about so much work. Whoever has gone is forgotten when nothing of it waits any more;
-    /// before that it comes back as who it was.
+    /// A new round: each may cause so much work. A principal without connections is forgotten when nothing of it waits
+    /// any more; before that it comes back as the same.
     pub(super) fn look(&mut self, now_ns: u64, work: usize) {
         self.uses.values_mut().for_each(|uses| uses.work_left = work);
         let is_past = |(gone_ns, _): &mut (u64, PrincipalId)| now_ns.saturating_sub(*gone_ns) > 2 * WAIT_MAX_NS;
@@ -103,7 +104,7 @@ impl Principals {
             if self.uses.get(&id).is_some_and(is_gone)
                 && let Some(uses) = self.uses.remove(&id)
             {
-                self.ids.remove(&uses.whose);
+                self.ids.remove(&uses.owner);
             }
         }
     }
@@ -127,19 +128,19 @@ mod tests {
     }
 
     #[test]
-    fn who_comes_back_at_once_is_who_it_was() {
-        let (mut principals, whose) = (Principals::default(), Principal::Certificate("node a".into()));
-        let first = principals.joins(&whose, 0, ClientIndex(0), 5);
+    fn a_principal_that_comes_back_at_once_is_the_same() {
+        let (mut principals, owner) = (Principals::default(), Principal::Certificate("node a".into()));
+        let first = principals.joins(&owner, 0, ClientIndex(0), 5);
         principals.uses_mut(first).unwrap().lost = 7;
         principals.leaves(10, first, 0, ClientIndex(0));
         principals.look(10 + WAIT_MAX_NS, 5);
-        assert_eq!(principals.joins(&whose, 20, ClientIndex(1), 5), first);
+        assert_eq!(principals.joins(&owner, 20, ClientIndex(1), 5), first);
         principals.look(10 + 3 * WAIT_MAX_NS, 5);
         assert_eq!(principals.uses(first).map(|uses| uses.lost), Some(7), "it is there again");
         let now_ns = 10 + 3 * WAIT_MAX_NS;
         principals.leaves(now_ns, first, 20, ClientIndex(1));
         principals.look(now_ns + 2 * WAIT_MAX_NS + 1, 5);
         assert!(principals.uses(first).is_none() && principals.gone.is_empty());
-        assert_ne!(principals.joins(&whose, 30, ClientIndex(0), 5), first);
+        assert_ne!(principals.joins(&owner, 30, ClientIndex(0), 5), first);
     }
 }

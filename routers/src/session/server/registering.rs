@@ -16,7 +16,8 @@ use crate::session::table::ENTRIES_MAX;
 use rohrpost_mailbox::Name;
 
 impl Server {
-    /// Whether a name is to be a client's: its registration waits for its turn, it may host the name, and nobody else does.
+    /// Whether a name is to be a client's: its registration waits for its turn, it may host the name, and nobody else
+    /// does.
     pub(super) fn is_to_host(&self, client: ClientIndex, name: Name) -> bool {
         let waiting = |member: &Member| {
             let waiting = member.registrations.waiting.as_ref();

@@ -86,8 +86,8 @@ impl OwnNodes {
         self.by_name.contains_key(name)
     }
 
-    /// What a client of the own system may host which has shown no certificate: what the file gives the node whose name
-    /// it says, and what the file gives nobody.
+    /// What a client of the own system without a certificate may host. What the file gives
+    /// the node that it names, and what the file gives to no node.
     pub(super) fn rights_of(&self, name: &str) -> Rights {
         let own = self.by_name.get(name).cloned().unwrap_or_default();
         Rights { own, not: Some(self.all.clone()) }
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_file_gives_a_node_goes_to_that_node_and_the_rest_to_whoever_asks() {
+    fn what_the_file_gives_a_node_goes_to_that_node_and_the_rest_to_any() {
         let names = |ranges: &[Range]| ranges.iter().copied().collect::<Names>();
         let (base, brain) = (names(&[modules(30, 30), modules(10, 12)]), names(&[modules(20, 20)]));
         let node = |name: &str, names: &Names| OwnNode {

@@ -22,7 +22,7 @@ const _: () = assert!(RANGES_MAX <= RANGES_SHARE, "a client that is alone in its
 pub(super) struct Registering {
     /// Ranges that may still be gone through before the next look.
     pub(super) left: usize,
-    /// Whose turn is the first at the next look.
+    /// The principal with the first turn in the next round.
     pub(super) first: u16,
     /// Registrations that a later one of the same client took the place of.
     pub(super) overtaken: u64,

@@ -14,7 +14,7 @@ const BARRED: Class = Class(60);
 
 pub(super) const CHECKS: &[fn()] = &[check_admission, check_leaving];
 
-/// A client of system 2, whose modules of class 60 only class 40 may command, joined to its server.
+/// A client of system 2, in which only class 40 may command modules of class 60, joined to its server.
 fn guarded() -> Ground {
     let rule = config::Access { class: BARRED, callers: vec![Class(40)], line: 12 };
     let admission = Admission { access: Access::new(&[rule]), router: Some(ROUTER), ..Admission::default() };
@@ -44,12 +44,12 @@ fn check_admission() {
     let allowed = Name::new(3, 40, 0, local::REPLIES);
     for (to, from, kind, expected, why) in [
         (ours, allowed, command, Ok(40), "a command, as its sender"),
-        (ours.with_local(1), Name::new(3, 200, 0, 0), reply, Ok(60), "a reply, as who asked"),
+        (ours.with_local(1), Name::new(3, 200, 0, 0), reply, Ok(60), "a reply, as its receiver"),
         (ours.with_local(2), allowed, data, Ok(60), "data that were asked for"),
         (ours.with_local(2), Name::new(3, 200, 0, 0), data, Ok(200), "data that were not"),
         (ours, tool, command, Err(Cause::NotAllowed), "a class that may not"),
         (ours.with_local(2), ours.with_local(0), data, Err(Cause::Foreign), "in our own name"),
-        (ours.with_local(1), ours, reply, Ok(60), "but what the server says in the name of who is not there"),
+        (ours.with_local(1), ours, reply, Ok(60), "but the server's reply for an absent receiver"),
         (ours.with_local(2), Name::NONE, data, Err(Cause::Foreign), "in no name"),
         (router.with_local(local::TRANSIT), tool, data, Err(Cause::RoutersOwn), "for a transit mailbox"),
         (router.with_local(TUNNEL), router.with_local(TUNNEL), PACKET, Err(Cause::RoutersOwn), "an IP packet"),
@@ -67,7 +67,7 @@ fn what_the_server_brings_is_admitted_as_on_the_lan() {
 }
 
 #[test]
-fn who_may_not_command_is_told_by_which_rule() {
+fn a_refused_command_names_its_rule() {
     let mut ground = guarded();
     let head = Head { to: module(1), from: Name::new(3, 32, 40, 1), kind: Type::command(16), ..Head::default() };
     assert_eq!(brought(&mut ground, head), Err(Cause::NotAllowed));

@@ -13,7 +13,7 @@ use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
 pub(super) const CHECKS: &[fn()] = &[
     check_digests,
     check_a_name_is_hosted_once,
-    check_who_hosts_the_name,
+    check_packages_go_to_the_host_of_the_name,
     check_hops,
     check_slow_greetings,
     check_silence,
@@ -41,7 +41,7 @@ fn check_digests() {
 }
 
 #[test]
-fn who_has_another_digest_takes_no_part_and_is_told_both() {
+fn a_client_with_another_digest_takes_no_part_and_is_told_both() {
     check_digests();
 }
 
@@ -63,7 +63,7 @@ fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
     check_a_name_is_hosted_once();
 }
 
-fn check_who_hosts_the_name() {
+fn check_packages_go_to_the_host_of_the_name() {
     let mut ground = Ground::clients(4);
     let (between, behind) = (Name::new(1, 105, 0, 0), Name::new(1, 106, 1, 0));
     ground.send(1, between, 0);
@@ -78,8 +78,8 @@ fn check_who_hosts_the_name() {
 }
 
 #[test]
-fn packages_go_to_who_hosts_the_name_and_never_back() {
-    check_who_hosts_the_name();
+fn packages_go_to_the_host_of_the_name_and_never_back() {
+    check_packages_go_to_the_host_of_the_name();
 }
 
 fn check_hops() {
@@ -125,7 +125,7 @@ fn check_slow_greetings() {
 }
 
 #[test]
-fn who_is_slow_to_say_hello_is_closed_and_keeps_nobody_out() {
+fn a_client_without_a_hello_is_closed_and_keeps_no_other_out() {
     check_slow_greetings();
 }
 
@@ -143,7 +143,7 @@ fn check_silence() {
 }
 
 #[test]
-fn who_is_silent_is_gone() {
+fn a_silent_end_is_gone() {
     check_silence();
 }
 
@@ -315,7 +315,7 @@ fn names_of_others_are_sent_by_nobody() {
 }
 
 #[test]
-fn a_later_connection_of_the_same_life_takes_the_place_of_the_earlier() {
+fn a_later_connection_of_the_same_incarnation_takes_the_place_of_the_earlier() {
     let mut ground = Ground::clients(2);
     let old = ground.ends[0].1.unwrap();
     let place = ground.server.accept(ground.now_ns, address(0, 2), &mut ground.said).unwrap();
@@ -324,7 +324,7 @@ fn a_later_connection_of_the_same_life_takes_the_place_of_the_earlier() {
         reaches_own: true,
         common: COMMON,
         system_digest: 11,
-        life: 100,
+        incarnation: 100,
         attempt: 2,
         asked_ns: 1,
         name: "client 0",

@@ -1,6 +1,9 @@
 //! Sessions in simulated networks, and the same with a mistake switched on: `ROHRPOST_SIM_SEEDS=1000` for more of them.
 
 mod admitted;
+#[allow(unreachable_pub, dead_code, reason = "public in the testbed, and more of it is used there")]
+#[path = "../../../../tests/testbed/src/sim/chance.rs"]
+mod chance;
 mod ends;
 mod ground;
 mod newest;
@@ -21,8 +24,8 @@ use rohrpost_mailbox::{ALL_SYSTEMS, Head, Priority, Type};
 use std::collections::BTreeMap;
 use world::{MS, S, World};
 
-/// After the last fault all clients are registered again within so long: silence is noticed, a greeting given up, and the longest
-/// wait is over.
+/// After the last fault all clients are registered again within so long: silence is noticed, a greeting given up, and
+/// the longest wait is over.
 const WELL_NS: u64 = 10 * S;
 const SEEDS: u64 = 30;
 /// What must have been seen in each ten networks.
@@ -151,7 +154,7 @@ fn check_flood() {
 }
 
 #[test]
-fn who_finds_no_server_tries_ever_less_often() {
+fn a_client_without_a_server_tries_ever_less_often() {
     check_backoff();
 }
 

@@ -35,7 +35,7 @@ impl Fates for Log {
     }
 }
 
-/// An end whose connection takes nothing.
+/// An end with a connection that takes nothing.
 struct Stalled {
     outgoing: Outgoing,
     log: Log,

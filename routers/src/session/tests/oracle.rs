@@ -3,8 +3,8 @@
 use super::plan::ROUTER;
 use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
+use crate::session::tests::chance::Chance;
 use crate::session::{AGE_MAX_NS, Answers, Cause, client, server};
-use crate::sim::chance::Chance;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options, local};
 use std::collections::BTreeMap;
 
@@ -33,7 +33,8 @@ pub(super) struct Known {
     pub(super) refusals: Vec<String>,
 }
 
-/// Whose packages stay in their order: of one sender, receiver and priority; of data of which only the newest counts, of one address and id.
+/// Packages that stay in their order: of one sender, receiver and priority; of data of which only the newest counts, of
+/// one address and id.
 type Flow = (Name, Name, u8, Option<(Name, u16)>);
 
 #[derive(Default)]
@@ -41,13 +42,13 @@ pub(super) struct SessionOracle {
     pub(super) now_ns: u64,
     pub(super) packages: Vec<Posted>,
     pub(super) clients: Vec<Known>,
-    /// The last number of each flow, by who delivers.
+    /// The last number of each flow, by the delivering end.
     last: BTreeMap<(usize, Flow), usize>,
-    /// Of each delivery: age, from whom, to whom.
+    /// Of each delivery: age, sender, receiver.
     pub(super) log: Vec<(u64, usize, usize)>,
     pub(super) problems: Vec<String>,
     pub(super) seen: BTreeMap<&'static str, u64>,
-    /// Whoever sends too much. What others send it must not cost anything.
+    /// The client that sends too much. What others send it must not cost anything.
     pub(super) flooder: Option<usize>,
 }
 

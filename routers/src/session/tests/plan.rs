@@ -1,10 +1,10 @@
-//! What a seed decides: who takes part, with which clocks and lines, and what goes wrong.
+//! What a seed decides: the clients, their clocks and rates, and the faults.
 
 use crate::admission::Admission;
 use crate::session::client::ClientSettings;
 use crate::session::frame::Range;
 use crate::session::server::{OwnNodes, ServerSettings};
-use crate::sim::chance::Chance;
+use crate::session::tests::chance::Chance;
 use rohrpost_mailbox::{Class, Name};
 use std::net::SocketAddr;
 
@@ -60,7 +60,7 @@ impl Plan {
         Self { calm: true, lines: vec![100_000; 7], per_s: 500, ..Self::rough(seed) }
     }
 
-    /// One client floods all others, whose lines take some hundred kB a second.
+    /// One client floods all others, at rates of some hundred kB a second.
     pub(super) fn flooded(seed: u64) -> Self {
         let mut chance = Chance::new(seed ^ 0xf10);
         let plan = Self::calm(seed);
@@ -126,27 +126,27 @@ pub(super) fn levels() -> [u8; 256] {
     std::array::from_fn(|priority| if priority < 16 { 31 } else { (15 - (priority as u8 >> 4)) * 2 })
 }
 
-pub(super) fn client_settings(client: usize, life: u64) -> ClientSettings {
+pub(super) fn client_settings(client: usize, incarnation: u64) -> ClientSettings {
     ClientSettings {
         name: format!("client {client}"),
         system: system_of(client),
         reaches_own: client.is_multiple_of(2),
         common: COMMON,
         system_digest: u64::from(system_of(client)) * 11,
-        life,
+        incarnation,
         quota_bytes: QUOTA,
         levels: levels(),
         admission: Admission { router: Some(ROUTER), ..Admission::default() },
     }
 }
 
-pub(super) fn server_settings(life: u64) -> ServerSettings {
+pub(super) fn server_settings(incarnation: u64) -> ServerSettings {
     ServerSettings {
         name: "the server".into(),
         common: COMMON,
         system: Some((1, 11)),
         own_nodes: OwnNodes::default(),
-        life,
+        incarnation,
         clients_max: 16,
         greetings_max: 4,
         quota_bytes: QUOTA,

@@ -24,9 +24,17 @@ fn says(client: usize) -> Vec<u8> {
     };
     let ranges: Vec<Range> = (0..RANGES).map(|index| Range::module(module(index))).collect();
     let (mut bytes, mut laid_out) = (Vec::new(), Vec::new());
-    let (system, life, name) = (module(0).system(), 1 + client as u64, "a client");
-    let hello =
-        Hello { system, reaches_own: true, common: COMMON, system_digest: 1, life, attempt: 1, asked_ns: 1, name };
+    let (system, incarnation, name) = (module(0).system(), 1 + client as u64, "a client");
+    let hello = Hello {
+        system,
+        reaches_own: true,
+        common: COMMON,
+        system_digest: 1,
+        incarnation,
+        attempt: 1,
+        asked_ns: 1,
+        name,
+    };
     Message::Hello(hello).write(&mut bytes);
     Message::Register(Ranges::new(1, &ranges, &mut laid_out)).write(&mut bytes);
     bytes

@@ -78,10 +78,10 @@ fn check_memory_of_a_queue() {
         ground.server.views().find(|view| view.index == place).unwrap().lost
     };
     let all = ground.server.counts().lost_for(Cause::Full) + ground.server.counts().lost_for(Cause::Share);
-    assert_eq!((lost_of(0), lost_of(1)), (all, 0), "counted as whose it was");
+    assert_eq!((lost_of(0), lost_of(1)), (all, 0), "counted for its sender");
 }
 
-/// Whoever sends more than an equal part gives way, however important it is.
+/// A client that sends more than an equal share gives way, however important its packages are.
 fn check_equal_parts() {
     let mut ground = Ground::clients(3);
     let robot = ground.ends[2].1.unwrap();
@@ -101,7 +101,7 @@ fn check_equal_parts() {
 }
 
 #[test]
-fn who_floods_a_queue_displaces_nobody_who_has_less_in_it() {
+fn a_flood_of_a_queue_displaces_no_sender_with_less_in_it() {
     check_memory_of_a_queue();
     check_equal_parts();
 }
@@ -127,7 +127,7 @@ fn check_a_line() {
 }
 
 #[test]
-fn who_floods_a_line_with_what_is_urgent_leaves_others_their_part_of_it() {
+fn an_urgent_flood_of_a_line_leaves_others_their_share() {
     check_a_line();
 }
 
@@ -194,7 +194,7 @@ fn check_connections_of_one() {
         assert!(joins(&mut ground, client, from).is_some(), "{client} of another address has a place");
     }
     let left = greedy.iter().filter(|place| is_member(&ground, **place)).count();
-    assert!(left == 2 && is_member(&ground, greedy[0]), "the newest of whoever has most give way: {left} left");
+    assert!(left == 2 && is_member(&ground, greedy[0]), "the newest of the largest give way: {left} left");
     assert_eq!(joins(&mut ground, 20, 1), None, "it does not get them back");
     assert!(joins(&mut ground, 21, 6).is_some(), "the last that has more than one gives way");
     assert_eq!(joins(&mut ground, 22, 7), None, "all have one");
@@ -219,7 +219,7 @@ fn check_greetings_of_one() {
         let _ = accept(2, connection);
     }
     let states: Vec<_> = ground.server.clients().map(|(index, _, state)| (index, state)).collect();
-    assert!(states.contains(&(slow, State::Greeting)), "who is slow beside a flood is not the one that gives way");
+    assert!(states.contains(&(slow, State::Greeting)), "a slow client beside a flood does not give way");
     assert!(ground.server.crowded().greetings > 3);
 }
 

@@ -55,7 +55,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     #[test]
-    fn who_is_flooded_works_for_a_tenth_of_the_time_and_who_is_not_never_rests() {
+    fn a_flooded_thread_works_a_tenth_of_the_time_and_others_never_rest() {
         let (mut share, mut now_ns, mut worked_ns) = (Share::new(0), 0, 0);
         while now_ns < 1_000 * MS {
             match share.rests_until_ns(now_ns) {

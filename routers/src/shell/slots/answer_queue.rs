@@ -6,6 +6,7 @@ use crate::frame::{NodeIndex, Reason};
 use crate::inbound::write_refusal;
 use crate::security::{HELLO_SLOT_BYTES, Said, Waiting};
 use crate::settings::Settings;
+use crate::tdma::TransmitWindow;
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -77,14 +78,17 @@ impl AnswerQueue {
         speech::parted(&self.settings, others)
     }
 
-    /// Sends the next that fits, a hello to this node before others; as how many bytes slots count it.
+    /// Sends the next that the window carries and that fits, a hello to this node before others; as how many bytes slots count it.
     pub(super) fn answer(
         &mut self,
         now_ns: u64,
         first: Option<NodeIndex>,
-        fits: impl Fn(usize) -> bool,
+        tx_window: &TransmitWindow,
+        local_ns: impl Fn() -> u64,
     ) -> Option<usize> {
         self.look(now_ns);
+        // What was looked through before takes its time.
+        let fits = |bytes| tx_window.fits(local_ns(), bytes);
         if let Some(hellos) = &mut self.hellos {
             let (said, datagram) = if fits(HELLO_SLOT_BYTES) { hellos.take(now_ns, first) } else { None }?;
             self.socket.answer(self.settings.nodes[usize::from(said.to)].address, &datagram);
@@ -92,7 +96,7 @@ impl AnswerQueue {
             return Some(HELLO_SLOT_BYTES);
         }
         match self.refusal.take()? {
-            Answer::Refusal { to, bytes, datagram } if fits(bytes) => {
+            Answer::Refusal { to, bytes, datagram } if tx_window.carries_refusal() && fits(bytes) => {
                 self.socket.answer(to, &datagram[..bytes]);
                 Some(bytes)
             }

@@ -1,16 +1,12 @@
 //! How the thread that sends in time slots is scheduled: as well as the system allows.
 
 use super::super::clock::FIFO;
+use crate::driver::spin_ns;
 use crate::tdma::{Table, Window};
 use rohrpost_config::duration_decimal;
 use rohrpost_mailbox::sys::{Reservation, Scheduling, reserve, schedule};
 use std::time::Duration;
 
-/// It wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it wakes
-/// up 50 µs late on average, and to read takes 30 µs.
-pub(super) const SPIN_NS_MAX: u64 = 150_000;
-/// Of the cycle, at most this part for each window: short cycles leave less time for it.
-const SPIN_CYCLES: u64 = 20;
 /// For a window, besides the time in which it sends and the spinning before it: to wake up, and to read what came.
 const AROUND_NS: u64 = 100_000;
 /// For each millisecond: to take what waits in the mailbox.
@@ -21,11 +17,6 @@ const PERIOD_NS_MAX: u64 = 10_000_000;
 const SHARE_PERCENT_MAX: u64 = 60;
 /// Slot tables repeat themselves after so many cycles at most.
 const CYCLES: u64 = 64;
-
-/// How long before the call the thread that sends in time slots is to wake up, ns; then it spins.
-pub fn spin_ns(cycle_ns: u64) -> u64 {
-    SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)
-}
 
 /// What the system has granted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -185,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn who_gets_less_than_it_needs_is_told_what_to_change() {
+    fn a_short_reservation_is_reported_with_what_to_change() {
         let warning = wanted(5000, &[(3000, 1)]).warning().unwrap();
         assert_eq!(
             warning,

@@ -1,62 +1,20 @@
-//! The router's mailbox in the hands of the thread of the time slots: [`intake`](crate::intake) says what to take when.
+//! The router's mailbox as the thread of the time slots has it: [`intake`](crate::intake) says what to take when.
 
-use crate::intake::{self, Transit};
+use crate::intake::Transit;
 use crate::outbound::{Accepted, Outbound, Package};
 use crate::report::Report;
 use rohrpost_mailbox::{Head, Priority, Receiver, monotonic_ns};
 
-/// The router's mailbox, and what the coming slot still wants of it.
-pub(super) struct Intake {
-    transit: Receiver,
-    wants: intake::Intake,
-}
-
-impl Intake {
-    pub(super) fn new(transit: Receiver) -> Self {
-        Self { transit, wants: intake::Intake::new(monotonic_ns()) }
-    }
-
-    /// A slot comes that carries at most so many bytes.
-    pub(super) fn open(&mut self, room_bytes: usize) {
-        self.wants.open(monotonic_ns(), room_bytes);
-    }
-
-    /// It is over.
-    pub(super) fn close(&mut self) {
-        self.wants.close();
-    }
-
-    /// Before the call.
-    pub(super) fn take_one(&mut self, outbound: &mut Outbound, report: &mut impl Report) {
-        self.wants.take_one(&mut Hands { transit: &mut self.transit, outbound, report, busy_ns: || 0 });
-    }
-
-    /// In the slot, before each datagram. `busy_ns` says for how long the wire is still busy.
-    pub(super) fn take_on(&mut self, outbound: &mut Outbound, report: &mut impl Report, busy_ns: impl Fn() -> u64) {
-        self.wants.take_on(&mut Hands { transit: &mut self.transit, outbound, report, busy_ns });
-    }
-
-    /// How important the first is that was not taken.
-    pub(super) fn first(&mut self) -> Option<Priority> {
-        self.transit.waits().1
-    }
-
-    /// Between slots. `left_ns` says how long it may last.
-    pub(super) fn relieve(&mut self, outbound: &mut Outbound, report: &mut impl Report, left_ns: impl FnMut() -> u64) {
-        let mut hands = Hands { transit: &mut self.transit, outbound, report, busy_ns: || 0 };
-        self.wants.relieve(monotonic_ns(), &mut hands, left_ns);
-    }
-}
-
 /// What a package goes through when it is taken.
-struct Hands<'a, R, B> {
-    transit: &'a mut Receiver,
-    outbound: &'a mut Outbound,
-    report: &'a mut R,
-    busy_ns: B,
+pub(super) struct Hands<'a, R, N> {
+    pub(super) transit: &'a mut Receiver,
+    pub(super) outbound: &'a mut Outbound,
+    pub(super) report: &'a mut R,
+    /// Says the local time, ns.
+    pub(super) local_ns: N,
 }
 
-impl<R: Report, B: Fn() -> u64> Transit for Hands<'_, R, B> {
+impl<R: Report, N: Fn() -> u64> Transit for Hands<'_, R, N> {
     fn waits(&mut self) -> (usize, Option<Priority>) {
         self.transit.waits()
     }
@@ -73,8 +31,8 @@ impl<R: Report, B: Fn() -> u64> Transit for Hands<'_, R, B> {
         self.outbound.level(priority)
     }
 
-    fn busy_ns(&self) -> u64 {
-        (self.busy_ns)()
+    fn local_ns(&self) -> u64 {
+        (self.local_ns)()
     }
 
     fn take(&mut self) -> Option<(Head, Accepted)> {
@@ -90,7 +48,7 @@ mod tests {
     use super::*;
     use crate::counts::Cause;
     use crate::harness::{End, S, module};
-    use crate::intake::{FEW, LEFT_NS_MIN, MAKING_NS, TAKING_NS, UNTAKEN_NS_MAX};
+    use crate::intake::{FEW, Intake, LEFT_NS_MIN, MAKING_NS, TAKING_NS, UNTAKEN_NS_MAX};
     use rohrpost_mailbox::{HEAD_BYTES, Label, Name, Node, Participant, Sender, Shape, Type};
 
     /// A package of this body takes 50 bytes of a slot.
@@ -100,6 +58,7 @@ mod tests {
     /// A router of node 0, and a mailbox for packages to node 1.
     struct Ground {
         intake: Intake,
+        transit: Receiver,
         sender: Sender,
         end: End,
         /// Time until the thread has to wake up.
@@ -114,10 +73,11 @@ mod tests {
             let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
             let join = || Participant::join(&node, Name::NONE).unwrap();
             let shape = Shape { slots: SLOTS, full: rohrpost_mailbox::OverflowPolicy::Displace, ..Shape::default() };
-            let intake = Intake::new(join().receiver(module(100, 1), shape).unwrap());
+            let transit = join().receiver(module(100, 1), shape).unwrap();
             let sender = join().sender(module(100, 1)).unwrap();
             Self {
-                intake,
+                intake: Intake::new(monotonic_ns()),
+                transit,
                 sender,
                 end: End::begin(0, monotonic_ns() - age_ns, |_| {}),
                 left_ns: u64::MAX,
@@ -136,25 +96,38 @@ mod tests {
             self.send(Type::data(1), priorities);
         }
 
+        fn open(&mut self, room_bytes: usize) {
+            self.intake.open(monotonic_ns(), room_bytes);
+        }
+
+        fn hands(&mut self) -> (&mut Intake, impl Transit) {
+            let Self { intake, transit, end, .. } = self;
+            (intake, Hands { transit, outbound: &mut end.outbound, report: &mut end.log, local_ns: || 0 })
+        }
+
         /// So many looks shortly before the call.
         fn before_the_call(&mut self, looks: usize) {
-            (0..looks).for_each(|_| self.intake.take_one(&mut self.end.outbound, &mut self.end.log));
+            let (intake, mut hands) = self.hands();
+            (0..looks).for_each(|_| _ = intake.take_one(&mut hands));
         }
 
         /// Before a datagram, while the wire is busy for long enough to take so many.
         fn in_the_slot(&mut self, busy_for: u64) {
             let left = std::cell::Cell::new(busy_for + 1);
-            let busy_ns = || left.replace(left.get().saturating_sub(1)).min(2) * (TAKING_NS + MAKING_NS);
-            self.intake.take_on(&mut self.end.outbound, &mut self.end.log, busy_ns);
+            let busy_ns = |_| left.replace(left.get().saturating_sub(1)).min(2) * (TAKING_NS + MAKING_NS);
+            let (intake, mut hands) = self.hands();
+            intake.take_on(&mut hands, busy_ns);
         }
 
         fn between_slots(&mut self) {
-            self.intake.relieve(&mut self.end.outbound, &mut self.end.log, || self.left_ns);
+            let wake_ns = self.left_ns;
+            let (intake, mut hands) = self.hands();
+            intake.relieve(monotonic_ns(), &mut hands, wake_ns);
         }
 
         /// Packages in the mailbox, and in the queue.
         fn waiting(&mut self) -> (usize, u64) {
-            (self.intake.transit.waits().0, self.end.stats.waiting_in_all())
+            (self.transit.waits().0, self.end.stats.waiting_in_all())
         }
     }
 
@@ -162,7 +135,7 @@ mod tests {
     fn a_slot_takes_what_it_has_room_for_and_then_what_is_more_important() {
         let mut ground = Ground::new(0);
         ground.data(&[10, 90, 50, 50, 20]);
-        ground.intake.open(100);
+        ground.open(100);
         ground.before_the_call(10);
         assert_eq!(ground.waiting(), (3, 2), "90 and 50 fill it");
         ground.data(&[50]);
@@ -177,7 +150,7 @@ mod tests {
         assert_eq!(ground.waiting(), (6, 8), "a few between two datagrams");
         ground.in_the_slot(9);
         assert_eq!(ground.waiting(), (4, 10));
-        ground.intake.open(10_000);
+        ground.open(10_000);
         ground.in_the_slot(0);
         assert_eq!(ground.waiting(), (4, 10), "what is less important takes no time from what is to leave");
         ground.data(&[200]);
@@ -192,7 +165,7 @@ mod tests {
         let mut ground = Ground::new(0);
         ground.data(&[90; FEW + 2]);
         ground.data(&[50, 50]);
-        ground.intake.open(10_000);
+        ground.open(10_000);
         ground.in_the_slot(0);
         assert_eq!(ground.waiting(), (4, FEW as u64));
         ground.in_the_slot(0);
@@ -210,7 +183,7 @@ mod tests {
     #[test]
     fn in_a_slot_a_mailbox_does_not_become_full_and_what_is_lost_does_not_end_it() {
         let mut ground = Ground::new(0);
-        ground.intake.open(50);
+        ground.open(50);
         ground.data(&[90; 1]);
         ground.before_the_call(1);
         ground.data(&[90; SLOTS as usize / 2]);
@@ -223,7 +196,7 @@ mod tests {
         // Their peer is silent, so that taking them gives nothing to send.
         let mut ground = Ground::new(5 * S);
         ground.data(&[90; FEW + 2]);
-        ground.intake.open(1000);
+        ground.open(1000);
         ground.in_the_slot(0);
         assert_eq!(ground.waiting(), (0, 0));
         assert_eq!(ground.end.log.lost.len(), FEW + 2);
@@ -232,7 +205,7 @@ mod tests {
     #[test]
     fn what_comes_after_a_slot_that_was_not_full_waits_for_the_next() {
         let mut ground = Ground::new(0);
-        ground.intake.open(1000);
+        ground.open(1000);
         ground.data(&[50]);
         ground.before_the_call(1);
         ground.intake.close();
@@ -257,7 +230,7 @@ mod tests {
         ground.data(&[50]);
         ground.between_slots();
         assert_eq!(ground.waiting(), (1, 9));
-        ground.intake.wants = intake::Intake::new(monotonic_ns() - UNTAKEN_NS_MAX);
+        ground.intake = Intake::new(monotonic_ns() - UNTAKEN_NS_MAX);
         ground.between_slots();
         assert_eq!(ground.waiting(), (0, 10), "no slot came for long");
     }
@@ -266,7 +239,7 @@ mod tests {
     fn what_hurries_more_than_it_may_takes_no_room_from_what_may() {
         let mut ground = Ground::new(0);
         ground.send(Type::command(16), &[200, 200, 100]);
-        ground.intake.open(50);
+        ground.open(50);
         ground.before_the_call(10);
         assert_eq!(ground.waiting(), (0, 3));
         ground.send(Type::command(16), &[100]);
@@ -278,7 +251,7 @@ mod tests {
     fn packages_for_a_silent_node_are_lost_in_the_next_slot_and_keep_nothing_up() {
         let mut ground = Ground::new(10 * S);
         ground.data(&[50; 5]);
-        ground.intake.open(50);
+        ground.open(50);
         ground.in_the_slot(0);
         assert_eq!(ground.waiting(), (0, 0));
         assert_eq!(ground.end.log.causes(), [Cause::Silent; 5]);

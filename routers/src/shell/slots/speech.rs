@@ -47,7 +47,7 @@ mod tests {
     use crate::harness::settings;
 
     #[test]
-    fn whoever_is_parted_names_nodes_digests_and_what_to_type() {
+    fn a_refusal_of_a_table_names_nodes_digests_and_what_to_type() {
         let text = parted(&settings(2, 3), [(Some(0), 0xab), (None, 0xcd)].into_iter());
         let own = settings(2, 3).nodes[2].name.clone();
         for words in

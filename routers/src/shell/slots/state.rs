@@ -1,27 +1,9 @@
 //! What the thread of the time slots lets others see.
 
 use super::granted::Granted;
-use crate::tdma::{Counts, Silent, Window};
+use crate::driver::{Used, WINDOWS};
+use crate::tdma::{Counts, Silent};
 use std::sync::{Mutex, PoisonError};
-
-/// So many windows are remembered.
-pub const WINDOWS: usize = 16;
-
-/// A window that was used.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Used {
-    /// Which, in system time.
-    pub window: Window,
-    /// The first datagram was on the wire so long after the beginning, ns: by the kernel's stamp where there is one, else when it was
-    /// handed over and the usual lead. Less than 0: too early.
-    pub off_ns: i64,
-    /// Whether it was the kernel's stamp.
-    pub by_kernel: bool,
-    /// Datagrams.
-    pub datagrams: u64,
-    /// Their bytes on the wire, all heads counted.
-    pub wire_bytes: u64,
-}
 
 /// How it stands with the time slots of this node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -41,9 +23,16 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    pub(super) fn used(&mut self, used: Used) {
-        self.windows.rotate_left(1);
-        self.windows[WINDOWS - 1] = Some(used);
+    /// Of a router that begins.
+    pub(super) fn new(silent: Option<Silent>) -> Self {
+        Self {
+            counts: Counts::default(),
+            silent,
+            lead_ns: (0, 0),
+            granted: Granted::Ordinary,
+            held: 0,
+            windows: [None; WINDOWS],
+        }
     }
 }
 

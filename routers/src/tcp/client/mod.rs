@@ -1,4 +1,5 @@
-//! A node's client at work: one thread, which sleeps on the node's mailbox for what is beyond and on its socket at once.
+//! A node's client at work: one thread, which sleeps on the node's mailbox for what is beyond and on its socket at
+//! once.
 //!
 //! ```text
 //!  modules ─▶ tcp.I.3 ─▶ session::Client ─▶ socket ═▶
@@ -89,7 +90,7 @@ pub struct ClientParts<'a> {
 /// A client at work; dropped, it ends. What waits in its mailbox stays there.
 pub struct ClientShell {
     shared: Arc<Shared>,
-    /// Of its thread, whose bell wakes it.
+    /// Of its thread, which its bell wakes.
     participant: Arc<Participant>,
     /// Ends after the thread does.
     _bad_line: Option<BadLine>,
@@ -209,7 +210,8 @@ impl Work {
                 Output::Connect => self.connect(now_ns),
                 Output::Write => {
                     self.write();
-                    // However much there is to send, what comes has its turn; who sends one package looks when it sleeps.
+                    // However much there is to send, what comes has its turn; a client with one package looks when it
+                    // sleeps.
                     if has_written {
                         self.watches.look();
                     }
@@ -239,8 +241,8 @@ impl Work {
             let Some(waiting) = self.mailbox.try_receive() else { return false };
             let (head, published_ns, body) = (capped(waiting.head()), waiting.published_ns(), waiting.body());
             if head.to.system() == ALL_SYSTEMS {
-                // Its own system is one of them: there it goes as any package does, by the LAN, or if need be by the server. A node that only the
-                // server reaches knows of no others: the server brings it to them.
+                // Its own system is one of them: there it goes as any package does, by the LAN, or if need be by the
+                // server. A node that only the server reaches knows of no others: the server brings it to them.
                 let to = in_system(head.to, self.system);
                 let is_others = self.others.iter().any(|range| range.has(to));
                 let sender_cache = if is_others { &mut self.ways_to_others } else { &mut self.reporter.sender_cache };

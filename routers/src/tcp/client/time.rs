@@ -26,7 +26,8 @@ impl Time {
         Ok(time)
     }
 
-    /// Whether this computer's clock is one to measure by. If it slept, or its clock is slewed, nothing is known any more.
+    /// Whether this computer's clock is one to measure by. If it slept, or its clock is slewed, nothing is known any
+    /// more.
     pub(super) fn is_steady(&mut self) -> bool {
         self.is_steady_by(looked())
     }

@@ -1,4 +1,4 @@
-//! Whose certificates these are, and a client that says nothing, sealed, without end.
+//! Owners of certificates, and a client that sends sealed empty records without end.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use std::os::unix::fs::PermissionsExt;
 
 #[test]
-fn a_certificate_says_whose_it_is() {
+fn a_certificate_names_its_owner() {
     let base = Holder::Node { node: "base".into(), system: 7 };
     assert_eq!(base.dns_name(), "base.system-7.rohrpost");
     assert_eq!(Holder::of(&base.dns_name()), Some(base));
@@ -93,7 +93,7 @@ impl Says {
 }
 
 #[test]
-fn who_seals_nothing_without_end_is_refused() {
+fn endless_empty_records_are_refused() {
     let node = Holder::Node { node: "base".into(), system: 7 };
     let folder = certificates(&node);
     let mut seal = ClientSeal::load(folder.path(), &node).unwrap();

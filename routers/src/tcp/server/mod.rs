@@ -1,6 +1,7 @@
 //! The TCP router at work: one thread, which sleeps on all sockets at once.
 //!
-//! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the client's own queue.
+//! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the
+//! client's own queue.
 
 mod door;
 mod reporter;
@@ -43,8 +44,8 @@ pub enum ServerError {
     InUse(SocketAddr),
     /// It is another computer's address.
     #[error(
-        "{0} is no address of this computer: let `server` of [tcp] name the node that has it, or correct `address` (`ip addr` shows which \
-         there are)"
+        "{0} is no address of this computer: let `server` of [tcp] name the node that has it, or correct `address` \
+         (`ip addr` shows which there are)"
     )]
     NotHere(SocketAddr),
     /// The system says no for another reason.
@@ -63,11 +64,12 @@ pub struct ServerParts<'a> {
     pub settings: ServerSettings,
     /// How commands are answered that cannot be handed on.
     pub faults: Arc<dyn Faults>,
-    /// Its certificates; none: nothing is sealed, and nobody shows who he is.
+    /// Its certificates; none: nothing is sealed, and no client proves its identity.
     pub seal: Option<ServerSeal>,
-    /// What each node of its own system hosts, by its configuration: no certificate lets one register more. Of other systems it knows nothing.
+    /// What each node of its own system hosts, by its configuration: no certificate lets one register more. Of other
+    /// systems it knows nothing.
     pub names: BTreeMap<String, Names>,
-    /// The node whose system time it tells.
+    /// The node that it takes system time from.
     pub node: &'a Arc<Node>,
 }
 
@@ -195,7 +197,7 @@ impl Work {
             }
             if !ending && self.shared.ends.load(Ordering::Acquire) {
                 ending = true;
-                // Who was told that it ends would come back.
+                // A client that is told of the end would come back.
                 let _ = self.epoll.delete(&self.listener);
                 self.accept_ns = None;
                 self.server.end(now_ns, &mut self.host);
@@ -251,7 +253,7 @@ impl Work {
         }
     }
 
-    /// Learns who a client is from its certificate; false: that says it not.
+    /// Learns a client's identity from its certificate; false: that does not name one.
     fn is_known(&mut self, client: ClientIndex) -> bool {
         let Some(connection) = connection(&mut self.connections, client) else { return false };
         if connection.stream.is_sealed() {

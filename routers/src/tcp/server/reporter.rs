@@ -1,4 +1,4 @@
-//! What the TCP router has to say: to those whose commands go no further, and to people.
+//! Reports of the TCP router: refusals to senders of commands that go no further, and lines for people.
 
 use crate::session::frame::Reason;
 use crate::session::server::{Event, Host};
@@ -7,7 +7,7 @@ use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::hush::{Hush, Topic};
 use rohrpost_mailbox::monotonic_ns;
 
-/// Says what happens, and answers for who is not reached.
+/// Reports events, and answers for receivers that are not reached.
 pub(super) struct ServerReporter {
     fault_writer: FaultWriter,
     hush: Hush,
@@ -82,8 +82,8 @@ impl Host for ServerReporter {
             Event::Refused { name, reason, digests: (theirs, ours), text } => {
                 let refusal = match reason {
                     Reason::Common | Reason::System => format!(
-                        "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; give both the same configuration \
-                         (`rohrpost check`, on both)",
+                        "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; \
+                         give both the same configuration (`rohrpost check`, on both)",
                         reason.word()
                     ),
                     _ if text.is_empty() => format!("{name} may not take part: {}", reason.word()),

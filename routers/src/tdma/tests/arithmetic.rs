@@ -1,4 +1,4 @@
-//! The table, and the line's inverse, against what they say.
+//! The table, and the inverse of the line, against their definitions.
 
 use super::world::{CYCLE, HEADS, MASTERS, MS, US, table, tdma};
 use crate::tdma::{Kind, Table, Window};
@@ -47,7 +47,11 @@ fn windows(table: &Table, from_ns: u64, to_ns: u64) -> Vec<Window> {
 
 proptest! {
     #[test]
-    fn windows_of_all_nodes_lie_one_behind_the_other((tdma, masters) in any_tdma(), cycles in 0..1_000_000_u64, shift_ns in 0..10 * MS) {
+    fn windows_of_all_nodes_lie_one_behind_the_other(
+        (tdma, masters) in any_tdma(),
+        cycles in 0..1_000_000_u64,
+        shift_ns in 0..10 * MS,
+    ) {
         let cycle_ns = tdma.cycle.as_nanos() as u64;
         let from_ns = cycles * cycle_ns + shift_ns;
         let to_ns = from_ns + 13 * cycle_ns;
@@ -58,7 +62,7 @@ proptest! {
             let slots = own_windows.iter().filter(|window| matches!(window.kind, Kind::Slot { .. })).count();
             prop_assert_eq!(table.slots_between(from_ns, to_ns), slots as u64);
             for window in own_windows {
-                // The one who looks at the wire sees the same.
+                // The view from the wire agrees.
                 for (at_ns, is_guard) in [(window.begin_ns, false), (window.end_ns - 1, false), (window.end_ns, true)] {
                     let owner = table.owner(at_ns).filter(|owner| owner.is_guard == is_guard || tdma.guard.is_zero());
                     let seen = owner.map(|owner| (owner.node, owner.window));
@@ -76,7 +80,7 @@ proptest! {
             let guard_ns = tdma.guard.as_nanos() as u64;
             prop_assert!(before.end_ns + guard_ns <= after.begin_ns, "{:?} {:?}", before, after);
         }
-        // Complete: whatever moment is somebody's lies in a window that was found, unless it is at the edges.
+        // Complete: each owned moment lies in a window that was found, unless it is at the edges.
         let owners = (from_ns + cycle_ns..to_ns - cycle_ns).step_by(97_000);
         let any = Table::new(&tdma, &masters, 0, NODES, HEADS);
         for owner in owners.filter_map(|at_ns| any.owner(at_ns)) {

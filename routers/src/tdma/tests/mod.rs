@@ -1,4 +1,4 @@
-//! The table by properties, the scheduler by scenes; and each mistake must be seen by one of the checks.
+//! The table by properties, the scheduler by scenes; each planted mistake must fail one of the checks.
 
 mod arithmetic;
 mod overheard;
@@ -17,15 +17,15 @@ const CHECKS: [fn(); 16] = [
     single::no_frame_starts_before_its_slot,
     single::what_was_handed_over_counts,
     single::a_replacement_is_a_sign_of_life_and_nothing_else,
-    single::who_turns_while_the_first_master_lives_is_not_sure,
+    single::a_node_that_turns_while_the_first_master_lives_is_not_sure,
     scenes::nodes_join_one_by_one_and_never_meet,
     scenes::a_master_dies_and_no_slot_is_lost,
     scenes::a_master_of_which_two_syncs_are_missing_remains_it,
     scenes::two_masters_become_one,
     overheard::a_hello_leaves_in_one_of_four_cycles_and_nothing_else,
-    overheard::whoever_hears_somebody_begins_no_time_for_a_while,
-    overheard::who_has_begun_a_time_steps_back_until_it_is_impatient,
-    tables::whoever_starts_from_an_edited_file_beside_others_sends_nothing,
+    overheard::a_node_that_hears_unverified_frames_begins_no_time_for_a_while,
+    overheard::a_new_master_steps_back_until_patience_is_over,
+    tables::a_node_with_an_edited_file_beside_others_sends_nothing,
     tables::of_two_tables_that_meet_one_goes_on,
 ];
 

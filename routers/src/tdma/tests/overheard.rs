@@ -1,4 +1,4 @@
-//! One node that knows nobody yet, and hears frames of which it does not know whether they were said just now.
+//! One node that knows no peer yet, and hears unverified frames.
 
 use super::world::{CYCLE, MASTERS, SECOND, US, World, table};
 use crate::frame::FrameHead;
@@ -7,17 +7,18 @@ use crate::time::message::{Message, Request, Sync};
 use crate::time::{Clock, Ignored, Role, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
 
-/// Who listens so long, and hears nobody, begins a time; node 1 after another cycle.
+/// A node that hears nothing for this long begins a time; node 1 one cycle later.
 const LISTENS: u64 = 100_000_000 + 9 * CYCLE;
-/// So long it waits if it hears somebody.
+/// How long it waits if it hears unverified frames.
 const PATIENCE: u64 = 2 * SECOND + 64 * CYCLE;
 
-/// Whoever lives has answered after so long: eight cycles' hellos are heard, and four go to and from each of two others, one in four cycles.
+/// A live peer has answered after this long: it takes eight cycles' hellos, and four to and from each of two others,
+/// one in four cycles.
 const JOINS: u64 = (8 + 4 * 2) * UNPROVEN_CYCLES * CYCLE;
-/// So much later the second master begins than the first, if both hear somebody for ever; else it is a cycle.
+/// Distance of the second master's beginning from the first one's, if both keep hearing frames; else it is a cycle.
 const APART: u64 = JOINS + 100_000_000 + 8 * CYCLE;
 
-/// A node that may be master, and overhears another.
+/// A node that may be master, and hears unverified frames of another.
 struct Ear {
     clock: Clock,
     scheduler: SlotScheduler,
@@ -70,7 +71,7 @@ impl Ear {
         self.overhears_of(from, &Message::Request(hello))
     }
 
-    /// It is awake once a cycle.
+    /// It runs once a cycle.
     fn pass(&mut self, for_ns: u64) {
         for _ in 0..for_ns.div_ceil(CYCLE) {
             self.now_ns += CYCLE;
@@ -78,7 +79,7 @@ impl Ear {
         }
     }
 
-    /// Is awake until it is master: how long that takes, if not longer than this.
+    /// Runs until it is master; returns how long that takes, if not longer than this.
     fn begins_within(&mut self, most_ns: u64, mut each_cycle: impl FnMut(&mut Self)) -> Option<u64> {
         let from_ns = self.now_ns;
         while self.now_ns - from_ns < most_ns {
@@ -122,7 +123,7 @@ pub(super) fn a_hello_leaves_in_one_of_four_cycles_and_nothing_else() {
     }
 }
 
-pub(super) fn whoever_hears_somebody_begins_no_time_for_a_while() {
+pub(super) fn a_node_that_hears_unverified_frames_begins_no_time_for_a_while() {
     let begins = Ear::new(1).begins_within(SECOND, |ear| ear.pass(CYCLE));
     assert!(begins.is_some_and(|begins| begins.abs_diff(LISTENS) <= 2 * CYCLE), "in silence: {begins:?}");
     let overhears = |ear: &mut Ear| ear.overhears().unwrap();
@@ -140,7 +141,7 @@ pub(super) fn whoever_hears_somebody_begins_no_time_for_a_while() {
     );
 }
 
-pub(super) fn who_has_begun_a_time_steps_back_until_it_is_impatient() {
+pub(super) fn a_new_master_steps_back_until_patience_is_over() {
     let mut ear = Ear::new(1);
     ear.begins_within(SECOND, |ear| ear.pass(CYCLE)).unwrap();
     let first_ns = ear.now_ns;
@@ -158,7 +159,7 @@ pub(super) fn who_has_begun_a_time_steps_back_until_it_is_impatient() {
 }
 
 #[test]
-fn whoever_is_impatient_leaves_the_time_to_hear_it_to_who_begins_before() {
+fn a_node_out_of_patience_leaves_time_to_hear_an_earlier_master() {
     let begins = MASTERS.map(|own| {
         let each_cycle = |ear: &mut Ear| {
             ear.pass(CYCLE);
@@ -221,7 +222,7 @@ fn a_window_of_what_is_overheard_is_no_slot_of_the_nodes_own_time() {
 }
 
 #[test]
-fn who_goes_by_who_lives_meanwhile_asks_for_its_window_anew() {
+fn a_node_that_meanwhile_follows_a_live_master_asks_for_its_window_anew() {
     let mut ear = Ear::new(2);
     (0..8).for_each(|_| ear.overhears().unwrap());
     let Next::Window(planned) = ear.scheduler.next(ear.now_ns, &ear.clock) else { panic!("silent") };
@@ -257,7 +258,7 @@ fn rare_slots_are_waited_for() {
 }
 
 #[test]
-fn who_knows_the_time_overhears_nobody_and_what_tells_no_time_is_of_no_use() {
+fn a_node_that_knows_the_time_ignores_unverified_frames_as_it_does_those_without_time() {
     let mut ear = Ear::new(2);
     for message in [Message::WarmUp, Message::Request(Request::default())] {
         assert_eq!(ear.overhears_of(0, &message), Err(Ignored::Unproven));

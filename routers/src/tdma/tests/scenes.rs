@@ -1,4 +1,4 @@
-//! What may happen to three nodes on one wire.
+//! Scenes of three nodes on one wire.
 
 use super::world::{CYCLE, MS, SECOND, US, World};
 use crate::frame::NodeIndex;
@@ -57,7 +57,7 @@ pub(super) fn nodes_join_one_by_one_and_never_meet() {
     }
 }
 
-/// Dies when it has just sent its Syncs of a cycle. When that was.
+/// The master dies when it has just sent its Syncs of a cycle. Returns when that was.
 fn dies_after_sync(world: &mut World, master: NodeIndex) -> u64 {
     let sent = world.counts(master).syncs.sent;
     assert!(world.run_until(2 * CYCLE, |world| world.counts(master).syncs.sent > sent), "a master sends");
@@ -65,7 +65,7 @@ fn dies_after_sync(world: &mut World, master: NodeIndex) -> u64 {
     world.now
 }
 
-/// The other of two masters stands in, and takes the place of the one that died; when, after its last Sync.
+/// The other of two masters stands in, and replaces the dead one; returns when, after its last Sync.
 fn is_replaced(world: &mut World, other: NodeIndex, died: u64) -> [u64; 2] {
     let (before, term) = (world.counts(other).syncs.replacements_sent, world.clock(2).term());
     let stands_in = |world: &World| world.counts(other).syncs.replacements_sent > before;
@@ -94,7 +94,7 @@ pub(super) fn a_master_dies_and_no_slot_is_lost() {
             assert_eq!(lost, (0, 0, 0), "seed {seed}: node {node}: {}", tell(&world));
         }
         assert_eq!(world.counts(2).syncs.replacements_heard, 2, "seed {seed}");
-        // Who comes back listens first, and is a slave.
+        // A node that returns listens first, and is a slave.
         world.start(0);
         world.run(SECOND);
         assert!(world.agrees() && world.clock(1).role() == Role::Master, "seed {seed}: {}", tell(&world));
@@ -137,7 +137,7 @@ pub(super) fn a_master_of_which_two_syncs_are_missing_remains_it() {
 }
 
 #[test]
-fn who_wakes_up_late_in_its_window_of_synchronisation_synchronises() {
+fn a_master_that_wakes_up_late_in_its_synchronisation_window_synchronises() {
     for (late_us, sends) in [(110, true), (170, false)] {
         let mut world = agreed(7);
         let counts = world.counts(0);
@@ -160,7 +160,7 @@ fn who_wakes_up_late_in_its_window_of_synchronisation_synchronises() {
 }
 
 #[test]
-fn a_master_whose_packages_come_lives() {
+fn a_master_with_packages_that_come_lives() {
     for seed in seeds() {
         let mut world = agreed(seed);
         let term = world.clock(0).term();
@@ -196,7 +196,7 @@ pub(super) fn two_masters_become_one() {
         world.collisions.clear();
         world.run(10 * SECOND);
         assert!(world.agrees(), "seed {seed}: {}", tell(&world));
-        // Whoever yields is silent until it has measured.
+        // A node that yields is silent until it has measured.
         holds(&world, seed);
     }
 }
@@ -205,7 +205,7 @@ pub(super) fn two_masters_become_one() {
 fn a_node_that_hears_nobody_holds_over_then_falls_silent() {
     for seed in seeds() {
         let mut world = agreed(seed);
-        // The longer it has measured, the surer it is of the rate.
+        // A longer measurement gives a more exact rate.
         world.run(10 * SECOND);
         (world.cut[0][2], world.cut[1][2]) = (true, true);
         let silent = |world: &World| matches!(world.silent(2), Some(Silent::BoundTooLarge { .. }));

@@ -1,4 +1,4 @@
-//! One node, and a master made of plain messages: to the nanosecond.
+//! One node, and a master made of plain messages: exact to the nanosecond.
 
 use super::world::{CYCLE, MASTERS, SECOND, US, table};
 use crate::frame::{FrameHead, Kind as Frame};
@@ -7,7 +7,7 @@ use crate::time::message::{Message, Reply, Sync};
 use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
 
-/// Its clock shows so much less than system time.
+/// Its clock shows this much less than system time.
 const OFFSET: u64 = 1_000 * SECOND;
 const TERM: Term = Term(1 << 8 | 255);
 
@@ -51,7 +51,7 @@ impl Lonely {
         Sync { began: TERM, followed: true, ..sync }
     }
 
-    /// The master's Sync of the next cycle, on its way for 10 µs.
+    /// The master's Sync of the next cycle, with a delay of 10 µs.
     fn hears_sync(&mut self) {
         (self.cycle, self.id) = (self.cycle + 1, self.id + 1);
         self.now_ns = self.cycle * CYCLE - OFFSET + 10 * US;
@@ -59,7 +59,7 @@ impl Lonely {
         self.hears(0, self.now_ns, &Message::Sync(sync));
     }
 
-    /// Its next window, judged at this moment after its call.
+    /// Its next window, validated at this moment after its call.
     fn judged(&mut self, after_ns: i64) -> (Planned, Verdict) {
         let Next::Window(planned) = self.scheduler.next(self.now_ns, &self.clock) else { panic!("silent") };
         self.now_ns = planned.call_ns.saturating_add_signed(after_ns);
@@ -67,7 +67,7 @@ impl Lonely {
         (planned, verdict)
     }
 
-    /// Asks in its slot, and is answered. Each way takes 10 µs.
+    /// Asks in its slot, and is answered. Each direction takes 10 µs.
     fn asks(&mut self) {
         let (_, verdict) = self.judged(0);
         let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
@@ -122,7 +122,7 @@ fn a_node_listens_then_asks_then_sends() {
     let (planned, verdict) = one.judged(0);
     let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
     assert_eq!((tx_window.carries, one.scheduler.silent()), (Carries::Time, Some(Silent::Joining { heard: 8 })));
-    // By coarse time a Sync takes half of what it may take at most.
+    // For coarse time a Sync takes half of its longest delay.
     let delay_max_ns = one.scheduler.table().for_clock().delay_max_ns;
     assert_eq!(planned.begin_ns, planned.window.begin_ns - OFFSET + 10 * US - delay_max_ns / 2);
     let mut one = Lonely::joined();
@@ -257,7 +257,7 @@ pub(super) fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     one.now_ns += CYCLE;
     let (heard_ns, counts) = (one.clock.heard_ns(one.now_ns), one.clock.sync_counts());
     let coarse = one.clock.coarse(one.now_ns);
-    // Its time is ahead by as much as its sender may be off.
+    // Its time is ahead by its sender's error.
     let replacement = Sync { id: 77, replacement: true, followed: false, ..one.sync(one.cycle * CYCLE + 50 * US) };
     one.hears(1, one.now_ns, &Message::Sync(replacement));
     assert_eq!(one.clock.heard_ns(one.now_ns), heard_ns, "the master is as silent as before");
@@ -271,7 +271,7 @@ pub(super) fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     assert_eq!(one.clock.sync_counts().missed, counts.missed + 3, "three cycles without the master's");
 }
 
-pub(super) fn who_turns_while_the_first_master_lives_is_not_sure() {
+pub(super) fn a_node_that_turns_while_the_first_master_lives_is_not_sure() {
     for (silence, is_sure) in [(0, false), (4 * CYCLE, true)] {
         let mut one = Lonely::joined();
         (one.cycle, one.now_ns) = (one.cycle + silence / CYCLE, one.now_ns + silence);

@@ -1,4 +1,4 @@
-//! Nodes with other tables on one wire: whoever is started from a file that somebody has edited.
+//! Nodes with different tables on one wire: one is started from an edited file.
 
 use super::world::{CYCLE, File, MS, SECOND, World};
 use crate::tdma::Silent;
@@ -7,10 +7,10 @@ use std::time::Duration;
 
 const US: fn(u64) -> Duration = Duration::from_micros;
 
-/// What somebody has done to a file.
+/// An edit of a file.
 type Edit = fn(&mut File);
 
-/// Each field that somebody may edit, and what of it is another then.
+/// Each field that may be edited, and the edit.
 const EDITS: [(&str, Edit); 12] = [
     ("nothing of the slots", |_| {}),
     ("cycle", |file| file.tdma.cycle += US(1_000)),
@@ -44,7 +44,7 @@ fn agreed(seed: u64) -> World {
     world
 }
 
-pub(super) fn whoever_starts_from_an_edited_file_beside_others_sends_nothing() {
+pub(super) fn a_node_with_an_edited_file_beside_others_sends_nothing() {
     for (seed, (field, edit)) in (0..).zip(EDITS) {
         for (node, digest) in [(0, 3), (1, 9), (2, 9), (0, 9)] {
             let mut world = agreed(seed);
@@ -59,7 +59,7 @@ pub(super) fn whoever_starts_from_an_edited_file_beside_others_sends_nothing() {
             assert!(is_parted(&world, node) && world.frames_of(node) == sent, "{told}");
             let others: Vec<u8> = (0..3).filter(|other| *other != node).collect();
             assert!(others.iter().all(|other| world.silent(*other).is_none()), "the others go on: {told}");
-            // From the right file it joins them.
+            // With the right file it joins them.
             world.kill(node);
             world.nodes[usize::from(node)].file = File::right();
             world.start(node);
@@ -93,7 +93,7 @@ pub(super) fn of_two_tables_that_meet_one_goes_on() {
 }
 
 #[test]
-fn whoever_does_not_hear_that_it_has_to_yield_silences_the_others() {
+fn a_node_that_does_not_hear_that_it_must_yield_silences_the_others() {
     let mut world = World::new(5);
     world.nodes[1].file = edited(EDITS[9].1, 3);
     for other in [0, 2] {
@@ -101,7 +101,7 @@ fn whoever_does_not_hear_that_it_has_to_yield_silences_the_others() {
     }
     world.start_all();
     world.run(2 * SECOND);
-    // It is heard, and hears nothing.
+    // The others hear it, and it hears nothing.
     (world.cut[1][0], world.cut[1][2]) = (false, false);
     world.run(SECOND / 4);
     world.collisions.clear();

@@ -1,5 +1,5 @@
-//! A few nodes in time slots on one wire, in virtual time from a seed. Each sends as much as fits in its slots; it knows what was on the
-//! wire when, and whether two were at once.
+//! A few nodes in time slots on one wire, in virtual time from a seed. Each sends as much as fits in its slots. The
+//! world knows what was on the wire when, and whether two frames were at once.
 
 use crate::frame::{FrameHead, NodeIndex};
 use crate::harness::settings;
@@ -18,7 +18,7 @@ pub(super) const MS: u64 = 1_000_000;
 pub(super) const SECOND: u64 = 1_000 * MS;
 pub(super) const CYCLE: u64 = 5 * MS;
 const WALL_NS: u64 = 1_790_000_000 * SECOND;
-/// Heads of IP and UDP.
+/// IP and UDP headers.
 pub(super) const HEADS: usize = 28;
 const DATAGRAM_BYTES: usize = 600;
 
@@ -52,7 +52,7 @@ pub(super) fn table(own: NodeIndex) -> Table {
     Table::new(&tdma(), &MASTERS, own, 3, HEADS)
 }
 
-/// A frame that was on the wire, in true time; its gap is counted.
+/// A frame that was on the wire, in true time, with its gap.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct OnWire {
     pub(super) from: NodeIndex,
@@ -61,7 +61,7 @@ pub(super) struct OnWire {
     pub(super) is_time: bool,
 }
 
-/// What a node is started from.
+/// Settings of a node.
 #[derive(Clone, Debug)]
 pub(super) struct File {
     pub(super) tdma: Tdma,
@@ -70,7 +70,7 @@ pub(super) struct File {
 }
 
 impl File {
-    /// That of all.
+    /// The settings of all nodes.
     pub(super) fn right() -> Self {
         Self { tdma: tdma(), masters: MASTERS.to_vec(), digest: 7 }
     }
@@ -97,7 +97,7 @@ pub(super) struct One {
     wakes: u64,
     planned: Option<Planned>,
     came: VecDeque<Letter>,
-    /// It stands still until then.
+    /// It is stalled until then.
     pub(super) frozen_until: u64,
     incarnation: u64,
 }
@@ -108,7 +108,7 @@ impl One {
         (i128::from(true_ns) + fast) as u64 + self.offset_ns
     }
 
-    /// The first true moment at which it shows this.
+    /// The first true moment at which its clock shows this.
     fn true_ns(&self, local_ns: u64) -> u64 {
         let even = i128::from(local_ns.saturating_sub(self.offset_ns));
         let mut at = (even * 1_000_000_000 / (1_000_000_000 + i128::from(self.rate_ppb)) - 2).max(0) as u64;
@@ -123,15 +123,15 @@ pub(super) struct World {
     pub(super) now: u64,
     pub(super) nodes: Vec<One>,
     pub(super) wire: Vec<OnWire>,
-    /// Between whom no datagrams of time pass.
+    /// Pairs of nodes between which no datagrams of time pass.
     pub(super) cut: [[bool; 3]; 3],
-    /// Whether packages come to all others, also where no datagrams of time pass.
+    /// Whether packages reach all others, even where no datagrams of time pass.
     pub(super) packages_come: bool,
-    /// Two that were on the wire at once.
+    /// Frames that were on the wire at once.
     pub(super) collisions: Vec<(OnWire, OnWire)>,
-    /// Moments at which some node sent packages by a time that may be too far off.
+    /// How often a node sent packages by a time that may be too far off.
     pub(super) unsure: u32,
-    /// One wake-up in so many comes up to 3 ms late; 0: none does.
+    /// One wake-up in this many comes up to 3 ms late; 0: none does.
     pub(super) stalls: u32,
     random: ChaCha8Rng,
 }
@@ -189,7 +189,7 @@ impl World {
         one.page = one.clock.take().map(|clock| *clock.record());
     }
 
-    /// From now on a node's clock is faster by so much.
+    /// From now on a node's clock is faster by this much.
     pub(super) fn warms(&mut self, node: NodeIndex, by_ppb: i64) {
         let now = self.now;
         let one = &mut self.nodes[usize::from(node)];
@@ -198,7 +198,7 @@ impl World {
         one.offset_ns -= one.local_ns(now) - shows_ns;
     }
 
-    /// Stands still from shortly before its next window of synchronisation until so much after its beginning.
+    /// Is stalled from shortly before its next synchronisation window until this long after its beginning.
     pub(super) fn wakes_late_to_synchronise(&mut self, node: NodeIndex, late_ns: u64) {
         let window = |world: &Self| {
             let planned = world.nodes[usize::from(node)].planned;
@@ -227,7 +227,7 @@ impl World {
         self.wire.iter().filter(|frame| frame.from == node).count()
     }
 
-    /// All that live send, and by one master.
+    /// All live nodes send, and follow one master.
     pub(super) fn agrees(&self) -> bool {
         let alive = || (0..3).filter(|node| self.nodes[usize::from(*node)].clock.is_some());
         let masters = alive().filter(|node| self.clock(*node).role() == Role::Master).count();
@@ -236,7 +236,7 @@ impl World {
         masters == 1 && alive().all(|node| self.silent(node).is_none() && Some(term(node)) == first)
     }
 
-    /// Nobody met anybody on the wire since it was emptied last, and nobody sent who was not sure.
+    /// No collision since the last check, and no node sent without an exact time.
     pub(super) fn assert_alone(&self, told: &str) {
         let (met, first) = (self.collisions.len(), self.collisions.first());
         assert!(met == 0 && self.unsure == 0, "{met} met, {} unsure: {first:?}; {told}", self.unsure);
@@ -266,7 +266,7 @@ impl World {
         self.act(node as NodeIndex);
     }
 
-    /// What the thread that sends does when it wakes up.
+    /// What the sending thread does when it wakes up.
     fn act(&mut self, node: NodeIndex) {
         self.read(node);
         let (now, planned) = (self.now, self.nodes[usize::from(node)].planned.take());
@@ -288,7 +288,7 @@ impl World {
         };
         let (next, clock_ns) = (one.scheduler.next(local_ns, clock), until_ns.max(local_ns + 10_000));
         let (wakes_ns, planned) = match next {
-            // Who has woken up for a window spins until it is there.
+            // A thread that is awake for a window spins until it begins.
             Next::Window(planned) if planned.call_ns <= clock_ns + 100 * US => (planned.call_ns, Some(planned)),
             Next::Window(_) => (clock_ns, None),
             Next::Silent { until_ns, .. } => (until_ns.min(clock_ns), None),
@@ -301,7 +301,7 @@ impl World {
         one.planned = planned;
     }
 
-    /// Takes the datagrams of time that came, and their stamps.
+    /// Takes the received datagrams of time, and stamps.
     fn read(&mut self, node: NodeIndex) {
         let now = self.now;
         let one = &mut self.nodes[usize::from(node)];
@@ -369,7 +369,7 @@ impl World {
         }
     }
 
-    /// Hands a datagram to the wire, which it reaches some µs later; and looks who else is there.
+    /// Hands a datagram to the wire, which it reaches some µs later, and checks for collisions.
     fn put(&mut self, from: NodeIndex, datagram_bytes: usize, free: &mut u64, is_time: bool) -> OnWire {
         let reaches = self.now + self.random.random_range(4 * US..20 * US);
         let begin = reaches.max(*free);

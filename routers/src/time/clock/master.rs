@@ -1,4 +1,4 @@
-//! A clock as a master: it says what time it is, and when the frames left and came; others ask.
+//! A clock as a master: it states the time, and answers when frames left and came.
 
 use super::{Clock, Draft, Left, Slave};
 use crate::broken::broken;
@@ -10,7 +10,7 @@ use crate::time::{Ignored, Stamp, Term};
 
 /// Pause while a slave has too few samples.
 const EAGER_NS: u64 = 20_000_000;
-/// A master begins at most one epoch in so long.
+/// A master begins at most one epoch in this time.
 const EPOCH_NS_MIN: u64 = 10_000_000_000;
 
 impl Clock {
@@ -19,7 +19,7 @@ impl Clock {
             self.election.hello(request, received.ns);
             self.keep_term();
             self.hello_in_slots(received, request);
-            // Whoever asks for a master gets its time at once.
+            // A node that asks for a master gets its time at once.
             if matches!(self.election.state(), State::Master(_)) {
                 self.slaves[usize::from(from)].next_ns = 0;
             }
@@ -29,7 +29,7 @@ impl Clock {
         if !is_asked || !matches!(self.election.state(), State::Master(_)) {
             return Err(Ignored::Unasked);
         }
-        // It may come from a part of the network that had a later term, and a time that it must not go back from.
+        // It may come from a part of the network with a later term, and with a time that must not go back.
         self.election.is_told(request);
         self.keep_term();
         let slave = &mut self.slaves[usize::from(from)];
@@ -43,8 +43,8 @@ impl Clock {
         let reply = Draft::Reply { id: request.id, came: received };
         let waits = |(to, draft): &(NodeIndex, Draft)| *to == from && matches!(draft, Draft::Reply { .. });
         let waiting = self.slots.as_ref().and_then(|_| self.drafts.iter().position(waits));
-        // In time slots one answer to each is enough, however many questions came before there is a window. It keeps its place: else who asks
-        // again and again would never be answered where not all answers fit.
+        // In time slots one answer per node is enough, however many questions came before the window. It keeps its
+        // place: else a node that asks again and again would never be answered where not all answers fit.
         if let Some(at) = waiting {
             self.drafts[at] = (from, reply);
         } else if self.drafts.len() < self.drafts.capacity() {
@@ -53,8 +53,8 @@ impl Clock {
         Ok(())
     }
 
-    /// This node is master from now on. If it has time, that goes on, or that which it heard; else the first epoch begins by its wall
-    /// clock.
+    /// This node is master from now on. Its own time continues, or the one that it heard; else the first epoch begins
+    /// by its wall clock.
     pub(super) fn reign(&mut self, now_ns: u64, term: Term, origin: Origin) {
         self.line.stop_slew(now_ns);
         if origin == Origin::Heard {
@@ -78,14 +78,14 @@ impl Clock {
         }
     }
 
-    /// A master's own term may have been raised: its timeline goes on.
+    /// A master's own term may have been raised: its timeline continues.
     pub(super) fn keep_term(&mut self) {
         if let State::Master(term) = self.election.state() {
             self.term = term;
         }
     }
 
-    /// Another master that must yield, and does not know of this one: it is told soon.
+    /// Another master must yield and does not know of this one: it gets a Sync soon.
     pub(super) fn answer_master(&mut self, now_ns: u64, other: NodeIndex) {
         if matches!(self.election.state(), State::Master(_)) {
             let soon_ns = now_ns.saturating_add(self.exchange_ns);
@@ -94,7 +94,7 @@ impl Clock {
         }
     }
 
-    /// Somebody is too far off to slew, or has seen a later epoch.
+    /// A node is too far off to slew, or has seen a later epoch.
     pub(super) fn begin_epoch(&mut self, now_ns: u64, theirs: u64) {
         let own = self.line.record().epoch;
         let pause_ns = EPOCH_NS_MIN.max(self.interval_ns);
@@ -120,12 +120,12 @@ impl Clock {
         let slave = &self.slaves[usize::from(node)];
         let answers = self.answers(slave, now_ns);
         let every_ns = match answers {
-            // Nobody may be there.
+            // The node may not exist.
             false => self.interval_ns,
             true if slave.eager => self.exchange_ns.min(EAGER_NS),
             true => self.exchange_ns,
         };
-        // In step with system time, so that the next master goes on in step; slaves one after the other.
+        // In step with system time, so that the next master continues in step; slaves one after the other.
         let system_ns = self.line.at(now_ns).ns;
         let shift_ns = every_ns / u64::from(self.settings.nodes) * u64::from(node);
         let nominal_ns = system_ns.saturating_sub(shift_ns) / every_ns * every_ns + shift_ns;

@@ -1,4 +1,4 @@
-//! A clock that makes a mistake.
+//! A clock with a planted mistake.
 
 use super::Clock;
 use crate::time::broken::Broken;

@@ -1,4 +1,4 @@
-//! A clock in time slots beside nodes that go by another configuration: who of them says what time it is, and who says nothing.
+//! A clock in time slots beside nodes of another configuration: which part continues its time, and which is silent.
 
 use super::Clock;
 use crate::broken::broken;
@@ -10,8 +10,8 @@ use crate::time::others::Claim;
 use crate::time::{Ignored, Stamp};
 
 impl Clock {
-    /// Takes a datagram of time whose digest is another than this node's. `node`: whose address it comes from; none if no node has it. What it
-    /// says is no time for this node; that it is said is a reason not to speak.
+    /// Takes a datagram of time with another digest than this node's. `node`: the owner of its source address; none if
+    /// no node has it. Its content is no time for this node, but a reason to be silent.
     ///
     /// # Errors
     /// [`Ignored`]: it changed nothing.
@@ -27,7 +27,7 @@ impl Clock {
             return Err(Ignored::Stranger);
         }
         let theirs = claim(head, &Message::parse(head.kind, rest)?).ok_or(Ignored::OtherTable)?;
-        // Where there are no slots, two times are in nobody's way.
+        // Without slots two times do not disturb each other.
         if self.slots.is_none() || broken!(DeafToOtherTables) {
             return Err(Ignored::OtherTable);
         }
@@ -37,8 +37,9 @@ impl Clock {
         Ok(())
     }
 
-    /// What the one who takes packages knows of those who refuse this node for its configuration. `now_ns`: by the clock by which that is
-    /// counted; `local_ns`: by that of time. Whoever is followed lets them; who has a greater claim says what time it is.
+    /// Handles refusals of this node's configuration that the counters of packages report. `now_ns`: now by the clock
+    /// of these counters; `local_ns`: now by the clock of time. A master with followers lets refusers be; with the
+    /// greater claim it continues its time.
     pub(super) fn refused_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
         if self.slots.is_none() || broken!(DeafToOtherTables) {
             return;
@@ -51,10 +52,10 @@ impl Clock {
             if self.others.is_news(refused_ns) && !own.0 {
                 self.others.refuses(node, local_ns_of(refused_ns), link.refuses_us_digest.get());
             }
-            // One datagram that was forged, or went astray, must not silence it for long.
+            // One forged or misdirected datagram must not silence this node for long.
             self.others.is_heard(node, local_ns_of(link.heard_ns.get()));
             if self.others.is_news(told_ns) {
-                // Whether it is followed it does not say.
+                // A refusal does not say whether its time is followed.
                 self.others.hears(Some(node), local_ns_of(told_ns), (true, link.tells_other_digest.get()), own);
             }
         }
@@ -62,8 +63,8 @@ impl Clock {
         self.part(local_ns);
     }
 
-    /// Because of which nodes this one neither begins a time nor goes on with one, and their digests; a node is none if its address is that of
-    /// no node. Empty unless that is so.
+    /// The nodes that keep this one from beginning or continuing a time, and their digests. The node is none if no node
+    /// has the address. Empty unless that is so.
     pub fn parted_by(&self, now_ns: u64) -> impl Iterator<Item = (Option<NodeIndex>, u64)> {
         self.others.because_of(now_ns)
     }
@@ -81,7 +82,7 @@ impl Clock {
         self.others.silent_until_ns(now_ns)
     }
 
-    /// It follows nobody and reigns no more, as long as it must not: then it listens anew.
+    /// While it must be silent, this node follows no master and is none; then it listens anew.
     fn part(&mut self, now_ns: u64) {
         let Some(until_ns) = self.parted_until_ns(now_ns) else { return };
         self.step_back(now_ns);
@@ -92,14 +93,14 @@ impl Clock {
         }
     }
 
-    /// Who hears no time of its own configuration, or whom nobody follows, has the lesser claim.
+    /// A node that hears no time of its own configuration, or a master without followers, has the lesser claim.
     pub(super) fn claim(&self, now_ns: u64) -> Claim {
         let is_followed = match self.election.state() {
             State::Listening => false,
             State::Slave(_) => true,
             State::Master(_) => self.is_followed(now_ns),
         };
-        // Of two that have no time neither may begin one.
+        // Of two configurations without time neither may begin one.
         let digest = if self.election.state() == State::Listening { 0 } else { self.settings.digest };
         (is_followed, digest)
     }
@@ -110,7 +111,7 @@ pub(super) fn claim(head: &FrameHead, message: &Message) -> Option<Claim> {
     let is_followed = match message {
         Message::Sync(sync) => sync.followed || sync.replacement,
         Message::Request(hello) if hello.id == 0 && !hello.timed => return None,
-        // They go between a master and who follows it; or it says that it has time.
+        // These go between a master and its follower, or say that the sender has time.
         Message::WarmUp | Message::Request(_) | Message::Reply(_) => true,
     };
     Some((is_followed, head.digest))

@@ -1,5 +1,5 @@
-//! A clock in time slots that does not know the time, and hears frames of which nobody knows whether they were said just now. They tell it when to
-//! ask, and not to begin a time of its own yet; nothing else.
+//! A clock in time slots without time that hears unverified frames. They tell it when to ask, and delay a time of its
+//! own; nothing else.
 
 use super::Clock;
 use super::other_tables::claim;
@@ -11,13 +11,13 @@ use crate::time::unverified::TimeReport;
 use crate::time::{Ignored, Stamp, TimeEstimate};
 
 impl Clock {
-    /// Whether frames help whose sender has not shown that it lives: those of [`Clock::overhear`].
+    /// Whether unverified frames help: those for [`Clock::overhear`].
     pub fn overhears(&self, now_ns: u64) -> bool {
         let is_listening = || self.election.state() == State::Listening && self.sure(now_ns).is_none();
         self.slots.is_some() && (self.is_beginning() || is_listening())
     }
 
-    /// Takes a datagram of time that some incarnation of its node has said at some time, and to this node.
+    /// Takes a datagram of time that some incarnation of its node sent at some time, to this node.
     ///
     /// # Errors
     /// [`Ignored`]: it changed nothing.
@@ -67,7 +67,7 @@ impl Clock {
         Ok(())
     }
 
-    /// What this master began nobody goes by yet, and another's time may be older: it listens again.
+    /// No node follows this master yet, and another's time may be older: it listens again.
     pub(super) fn step_back(&mut self, now_ns: u64) {
         self.election.steps_back(now_ns);
         self.line.stop_slew(now_ns);
@@ -78,14 +78,14 @@ impl Clock {
         }
     }
 
-    /// Who may be asked whether it lives, and by what time: none if nobody is heard, or not enough. For hellos alone.
+    /// The peer to ask for a sign of life, and the time to use: none without enough frames. For hellos alone.
     pub fn overheard(&self, now_ns: u64) -> Option<(NodeIndex, TimeEstimate)> {
         let slots = self.slots.as_ref()?;
         let (delay_max_ns, allowance_ns) = (slots.settings.delay_max_ns, slots.settings.allowance_ns);
         slots.overheard.estimate(now_ns, delay_max_ns, allowance_ns)
     }
 
-    /// A hello has left by [`Self::overheard`]: the next goes by another's time, if there is one.
+    /// A hello left by [`Self::overheard`]: the next uses another node's time, if there is one.
     pub fn asked_overheard(&mut self, now_ns: u64) {
         if let Some(slots) = &mut self.slots {
             let (delay_max_ns, allowance_ns) = (slots.settings.delay_max_ns, slots.settings.allowance_ns);

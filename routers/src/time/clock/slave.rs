@@ -1,6 +1,6 @@
-//! A clock as a slave: it asks the master after each of its Syncs, and bends its page's line to what comes of it.
+//! A clock as a slave: it asks the master after each Sync, and slews its page's line to the result.
 
-use super::{Asked, Clock, Draft, EXCHANGE_NS_MIN, rate_of};
+use super::{Clock, Draft, EXCHANGE_NS_MIN, PendingExchange, rate_of};
 use crate::frame::FrameHead;
 use crate::time::broken::Broken;
 use crate::time::clock_model::{EVEN_PPB, wander_ns_s};
@@ -9,14 +9,14 @@ use crate::time::history::{Estimate, Sample};
 use crate::time::message::{Reply, Request, Sync};
 use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
 
-/// So many samples a slave has before it believes them, and before it is content.
+/// Samples that a slave needs before it trusts them, and before it is content.
 const SAMPLES_MIN: u32 = 4;
 const SAMPLES_EAGER: u32 = 8;
-/// A slave answers a Sync at most so late: meanwhile its clock drifts from the master's.
+/// A slave answers a Sync at most this late: meanwhile its clock drifts from the master's.
 const ANSWER_NS_MAX: u64 = 50_000_000;
-/// A slave is fixed within so long, or four exchanges.
+/// A slave corrects its offset within this time, or four exchanges.
 const SERVO_NS_MIN: u64 = 250_000_000;
-/// For so long the stated growth of the bound holds, and at least for four intervals; then a greater one is stated.
+/// The stated growth of the bound holds for this long, and at least for four intervals; then a greater one is stated.
 const HORIZON_NS_MIN: u64 = 2_000_000_000;
 
 impl Clock {
@@ -44,7 +44,7 @@ impl Clock {
                     self.drafts.clear();
                 }
             }
-            // Its reign goes on under a later term, and with it the timeline.
+            // The same reign under a later term: the timeline continues.
             Heard::Followed if self.timeline == sync.began => self.term = sync.term,
             Heard::Followed => {}
         }
@@ -56,8 +56,8 @@ impl Clock {
         self.asked_ns = received.ns;
         let exchange = Exchange { id: sync.id, sync_sent_ns: sync.sent_ns, sync_came: received, ..Exchange::default() };
         self.asked.rotate_right(1);
-        self.asked[0] = Asked { exchange, ..Asked::default() };
-        // The newest question is enough, when several Syncs came at once.
+        self.asked[0] = PendingExchange { exchange, ..PendingExchange::default() };
+        // The newest question is enough when several Syncs came at once.
         self.drafts.clear();
         self.drafts.push_back((head.from, Draft::WarmUp));
         self.drafts.push_back((head.from, Draft::Request { id: sync.id }));
@@ -97,7 +97,7 @@ impl Clock {
         Ok(())
     }
 
-    /// The servo: from what was measured, where the line is to go.
+    /// The servo: from the measurement to the target of the line.
     pub(super) fn scheduler(&mut self, now_ns: u64, newest: Sample) {
         let State::Slave(master) = self.election.state() else { return };
         let Some(estimate) = self.history.estimate(now_ns, self.usual_rate) else {
@@ -149,7 +149,7 @@ impl Clock {
         self.drafts.iter().any(|(_, draft)| matches!(draft, Draft::Request { id: 1.. }))
     }
 
-    /// How far a line may be off that is `offset_ns` from the local clock now.
+    /// Error bound of a line that is `offset_ns` from the local clock now.
     pub(super) fn bound_ns(&self, estimate: &Estimate, offset_ns: i64, master: &Followed) -> u64 {
         let (above, below) = (estimate.high_ns.saturating_sub(offset_ns), offset_ns.saturating_sub(estimate.low_ns));
         let off_ns = above.max(below).unsigned_abs();
@@ -157,7 +157,7 @@ impl Clock {
         off_ns.saturating_add(if self.is(Broken::NoMasterError) { 0 } else { master.error_ns })
     }
 
-    /// How fast a bound may grow until the horizon, ns a second.
+    /// Growth of the bound until the horizon, ns a second.
     pub(super) fn drift_ns_s(&self, estimate: &Estimate, pace_ppb: u64) -> u64 {
         let pace = rate_of(pace_ppb);
         let off = (pace - estimate.rate_low).max(estimate.rate_high - pace).max(0.0);
@@ -168,7 +168,7 @@ impl Clock {
         self.interval_ns.saturating_mul(4).max(HORIZON_NS_MIN)
     }
 
-    /// Without a master for longer than was thought of, the rate may have changed more: the bound grows faster.
+    /// Without a master for longer than the horizon, the rate may have changed more: the bound grows faster.
     pub(super) fn keep_bound(&mut self, now_ns: u64) {
         let (until_ns, span_ns) = self.stated;
         if self.is(Broken::NoDrift) {
@@ -207,7 +207,8 @@ impl Clock {
     }
 }
 
-/// The interval that an exchange leaves for `system − local` when the Request left. None when the frames took less than no time.
+/// The interval that an exchange leaves for `system − local` when the Request left. None when the frames took negative
+/// time.
 fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<Sample> {
     let (came_ns, left_ns) = (exchange.sync_came.ns, exchange.request_left.ns);
     let waited_ns = left_ns.checked_sub(came_ns)?;
@@ -216,7 +217,7 @@ fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<Sample> {
     if high_ns <= low_ns {
         return None;
     }
-    // Between both of our stamps our clock drifted; the master's are whole numbers.
+    // Between both stamps of this node its clock drifted; the master's are whole numbers.
     let drifted_ns = u128::from(waited_ns) * RATE_MAX_PPB as u128 / 1_000_000_000;
     let doubt_ns = doubt_ns.saturating_add(drifted_ns as u64).saturating_add(2).cast_signed();
     Some(Sample {

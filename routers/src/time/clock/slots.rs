@@ -1,7 +1,8 @@
-//! A clock in time slots: what it may send is asked of it window by window, and the interval is the cycle.
+//! A clock in time slots: the caller asks window by window what to send, and the interval is the cycle.
 //!
-//! Syncs leave in the master's synchronisation window alone. Questions wait for a slot of the slave, answers for the master's next window.
-//! So from a Sync to the Request after it may be a cycle or more, in which both clocks drift: the sample of the exchange says so.
+//! Syncs leave in the master's synchronisation window alone. Requests wait for a slot of the slave, Replies for the
+//! master's next window. So a Request may leave a cycle or more after its Sync. Both clocks drift meanwhile, and the
+//! sample's interval includes that drift.
 
 use super::{Clock, Draft};
 use crate::broken::broken;
@@ -15,27 +16,27 @@ use crate::time::unverified::UnverifiedPeers;
 use crate::time::{Ignored, InSlots, JOINING_SYNCS, Stamp, Step, SyncCounts, TIME_BYTES, Term, TimeEstimate};
 use rohrpost_mailbox::TimeRecord;
 
-/// Who reigns by a time that is not its own sends nothing but Syncs in so many cycles: who goes by another hears of it meanwhile.
+/// Cycles in which a master with a new or heard time sends only Syncs, so that nodes with another time hear of it.
 const BEGINNING_CYCLES: u8 = JOINING_SYNCS;
 
-/// So many Syncs of a master in a row are missing when another takes its place.
+/// Syncs in a row that a master misses before another node takes its place.
 const MISSES: u64 = 3;
 
-/// So many cycles and slots of this node the time of another configuration may go on beside its own, if that has the greater claim: whoever
-/// hears it has yielded by then.
+/// Cycles and slots of this node in which another configuration's time may continue when this one has the greater
+/// claim. A node that hears this one has yielded by then.
 const OTHERS_CYCLES: u64 = 2 * JOINING_SYNCS as u64;
 const OTHERS_SLOTS: u64 = 2;
 
 const MS: u64 = 1_000_000;
 
-/// What of time may leave now.
+/// Which datagrams of time may leave now.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Allowed {
-    /// Nothing: only what the passing of time does, with roles, page and bound.
+    /// None: only roles, page and bound advance.
     Nothing,
-    /// It is a slot of this node: what asks and answers.
+    /// In a slot of this node: Requests and Replies.
     Slot,
-    /// It is the window of this node's synchronisation.
+    /// In this node's synchronisation window.
     Synchronisation {
         /// Of this cycle.
         cycle: u64,
@@ -44,64 +45,64 @@ pub enum Allowed {
     },
 }
 
-/// What a clock in time slots remembers besides.
+/// State of a clock that exists only in time slots.
 #[derive(Debug)]
 pub(super) struct Slots {
     pub(super) settings: InSlots,
     coarse: Coarse,
-    /// What was heard of who may not live any more.
+    /// Frames of nodes that may not be alive any more.
     pub(super) overheard: UnverifiedPeers,
     counts: SyncCounts,
-    /// The page goes by something else than what others go by now: a master that is not measured yet.
+    /// The page does not follow the present master yet, since that one is not measured.
     pub(super) unsure: bool,
-    /// What the master was off an earlier term when the page was made, ns: all its followers are so.
+    /// The master's own error against an earlier term when the page was made, ns. Its followers share it.
     master_error_ns: u64,
-    /// The last cycles of which a Sync of the master came, and of which any did.
+    /// The last cycle with a Sync of the master, and the last with any Sync.
     heard_cycle: u64,
     lives_cycle: u64,
-    /// The last one in which anything else of the master came.
+    /// The last cycle with another frame of the master.
     spoke_cycle: u64,
-    /// In this one it woke up, and knows nothing of those before.
+    /// This node woke up in this cycle: it knows nothing of those before.
     awake_cycle: u64,
-    /// The cycle that is being synchronised, and who is next; whether the way to it is warm.
+    /// The cycle in synchronisation, the next receiver, and whether its warm-up was sent.
     synced_cycle: u64,
     next: usize,
     is_warm: bool,
-    /// Cycles in which this node has only to say what time it is.
+    /// Cycles left in which this node sends only Syncs.
     pub(super) beginning: u8,
-    /// When this node was awake last, local ns.
+    /// When this node last ran, local ns.
     advanced_ns: u64,
 }
 
 impl Slots {
-    /// The page goes by the master's time, which may be so far off that of an earlier term.
+    /// The page follows the master's time, which may be this far off that of an earlier term.
     pub(super) fn goes_by(&mut self, master_error_ns: u64) {
         (self.unsure, self.master_error_ns) = (false, master_error_ns);
     }
 
-    /// What was heard of the time does not count any more.
+    /// Forgets what was heard of the time.
     pub(super) fn goes_by_nobody(&mut self) {
         self.coarse.clear();
         self.overheard.forget();
     }
 
-    /// This node reigns by such a time, which may be so far off that of an earlier term.
+    /// This node is master; its time may be this far off that of an earlier term.
     pub(super) fn reigns(&mut self, error_ns: u64, origin: Origin) {
         self.goes_by(error_ns);
         self.beginning = if origin == Origin::Own { 0 } else { BEGINNING_CYCLES };
     }
 }
 
-/// What goes in a window.
+/// What to send in a window.
 impl Clock {
-    /// From now on it sends only what it is asked for with [`Clock::poll_in`], and goes by the rules of time slots. The interval is the cycle.
-    /// For a clock that is new: it listens first, whatever its page says.
+    /// From now on the clock sends only through [`Clock::poll_in`], by the rules of time slots. The interval is the
+    /// cycle. For a new clock: it listens first, whatever its page says.
     pub fn in_slots(mut self, settings: InSlots) -> Self {
         self.election.asks_after(JOINING_SYNCS.into(), settings.asks_every_ns);
         let hears_ns = self.interval_ns.saturating_mul(OTHERS_CYCLES);
         self.others.gives(hears_ns.saturating_add(settings.slot_every_ns.saturating_mul(OTHERS_SLOTS)));
-        // Who hears nobody begins its terms anew, but not those of an earlier incarnation, by which others may still go: a reign lasts longer than
-        // a millisecond.
+        // A node that hears no other restarts its terms, but above those of its earlier incarnation, which others may
+        // still follow: a reign lasts longer than a millisecond.
         if self.line.record().epoch > 0 {
             self.election.speaks_of(Term::new(self.hello_ns / MS, 0), 0);
         }
@@ -126,8 +127,9 @@ impl Clock {
         self
     }
 
-    /// As [`Clock::poll`], of a clock in time slots: what may leave now. All that came is to be handed over before: a backup master
-    /// sends when it has not heard the master's Sync of this cycle. What has to wait for another window is not waited for.
+    /// As [`Clock::poll`], for a clock in time slots: what may leave now. Handle all received datagrams before: a
+    /// backup master sends when it has not heard the master's Sync of this cycle. Datagrams that need another window
+    /// are dropped.
     pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
         self.advance(now_ns);
         if allowed == Allowed::Slot && self.drafts.is_empty() && self.election.state() == State::Listening {
@@ -141,7 +143,7 @@ impl Clock {
         Step::Wait { until_ns: self.deadline_ns(now_ns) }
     }
 
-    /// In time slots this node is awake at least once in a cycle, from the first time on that it is asked.
+    /// In time slots this node runs at least once a cycle, from the first call on.
     pub(super) fn stood_still(&mut self, now_ns: u64) {
         let cycle = self.line.at(now_ns).ns / self.interval_ns;
         let Some(slots) = &mut self.slots else { return };
@@ -181,7 +183,7 @@ impl Clock {
         self.drafts.remove(at)
     }
 
-    /// The next Sync of a cycle, or what goes before it; none when everyone has got one.
+    /// The next Sync of a cycle, or its warm-up; none when each node has got one.
     fn next_sync(&mut self, now_ns: u64, cycle: u64, nominal_ns: u64) -> Option<(NodeIndex, Draft)> {
         if self.slots.as_ref()?.synced_cycle != cycle {
             if !self.synchronises(cycle) {
@@ -212,8 +214,7 @@ impl Clock {
         Some((to, if is_master { Draft::Sync { nominal_ns } } else { Draft::Replacement { nominal_ns } }))
     }
 
-    /// Whoever stands in for a master takes its place when as many Syncs are missing as must be. Who is not the next does so only if nobody
-    /// else stood in.
+    /// A stand-in becomes master when enough Syncs are missing; the next in order before others.
     fn succeed(&mut self, now_ns: u64, cycle: u64) {
         let (State::Slave(master), Some(slots)) = (self.election.state(), &self.slots) else { return };
         let is_next = self.election.before(Some(master.node)) == 0;
@@ -228,7 +229,7 @@ impl Clock {
         }
     }
 
-    /// Who gets the Sync at this place of a cycle: each time another one first, since the first finds the wire empty.
+    /// The receiver at this place of a cycle. The first one changes each cycle, since it finds the wire empty.
     fn receiver(&self, cycle: u64, place: usize) -> Option<NodeIndex> {
         let (nodes, own) = (u64::from(self.settings.nodes), u64::from(self.settings.own));
         let others = nodes.saturating_sub(1);
@@ -255,10 +256,9 @@ impl Clock {
     }
 }
 
-/// What came, as far as slots are concerned.
+/// Received frames, as far as slots are concerned.
 impl Clock {
-    /// A Sync of a master that this node heard, or a later one: whether the present master has not fallen silent, so that the two are
-    /// masters at once. Then their times may be two.
+    /// A Sync of this or a later master came: whether the present one lives, so that there are two.
     pub(super) fn is_contested(&self, received_ns: u64) -> bool {
         match self.election.state() {
             State::Listening => false,
@@ -267,7 +267,7 @@ impl Clock {
         }
     }
 
-    /// A Sync was taken.
+    /// A Sync was accepted.
     pub(super) fn heard_in_slots(&mut self, received: Stamp, sync: &Sync, contested: bool, turned: bool) {
         let Some(slots) = &mut self.slots else { return };
         slots.overheard.forget();
@@ -276,9 +276,10 @@ impl Clock {
             slots.coarse.clear();
             (slots.heard_cycle, slots.spoke_cycle) = (0, 0);
         }
-        // All who follow a master are off alike by what it may be off.
+        // All followers of a master share its error.
         slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
-        // Until it is measured, its time may be another: to go on by the old one is to send in the slots of those who follow it.
+        // A master that is not measured may have another time. Sending by the old one would hit the slots of its
+        // followers.
         let is_measured = self.timeline == sync.began;
         let off_ns = slots.coarse.off_ns(received.ns, self.line.at(received.ns).ns);
         let is_other = sync.epoch != self.line.record().epoch || off_ns > slots.settings.allowance_ns;
@@ -290,8 +291,8 @@ impl Clock {
         (slots.heard_cycle, slots.lives_cycle) = (sync.cycle, sync.cycle);
     }
 
-    /// Something of a node came that is no Sync, packages perhaps: the last of this incarnation of it at `received_ns`, local. If that is the
-    /// master, it lives, though its Syncs may be missing. Matters in time slots alone.
+    /// A frame other than a Sync came from a node, perhaps a package: the last of this incarnation at `received_ns`,
+    /// local. A master that sends is alive even if its Syncs are missing. Matters in time slots alone.
     pub fn hears(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) {
         if let Some(slots) = &mut self.slots
             && let Some(heard_ns) = self.election.speaks(from, incarnation, received_ns)
@@ -300,8 +301,7 @@ impl Clock {
         }
     }
 
-    /// The same of packages, as the one who takes them counts. `now_ns`: now by the monotonic clock, by which that is counted; `local_ns`: by
-    /// that of time.
+    /// The same for packages, from their counters, with now by their monotonic clock and by the clock of time.
     pub fn hears_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
         self.refused_by(packages, now_ns, local_ns);
         let State::Slave(Followed { node, .. }) = self.election.state() else { return };
@@ -310,14 +310,14 @@ impl Clock {
         self.hears(node, link.incarnation.get(), local_ns.saturating_sub(since_ns));
     }
 
-    /// Somebody hears no master either, and has time: whoever takes over goes on by that.
+    /// Another node hears no master either, and has time: a new master continues that time.
     pub(super) fn hello_in_slots(&mut self, received: Stamp, hello: &Request) {
         if let (Some(slots), State::Listening, true) = (&mut self.slots, self.election.state(), hello.timed) {
             slots.coarse.add(hello.epoch, hello.sent_ns, received.ns, hello.error_ns);
         }
     }
 
-    /// Another sent in the master's place: the cycle lives. That the master was not heard remains as it is.
+    /// Another node sent in the master's place: the cycle lives. The master still counts as unheard.
     pub(super) fn replaced(&mut self, received: Stamp, head: &FrameHead, sync: &Sync) -> Result<(), Ignored> {
         let (State::Slave(master), Some(slots)) = (self.election.state(), &mut self.slots) else {
             return Err(Ignored::Late);
@@ -335,9 +335,9 @@ impl Clock {
     }
 }
 
-/// What a node in time slots goes by.
+/// What a node in time slots follows.
 impl Clock {
-    /// By what a node in time slots goes. None if it has no time, or one that the present master has not confirmed.
+    /// The time by which a node in time slots sends. None without time, or before the present master has confirmed it.
     pub fn estimate(&self) -> Option<TimeEstimate> {
         let slots = self.slots.as_ref().filter(|slots| !slots.unsure && self.line.is_synchronised())?;
         let record = *self.line.record();
@@ -348,13 +348,13 @@ impl Clock {
         Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))
     }
 
-    /// The same, if it is sure enough of it to send by it.
+    /// The same, if its bound is small enough to send by it.
     pub(super) fn sure(&self, now_ns: u64) -> Option<TimeEstimate> {
         let allowance_ns = self.slots.as_ref()?.settings.allowance_ns;
         self.estimate().filter(|own| own.bound_ns(now_ns) <= allowance_ns)
     }
 
-    /// By what time this node would reign: that which others still go by, if it knows it well enough.
+    /// The time that this node would use as master: the others' time, if it knows that well enough.
     pub(super) fn origin_in_slots(&self, slots: &Slots, now_ns: u64) -> Origin {
         let is_heard =
             || self.coarse(now_ns).is_some_and(|heard| heard.bound_ns(now_ns) <= slots.settings.allowance_ns);
@@ -365,8 +365,7 @@ impl Clock {
         }
     }
 
-    /// From now on the line is what others were heard to go by. It was so all along if it is hardly off; else it goes there, and must not go
-    /// back within an epoch.
+    /// The page takes over the time that was heard. A large difference is a step, but not back within an epoch.
     pub(super) fn take_up_heard(&mut self, now_ns: u64) {
         let Some((heard, slots)) = self.coarse(now_ns).zip(self.slots.as_ref()) else { return };
         let (epoch, system_ns) = (self.line.record().epoch, heard.system_ns(now_ns));
@@ -375,18 +374,18 @@ impl Clock {
         if is_timed && epoch == heard.epoch() && off_ns <= slots.settings.allowance_ns {
             return;
         }
-        // Also a node that knows nothing of its time any more must not go back in an epoch that it was in.
+        // A node that lost its time must not go back within an epoch that it was in, either.
         let is_back = epoch == heard.epoch() && system_ns < self.line.at(now_ns).ns;
         let epoch = if (is_timed && epoch >= heard.epoch()) || is_back { epoch + 1 } else { heard.epoch() };
         self.line.step(now_ns, epoch, system_ns, EVEN_PPB, heard.bound_ns(now_ns), 0);
     }
 
-    /// Whether this node reigns by a time that others may not go by yet: it sends nothing but Syncs.
+    /// Whether this node is a master with a time that others may not follow yet: it sends only Syncs.
     pub fn is_beginning(&self) -> bool {
         self.is_master() && self.slots.as_ref().is_some_and(|slots| slots.beginning > 0)
     }
 
-    /// The time by the last Syncs alone, good enough to ask for more. None if there are too few.
+    /// The time by the last Syncs alone, good enough to send Requests. None if there are too few.
     pub fn coarse(&self, now_ns: u64) -> Option<TimeEstimate> {
         let slots = self.slots.as_ref()?;
         slots.coarse.estimate(now_ns, slots.settings.delay_max_ns)
@@ -407,7 +406,7 @@ impl Clock {
         }
     }
 
-    /// Whether it has to, in that of this cycle: as the master, or in place of one whose Sync has not come.
+    /// Whether it must send in that window of this cycle: as the master, or because the master's Sync is missing.
     pub fn synchronises(&self, cycle: u64) -> bool {
         let is_missing = |master: &Followed| {
             let due_cycle = self.due_cycle(cycle, master);
@@ -420,7 +419,7 @@ impl Clock {
         }
     }
 
-    /// The last cycle whose Sync must have come before this node's own window of a cycle.
+    /// The last cycle with a Sync that is due before this node's own window of a cycle.
     fn due_cycle(&self, cycle: u64, master: &Followed) -> u64 {
         if self.election.stands_behind(master.term) { cycle } else { cycle.saturating_sub(1) }
     }
@@ -429,7 +428,7 @@ impl Clock {
         matches!(self.election.state(), State::Master(_))
     }
 
-    /// What was sent and heard of synchronisation in time slots.
+    /// Counters of synchronisation in time slots.
     pub fn sync_counts(&self) -> SyncCounts {
         self.slots.as_ref().map(|slots| slots.counts).unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! A clock whose computer sleeps, or is slewed by a time daemon: what was known ends, and is measured anew.
+//! A clock on a computer that sleeps, or with a time daemon that slews it: the known time ends, and is measured anew.
 
 use super::Clock;
 use crate::time::UNSYNCHRONISED_NS;
@@ -6,15 +6,16 @@ use crate::time::steadiness::{Looked, Steadiness, Unsteady};
 use rohrpost_mailbox::Watched;
 
 impl Clock {
-    /// Looks whether the local clock keeps what bounds assume of it. To be called before anything else, at least once a cycle in time slots; what is
-    /// wrong, if this look shows it. Then nothing is known of the time until it has been measured anew; and whoever reigned by it reigns no more.
+    /// Checks whether the local clock keeps its limits. Call it before anything else, at least once a cycle in time
+    /// slots. Returns the fault, if this look shows one. Then the time is unknown until it has been measured anew, and
+    /// a master steps down.
     pub fn look_at_clocks(&mut self, looked: Looked) -> Option<Unsteady> {
         let found = self.steadiness.look(looked)?;
         self.distrust(looked.local_ns);
         Some(found)
     }
 
-    /// Goes on watching where an earlier incarnation has ended; for a clock that is new.
+    /// Continues to watch where an earlier incarnation ended; for a new clock.
     #[must_use]
     pub fn watching(mut self, now_ns: u64, watched: Option<Watched>) -> Self {
         self.steadiness = Steadiness::of(watched);
@@ -24,12 +25,12 @@ impl Clock {
         self
     }
 
-    /// What the next incarnation of this node's clock goes on from.
+    /// State for the next incarnation of this node's clock.
     pub fn watched(&self) -> Option<Watched> {
         self.steadiness.watched()
     }
 
-    /// Why nothing is known of the time though it may be heard: what [`Self::look_at_clocks`] found.
+    /// Why the time is unknown though it may be heard: the finding of [`Self::look_at_clocks`].
     pub fn unsteady(&self, now_ns: u64) -> Option<Unsteady> {
         self.steadiness.why(now_ns).map(|(why, _)| why)
     }
@@ -38,8 +39,8 @@ impl Clock {
         self.steadiness.why(now_ns).is_some()
     }
 
-    /// The local clock did what bounds exclude. The line goes on, so that time never goes back within an epoch; where it is too far off to be bent, the
-    /// master begins another.
+    /// The local clock broke its limits. The line continues, so that time never goes back within an epoch. If it is too
+    /// far off to be slewed, the master begins another epoch.
     fn distrust(&mut self, now_ns: u64) {
         self.line.stop_slew(now_ns);
         self.line.restate(UNSYNCHRONISED_NS, 0);

@@ -1,4 +1,4 @@
-//! Clocks against a world that knows the true time: each promise of the module's page, with many seeds.
+//! Clocks in a world that knows the true time: each promise of the module's page, with many seeds.
 
 mod scenes;
 mod strangers;

@@ -1,4 +1,4 @@
-//! What may happen to a system, one after the other. The world checks at each moment; a scene says what must come of it, and when.
+//! Sequences of events in a system. The world checks at each moment; a scene states the result and its deadline.
 
 use super::world::{Conditions, MS, SECOND, World};
 use crate::time::{Broken, STEP_MIN_NS};
@@ -55,7 +55,7 @@ fn the_master_dies(world: &mut World) {
         world.start(master);
         world.run(2 * SECOND);
         if world.masters_now().contains(&master) {
-            world.fail("who returns stays a slave");
+            world.fail("a node that returns stays a slave");
         }
     }
     if world.epoch(3) != 1 {
@@ -70,14 +70,14 @@ fn two_masters_die(world: &mut World) {
     world.run_until(6 * INTERVAL, "takeover by the one after the next", |world| world.masters_now() == [2]);
     agrees_again(world, SECOND);
     world.kill(2);
-    // Nobody is left who may be master: the last one goes on by its own clock, and its bound says so.
+    // No candidate for master is left: the last one continues by its own clock, and its bound says so.
     world.run(20 * SECOND);
     let reading = world.clock(3).reading(world.local_ns(3));
     if !reading.synchronised || reading.time.error < Duration::from_micros(20) {
         world.fail("a bound that does not grow");
     }
     world.start(1);
-    world.run_until(2 * SECOND, "agreement with who knows the time no better", |world| world.agrees(50 * MS));
+    world.run_until(2 * SECOND, "agreement with a node that knows the time no better", |world| world.agrees(50 * MS));
 }
 
 fn the_masters_router_starts_again(world: &mut World) {
@@ -109,7 +109,7 @@ fn a_computer_starts_again(world: &mut World) {
     world.switch_off(0);
     world.start(0);
     world.run(INTERVAL);
-    // The others have time, so one of them is master, though the first in order was there before them.
+    // The others have time, so one of them is master, though the first in order started before them.
     (1..4).for_each(|node| world.start(node));
     agrees_again(world, 12 * INTERVAL + SECOND);
 }

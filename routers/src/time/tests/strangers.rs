@@ -1,4 +1,4 @@
-//! Datagrams that nobody sends who means well: they are refused, or change nothing that a module could notice.
+//! Hostile datagrams: they are refused, or change nothing that a module could notice.
 
 use crate::frame::{FrameHead, Kind};
 use crate::time::message::{MESSAGE_BYTES, Message, Reply, Request, Sync};
@@ -24,7 +24,7 @@ fn head(kind: Kind, from: u8) -> FrameHead {
     FrameHead { kind, system: 1, from, to: 1, digest: 7, incarnation: 5, sequence: 0 }
 }
 
-/// Numbers at the edges, and near each other: so that they go together now and then.
+/// Numbers at the edges, and near each other, so that they match now and then.
 fn number() -> impl Strategy<Value = u64> {
     prop_oneof![0..4_u64, 250..260_u64, 500..520_u64, Just(u64::MAX), Just(i64::MAX as u64), any::<u64>()]
 }
@@ -77,13 +77,24 @@ proptest! {
 
     #[test]
     fn a_clock_survives_whatever_it_is_told_and_never_goes_back(
-        told in prop::collection::vec((message(), prop_oneof![Just(0_u8), Just(2)], 0..200_000_000_u64, 0..300_000_000_u64), 1..60),
+        told in prop::collection::vec(
+            (message(), prop_oneof![Just(0_u8), Just(2)], 0..200_000_000_u64, 0..300_000_000_u64),
+            1..60,
+        ),
         in_slots in any::<bool>(),
     ) {
         let mut now_ns = 1_000_000_000;
         let mut clock = Clock::new(settings(), now_ns, 1_790_000_000_000_000_000, None);
         if in_slots {
-            clock = clock.in_slots(InSlots { warm_ups: true, replies_in_synchronisation: false, delay_max_ns: 30_000, allowance_ns: 60_000, slot_every_ns: 5_000_000, asks_every_ns: 5_000_000, hello_every_ns: 20_000_000 });
+            clock = clock.in_slots(InSlots {
+                warm_ups: true,
+                replies_in_synchronisation: false,
+                delay_max_ns: 30_000,
+                allowance_ns: 60_000,
+                slot_every_ns: 5_000_000,
+                asks_every_ns: 5_000_000,
+                hello_every_ns: 20_000_000,
+            });
         }
         let mut last = clock.reading(now_ns).time;
         for (message, from, waits_ns, came_before_ns) in told {
@@ -96,7 +107,10 @@ proptest! {
                 let step = match sent % 3 {
                     _ if !in_slots => clock.poll(now_ns, &mut datagram),
                     0 => clock.poll_in(now_ns, Allowed::Slot, &mut datagram),
-                    1 => clock.poll_in(now_ns, Allowed::Synchronisation { cycle: now_ns, nominal_ns: now_ns }, &mut datagram),
+                    1 => {
+                        let allowed = Allowed::Synchronisation { cycle: now_ns, nominal_ns: now_ns };
+                        clock.poll_in(now_ns, allowed, &mut datagram)
+                    }
                     _ => clock.poll_in(now_ns, Allowed::Nothing, &mut datagram),
                 };
                 match step {
@@ -111,7 +125,12 @@ proptest! {
                 }
             }
             let time = clock.reading(now_ns).time;
-            prop_assert!(time.epoch > last.epoch || (time.epoch == last.epoch && time.ns >= last.ns), "{:?} {:?}", last, time);
+            prop_assert!(
+                time.epoch > last.epoch || (time.epoch == last.epoch && time.ns >= last.ns),
+                "{:?} {:?}",
+                last,
+                time
+            );
             last = time;
         }
     }
@@ -146,10 +165,10 @@ fn a_reply_to_another_question_changes_nothing() {
 }
 
 #[test]
-fn who_is_too_far_off_gets_an_epoch_though_it_followed_a_later_term() {
+fn a_node_too_far_off_gets_an_epoch_though_it_followed_a_later_term() {
     let mut clock = Clock::new(settings(), 0, 0, None);
     let mut datagram = [0; TIME_BYTES];
-    // It hears nobody, and becomes master.
+    // It hears no other node, and becomes master.
     let syncs = (1..100).map(|n| n * 10_000_000).find_map(|now_ns| {
         while let Step::Send { to, .. } = clock.poll(now_ns, &mut datagram) {
             let (head, rest) = FrameHead::parse(&datagram).unwrap();

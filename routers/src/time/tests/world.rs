@@ -1,5 +1,5 @@
-//! A few nodes with wrong clocks on a bad network, in virtual time from a seed. It knows the true time, and checks every node's page at
-//! every moment against what the module's page promises.
+//! A few nodes with wrong clocks on a bad network, in virtual time from a seed. It knows the true time, and checks
+//! every node's page at every moment against the promises of the module.
 
 use crate::frame::{FrameHead, NodeIndex};
 use crate::time::{Broken, Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
@@ -24,7 +24,7 @@ const WALL_NS: u64 = 1_790_000_000 * SECOND;
 struct Node {
     clock: Option<Clock>,
     oscillator: Oscillator,
-    /// What its page says; it outlives a router.
+    /// Its page; it outlives a router.
     page: Option<TimeRecord>,
     /// The term that the page follows.
     page_term: Term,
@@ -55,7 +55,7 @@ pub(super) struct World {
     cut: Vec<Vec<bool>>,
     pub(super) replay: String,
     pub(super) broken: Option<Broken>,
-    /// When somebody became master, and who.
+    /// When a node became master, and which.
     pub(super) reigns: Vec<(u64, NodeIndex)>,
     pub(super) ignored: u64,
     pub(super) failures: u32,
@@ -145,12 +145,12 @@ impl World {
         one.page_term = Term::NONE;
     }
 
-    /// Its threads stand still.
+    /// Its threads stall.
     pub(super) fn freeze(&mut self, node: NodeIndex, for_ns: u64) {
         self.nodes[usize::from(node)].frozen_until = self.now + for_ns;
     }
 
-    /// Whoever is on one side does not hear the other; nor the other way round.
+    /// Nodes on one side do not hear the other side, nor the other way round.
     pub(super) fn split(&mut self, side: &[NodeIndex]) {
         for from in 0..self.cut.len() {
             for to in 0..self.cut.len() {
@@ -187,7 +187,7 @@ impl World {
         self.clock(node).record().epoch
     }
 
-    /// Whether all that are alive follow one master, by its term and epoch, with a bound below this.
+    /// Whether all live nodes follow one master, by its term and epoch, with a bound below this.
     pub(super) fn agrees(&self, error_ns: u64) -> bool {
         let masters = self.masters_now();
         let [master] = masters[..] else { return false };
@@ -199,7 +199,7 @@ impl World {
         })
     }
 
-    /// Runs until this holds; how long that took.
+    /// Runs until this holds; returns how long that took.
     pub(super) fn run_until(&mut self, within_ns: u64, what: &str, is: impl Fn(&Self) -> bool) -> u64 {
         let begin = self.now;
         while !is(self) {
@@ -220,7 +220,7 @@ impl World {
         }
     }
 
-    /// A broken clock is expected to fail, and the world goes on.
+    /// A broken clock is expected to fail, and the world continues.
     pub(super) fn fail(&mut self, what: &str) {
         assert!(self.broken.is_some(), "{what}; at {} ms; {}", self.now / MS, self.replay);
         self.failures += 1;
@@ -262,7 +262,7 @@ impl World {
                 self.push(next, Event::SnapshotRequest);
             }
             Event::Wake(node) if frozen_until(self, node) > self.now => {
-                // What came meanwhile lies in its socket, and is read first.
+                // Received datagrams are in its socket, and are read first.
                 let at = frozen_until(self, node) + 1;
                 self.wake(node, at);
             }

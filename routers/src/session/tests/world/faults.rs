@@ -76,9 +76,9 @@ impl World {
     fn restart_client(&mut self, index: usize) {
         self.oracle.saw("client restarted");
         let node = &mut self.nodes[index];
-        node.life += 2;
+        node.incarnation += 2;
         let now_ns = node.clock.at(self.now_ns);
-        node.client = Client::new(client_settings(index, node.life), ranges(index), now_ns);
+        node.client = Client::new(client_settings(index, node.incarnation), ranges(index), now_ns);
         node.wake_ns = 0;
         self.oracle.clients[index].up_ns = None;
         let is_told = self.faults.percent(50);

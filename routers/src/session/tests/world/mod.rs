@@ -9,7 +9,7 @@ use crate::admission::capped;
 use crate::session::LOOK_EVERY_NS;
 use crate::session::client::{self, Client, Package};
 use crate::session::server::{self, Server};
-use crate::sim::chance::Chance;
+use crate::session::tests::chance::Chance;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Options, Priority, TimeRecord, TimeSource, Type};
 use streams::Connection;
 
@@ -25,7 +25,7 @@ pub(super) struct Node {
     clock: Clock,
     frozen_until_ns: u64,
     wake_ns: u64,
-    life: u64,
+    incarnation: u64,
     pub(super) attempts: u64,
     chance: Chance,
 }
@@ -53,9 +53,9 @@ impl World {
     pub(super) fn new(plan: Plan) -> Self {
         let mut chance = Chance::new(plan.seed);
         let node = |index: usize, chance: &mut Chance| {
-            let (clock, life) = (Clock::new(chance), chance.bits() | 1);
-            let client = Client::new(client_settings(index, life), ranges(index), clock.at(0));
-            Node { client, clock, frozen_until_ns: 0, wake_ns: 0, life, attempts: 0, chance: chance.fork() }
+            let (clock, incarnation) = (Clock::new(chance), chance.bits() | 1);
+            let client = Client::new(client_settings(index, incarnation), ranges(index), clock.at(0));
+            Node { client, clock, frozen_until_ns: 0, wake_ns: 0, incarnation, attempts: 0, chance: chance.fork() }
         };
         let nodes: Vec<Node> = (0..plan.clients).map(|index| node(index, &mut chance)).collect();
         let known = |index| Known {
@@ -141,7 +141,7 @@ impl World {
         }
     }
 
-    /// Whether the server that a client knows is the one that lives.
+    /// Whether a client knows the server's present incarnation.
     fn is_reached(&self, client: usize) -> bool {
         let is_whole = |connection: &Connection| connection.is_client_open && connection.index.is_some();
         self.connections.iter().any(|connection| connection.client == client && is_whole(connection))
@@ -288,11 +288,11 @@ impl World {
     }
 }
 
-fn check_counts(who: &str, counts: &crate::session::Counts, waits_none: bool) -> Vec<String> {
+fn check_counts(end: &str, counts: &crate::session::Counts, waits_none: bool) -> Vec<String> {
     let wrong = counts.classes().filter_map(|(priority, class)| {
         let (came, went) = (class.packages.get(), class.settled());
         let holds = if waits_none { came == went } else { came >= went };
-        (!holds).then(|| format!("{who}: of class {} came {came}, and {went} are accounted for", priority.0))
+        (!holds).then(|| format!("{end}: of class {} came {came}, and {went} are accounted for", priority.0))
     });
     wrong.collect()
 }

@@ -1,11 +1,11 @@
-//! What is true of a world, and what its nodes say: the time of each term, and what must hold at any moment.
+//! The true state of a world against its nodes' claims: the time of each term, and what must hold at any moment.
 
 use super::{Oscillator, World};
 use crate::frame::NodeIndex;
 use crate::time::Role;
 use rohrpost_mailbox::TimeRecord;
 
-/// The time of a term: the line of its master, as the master had it at the beginning, shifted to where the time before went on.
+/// The time of a term: its master's line at the beginning, shifted so that it continues the time before.
 #[derive(Clone, Copy)]
 pub(super) struct TermTime {
     node: NodeIndex,
@@ -56,7 +56,7 @@ impl World {
         }
     }
 
-    /// A master that was none before begins a term, which goes on from the time before unless an epoch began.
+    /// A new master begins a term, which continues the time before unless an epoch began.
     fn check_reign(&mut self, node: NodeIndex) {
         let one = &self.nodes[usize::from(node)];
         let Some(clock) = one.clock.as_ref().filter(|clock| clock.role() == Role::Master) else { return };

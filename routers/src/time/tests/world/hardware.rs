@@ -1,4 +1,4 @@
-//! Oscillators, and what the network and the computers do.
+//! Oscillators, and the faults of network and computers.
 
 use super::MS;
 
@@ -7,7 +7,7 @@ use super::MS;
 pub(super) struct Oscillator {
     pub(super) offset_ns: u64,
     pub(super) rate_ppb: i64,
-    /// The rate swings by so much, with this period.
+    /// The rate swings by this much, with this period.
     pub(super) wander_ppb: f64,
     pub(super) period_ns: f64,
     pub(super) phase: f64,
@@ -25,18 +25,18 @@ impl Oscillator {
     }
 }
 
-/// What the network and the computers do.
+/// Faults of the network and the computers.
 #[derive(Clone, Copy, Debug)]
 pub(in super::super) struct Conditions {
     pub(in super::super) delay_ns: u64,
-    /// Of the way to nodes of a higher index: so much more.
+    /// Extra delay to nodes with a higher index.
     pub(in super::super) asymmetry_ns: u64,
     pub(in super::super) jitter_ns: u64,
-    /// Of a thousand.
+    /// Per thousand.
     pub(in super::super) loss: u32,
     pub(in super::super) twice: u32,
     pub(in super::super) kernel_stamps: bool,
-    /// A thread that wants to run waits so long, now and then ten times as long.
+    /// Wake-up delay of a thread, now and then ten times as long.
     pub(in super::super) wakeup_ns: u64,
 }
 

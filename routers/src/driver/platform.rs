@@ -1,0 +1,78 @@
+//! What a slot driver has of the system, and what it tells of itself.
+
+use super::log::WindowLog;
+use crate::frame::NodeIndex;
+use crate::intake::Transit;
+use crate::outbound::Outbound;
+use crate::report::Report;
+use crate::stats::Stats;
+use crate::tdma::{Planned, SlotScheduler, TransmitWindow, Verdict};
+use crate::time::{Clock, SentId, Stamp, Step, TIME_BYTES};
+
+/// The system took a datagram neither to send nor to keep it: its packages are lost.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("the datagram was not sent")]
+pub struct NotSent;
+
+/// Clocks, mailbox, queue and sockets of a router with time slots.
+pub trait Platform {
+    /// The clock by which windows are planned, ns.
+    fn local_ns(&self) -> u64;
+    /// The clock by which packages are published, ns.
+    fn monotonic_ns(&self) -> u64;
+    /// What is known of system time.
+    fn clock(&self) -> &Clock;
+    /// The same, to be changed; and in which the half that receives counts.
+    fn time(&mut self) -> (&mut Clock, &Stats);
+    /// The router's mailbox, and the queue behind it.
+    fn transit(&mut self) -> impl Transit;
+    /// The queue; and who is told of what it loses.
+    fn queue(&mut self) -> (&mut Outbound, impl Report);
+    /// Hands over the datagram in the first `bytes` of a buffer, which has room for a seal behind them.
+    ///
+    /// # Errors
+    /// [`NotSent`]; the datagram is as it was.
+    fn send(&mut self, now_ns: u64, to: NodeIndex, buffer: &mut [u8], bytes: usize) -> Result<(), NotSent>;
+    /// Hands over a datagram of time.
+    fn send_time(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]);
+    /// Sends the next refusal or hello if it fits, a hello to the node `first` before others; as how many bytes slots count it.
+    fn answer(&mut self, tx_window: &TransmitWindow, first: Option<NodeIndex>) -> Option<usize>;
+    /// Hands the clock what came: stamps of what `left`, then at most so many datagrams of time.
+    fn take_time(&mut self, most: usize, left: impl FnMut(SentId, Stamp));
+    /// Does between windows what is due besides.
+    fn tidy(&mut self, now_ns: u64);
+    /// Lets others see how it stands.
+    fn publish(&mut self, scheduler: &SlotScheduler, log: &WindowLog);
+    /// The queue has become longer or shorter.
+    fn queue_changed(&mut self) {}
+    /// Something happened that a simulation watches, or that takes its time there.
+    fn happened(&mut self, _: SlotEvent<'_>) {}
+}
+
+/// What a slot driver does.
+#[derive(Clone, Copy, Debug)]
+pub enum SlotEvent<'a> {
+    /// It is awake for a window, and has read what came.
+    Awake(&'a Planned),
+    /// The clock was asked between windows, when it may send nothing.
+    Idle(&'a Step),
+    /// It was time for a window.
+    Judged(&'a Planned, &'a Verdict),
+    /// A hello leaves in this window by what is only overheard.
+    AnsweredOverheard(&'a TransmitWindow),
+    /// A datagram of packages was made.
+    Made,
+    /// A datagram was made, and fits no more. `held`: it leaves first in the next slot; else it is lost.
+    Missed {
+        /// Its bytes.
+        datagram: &'a [u8],
+        /// Whether it waits.
+        held: bool,
+    },
+    /// A datagram was held for too long, and is lost.
+    DroppedOld(&'a [u8]),
+    /// Packages that wait cannot keep their bounds: a slot was left out or cut short.
+    LeftOut,
+    /// The window is done with.
+    Closed(&'a TransmitWindow),
+}

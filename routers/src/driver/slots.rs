@@ -1,0 +1,395 @@
+//! When the thread of the time slots wakes, and what it does then.
+//!
+//! ```text
+//!        sleep, about a millisecond at a time                  wake    call begin              guard
+//!  ──┬──────────────┬──────────────┬─────────────────────────┬───────┬────┬───────────────────┬─────▶ local time
+//!    is the mailbox full?   the same      the same           │ spin  │lead│ time, refusal,    │
+//!                                         mailbox ─▶ queue ──┼──────▶│    │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
+//!                                       stamps, datagrams of time ─▶ Clock
+//! ```
+
+use super::held::{self, Held};
+use super::log::WindowLog;
+use super::platform::{NotSent, Platform, SlotEvent};
+use super::timing::{LAST_LOOK_NS, LOOK_BURST, NAP_NS, SLEEP_NS_MAX, TIDY_NS};
+use crate::frame::{FrameHead, NodeIndex};
+use crate::intake::{Intake, MAKING_NS, QUIET_NS, Transit};
+use crate::outbound::Outbound;
+use crate::tdma::{Carries, Kind, Next, Planned, SlotScheduler, TransmitWindow, Verdict};
+use crate::time::{Allowed, SentId, Step, TIME_BYTES};
+use rohrpost_network::Network;
+
+/// Sends in the windows of its node. Nothing but this sends, and this only with a [`TransmitWindow`].
+pub struct SlotDriver {
+    network: Network,
+    /// Nodes of the network.
+    nodes: usize,
+    scheduler: SlotScheduler,
+    intake: Intake,
+    /// Room for the largest datagram, and its seal.
+    datagram: Box<[u8]>,
+    /// A datagram that lies there since the last slot.
+    held: Option<Held>,
+    phase: Phase,
+    /// When the socket of time was read last, local ns.
+    looked_ns: u64,
+    /// When it saw last to what waits.
+    tidied_ns: u64,
+    /// Slots that were left out so far, as it has told.
+    left_out: u64,
+    /// The first datagram of the last window, if the kernel stamps it.
+    first: Option<First>,
+    log: WindowLog,
+}
+
+/// What to do until it is polled again.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SlotStep {
+    /// Sleep, ns from now on.
+    Sleep {
+        /// For so long.
+        for_ns: u64,
+    },
+    /// Spin: packages that come meanwhile are taken. Nothing else is due before then, local ns.
+    Spin {
+        /// Until when.
+        until_ns: u64,
+    },
+}
+
+/// What it waits for.
+#[derive(Clone, Copy)]
+enum Phase {
+    /// Nothing has been planned.
+    Plans,
+    /// To see to what waits, between windows.
+    Naps { is_silent: bool, wake_ns: u64 },
+    /// To wake up for a window, or where there is none to look at what came.
+    Sleeps(Option<Planned>),
+    /// The call of a window. `looks`: what came is to be looked at once more.
+    Spins { planned: Planned, looks: bool },
+}
+
+/// A datagram that begins a window.
+#[derive(Clone, Copy)]
+struct First {
+    id: SentId,
+    /// When its window was asked for, local ns.
+    called_ns: u64,
+    /// When the window begins, local ns.
+    begin_ns: u64,
+}
+
+impl SlotDriver {
+    /// Of a router that begins at `now_ns`. `datagram`: room for the largest, and its seal.
+    pub fn new(network: Network, nodes: usize, scheduler: SlotScheduler, datagram: Box<[u8]>, now_ns: u64) -> Self {
+        Self {
+            network,
+            nodes,
+            scheduler,
+            intake: Intake::new(now_ns),
+            datagram,
+            held: None,
+            phase: Phase::Plans,
+            looked_ns: 0,
+            tidied_ns: 0,
+            left_out: 0,
+            first: None,
+            log: WindowLog::default(),
+        }
+    }
+
+    /// When it sends, and why not.
+    pub fn scheduler(&self) -> &SlotScheduler {
+        &self.scheduler
+    }
+
+    /// Does what is due. To be called again when it has slept, or at once if it spins.
+    pub fn poll(&mut self, on: &mut impl Platform) -> SlotStep {
+        match self.phase {
+            Phase::Plans => {}
+            Phase::Naps { is_silent, wake_ns } => self.between(on, is_silent, wake_ns),
+            Phase::Sleeps(None) => {
+                self.look(on);
+                self.between(on, true, u64::MAX);
+            }
+            Phase::Sleeps(Some(planned)) => {
+                self.look(on);
+                self.open(on, &planned);
+                // Who is to send only if a Sync is missing looks for it once more.
+                let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
+                let looks = !is_slot && planned.call_ns.saturating_sub(on.local_ns()) > 2 * LAST_LOOK_NS;
+                self.phase = Phase::Spins { planned, looks };
+            }
+            Phase::Spins { .. } => {}
+        }
+        if let Phase::Spins { planned, looks } = self.phase {
+            if let Some(until_ns) = self.spin(on, &planned, looks) {
+                return SlotStep::Spin { until_ns };
+            }
+            self.window(on, &planned);
+        }
+        SlotStep::Sleep { for_ns: self.plan(on) }
+    }
+
+    /// What comes next; for how long to sleep before that.
+    fn plan(&mut self, on: &mut impl Platform) -> u64 {
+        loop {
+            let now_ns = on.local_ns();
+            let next = self.scheduler.next(now_ns, on.clock());
+            self.tell_left_out(on);
+            let (planned, wake_ns) = match next {
+                Next::Window(planned) => (Some(planned), planned.wake_ns),
+                Next::Silent { until_ns, .. } => (None, until_ns),
+            };
+            let left_ns = wake_ns.saturating_sub(now_ns);
+            if left_ns > SLEEP_NS_MAX {
+                self.phase = Phase::Naps { is_silent: planned.is_none(), wake_ns };
+                // Not so that the rest is a short one.
+                return NAP_NS.min(left_ns / 2);
+            }
+            // Windows follow each other quickly.
+            if left_ns > TIDY_NS && on.monotonic_ns().saturating_sub(self.tidied_ns) > SLEEP_NS_MAX {
+                self.between(on, planned.is_none(), wake_ns);
+                continue;
+            }
+            self.phase = Phase::Sleeps(planned);
+            return left_ns;
+        }
+    }
+
+    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is silent waits for datagrams of
+    /// time; others read them once a cycle at least.
+    fn between(&mut self, on: &mut impl Platform, is_silent: bool, wake_ns: u64) {
+        let now_ns = on.monotonic_ns();
+        self.tidied_ns = now_ns;
+        self.drop_if_old(on);
+        let (outbound, mut report) = on.queue();
+        outbound.tidy(now_ns, &mut report);
+        drop(report);
+        self.intake.relieve(now_ns, &mut on.transit(), wake_ns);
+        on.queue_changed();
+        on.tidy(now_ns);
+        if is_silent || on.local_ns().saturating_sub(self.looked_ns) > self.scheduler.table().cycle_ns() {
+            self.look(on);
+        }
+    }
+
+    /// Hands all datagrams of time and stamps that came to the clock, and shows how it stands.
+    fn look(&mut self, on: &mut impl Platform) {
+        let Self { scheduler, first, log, .. } = self;
+        // What comes with a node's address, and is none of its, must not take the time before a slot.
+        let most = LOOK_BURST + self.nodes;
+        on.take_time(most, |id, stamp| {
+            let Some(First { called_ns, begin_ns, .. }) = first.take_if(|first| first.id == id) else { return };
+            scheduler.left(called_ns, stamp);
+            log.left(begin_ns, stamp);
+        });
+        let (now_ns, monotonic_ns) = (on.local_ns(), on.monotonic_ns());
+        let (clock, stats) = on.time();
+        clock.hears_by(stats, monotonic_ns, now_ns);
+        // Roles and bounds go on with time; there is nothing to be sent.
+        let step = clock.poll_in(now_ns, Allowed::Nothing, &mut [0; TIME_BYTES]);
+        on.happened(SlotEvent::Idle(&step));
+        self.looked_ns = now_ns;
+        on.publish(&self.scheduler, &self.log);
+    }
+
+    /// Awake for a slot, it takes from the mailbox what that has room for.
+    fn open(&mut self, on: &mut impl Platform, planned: &Planned) {
+        on.happened(SlotEvent::Awake(planned));
+        if let (Kind::Slot { .. }, None) = (planned.window.kind, self.scheduler.silent()) {
+            let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
+            self.intake.open(on.monotonic_ns(), self.scheduler.table().wire().bytes_in(sends_ns));
+        }
+    }
+
+    /// Takes what the slot has room for, and what still comes, until shortly before the call. When there is something to do again, unless
+    /// packages come; none: it is time for the call.
+    fn spin(&mut self, on: &mut impl Platform, planned: &Planned, mut looks: bool) -> Option<u64> {
+        loop {
+            let left_ns = planned.call_ns.saturating_sub(on.local_ns());
+            if left_ns == 0 {
+                return None;
+            }
+            if looks && left_ns < LAST_LOOK_NS {
+                looks = false;
+                self.look(on);
+            }
+            if left_ns > QUIET_NS && self.intake.take_one(&mut on.transit()) {
+                continue;
+            }
+            self.phase = Phase::Spins { planned: *planned, looks };
+            return Some(if looks { planned.call_ns - LAST_LOOK_NS + 1 } else { planned.call_ns });
+        }
+    }
+
+    /// It is time for a window.
+    fn window(&mut self, on: &mut impl Platform, planned: &Planned) {
+        let called_ns = on.local_ns();
+        let verdict = self.scheduler.validate(planned, called_ns, on.clock());
+        on.happened(SlotEvent::Judged(planned, &verdict));
+        if let Verdict::Send(tx_window) = verdict {
+            self.use_window(on, tx_window, called_ns);
+        }
+        self.intake.close();
+    }
+
+    /// `called_ns`: when the window was asked for.
+    fn use_window(&mut self, on: &mut impl Platform, mut tx_window: TransmitWindow, called_ns: u64) {
+        self.first = None;
+        self.send_time(on, &mut tx_window, called_ns);
+        if tx_window.carries_hello() {
+            answer(on, &mut tx_window);
+        }
+        if tx_window.carries == Carries::All {
+            self.send_packages(on, &mut tx_window);
+            on.queue_changed();
+        }
+        self.scheduler.close(&tx_window);
+        if tx_window.datagrams() > 0 {
+            let (_, lead_ns) = self.scheduler.lead_ns();
+            self.log.used(&tx_window, called_ns + lead_ns);
+        }
+        on.happened(SlotEvent::Closed(&tx_window));
+        self.look(on);
+    }
+
+    /// `called_ns`: when the window was asked for. From there on it counts how long the first frame takes to the wire.
+    fn send_time(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow, called_ns: u64) {
+        let mut datagram = [0; TIME_BYTES];
+        loop {
+            let now_ns = on.local_ns();
+            if !tx_window.fits(now_ns, TIME_BYTES) {
+                return;
+            }
+            let Step::Send { to, .. } = on.time().0.poll_in(now_ns, tx_window.allowed(), &mut datagram) else { return };
+            let now_ns = on.local_ns();
+            if !tx_window.fits(now_ns, TIME_BYTES) {
+                // The thread stood still: better lost than in another's slot.
+                return;
+            }
+            tx_window.takes(now_ns, TIME_BYTES);
+            on.send_time(to, &datagram);
+            if tx_window.datagrams() == 1 {
+                let id = FrameHead::parse(&datagram).ok().map(|(head, _)| SentId { to, sequence: head.sequence });
+                self.first = id.map(|id| First { id, called_ns, begin_ns: tx_window.begin_ns });
+            }
+        }
+    }
+
+    fn send_packages(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
+        self.drop_if_old(on);
+        while let Some(made) = self.next_datagram(on, tx_window) {
+            let (Held { to, bytes, .. }, now_ns) = (made, on.local_ns());
+            if !tx_window.fits(now_ns, bytes) {
+                self.missed(on, made);
+                break;
+            }
+            self.hand_over(on, tx_window, now_ns, to, bytes);
+        }
+        if tx_window.is_behind(on.local_ns()) {
+            left_out(on, on.monotonic_ns());
+        }
+    }
+
+    /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread stands still meanwhile.
+    fn next_datagram(&mut self, on: &mut impl Platform, tx_window: &TransmitWindow) -> Option<Held> {
+        if let Some(held) = self.held.take() {
+            return Some(held);
+        }
+        let now_ns = on.monotonic_ns();
+        let (outbound, mut report) = on.queue();
+        outbound.drop_first(now_ns, &mut report);
+        drop(report);
+        self.intake.take_on(&mut on.transit(), |now_ns| tx_window.busy_ns(now_ns));
+        let room_bytes = tx_window.room_bytes(on.local_ns() + MAKING_NS)?;
+        let (made_ns, (_, behind)) = (on.monotonic_ns(), on.transit().waits());
+        let (outbound, mut report) = on.queue();
+        let (to, bytes) = outbound.poll_slot(made_ns, (room_bytes, &mut self.datagram[..]), behind, &mut report)?;
+        drop(report);
+        on.happened(SlotEvent::Made);
+        Some(Held { to, bytes, made_ns })
+    }
+
+    /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time: then it would keep
+    /// up what is, and is lost.
+    fn missed(&mut self, on: &mut impl Platform, made: Held) {
+        let datagram = &self.datagram[..made.bytes];
+        let held = held::is_real_time(datagram, &self.network);
+        on.happened(SlotEvent::Missed { datagram, held });
+        if held {
+            self.held = Some(made);
+            self.log.held += 1;
+        } else {
+            lose(on, datagram);
+        }
+    }
+
+    /// What was made and found no slot for long is lost: whoever sent it counts on that nothing arrives that is much older than it may be.
+    fn drop_if_old(&mut self, on: &mut impl Platform) {
+        let now_ns = on.monotonic_ns();
+        if let Some(held) = self.held.take_if(|held| held.is_old(now_ns)) {
+            let datagram = &self.datagram[..held.bytes];
+            on.happened(SlotEvent::DroppedOld(datagram));
+            lose(on, datagram);
+        }
+    }
+
+    /// `now_ns`: local; when it was found to fit.
+    fn hand_over(
+        &mut self,
+        on: &mut impl Platform,
+        tx_window: &mut TransmitWindow,
+        now_ns: u64,
+        to: NodeIndex,
+        bytes: usize,
+    ) {
+        let handed_ns = on.monotonic_ns();
+        if let Err(NotSent) = on.send(handed_ns, to, &mut self.datagram, bytes) {
+            lose(on, &self.datagram[..bytes]);
+        } else if on.queue().0.is_measured() {
+            // The usual way to the wire; where the call took longer it was perhaps kept up before that.
+            let (usual_ns, _) = self.scheduler.lead_ns();
+            let to_wire_ns = usual_ns.max(on.monotonic_ns().saturating_sub(handed_ns));
+            if tx_window.is_late(now_ns + (to_wire_ns - usual_ns), bytes) {
+                left_out(on, handed_ns);
+            }
+            on.queue().0.sent(handed_ns + tx_window.arrives_after_ns(now_ns, bytes, to_wire_ns));
+        }
+        tx_window.takes(now_ns, bytes);
+    }
+
+    /// Which packages cannot have kept their bounds.
+    fn tell_left_out(&mut self, on: &mut impl Platform) {
+        let count = self.scheduler.left_out();
+        if count != self.left_out || self.scheduler.silent().is_some() {
+            self.left_out = count;
+            left_out(on, on.monotonic_ns());
+        }
+    }
+}
+
+/// One in a slot: whoever brings refusals or hellos about must not take the slots of packages.
+fn answer(on: &mut impl Platform, tx_window: &mut TransmitWindow) {
+    let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
+    let overheard = if asks { on.clock().overheard(now_ns) } else { None };
+    if let Some(bytes) = on.answer(tx_window, overheard.map(|(from, _)| from)) {
+        tx_window.takes(on.local_ns(), bytes);
+        if asks {
+            on.happened(SlotEvent::AnsweredOverheard(tx_window));
+            on.time().0.asked_overheard(now_ns);
+        }
+    }
+}
+
+fn lose(on: &mut impl Platform, datagram: &[u8]) {
+    let (outbound, mut report) = on.queue();
+    outbound.unsent(datagram, &[], &mut report);
+}
+
+fn left_out(on: &mut impl Platform, now_ns: u64) {
+    let (outbound, _) = on.queue();
+    Outbound::slot_left_out(outbound, now_ns);
+    on.happened(SlotEvent::LeftOut);
+}

@@ -1,0 +1,6 @@
+//! Simulates whole networks of routers. Not published, and compiled for tests only.
+
+#![forbid(unsafe_code)]
+
+mod harm;
+pub mod sim;

@@ -1,0 +1,109 @@
+//! Packages where there are time slots: what the driver has of them.
+//!
+//! `sim/slotted` calls this; without slots, `poll` sends as packages come.
+
+use super::watch::Watch;
+use super::{PORT, Packages, checked};
+use crate::sim::host::TRANSIT_SLOTS;
+use crate::sim::station::{Io, Sent};
+use rohrpost_mailbox::{Head, Priority};
+use rohrpost_routers::driver::NotSent;
+use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::intake::{TAKING_NS, Transit};
+use rohrpost_routers::outbound::{Accepted, Outbound};
+use rohrpost_routers::report::Report;
+use rohrpost_routers::security::HELLO_SLOT_BYTES;
+use rohrpost_routers::tdma::TransmitWindow;
+use std::rc::Rc;
+
+/// What a package goes through when it is taken from the transit mailbox.
+pub(in crate::sim) struct Hands<'a, 'b> {
+    pub(in crate::sim) packages: &'a mut Packages,
+    pub(in crate::sim) io: &'a mut Io<'b>,
+}
+
+impl Transit for Hands<'_, '_> {
+    fn waits(&mut self) -> (usize, Option<Priority>) {
+        self.io.host.transit.waits()
+    }
+
+    fn slots(&self) -> usize {
+        TRANSIT_SLOTS
+    }
+
+    fn queued(&self) -> Option<u8> {
+        self.packages.outbound.first_level()
+    }
+
+    fn level(&self, priority: Priority) -> u8 {
+        self.packages.outbound.level(priority)
+    }
+
+    fn local_ns(&self) -> u64 {
+        self.io.now.monotonic_ns
+    }
+
+    fn take(&mut self) -> Option<(Head, Accepted)> {
+        if !self.io.host.transit.is_empty() {
+            self.io.works(TAKING_NS);
+        }
+        self.packages.take_one(self.io)
+    }
+}
+
+impl Packages {
+    /// The queue; and who is told of what it loses.
+    pub(in crate::sim) fn queue<'a, 'b>(&'a mut self, io: &'a mut Io<'b>) -> (&'a mut Outbound, impl Report) {
+        (&mut self.outbound, Watch::out(io, &mut self.undelivered))
+    }
+
+    /// With time slots: sends a datagram in one.
+    pub(in crate::sim) fn send_in(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: &[u8]) -> Result<(), NotSent> {
+        let sent = self.hand_over(io, to, bytes);
+        if sent.is_err() && self.holds {
+            self.drops_held(io, bytes);
+        }
+        sent
+    }
+
+    /// A datagram that was made waits for the next slot: it has left the queue.
+    pub(in crate::sim) fn holds(&mut self, io: &mut Io<'_>, datagram: &[u8]) {
+        self.leaves(io, &checked(datagram));
+        self.holds = true;
+    }
+
+    /// It is lost: what is in it is as if it had never left.
+    pub(in crate::sim) fn drops_held(&mut self, io: &mut Io<'_>, datagram: &[u8]) {
+        self.holds = false;
+        io.oracle.comes_back(io.life, &checked(datagram));
+    }
+
+    /// With time slots: sends in one what must be said besides packages, where all is sealed a hello, to this node before others; its bytes.
+    pub(in crate::sim) fn answer(
+        &mut self,
+        io: &mut Io<'_>,
+        first: Option<NodeIndex>,
+        tx_window: &TransmitWindow,
+    ) -> Option<usize> {
+        let now_ns = io.now.monotonic_ns;
+        let Some(seals) = &mut self.seals else {
+            let fits = |bytes| tx_window.carries_refusal() && tx_window.fits(now_ns, bytes);
+            let refusal = self.refusals.pop_front_if(|refusal| fits(refusal.bytes.len()))?;
+            let bytes = refusal.bytes.len();
+            io.sent.push(Sent { handed: io.now, ..refusal });
+            return Some(bytes);
+        };
+        let fits = tx_window.fits(now_ns, HELLO_SLOT_BYTES);
+        let (said, datagram) = fits.then(|| seals.waiting.take(now_ns, first)).flatten()?;
+        io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram), handed: io.now });
+        seals.waiting.left(said);
+        Some(HELLO_SLOT_BYTES)
+    }
+
+    /// The thread that receives: does what passing time does; when to ask again.
+    pub(in crate::sim) fn receive(&mut self, io: &mut Io<'_>) -> u64 {
+        let until_ns = self.poll_inbound(io);
+        self.answer_callers(io);
+        until_ns
+    }
+}

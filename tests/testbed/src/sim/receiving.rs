@@ -1,0 +1,173 @@
+//! The books of the receiver's side: what a router took, and what it delivered or lost.
+
+use super::clock::Now;
+use super::lives::{Receipt, Taken};
+use super::oracle::Oracle;
+use super::package::{Package, Role, admitted};
+use super::packages::ROUTER_CLASS;
+use super::promise::Promise;
+use rohrpost_mailbox::{Head, local};
+use rohrpost_routers::frame::{Frame, NodeIndex};
+use rohrpost_routers::inbound::{REORDER_MAX, WINDOW};
+
+impl Oracle {
+    /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was the last
+    /// part that was missing. `first`: where datagrams are sealed, the sequence from which on its incarnation is heard.
+    pub fn took(&mut self, now: Now, life: u32, (datagram, first): (&[u8], Option<u64>), digest: u64) {
+        let Ok((head, frame)) = Frame::parse(datagram) else {
+            return self.broken(now, Promise::Unchanged, "a datagram that is no frame was taken".into());
+        };
+        if head.digest != digest {
+            self.broken(now, Promise::Unchanged, format!("a datagram of digest {:#x} was taken", head.digest));
+        }
+        let receiving = self.receiving.entry(life).or_default();
+        let is_first_incarnation = !receiving.present.contains_key(&head.from);
+        let before = receiving.present.insert(head.from, head.incarnation);
+        let start = match first {
+            Some(first) => first,
+            None if is_first_incarnation && head.sequence >= REORDER_MAX => head.sequence,
+            None => 0,
+        };
+        let is_known = receiving.taken.contains_key(&head.incarnation);
+        let taken = receiving.taken.entry(head.incarnation).or_insert_with(|| Taken { start, ..Taken::default() });
+        taken.unclear |= is_known && before != Some(head.incarnation);
+        taken.from = head.from;
+        taken.highest = taken.highest.max(head.sequence);
+        if !taken.sequences.insert(head.sequence) {
+            let text = format!("datagram {} of {:#x} was taken twice", head.sequence, head.incarnation);
+            self.broken(now, Promise::NoCopies, text);
+        }
+        match frame {
+            Frame::Packages(packages) => {
+                for number in packages.filter_map(|(_, body)| super::oracle::number_of(body)) {
+                    self.part(now, life, number, 1);
+                }
+            }
+            Frame::Fragment(part) => {
+                if let Some(number) = self.by_part.get(&(head.incarnation, head.to, part.first)).copied() {
+                    self.part(now, life, number, part.count.into());
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A router dropped a datagram as one that it had before: it had, or it is too old to tell.
+    pub fn dropped_as_copy(&mut self, now: Now, life: u32, datagram: &[u8]) {
+        let Ok((head, _)) = Frame::parse(datagram) else { return };
+        let taken = self.receiving.entry(life).or_default().taken.entry(head.incarnation).or_default();
+        if !taken.sequences.contains(&head.sequence) && head.sequence + WINDOW > taken.highest && !taken.unclear {
+            let highest = taken.highest;
+            let text = format!("datagram {} was dropped as a copy; {highest} is the highest that came", head.sequence);
+            self.broken(now, Promise::Accounts, text);
+        }
+    }
+
+    fn receipt(&mut self, life: u32, number: u32) -> &mut Receipt {
+        self.receiving.entry(life).or_default().receipts.entry(number).or_default()
+    }
+
+    fn part(&mut self, now: Now, life: u32, number: u32, of: u32) {
+        let receipt = self.receipt(life, number);
+        receipt.parts += 1;
+        if receipt.parts == of && !receipt.ended {
+            let text = format!("package {number} came whole, and was neither delivered nor counted");
+            self.broken(now, Promise::Accounts, text);
+        }
+    }
+
+    /// A router counts a package that came, or parts of it; its number.
+    pub fn lost_behind(&mut self, now: Now, life: u32, head: &Head) -> Option<u32> {
+        let number = self.number(head);
+        match number {
+            Some(number) => self.receipt(life, number).ended = true,
+            None => self.broken(now, Promise::Unchanged, format!("what never was sent is counted as lost: {head:?}")),
+        }
+        number
+    }
+
+    /// A router hands a package to a mailbox. Its number, if it is one that was sent there, and unchanged.
+    pub fn arrives(&mut self, now: Now, node: usize, head: &Head, body: &[u8]) -> Option<u32> {
+        let known = super::oracle::number_of(body).filter(|number| {
+            self.packages.get(*number as usize).is_some_and(|package| {
+                let same = Head { options: package.head.options, priority: package.head.priority, ..*head };
+                same == package.head && usize::from(package.to_node) == node && self.is_body(*number, body)
+            })
+        });
+        if known.is_none() {
+            let text = format!("node {node} delivers what was never sent to it: {head:?}, {} bytes", body.len());
+            self.broken(now, Promise::Unchanged, text);
+        }
+        if let Some(number) = known {
+            self.is_admitted(now, head, &self.packages[number as usize].clone());
+        }
+        known
+    }
+
+    /// A package is delivered, with this head.
+    fn is_admitted(&mut self, now: Now, head: &Head, package: &Package) {
+        let wrong = if head.priority != admitted(&package.head).priority {
+            "with another priority than it may have"
+        } else if head.to.class() == ROUTER_CLASS && head.to.local() >= local::TRANSIT {
+            "to a router's own mailbox"
+        } else if self.is_sealed && head.from.instance() != package.from_node {
+            "in the name of another node"
+        } else {
+            return;
+        };
+        let text = format!("{wrong} {head:?} is delivered, posted at node {}: {:?}", package.from_node, package.head);
+        self.broken(now, Promise::Admission, text);
+    }
+
+    /// A mailbox took it. `lives`: incarnation of the router that sent the datagram, not of the one that has the package by now (it may
+    /// have found it again when it began), and incarnation of the one that delivers.
+    pub fn delivered(&mut self, now: Now, lives: (u64, u32), number: u32, redelivered: bool) {
+        let (_, life) = lives;
+        self.receipt(life, number).ended = true;
+        let package = &mut self.packages[number as usize];
+        package.redelivered |= redelivered;
+        let twice = package.deliveries.contains(&lives);
+        package.deliveries.push(lives);
+        let (head, place) = (package.head, package.place);
+        let took_ns = now.true_ns - package.posted_ns;
+        let slowest_ns = self.slowest_ns.entry((head.from, head.to, head.priority.0)).or_default();
+        *slowest_ns = took_ns.max(*slowest_ns);
+        let has_place = !twice && !redelivered && !matches!(package.role, Role::Report { .. } | Role::Intruder);
+        if twice {
+            let text = format!("package {number} was delivered twice by one router: {head:?}");
+            self.broken(now, Promise::NoCopies, text);
+        }
+        let last = &mut self.receiving.entry(life).or_default().last;
+        let last = last.entry((head.from, head.to, head.priority.0)).or_default();
+        let before = *last;
+        if has_place {
+            *last = before.max(place);
+        }
+        if place <= before && has_place {
+            let text = format!("package {number}, the {place}th of {head:?}, was delivered after the {before}th");
+            self.broken(now, Promise::Order, text);
+        }
+    }
+
+    /// How many datagrams of a peer never came, as an incarnation of a router should have counted by now; none if that is not clear.
+    pub fn missing(&self, life: u32, from: NodeIndex) -> Option<u64> {
+        let lives = || self.receiving.get(&life).into_iter().flat_map(|its| its.taken.values());
+        let lives = || lives().filter(|taken| taken.from == from);
+        let missing = |taken: &Taken| {
+            let counted = taken.sequences.iter().filter(|sequence| **sequence >= taken.start).count() as u64;
+            (taken.highest + 1 - taken.start).saturating_sub(counted)
+        };
+        lives().all(|taken| !taken.unclear).then(|| lives().map(missing).sum())
+    }
+
+    /// At the end: of no package has a router only parts, uncounted.
+    pub fn close_receipts(&mut self, now: Now, life: u32) {
+        let Some(receiving) = self.receiving.get(&life) else { return };
+        let open = receiving.receipts.iter().filter(|(_, receipt)| !receipt.ended);
+        let mut open: Vec<u32> = open.map(|(number, _)| *number).collect();
+        open.sort_unstable();
+        if !open.is_empty() {
+            self.broken(now, Promise::Accounts, format!("of packages {open:?} parts came, but they are not counted"));
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! One seed, from its plan to its verdict.
+
+use super::calls::NewGuard;
+use super::packages::{Packages, settings};
+use super::plan::{Flow, Plan, incarnation};
+use super::promise::Problem;
+use super::seals;
+use super::slotted::Slotted;
+use super::station::Layer;
+use super::ticking::{self, Ticking};
+use super::world::{NewLayers, World};
+use rohrpost_routers::tdma::Table;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+/// What became of a seed.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    /// Promises that were broken; the first ends the run.
+    pub problems: Vec<Problem>,
+    /// What was seen, and how often.
+    pub seen: BTreeMap<&'static str, u64>,
+    /// From posting to delivery at most, ns, of each flow of the plan.
+    pub slowest_ns: Vec<u64>,
+    /// Lines, if they were asked for.
+    pub trace: Vec<String>,
+}
+
+/// Runs a plan.
+pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
+    run_with(plan, guard, trace, |_| {})
+}
+
+/// Runs a plan in which every router makes a mistake.
+pub fn run_broken(plan: Plan, guard: NewGuard, mistake: Mistake) -> Outcome {
+    match mistake {
+        Mistake::Packages(broken) => rohrpost_routers::broken::with(broken, || run(plan, guard, false)),
+        Mistake::Time(broken) => run_with(plan, guard, false, move |ticking| ticking.clock().break_it(broken)),
+    }
+}
+
+/// A mistake of a core.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Mistake {
+    /// Of those that carry packages.
+    Packages(rohrpost_routers::broken::Broken),
+    /// Of the one that keeps time.
+    Time(rohrpost_routers::time::Broken),
+}
+
+fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticking) + 'static) -> Outcome {
+    let plan = Rc::new(plan);
+    let layers = routers(&plan, change);
+    let mut world = World::new(plan.clone(), guard, layers, trace);
+    world.run();
+    let oracle = world.oracle;
+    let slowest =
+        |flow: &Flow| oracle.slowest_ns.get(&(flow.from, flow.to, flow.priority)).copied().unwrap_or_default();
+    let slowest_ns = plan.flows.iter().map(slowest).collect();
+    Outcome { problems: oracle.problems, seen: oracle.seen, slowest_ns, trace: world.trace.lines }
+}
+
+/// Routers as this version has them.
+fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayers<'static> {
+    let plan = plan.clone();
+    Box::new(move |node, edition, life, now, page| {
+        let incarnation = incarnation(plan.seed, life);
+        let settings = settings(&plan, node, incarnation, edition);
+        let mut packages = Packages::new(&settings, now.monotonic_ns);
+        let mut ticking =
+            Ticking::new(ticking::settings(&plan, node, incarnation, edition), now, page, plan.has_stamps);
+        if plan.sealed {
+            let all = seals::peer_sessions(&settings);
+            (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all, plan.slots.is_some()));
+        }
+        change(&mut ticking);
+        if let Some(slots) = plan.slots_of(edition) {
+            let (own, nodes) = (settings.own, plan.nodes.len() as u8);
+            let table = Table::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());
+            return vec![Box::new(Slotted::new(packages, ticking, &settings, table, now))];
+        }
+        vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]
+    })
+}

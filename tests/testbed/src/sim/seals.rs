@@ -1,0 +1,132 @@
+//! Sealed datagrams in a simulated network: what the layers seal with, and what those do who have no key.
+
+use super::chance::Chance;
+use rohrpost_routers::frame::{self, FrameHead};
+use rohrpost_routers::security::{
+    Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection, RouterIdentity,
+    Sealing, TAG_BYTES, Waiting,
+};
+use rohrpost_routers::settings::Settings;
+use std::num::NonZeroU8;
+use std::rc::Rc;
+use std::sync::Arc;
+
+/// Of all routers.
+const KEY: [u8; KEY_BYTES] = [0x5a; KEY_BYTES];
+
+/// Whom an incarnation of a router knows; nobody yet.
+pub(super) fn peer_sessions(settings: &Settings) -> Arc<PeerSessions> {
+    PeerSessions::new(
+        RouterIdentity::of(settings),
+        KeyRing::new(InstallationKey::new(KeyId(NonZeroU8::MIN), &KEY), None),
+    )
+}
+
+/// What the layer of packages has.
+pub(super) struct PackageSeals {
+    pub(super) gate: Gate,
+    pub(super) sealing: Sealing,
+    /// Hellos that wait for a slot.
+    pub(super) waiting: Waiting,
+    all: Arc<PeerSessions>,
+}
+
+impl PackageSeals {
+    /// Of an incarnation with this incarnation, which nobody can guess.
+    pub(super) fn new(all: &Arc<PeerSessions>, incarnation: u64) -> Self {
+        let mut seed = [0; 32];
+        seed[..8].copy_from_slice(&incarnation.to_le_bytes());
+        let (gate, sealing) = (Gate::new(all, seed), Sealing::new(all, Port::Packages));
+        Self { gate, sealing, waiting: Waiting::new(all), all: all.clone() }
+    }
+
+    /// Whether something can be sealed to a node.
+    pub(super) fn knows(&self, node: u8) -> bool {
+        self.all.reached() & 1 << node != 0
+    }
+
+    /// From which sequence on the incarnation is heard that said a datagram, as it said when it began.
+    pub(super) fn first(&self, datagram: &[u8]) -> u64 {
+        FrameHead::read(datagram).map_or(0, |(head, _)| self.gate.first(head.from))
+    }
+
+    /// Datagrams that were not taken.
+    pub(super) fn rejected(&self, peer: Option<u8>) -> u64 {
+        Rejection::ALL.iter().map(|why| self.all.rejections(Port::Packages).of(peer, *why)).sum()
+    }
+}
+
+/// What the layer of time has.
+pub(super) struct TimeSeals {
+    sealing: Sealing,
+    opening: Opening,
+}
+
+impl TimeSeals {
+    pub(super) fn new(all: &Arc<PeerSessions>, in_slots: bool) -> Self {
+        let sealing = if in_slots { Sealing::of_slots(all) } else { Sealing::new(all, Port::Time) };
+        Self { sealing, opening: Opening::new(all, Port::Time) }
+    }
+
+    /// The datagram as it was before it was sealed, if it was sealed to this node, and whether by an incarnation that is known to live. `overhears`: whether
+    /// others are of any use.
+    pub(super) fn open(&mut self, datagram: &[u8], overhears: bool) -> Option<(Rc<[u8]>, bool)> {
+        let mut bytes = datagram.to_vec();
+        if overhears && self.opening.is_strange(&bytes) {
+            return self.opening.overhear(&mut bytes).is_ok().then(|| (opened(&bytes), false));
+        }
+        matches!(self.opening.open(&mut bytes), Ok(Opened::Frame(..))).then(|| (opened(&bytes), true))
+    }
+
+    /// The same, sealed; none if nobody is known there.
+    pub(super) fn close(&mut self, datagram: &[u8]) -> Option<Rc<[u8]>> {
+        sealed(&mut self.sealing, datagram)
+    }
+}
+
+/// The same datagram, sealed; none if nobody is known there.
+pub(super) fn sealed(sealing: &mut Sealing, datagram: &[u8]) -> Option<Rc<[u8]>> {
+    let mut bytes = [datagram, &[0; TAG_BYTES]].concat();
+    sealing.close(&mut bytes).ok().map(|()| Rc::from(bytes))
+}
+
+/// A datagram that was opened where it lies, as it was before it was sealed.
+pub(super) fn opened(bytes: &[u8]) -> Rc<[u8]> {
+    let mut clear = bytes[..bytes.len() - TAG_BYTES].to_vec();
+    frame::write_key(0, &mut clear);
+    checked(&clear)
+}
+
+/// A datagram with the check that it would have if it were not to be sealed.
+pub(super) fn checked(datagram: &[u8]) -> Rc<[u8]> {
+    let mut bytes = datagram.to_vec();
+    frame::write_check(&mut bytes);
+    Rc::from(bytes)
+}
+
+/// Incarnation in the head of a datagram, sealed or not.
+pub(super) fn incarnation(datagram: &[u8]) -> u64 {
+    FrameHead::read(datagram).map_or(0, |(head, _)| head.incarnation)
+}
+
+/// What somebody makes of a datagram who knows the format, and not the key.
+pub(super) fn altered(datagram: &[u8], chance: &mut Chance) -> Rc<[u8]> {
+    let mut bytes = damage(datagram, chance).to_vec();
+    frame::write_check(&mut bytes);
+    Rc::from(bytes)
+}
+
+/// Flips some bits.
+pub(super) fn damage(bytes: &[u8], chance: &mut Chance) -> Rc<[u8]> {
+    let mut bytes = bytes.to_vec();
+    for _ in 0..chance.between(1, 4) {
+        let at = chance.below(bytes.len() as u64) as usize;
+        if let Some(byte) = bytes.get_mut(at) {
+            *byte ^= 1 << chance.below(8);
+        }
+    }
+    if chance.percent(20) {
+        bytes.truncate(chance.below(bytes.len() as u64) as usize);
+    }
+    Rc::from(bytes)
+}

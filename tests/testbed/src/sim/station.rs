@@ -1,0 +1,199 @@
+//! One computer of a simulated network: clocks, modules, and the layers that its router is made of.
+//!
+//! A [`Layer`] is one protocol with one socket, packages or time, or all that one thread does with both. It sees what a real one sees:
+//! its own clocks, the datagrams of its sockets, the mailboxes of its computer. When its router dies, all layers are dropped, and made
+//! anew.
+
+use super::chance::Chance;
+use super::clock::{Clock, Now};
+use super::host::Host;
+use super::oracle::Oracle;
+use super::plan::Plan;
+use super::trace::Trace;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// A socket of a router, by its place behind the configured port.
+pub type Port = usize;
+/// Sockets of a router.
+pub const PORTS: usize = 2;
+/// A thread that is busy works for less at a time.
+const STILL_NS: u64 = 2 * super::spans::MS;
+/// Bytes that a socket holds for a router that does not read.
+pub const SOCKET_BYTES_MAX: usize = 256 * 1024;
+
+/// What a layer may do and see while it runs.
+pub struct Io<'a> {
+    /// Its clocks.
+    pub now: Now,
+    /// Which says what they show later.
+    pub clock: &'a Clock,
+    /// When it began what it does, true ns.
+    pub began_ns: u64,
+    /// The node's index.
+    pub node: usize,
+    /// What was planned.
+    pub plan: &'a Plan,
+    /// Counts the router's lives, over all nodes.
+    pub life: u32,
+    /// The incarnation of each node's router; 0: none.
+    pub lives: &'a [u32],
+    /// Its computer.
+    pub host: &'a mut Host,
+    /// The books.
+    pub oracle: &'a mut Oracle,
+    /// Chance.
+    pub chance: &'a mut Chance,
+    /// Datagrams that leave.
+    pub sent: &'a mut Vec<Sent>,
+    /// What is written down.
+    pub trace: &'a mut Trace,
+}
+
+impl Io<'_> {
+    /// The thread was busy for so long: what it does next is later.
+    pub fn works(&mut self, for_ns: u64) {
+        if for_ns > 0 {
+            self.now = self.clock.at(self.now.true_ns + for_ns);
+        }
+    }
+
+    /// Whether it stood still meanwhile: what it does after that happens only if its router lives so long.
+    pub fn stood_still(&self) -> bool {
+        self.now.true_ns > self.began_ns + STILL_NS
+    }
+
+    /// Writes a line.
+    pub fn line(&mut self, text: impl FnOnce() -> String) {
+        let (node, life) = (self.node, self.life);
+        self.trace.line(self.now.true_ns, || format!("{node}/{life} {}", text()));
+    }
+}
+
+/// A datagram on its way out.
+pub struct Sent {
+    /// Socket of the receiver.
+    pub port: Port,
+    /// Node that it is for.
+    pub to: usize,
+    /// Its bytes.
+    pub bytes: Rc<[u8]>,
+    /// When it was handed over; [`Now::default`] for what leaves at once.
+    pub handed: Now,
+}
+
+/// A datagram that came in.
+#[derive(Clone, Debug)]
+pub struct Arrived {
+    /// Socket that has it.
+    pub port: Port,
+    /// Node whose address it comes from; none: an address that no node has.
+    pub source: Option<usize>,
+    /// Its bytes.
+    pub bytes: Rc<[u8]>,
+    /// When the kernel had it.
+    pub stamp: Now,
+    /// Whether bits of it were flipped.
+    pub damaged: bool,
+}
+
+/// A protocol of a router.
+pub trait Layer {
+    /// A datagram came in.
+    fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived);
+    /// The kernel says when a datagram left a socket: which one, counted from 0, and on which clocks.
+    fn left(&mut self, io: &mut Io<'_>, port: Port, index: u64, stamp: Now);
+    /// Does what is due; when to be called again, on its monotonic clock.
+    fn poll(&mut self, io: &mut Io<'_>) -> u64;
+    /// Its router dies now: only the books may be looked at.
+    fn dies(&mut self, io: &mut Io<'_>);
+    /// What must hold at any time; called often, with `well` if all should be well by now.
+    fn check(&mut self, io: &mut Io<'_>, well: bool);
+    /// What must hold at the end, when all has come to rest.
+    fn close(&mut self, io: &mut Io<'_>);
+}
+
+/// A router that lives.
+pub struct Router {
+    /// Which incarnation this is, over all nodes.
+    pub life: u32,
+    /// Its protocols: one for each socket, or one for all.
+    pub layers: Vec<Box<dyn Layer>>,
+    /// Datagrams that left each socket.
+    pub sent: [u64; PORTS],
+}
+
+impl Router {
+    /// The protocol that has a socket.
+    pub fn layer(&mut self, port: Port) -> Option<&mut Box<dyn Layer>> {
+        let last = self.layers.len().saturating_sub(1);
+        self.layers.get_mut(port.min(last))
+    }
+}
+
+/// A computer.
+pub struct Station {
+    /// Its clocks.
+    pub clock: Clock,
+    /// Mailboxes.
+    pub host: Host,
+    /// Its router, while it lives.
+    pub router: Option<Router>,
+    /// How much its clocks run faster than planned now, ns a second.
+    pub drift_ppb: i64,
+    /// How many faults keep its router dead.
+    pub down: u32,
+    /// How many faults keep its router from running.
+    pub frozen: u32,
+    /// How many faults keep its modules from running.
+    pub asleep: u32,
+    /// How many faults have it sleep.
+    pub sleeps: u32,
+    /// Which edition of the configuration its router is started from.
+    pub edition: usize,
+    /// So much later comes again what it is told of the time; none: nobody repeats it.
+    pub echo_ns: Option<u64>,
+    /// When its timing thread last went to sleep to wake too late, true ns.
+    pub late_at_ns: u64,
+    /// What came in while the router did not run, by port.
+    pub sockets: [VecDeque<Arrived>; PORTS],
+    /// When it is to be woken, true ns; none: not.
+    pub wake_ns: Option<u64>,
+}
+
+impl Station {
+    /// One whose router has not begun yet.
+    pub fn new(clock: Clock) -> Self {
+        Self {
+            clock,
+            host: Host::default(),
+            router: None,
+            drift_ppb: 0,
+            down: 0,
+            frozen: 0,
+            asleep: 0,
+            sleeps: 0,
+            edition: 0,
+            echo_ns: None,
+            late_at_ns: 0,
+            sockets: Default::default(),
+            wake_ns: None,
+        }
+    }
+
+    /// Whether its router runs.
+    pub fn runs(&self) -> bool {
+        self.router.is_some() && self.frozen == 0
+    }
+
+    /// Puts a datagram in a socket that nobody reads now; false: it is full.
+    pub fn keep(&mut self, arrived: Arrived) -> bool {
+        let port = arrived.port;
+        let waiting: usize = self.sockets[port].iter().map(|other| other.bytes.len() + 256).sum();
+        let fits = waiting + arrived.bytes.len() <= SOCKET_BYTES_MAX;
+        if fits {
+            self.sockets[port].push_back(arrived);
+        }
+        fits
+    }
+}

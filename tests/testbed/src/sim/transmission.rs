@@ -1,0 +1,71 @@
+//! A datagram on the wire of a network with time slots, and by what its node sends.
+
+use rohrpost_routers::time::{Term, TimeEstimate};
+
+/// By what a node finds its windows.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub enum Basis {
+    /// Time that it has measured, or its own as a master.
+    #[default]
+    Own,
+    /// What it has heard only: it asks what time it is.
+    Heard {
+        /// All that it heard was on its way for too long.
+        is_misled: bool,
+    },
+    /// What it has heard of those who have not shown that they live: it asks whether they do.
+    Overheard {
+        /// Somebody repeats what they said once, or it was on its way for too long.
+        is_misled: bool,
+    },
+    /// A time that it began: it only says so.
+    Begins {
+        /// Since when, true ns.
+        since_ns: u64,
+    },
+}
+
+impl Basis {
+    /// Whether it cannot know better.
+    pub fn is_misled(self) -> bool {
+        matches!(self, Self::Heard { is_misled: true } | Self::Overheard { is_misled: true })
+    }
+}
+
+/// By what a node sends, and by whose time.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Says {
+    /// By what it finds its windows.
+    pub basis: Basis,
+    /// Of its configuration.
+    pub digest: u64,
+    /// The term whose time that is, as far as it knows.
+    pub term: Term,
+    /// The line by which it reckons.
+    pub estimate: Option<TimeEstimate>,
+}
+
+/// A datagram that is being transmitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Transmission {
+    /// Who does.
+    pub node: usize,
+    /// By what.
+    pub basis: Basis,
+    /// Of its configuration.
+    pub digest: u64,
+    /// The term whose time it keeps.
+    pub term: Term,
+    /// The master of that term.
+    pub master: Option<usize>,
+    /// First and last bit, true ns.
+    pub begin_ns: u64,
+    /// See `begin_ns`.
+    pub end_ns: u64,
+}
+
+impl Transmission {
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        self.begin_ns < other.end_ns && other.begin_ns < self.end_ns
+    }
+}
