@@ -1,5 +1,5 @@
-//! What other people's crates come along: none of a tool for who writes a module, none whose licence asks for more than to be named, and of none
-//! two versions without a reason.
+//! Third-party crates: none of a tool for the author of a module, no licence that asks for more than attribution, and
+//! none in two versions without a reason.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
-/// Of these each may be used, also in what is not open.
+/// Each of these may be used, also in closed software.
 const LICENCES: [&str; 9] = [
     "0BSD",
     "Apache-2.0",
@@ -20,17 +20,17 @@ const LICENCES: [&str; 9] = [
     "Zlib",
 ];
 
-/// What comes in two versions, and why.
+/// Crates in two versions, with the reason.
 const DOUBLED: [(&str, &str); 3] = [
     ("getrandom", "ring 0.17 stays at 0.2, tempfile takes 0.4"),
     ("signal-hook", "crossterm 0.29, the terminal of `top`, stays at 0.3"),
     ("syn", "clap_derive takes 3, all other macros 2; only the compiler runs them"),
 ];
 
-/// A tool of ours, or a crate that only tools need.
+/// Our tools, or crates that only tools need.
 const NOT_FOR_MODULES: [&str; 10] =
     ["clap", "comfy-table", "flate2", "rand", "ratatui", "rcgen", "rerun", "rohrpost-bench", "rustls", "serde_json"];
-/// Peers that only benches need, and what only the GUI bridge does.
+/// Peers that only benches need, and the GUI bridge's own dependencies.
 const NOT_FOR_THE_COMMAND: [&str; 3] = ["iceoryx2", "rerun", "zenoh"];
 
 struct Crate {
@@ -39,7 +39,7 @@ struct Crate {
     licence: String,
 }
 
-/// All that is compiled for a package of ours, with itself.
+/// All that is compiled for a package of ours, including itself.
 fn compiled_for(package: &str) -> Vec<Crate> {
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["tree", "--package", package, "--edges", "normal,build", "--prefix", "none", "--format", "{p}|{l}"]);
@@ -50,13 +50,13 @@ fn compiled_for(package: &str) -> Vec<Crate> {
         let (what, licence) = line.split_once('|')?;
         let mut words = what.split(' ');
         let (name, version) = (words.next()?.into(), words.next()?.into());
-        // A line of what stands above is repeated without what it needs, and with a star.
+        // A repeated line has a star and no dependencies below it.
         Some(Crate { name, version, licence: licence.trim_end_matches(" (*)").into() })
     };
     lines.iter().filter_map(read).collect()
 }
 
-/// Whether one of those that it may be chosen from is among [`LICENCES`]; of several that hold together each.
+/// Whether the licence allows use: one alternative of each part joined by AND must be among [`LICENCES`].
 fn is_free(expression: &str) -> bool {
     let one_of = |choice: &str| {
         let choice = choice.trim_matches(['(', ')']).replace('/', " OR ");
@@ -81,12 +81,12 @@ fn each_licence_may_be_used_and_nothing_comes_twice_without_a_reason() {
 }
 
 #[test]
-fn who_writes_a_module_compiles_no_tool() {
+fn the_author_of_a_module_compiles_no_tool() {
     for (package, unwanted) in [("rohrpost", &NOT_FOR_MODULES[..]), ("rohrpost-cli", &NOT_FOR_THE_COMMAND)] {
         let all = compiled_for(package);
         assert!(all.iter().any(|its| its.name == package));
         let found: Vec<&str> = all.iter().map(|its| its.name.as_str()).filter(|name| unwanted.contains(name)).collect();
-        assert!(found.is_empty(), "who compiles {package} compiles {found:?}");
+        assert!(found.is_empty(), "{package} also compiles {found:?}");
     }
 }
 
@@ -124,7 +124,7 @@ fn the_picture_of_the_crates_is_what_their_manifests_say() {
             named(manifest, "[dependencies]").into_iter().filter_map(|name| Some((*folders.get(&name)?).clone()));
         (folder.clone(), needed.collect::<BTreeSet<_>>())
     });
-    // Proofs compile the slot core itself, and need none of us.
+    // Proofs compile the slot core itself, and need none of our packages.
     let said: BTreeMap<_, _> = arrows.filter(|(folder, _)| !folder.starts_with("mailbox/proof")).collect();
     let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md")).unwrap();
     let picture = page.split_once("```text\nmailbox\n").unwrap().1.split_once("```").unwrap().0;
@@ -137,7 +137,7 @@ fn the_picture_of_the_crates_is_what_their_manifests_say() {
     assert_eq!(drawn.collect::<BTreeMap<_, _>>(), said, "left: ARCHITECTURE.md, right: the manifests");
 }
 
-/// What `Cargo.toml` says of a package is true, and said of each that others may have.
+/// Each package's `Cargo.toml` has a true description; public ones must have one.
 #[test]
 fn each_package_says_what_it_is() {
     let all = packages();

@@ -1,4 +1,4 @@
-//! What the documentation says about files is so: README shows the very example, and the book has all its pages.
+//! Statements of the documentation about files are true: README shows the very example, and the book has all its pages.
 
 #![allow(clippy::unwrap_used)]
 
@@ -61,12 +61,12 @@ fn sources() -> String {
     all
 }
 
-/// A name of a test, in whatever crate: words and numbers.
+/// A test's name, in any crate: words and numbers.
 fn is_name_of_a_test(word: &str) -> bool {
     word.contains('_') && word.chars().all(|c| c == '_' || c.is_ascii_lowercase() || c.is_ascii_digit())
 }
 
-/// The tables of the book that say of each row which test shows it: the last column of those with this heading.
+/// Tables of the book that name the test of each row: the last column of those with this heading.
 #[test]
 fn each_promise_of_security_names_tests_that_there_are() {
     let (page, sources) = (text("docs/src/security.md"), sources());
@@ -87,7 +87,7 @@ fn each_promise_of_security_names_tests_that_there_are() {
                 assert!(is_name_of_a_test(test), "docs/src/security.md: `{test}` is no name of a test: {row}");
                 let before = sources.split(&format!("fn {test}(")).next().filter(|before| before.len() < sources.len());
                 let attributes = before.and_then(|before| before.rsplit("\n\n").next()).unwrap_or_default();
-                // Some are called by a test that looks whether mistakes fail them.
+                // Some are called by a test that checks whether mistakes make them fail.
                 let is_run =
                     attributes.contains("#[test]") || before.is_some() && sources.contains(&format!("::{test},"));
                 assert!(is_run, "docs/src/security.md names the test `{test}`, and there is none: {row}");

@@ -1,4 +1,4 @@
-//! What the sources must be, and no compiler asks of them: the files of a crate lie in layers, and a reader can hold each in mind.
+//! Rules for sources that no compiler checks: the files of a crate lie in layers, and a reader can keep each in mind.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -11,7 +11,7 @@ use sources::{Crate, find_crates};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Two files that name each other, and why that is right.
+/// Two files that name each other, and the reason.
 const PAIRS: &[(&str, &str, &str)] = &[
     (
         "config/src/installation.rs",
@@ -22,7 +22,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
     (
         "mailbox/src/doorbell.rs",
         "mailbox/src/node.rs",
-        "bells are in the node's page, and whoever finds a death there rings them",
+        "bells are in the node's page, and a process that finds a death there rings them",
     ),
     (
         "mailbox/src/hot.rs",
@@ -77,7 +77,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// Type names that several files of a crate use, each for a type of its own, and why that is right.
+/// Type names that several files of a crate use, each for a type of its own, and the reason.
 const SHARED_NAMES: &[(&str, &str, &str)] = &[
     ("cli/src", "Arguments", "each subcommand has its own, in a file of its name"),
     ("modules/src", "Settings", "each module has its own, as those of an author have"),
@@ -87,7 +87,7 @@ const SHARED_NAMES: &[(&str, &str, &str)] = &[
 /// Lines that a file may have.
 const LINES_MAX: usize = 400;
 
-/// Files that are longer, and are still to be divided; they may only become shorter. Those of loom hold its models, and mistakes
+/// Longer files that are still to be divided; they may only become shorter. Those of loom hold its models, and mistakes
 /// as edits of text.
 const LONG: &[(&str, usize)] = &[
     ("config/src/reader.rs", 403),

@@ -1,5 +1,5 @@
-//! Counts how often a thread asks the heap for something or gives it back. Tests of hot paths in other crates are compiled with this
-//! very file.
+//! Counts how often a thread asks the heap for something or gives it back. Tests of hot paths in other crates are
+//! compiled with this very file.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -8,7 +8,8 @@ thread_local! {
     static USES: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's heap, and a count of its uses by each thread. A program that wants the count makes it its `#[global_allocator]`.
+/// The system's heap, and a count of its uses by each thread. A program that wants the count makes it its
+/// `#[global_allocator]`.
 pub struct CountingHeap;
 
 /// How often this thread has used the heap. Stays 0 in a program without [`CountingHeap`].

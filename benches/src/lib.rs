@@ -1,7 +1,7 @@
 //! Rohrpost's mailboxes, measured beside the floors of this very computer and beside what else could be used.
 //!
 //! ```text
-//!  cases ── which contenders, which sizes, which targets ──▶ rounds ── one contender after the other, round after round
+//!  cases ── which contenders, which sizes, which targets ──▶ rounds ── contenders in turn, round after round
 //!    │                                                         │
 //!    │   ours · floors · peers: how each sends and receives    ▼
 //!    └────────────────────────────▶ harness ── two processes, pinned and scheduled, samples in shared memory

@@ -42,10 +42,10 @@ struct Run {
     /// Rounds; in each, every contender has its turn.
     #[arg(long, default_value_t = Settings::default().rounds)]
     rounds: usize,
-    /// Only cases whose names contain one of these.
+    /// Only cases with a name that contains one of these.
     #[arg(long, num_args = 1.., value_name = "CASE")]
     only: Vec<String>,
-    /// A few hundred messages a turn, one round: whether everything runs.
+    /// A few hundred messages a turn, one round: checks that everything runs.
     #[arg(long)]
     quick: bool,
     /// The `rohrpost` command to measure; without it, the one beside this program.

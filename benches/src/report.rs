@@ -1,4 +1,4 @@
-//! A run: the computer, the cases one after the other, each told as soon as it is measured.
+//! A run: the computer, and the cases one after the other; each is reported as soon as it is measured.
 
 use crate::cases::Case;
 use crate::environment::{self, Environment};
@@ -16,14 +16,14 @@ pub struct Report {
 }
 
 impl Report {
-    /// Whether every contender did what it should. A missed target is no failure.
+    /// Whether all contenders worked. A missed target is no failure.
     pub fn is_sound(&self) -> bool {
         !self.rows.iter().any(|row| matches!(row.result, Err(Failure::Failed(_))))
     }
 }
 
-/// Measures these cases, those that the settings want, and tells `say` every line or table; false from it ends the run:
-/// nobody reads. Meanwhile the signals that end a program end this run alone, and what it made is removed.
+/// Measures the cases that the settings select, and passes every line or table to `say`. If `say` returns false, the
+/// run ends: nobody reads. Meanwhile terminating signals end only this run, and its files are removed.
 ///
 /// The calling process must have no other thread.
 ///

@@ -1,37 +1,37 @@
-//! Contenders of a case, one after the other, round after round; and the rows that come of it.
+//! Contenders of a case, one after the other, round after round; and their rows.
 
 use crate::harness::{Failure, alone, interrupted};
 use crate::settings::Settings;
 use crate::statistics::{Ratio, Summary, median};
 use std::time::Duration;
 
-/// Lets the kernel's fair server and everybody else have the processors between two turns.
+/// A pause between two turns for the kernel's fair server and other processes.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Somebody who is measured in a case.
+/// A contender of a case.
 pub struct Contender<'a> {
-    /// As the table calls it.
+    /// Name in the table.
     pub name: &'static str,
     /// One turn.
     pub turn: Box<dyn Fn() -> Result<Summary, Failure> + 'a>,
 }
 
 impl<'a> Contender<'a> {
-    /// One whose turn gives samples, of which the quantiles count.
+    /// A contender with turns of samples, of which the quantiles count.
     pub fn sampled(name: &'static str, turn: impl Fn() -> Result<Vec<f64>, Failure> + 'a) -> Self {
         let turn = move || Summary::of(&mut turn()?).ok_or_else(|| Failure::Failed("not one sample".into()));
         Self { name, turn: Box::new(turn) }
     }
 }
 
-/// What has to be reached, as a ratio to another contender.
+/// The target, as a ratio to another contender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Target {
-    /// Of times and sizes.
+    /// For times and sizes.
     AtMost(f64),
-    /// Of what may never be more: in each round.
+    /// For figures with an absolute limit: in each round.
     EachAtMost(f64),
-    /// Of rates.
+    /// For rates.
     AtLeast(f64),
 }
 
@@ -64,20 +64,20 @@ pub struct Versus {
     pub p99: Option<Target>,
 }
 
-/// One line of the table: what a contender did, and how it stands to another.
+/// One line of the table: the figures of a contender, and the comparison with another.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Row {
     /// Which case.
     pub case: String,
     /// Size of a message, where there is one.
     pub bytes: Option<usize>,
-    /// Who did it.
-    pub who: &'static str,
+    /// Name of the contender.
+    pub contender: &'static str,
     /// Unit of the figures, `us` or `packages/s` say.
     pub unit: &'static str,
     /// Medians over rounds (of the maximum: the largest), or why there are none.
     pub result: Result<Summary, Failure>,
-    /// Whom it is compared with.
+    /// The contender that it is compared with.
     pub versus: Option<Versus>,
     /// Of the medians, taken within each round.
     pub ratio_p50: Option<Ratio>,
@@ -86,13 +86,13 @@ pub struct Row {
 }
 
 impl Row {
-    /// What is compared with nothing.
-    pub fn alone(subject: Subject, who: &'static str, result: Result<Summary, Failure>) -> Self {
+    /// A row without a comparison.
+    pub fn alone(subject: Subject, contender: &'static str, result: Result<Summary, Failure>) -> Self {
         let Subject { case, bytes, unit } = subject;
-        Self { case, bytes, who, unit, result, versus: None, ratio_p50: None, ratio_p99: None }
+        Self { case, bytes, contender, unit, result, versus: None, ratio_p50: None, ratio_p99: None }
     }
 
-    /// Whether every target is met; none where there is no target, or where what it is compared with was skipped.
+    /// Whether every target is met; none without a target, or if the other contender was skipped.
     pub fn met(&self) -> Option<bool> {
         let versus = self.versus?;
         if versus.p50.is_none() && versus.p99.is_none() {
@@ -121,8 +121,8 @@ pub struct Subject {
     pub unit: &'static str,
 }
 
-/// Measures all contenders, interleaved, and compares the first one, which is ours, with each of `versus`. Rows: ours, once for
-/// each comparison (once without, if there is none), then the others.
+/// Measures all contenders, interleaved, and compares the first one, which is ours, with each of `versus`. Rows: ours,
+/// once for each comparison (once without, if there is none), then the others.
 pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender], versus: &[Versus]) -> Vec<Row> {
     let turns = interleave(settings, contenders);
     let row = |at: usize, versus: Option<&Versus>| {
@@ -131,7 +131,7 @@ pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender],
         Row {
             case: subject.case.clone(),
             bytes: subject.bytes,
-            who: contenders[at].name,
+            contender: contenders[at].name,
             unit: subject.unit,
             result: over_rounds(&turns[at]),
             versus: versus.copied(),
@@ -146,7 +146,7 @@ pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender],
 
 type Turns = Vec<Result<Summary, Failure>>;
 
-/// For each contender its turns, one a round. Who failed or was skipped once has no further turn.
+/// The turns of each contender, one a round. A contender that failed or was skipped has no further turn.
 fn interleave(settings: &Settings, contenders: &[Contender]) -> Vec<Turns> {
     let mut turns: Vec<Turns> = contenders.iter().map(|_| Vec::new()).collect();
     for _ in 0..settings.rounds.max(1) {
@@ -160,7 +160,7 @@ fn interleave(settings: &Settings, contenders: &[Contender]) -> Vec<Turns> {
     turns
 }
 
-/// Ratio of one figure to another's in the same round. Who did not do every round has none.
+/// Ratio of one figure to another's in the same round. None for a contender that did not do every round.
 fn ratio(
     ours: &[Result<Summary, Failure>],
     others: &[Result<Summary, Failure>],

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub struct Settings {
     /// Rounds; in each, every contender of a case has its turn.
     pub rounds: usize,
-    /// Only cases whose names contain one of these; all if empty.
+    /// Only cases with a name that contains one of these; all if empty.
     pub only: Vec<String>,
     /// A few hundred messages a turn: shows that everything runs, and measures little.
     pub quick: bool,

@@ -7,11 +7,11 @@ use crate::statistics::Ratio;
 use comfy_table::{CellAlignment, ColumnConstraint, Table, Width, presets};
 use serde::Serialize;
 
-/// Columns, and how wide they are at least: the tables of all cases stand below each other.
+/// Columns and their minimum widths, so that the tables of all cases align.
 const COLUMNS: [(&str, u16, CellAlignment); 14] = [
     ("case", 27, CellAlignment::Left),
     ("bytes", 6, CellAlignment::Right),
-    ("who", 20, CellAlignment::Left),
+    ("contender", 20, CellAlignment::Left),
     ("p50", 6, CellAlignment::Right),
     ("p99", 6, CellAlignment::Right),
     ("p99.9", 6, CellAlignment::Right),
@@ -25,7 +25,7 @@ const COLUMNS: [(&str, u16, CellAlignment); 14] = [
     ("", 6, CellAlignment::Left),
 ];
 
-/// The rows of one case, for people; below them, why some have no figures.
+/// The rows of one case, for people; below them the reasons for missing figures.
 pub fn human(rows: &[Row]) -> String {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
@@ -42,10 +42,10 @@ pub fn human(rows: &[Row]) -> String {
     let mut said = Vec::new();
     for row in rows {
         if let Err(failure) = &row.result
-            && !said.contains(&row.who)
+            && !said.contains(&row.contender)
         {
-            said.push(row.who);
-            text.push_str(&format!(" {}: {failure}\n", row.who));
+            said.push(row.contender);
+            text.push_str(&format!(" {}: {failure}\n", row.contender));
         }
     }
     text
@@ -53,7 +53,7 @@ pub fn human(rows: &[Row]) -> String {
 
 fn line(row: &Row) -> Vec<String> {
     let bytes = row.bytes.map(|bytes| bytes.to_string()).unwrap_or_default();
-    let mut line = vec![row.case.clone(), bytes, row.who.to_string()];
+    let mut line = vec![row.case.clone(), bytes, row.contender.to_string()];
     match &row.result {
         Ok(summary) => {
             let figures = [Some(summary.p50), summary.p99, summary.p999, summary.max];
@@ -82,7 +82,7 @@ fn line(row: &Row) -> Vec<String> {
     line
 }
 
-/// Three digits that count.
+/// Three significant digits.
 fn number(value: f64) -> String {
     match value.abs() {
         0.0..10.0 => format!("{value:.3}"),
@@ -92,7 +92,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// A row as JSON has it. What does not apply is null.
+/// A row as JSON. What does not apply is null.
 #[derive(Serialize)]
 struct JsonRow<'a> {
     case: &'a str,
@@ -108,7 +108,7 @@ struct JsonRow<'a> {
     target_p50: Option<f64>,
     target_p99: Option<f64>,
     met: Option<bool>,
-    who: &'a str,
+    contender: &'a str,
     ratio_p50_min: Option<f64>,
     ratio_p50_max: Option<f64>,
     /// Why there are no figures.
@@ -133,7 +133,7 @@ pub fn json(row: &Row) -> String {
         target_p50: versus.and_then(|versus| versus.p50).map(Target::bound),
         target_p99: versus.and_then(|versus| versus.p99).map(Target::bound),
         met: row.met(),
-        who: row.who,
+        contender: row.contender,
         ratio_p50_min: row.ratio_p50.map(|ratio| ratio.min),
         ratio_p50_max: row.ratio_p50.map(|ratio| ratio.max),
         note: row.result.as_ref().err().map(ToString::to_string),
@@ -175,7 +175,7 @@ pub fn json_load_afterwards(load: &str) -> String {
     object(&Tagged { case: "environment-after", rest: Load { load } })
 }
 
-/// An object that says what it is as rows do.
+/// An object with its kind, as rows have one.
 #[derive(Serialize)]
 struct Tagged<T> {
     case: &'static str,

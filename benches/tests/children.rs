@@ -1,5 +1,5 @@
-//! Children end when their time is over, when they fail, and when their parent is gone. Without the test harness, whose
-//! threads must not be forked.
+//! Children end when their time is over, when they fail, and when their parent is gone. Without the test harness, since
+//! its threads must not be forked.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -54,7 +54,7 @@ fn wait_for(what: &str, is_so: impl Fn() -> bool) {
     }
 }
 
-/// Gone, or a zombie that its parent has not looked at.
+/// Gone, or a zombie that its parent has not reaped.
 fn is_dead(pid: u32) -> bool {
     let stat = std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat")).unwrap_or_default();
     stat.rsplit(") ").next().is_none_or(|state| state.is_empty() || state.starts_with('Z'))
@@ -91,7 +91,7 @@ fn a_child_dies_with_its_parent() {
             hang()
         });
         pid.wait();
-        // As killed as by anyone else: nothing of this process is dropped.
+        // As with a kill from outside: nothing of this process is dropped.
         std::process::abort()
     });
     assert!(parent.unwrap().finish(soon()).is_err());

@@ -13,7 +13,7 @@ const CBWARE: &str = "CBWare, its table";
 
 const HOP: &[&str] = &["chain", "chain of mailboxes", "udp"];
 
-/// The cases: a size, and who is in it besides ours.
+/// The cases: a size, and the contenders besides ours.
 const CASES: [(&str, u64, &[&str]); 19] = [
     ("hop", 64, HOP),
     ("hop", 1024, HOP),
@@ -36,7 +36,7 @@ const CASES: [(&str, u64, &[&str]); 19] = [
     ("junk of a peer", 64, &["no junk", "udp, junk on unread ports", "udp"]),
 ];
 
-/// What this computer has of network devices, and of namespaces with a name.
+/// Network devices of this computer, and named namespaces.
 fn network() -> BTreeSet<String> {
     let names = |path| std::fs::read_dir(path).into_iter().flatten().flatten();
     let names = names("/sys/class/net").chain(names("/run/netns"));
@@ -53,18 +53,19 @@ fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
             let rows: Vec<&Map<String, Value>> =
                 rows.iter().filter(|row| row["case"] == case && row["bytes"] == bytes).collect();
             for other in others {
-                assert_eq!(rows.iter().filter(|row| row["who"] == *other).count(), 1, "{case} {bytes} {other}");
+                assert_eq!(rows.iter().filter(|row| row["contender"] == *other).count(), 1, "{case} {bytes} {other}");
                 assert_eq!(rows.iter().filter(|row| row["vs"] == *other).count(), 1, "{case} {bytes} beside {other}");
             }
         }
         let clock: Vec<&Map<String, Value>> = rows.iter().filter(|row| row["case"] == "clock").collect();
         assert_eq!(
-            clock.iter().filter(|row| row["who"] == "rohrpost" && row["vs"].is_string()).count(),
+            clock.iter().filter(|row| row["contender"] == "rohrpost" && row["vs"].is_string()).count(),
             3,
             "{clock:?}"
         );
-        // A network between two nodes of one computer that are not busy loses nothing; of what nobody paces the kernel's buffers may.
-        for row in rows.iter().filter(|row| row["unit"] == "%" && row["who"] != "udp") {
+        // A network between two nodes of an idle computer loses nothing; the kernel's buffers may lose unpaced
+        // datagrams.
+        for row in rows.iter().filter(|row| row["unit"] == "%" && row["contender"] != "udp") {
             assert_eq!(row["p50"], 0.0, "{row:?}");
         }
         assert_eq!(left_behind(&prefix), [""; 0]);
@@ -73,7 +74,7 @@ fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
 }
 
 #[test]
-fn whoever_interrupts_it_finds_no_process_and_no_network_left() {
+fn an_interrupt_leaves_no_process_and_no_network() {
     let before = network();
     let child = bench("lan", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
     let mut pids = Vec::new();

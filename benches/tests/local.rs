@@ -1,4 +1,5 @@
-//! All cases, run small: every contender delivers what it should, every line says what it has to, and nothing is left behind.
+//! All cases, run small: every contender delivers what it should, every line says what it has to, and nothing is left
+//! behind.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -8,7 +9,7 @@ use nix::sys::signal::Signal;
 use std::process::Child;
 use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
 
-/// The latency cases: sizes, and who is in it besides ours.
+/// The latency cases: sizes, and the contenders besides ours.
 const CASES: [(&str, &[u64], &[&str]); 8] = [
     ("blocking", &[64, 1024, 16_384, 62_000], &["futex", "posix-mq", "iceoryx2 listener"]),
     ("one-core", &[64], &["futex", "posix-mq", "iceoryx2 listener"]),
@@ -28,7 +29,7 @@ fn every_contender_delivers_and_every_line_is_complete() {
         for bytes in sizes {
             let rows = || rows.iter().filter(|row| row["case"] == case && row["bytes"] == *bytes);
             for other in others {
-                assert_eq!(rows().filter(|row| row["who"] == *other).count(), 1, "{case} {bytes} {other}");
+                assert_eq!(rows().filter(|row| row["contender"] == *other).count(), 1, "{case} {bytes} {other}");
                 assert_eq!(rows().filter(|row| row["vs"] == *other).count(), 1, "{case} {bytes} beside {other}");
             }
             assert_eq!(rows().count(), 2 * others.len(), "{case} {bytes}");
@@ -64,7 +65,7 @@ fn begun() -> (Child, String) {
 }
 
 #[test]
-fn whoever_interrupts_it_finds_nothing_left() {
+fn an_interrupt_leaves_nothing() {
     let (child, _) = begun();
     let pids = children(&child);
     interrupt(child, &pids);

@@ -8,7 +8,7 @@ use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
 
-/// A row that is there whenever its case could run: case and who.
+/// A row that exists whenever its case could run: case and contender.
 const ROWS: [(&str, &str); 18] = [
     ("hop", "rohrpost"),
     ("hop", "relays"),
@@ -35,14 +35,14 @@ fn every_case_runs_and_every_line_is_complete() {
     repeated_on_stall(Watched::RealTime, || {
         let (output, prefix) = run("tcp", &["--quick", "--json"]);
         let rows = rows(&output);
-        for (case, who) in ROWS {
-            let is_there = rows.iter().any(|row| row["case"] == case && row["who"] == who);
-            // Without a command ours has one row that says so, and none of what else was seen. What failed is no excuse.
+        for (case, contender) in ROWS {
+            let is_there = rows.iter().any(|row| row["case"] == case && row["contender"] == contender);
+            // Without a command, ours has one row that says so, and no other figures. A failure is no excuse.
             let is_skipped = |row: &Map<String, Value>| {
-                let is_own = case.starts_with(row["case"].as_str().unwrap()) && row["who"] == who;
+                let is_own = case.starts_with(row["case"].as_str().unwrap()) && row["contender"] == contender;
                 is_own && row["note"].as_str().is_some_and(|note| note.starts_with("skipped: "))
             };
-            assert!(is_there || rows.iter().any(is_skipped), "{case} by {who}");
+            assert!(is_there || rows.iter().any(is_skipped), "{case} by {contender}");
         }
         let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
         assert_eq!(failed, None);
@@ -54,7 +54,7 @@ fn every_case_runs_and_every_line_is_complete() {
 }
 
 #[test]
-fn whoever_interrupts_it_finds_no_process_left() {
+fn an_interrupt_leaves_no_process() {
     let child = bench("tcp", &["--only", "hop", "--rounds", "1000"]).spawn().unwrap();
     let mut pids = Vec::new();
     // Systems, relays and modules.

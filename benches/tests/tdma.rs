@@ -8,7 +8,7 @@ use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
-/// A row of each case that is there whenever the case could run, and by whom.
+/// A row of each case that exists whenever the case could run, and its contender.
 const ROWS: [(&str, &str); 18] = [
     ("slots", "loaded"),
     ("slots", "unloaded"),
@@ -40,12 +40,12 @@ fn every_case_runs_and_every_line_is_complete() {
     repeated_on_stall(Watched::RealTime, || {
         let (output, prefix) = run("tdma", &["--quick", "--json"]);
         let rows = rows(&output);
-        for (case, who) in ROWS {
+        for (case, contender) in ROWS {
             let own = || rows.iter().filter(|row| case_of(row) == case.split(',').next().unwrap());
-            // Where there are no namespaces, no real time or no command, a note says so. What failed is no excuse.
+            // Without namespaces, real-time scheduling or the command, a note says so. A failure is no excuse.
             let is_skipped = own().any(|row| row["note"].as_str().is_some_and(|note| note.starts_with("skipped: ")));
-            let is_there = rows.iter().any(|row| row["case"] == case && row["who"] == who);
-            assert!(is_there || is_skipped, "{case} by {who}");
+            let is_there = rows.iter().any(|row| row["case"] == case && row["contender"] == contender);
+            assert!(is_there || is_skipped, "{case} by {contender}");
             assert!(own().next().is_some(), "{case}");
         }
         let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
@@ -58,7 +58,7 @@ fn every_case_runs_and_every_line_is_complete() {
 }
 
 #[test]
-fn whoever_interrupts_it_finds_no_process_left() {
+fn an_interrupt_leaves_no_process() {
     let mut child = bench("tdma", &["--only", "slots", "--rounds", "1000"]).spawn().unwrap();
     let mut pids = Vec::new();
     // Routers, capture and feeders; without a command or namespaces it ends by itself.

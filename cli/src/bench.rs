@@ -117,7 +117,7 @@ fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
          and {:.2} µs to one that spins, {:.1} times bare shared memory",
         asleep.p50, ratio_asleep.median, awake.p50, ratio_awake.median
     );
-    let floor = report.rows.iter().find(|row| row.who == "futex").and_then(|row| row.result.as_ref().ok()?.p99);
+    let floor = report.rows.iter().find(|row| row.contender == "futex").and_then(|row| row.result.as_ref().ok()?.p99);
     let is_late = floor.is_some_and(|p99| p99 > LATE_US);
     let is_strange = ratio_asleep.median > STRANGE_BLOCKING || awake.p50 * SPINNING_PAYS > asleep.p50;
     if !is_late && !is_strange && report.environment.refusals.is_empty() && scheduling == Scheduling::Fifo {
@@ -150,13 +150,13 @@ mod tests {
     use rohrpost_bench::rounds::Versus;
     use rohrpost_bench::statistics::{Ratio, Summary};
 
-    fn row(floor: &'static str, who: &'static str, ratio: f64, p99: f64) -> Row {
+    fn row(floor: &'static str, contender: &'static str, ratio: f64, p99: f64) -> Row {
         let p50 = if floor == "spin" { 0.5 } else { 8.0 };
         let median = Ratio { median: ratio, min: ratio, max: ratio };
         let result = Ok(Summary { p50, p99: Some(p99), p999: Some(p99), max: Some(p99) });
-        let versus = (who == "rohrpost").then_some(Versus { name: floor, p50: None, p99: None });
+        let versus = (contender == "rohrpost").then_some(Versus { name: floor, p50: None, p99: None });
         let (case, unit) = (floor.to_string(), "us");
-        Row { case, bytes: Some(64), who, unit, result, versus, ratio_p50: Some(median), ratio_p99: None }
+        Row { case, bytes: Some(64), contender, unit, result, versus, ratio_p50: Some(median), ratio_p99: None }
     }
 
     fn environment(refusals: &[&str]) -> Environment {

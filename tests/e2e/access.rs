@@ -1,4 +1,4 @@
-//! `[access]` says who commands whom on one node, too.
+//! `[access]` also restricts commands between modules of one node.
 
 use crate::harness::{PATIENCE, Place, probe, wait};
 use crate::probe::{COUNT, ProbingInterface};
@@ -12,7 +12,7 @@ fn on_one_node_a_class_that_is_not_listed_commands_nothing_and_is_told_the_line(
     let (mut launch, robot) = place.launched(&[
         access,
         &probe("probe.0", "rate-hz = 100.0", ""),
-        // It is of a class that is listed: its subscriptions are commands, too.
+        // Its class is listed: its subscriptions are commands, too.
         &probe("probe.1", "hears = \"probe.0\"", "calls = [\"probe.0\"]"),
     ]);
     let mut tool = robot.tool(PATIENCE);

@@ -24,7 +24,7 @@ fn all(place: &Place, config: &Path, further: &[&str]) -> Running {
     Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"], further].concat()))
 }
 
-/// Whether namespaces may be made here.
+/// Whether the system allows namespaces here.
 fn is_allowed() -> bool {
     let place = Place::new();
     let config = configured(&place, "exit_at_start = 3", "restart = \"never\"");
@@ -39,7 +39,7 @@ fn wait_until_both_run(launch: &mut Running) {
     }
 }
 
-/// Processes that a process has started, and those that they have.
+/// Processes that a process has started, recursively.
 fn below(pid: u32) -> Vec<u32> {
     let text = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap_or_default();
     let children: Vec<u32> = text.split_whitespace().filter_map(|pid| pid.parse().ok()).collect();
@@ -104,7 +104,7 @@ fn a_node_that_does_not_start_ends_them_all() {
     place.assert_empty();
 }
 
-/// A killed node is told of, and the others go on.
+/// A killed node is reported, and the others go on.
 #[test]
 fn a_node_that_ends_leaves_the_others_alone() {
     if !is_allowed() {
@@ -120,7 +120,7 @@ fn a_node_that_ends_leaves_the_others_alone() {
     assert_eq!(place.say_at(&config, "base", &["call", "probe.0", "count", "1"]).ok(), "1\n");
     launch.signal(Signal::SIGINT);
     assert_eq!(launch.end().code(), Some(1), "a node failed");
-    // Its modules go when their launch has gone; what that had no time to remove is for `clean`.
+    // Its modules end after their launch; `clean` removes files that it had no time to remove.
     wait("nothing of it lives", || {
         place.say(&["clean"]).ok();
         std::fs::read_dir(place.memory()).unwrap().next().is_none().then_some(())
@@ -140,7 +140,7 @@ fn calls_are_counted_once_over_a_bad_network() {
     let mut expected = Vec::new();
     for number in 1..=12 {
         let said = place.say_at(&config, "base", &["call", "probe.1", "count", &number.to_string()]);
-        // One that fails says so, and may have been run; none is run twice.
+        // A failed call is reported, and may have run; none runs twice.
         if said.code == Some(0) {
             expected.push(number);
         }
@@ -175,7 +175,7 @@ fn what_cannot_be_launched_is_told_with_its_remedy() {
     place.assert_empty();
 }
 
-/// Of tests that run as root: a user who is not launches all nodes, too, if users may make namespaces.
+/// For tests that run as root: an ordinary user also launches all nodes, if users may make namespaces.
 #[test]
 fn a_user_without_rights_launches_all_nodes() {
     const NOBODY: u32 = 65_534;
@@ -183,12 +183,13 @@ fn a_user_without_rights_launches_all_nodes() {
         return skipped("root alone can be somebody else; the other tests ran without its rights");
     }
     let place = Place::new();
-    // No program of the tests' own: nobody may be allowed to read the folder that it is in.
+    // Not a program in the tests' own folder: users may have no access to that folder.
     let config = place.config_of("test", &format!("{NODES}{NETWORK}"), &[&format!("{OUTPUT}node = \"arm\"\n")]);
     let launch = place.command(&["launch", config.to_str().unwrap(), "--all"]);
     let program = place.path("rohrpost");
-    // Copied by a process of its own: what this one has open for writing, a child that another test forks at the moment holds as well
-    // until it runs its program, and until then the copy cannot be run ("text file busy").
+    // Copied by a process of its own: a file that this process has open for writing is also held by a child that
+    // another test forks just then, until the child executes its program; until then the copy cannot be executed ("text
+    // file busy").
     assert!(Command::new("cp").arg(launch.get_program()).arg(&program).status().unwrap().success());
     for path in [place.memory(), config.parent().unwrap()] {
         chown(path, Some(NOBODY), Some(NOBODY)).unwrap();
@@ -208,7 +209,7 @@ fn a_user_without_rights_launches_all_nodes() {
     place.assert_empty();
 }
 
-/// As on a computer that lets nobody make them: a user namespace with a limit of none.
+/// As on a computer without the right: a user namespace with a limit of zero.
 #[test]
 fn without_the_right_to_namespaces_it_says_what_gives_it() {
     let place = Place::new();

@@ -1,4 +1,4 @@
-//! `rohrpost bench local`. What its sentence says of other computers is tested beside its code, how it measures in `benches`.
+//! `rohrpost bench local`. Its sentence for other computers is tested beside its code, its measurements in `benches`.
 
 use crate::harness::{OUTPUT, Place, probe};
 use serde_json::Value;
@@ -15,9 +15,10 @@ fn the_self_test_has_all_figures() {
     assert_eq!(lines.last().unwrap()["case"], "environment-after");
     for (case, floor) in CASES {
         for bytes in [64, 1024] {
-            let row = |who: &str| {
-                let is_it = |line: &&Value| line["case"] == case && line["bytes"] == bytes && line["who"] == who;
-                lines.iter().find(is_it).unwrap_or_else(|| panic!("no {case} {bytes} {who}: {lines:#?}"))
+            let row = |contender: &str| {
+                let is_it =
+                    |line: &&Value| line["case"] == case && line["bytes"] == bytes && line["contender"] == contender;
+                lines.iter().find(is_it).unwrap_or_else(|| panic!("no {case} {bytes} {contender}: {lines:#?}"))
             };
             for row in [row("rohrpost"), row(floor)] {
                 assert!(row["p50"].as_f64().unwrap() > 0.0 && row["unit"] == "us", "{row}");
@@ -34,7 +35,7 @@ fn the_self_test_has_all_figures() {
 }
 
 #[test]
-fn a_robot_that_runs_is_not_disturbed_and_whoever_measures_is_told() {
+fn a_running_robot_is_not_disturbed_and_the_user_is_told() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     let pid = robot.pid("probe.0");

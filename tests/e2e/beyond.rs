@@ -1,5 +1,5 @@
-//! What crosses a TCP router, between systems and to each node of a LAN, and what it costs when the TCP router is killed. Who takes no part:
-//! `beyond_strangers`.
+//! Traffic through a TCP router, between systems and to each node of a LAN, and the cost of a killed TCP router.
+//! Refused programs: `beyond_strangers`.
 
 use crate::harness::{halt, probe, signal, wait};
 use crate::systems::{OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
@@ -8,7 +8,8 @@ use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Each system lists what the other hosts, whichever runs the TCP router; without that the list says that it does not know.
+/// Each system lists what the other hosts, whichever runs the TCP router; without the TCP router the list says that it
+/// is unknown.
 fn check_lists(systems: &Systems) {
     for (node, module, by) in
         [("north", "2.probe.0", "node south of south"), ("south", "1.probe.0", "node north of north")]
@@ -52,7 +53,7 @@ fn kills() -> u64 {
     std::env::var("ROHRPOST_KILLS").ok().map_or(3, |kills| kills.parse().unwrap())
 }
 
-/// Of each class of a client, what came and what became of it.
+/// Packages of each class of a client, by outcome.
 fn accounts(client: &serde_json::Value) -> Vec<(u64, u64)> {
     let ways = ["sent", "received"].map(|way| client[way].as_array().cloned().unwrap_or_default());
     let number = |value: &serde_json::Value| value.as_u64().unwrap_or_default();
@@ -72,7 +73,7 @@ fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
         let (before, mut called, mut answered) = (clients(), 0, 0);
         for kill in 1..=kills() {
             let server = north.pid("tcp.255");
-            // Calls are under way at any moment of it, and beats of both modules all the time.
+            // Calls are in flight at any moment of it, and beats of both modules all the time.
             let is_killed = AtomicBool::new(false);
             std::thread::scope(|scope| {
                 scope.spawn(|| {
@@ -106,7 +107,7 @@ fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
         assert_eq!(run.len(), times, "each call is run at most once");
         assert!(answered as usize <= times && times <= called as usize, "{answered} of {called} answered, {times} run");
         for node in SYSTEMS {
-            // A moment in which nothing waits: beats come and go all the time.
+            // A moment without waiting packages; beats come and go all the time.
             let accounts = || Some(accounts(&systems.client(node))).filter(|accounts| !accounts.is_empty());
             let is_even = |accounts: &Vec<(u64, u64)>| accounts.iter().all(|(came, went)| came == went);
             wait(format!("{node} accounts for all"), || accounts().filter(is_even));
@@ -124,7 +125,7 @@ fn check_foreign(systems: &Systems, system: u8, order: &str, certificates: &[&st
     let module = format!("{system}.probe.0.0");
     assert_eq!(systems.says("north", &["call", &module, "double", "21"]).ok(), "42\n", "{order}");
     program.wait_for("doubled 21");
-    // A certificate says who it is, before it says so itself.
+    // A certificate names the program before its hello does.
     let name = if certificates.is_empty() { "a program in Python" } else { "node python of system 5" };
     wait(format!("{module} in the list"), || {
         let list = systems.says("north", &["list"]).ok();
@@ -148,7 +149,7 @@ fn a_program_written_from_the_page_alone_takes_part_in_both_byte_orders() {
     systems.stop();
 }
 
-/// Its class is one of the file, its instance is none.
+/// Its class is in the file, its instance is not.
 #[test]
 fn a_program_of_the_own_system_that_the_file_does_not_know_is_reached_by_its_name() {
     let Some(systems) = Systems::launched(OPEN) else { return };
@@ -209,14 +210,14 @@ fn a_package_to_all_systems_comes_once_to_each_whatever_the_path() {
         robot.begin(&mut tool, "255.probe.1.0", crate::probe::COUNT, &(number,));
         wait(format!("both count what came from {node}"), || (times(number) >= 2).then_some(()));
         tool.close();
-        // What follows by either path would come behind a second copy.
+        // Packages by either path would arrive after a duplicate.
         for (further, module) in [(1, "1.probe.1.0"), (2, "2.probe.1.0")] {
             let counted = || systems.says(node, &["call", module, "count", &(number + further).to_string()]).code;
             wait(format!("{module} counts from {node}"), || (counted() == Some(0)).then_some(()));
         }
         assert_eq!(times(number), 2, "once in each system, from {node}: {:?}", systems.place.record());
     }
-    // On the LAN it goes by the LAN, also while the TCP router is away.
+    // On the LAN it takes the path over the LAN, also while the TCP router is away.
     halt(systems.robot("north").pid("tcp.255"));
     let mut tool = systems.robot("north").tool(Duration::from_secs(1));
     systems.robot("north").begin(&mut tool, "255.probe.1.0", crate::probe::COUNT, &(400_u32,));

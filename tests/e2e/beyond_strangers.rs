@@ -1,4 +1,4 @@
-//! Who takes part at a TCP router and who does not: certificates, versions of TLS, digests; and that both sides say why.
+//! Accepted and refused programs at a TCP router: certificates, versions of TLS, digests. Both sides report the reason.
 
 use crate::harness::{Place, probe, wait};
 use crate::process::Running;
@@ -22,7 +22,7 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     wait("the TCP router says why", || {
         systems.says("north", &["net"]).out.contains("an older TLS than 1.3").then_some(())
     });
-    // South's certificates are made anew, by another authority.
+    // South's certificates are new, by another authority.
     let (_, mut south, robot) = systems.nodes.pop().unwrap();
     drop(robot);
     south.stop();
@@ -41,7 +41,7 @@ fn sealed_systems_meet_and_one_with_a_foreign_certificate_takes_no_part() {
     systems.stop();
 }
 
-/// What the TCP router says to a program of a node's system that asks for these ranges one after the other.
+/// The answer of the TCP router to a program of a node's system that asks for these ranges one after the other.
 fn objections(systems: &Systems, node: &str, own: &str, ranges: &[&str]) -> Vec<String> {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/e2e/python/hijack.py");
     let digests = systems.robot(node).installation.digest().to_string();

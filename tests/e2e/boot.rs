@@ -1,4 +1,4 @@
-//! Launch as systemd starts it: what it tells the service manager, and when it falls silent.
+//! Launch as systemd starts it: its notifications to the service manager, and when they stop.
 
 use crate::harness::{Place, probe, signal, skipped, state, wait};
 use crate::process::Running;
@@ -15,7 +15,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// What systemd does: it listens at a socket, and notes what comes.
+/// The manager's side, as systemd has it: listens at a socket, and records messages.
 struct Manager {
     socket: UnixDatagram,
     said: Vec<String>,
@@ -27,7 +27,7 @@ impl Manager {
         Self { socket, said: Vec::new() }
     }
 
-    /// Lines that came since this was last asked.
+    /// Messages since the last call.
     fn hear(&mut self) -> usize {
         let (before, mut bytes) = (self.said.len(), [0; 4096]);
         while let Ok(len) = self.socket.recv(&mut bytes) {
@@ -79,7 +79,9 @@ fn the_manager_hears_that_it_is_ready_alive_and_stopping() {
             wait(format!("ping {count}"), || (manager.pings() >= count).then_some(()));
         }
         place.say(&["stop", "probe.1"]).ok();
-        wait("it is told who does not run", || manager.has("STATUS=1 modules run, probe.1 stopped").then_some(()));
+        wait("the manager learns that a module is stopped", || {
+            manager.has("STATUS=1 modules run, probe.1 stopped").then_some(())
+        });
         assert!(!manager.has("STOPPING=1"));
         drop(robot);
         launch.stop();
@@ -88,7 +90,7 @@ fn the_manager_hears_that_it_is_ready_alive_and_stopping() {
     }
 }
 
-/// Holds one thread of a child process, and no other: only its tracer can.
+/// Stops one thread of a child process, and no other: only its tracer can.
 struct Held {
     thread: Pid,
 }
@@ -103,7 +105,7 @@ impl Held {
         Ok(held)
     }
 
-    /// Of the thread, and of the others of its process.
+    /// States of the thread, and of the others of its process.
     fn states(&self) -> (char, Vec<char>) {
         let tasks = std::fs::read_dir(format!("/proc/{}/task", self.thread)).unwrap().map(|task| task.unwrap().path());
         let (own, others): (Vec<_>, Vec<_>) = tasks.partition(|task| task.ends_with(self.thread.to_string()));
@@ -117,14 +119,14 @@ impl Held {
 }
 
 #[test]
-fn a_launch_whose_loop_hangs_is_silent_whatever_its_other_threads_do() {
+fn a_launch_with_a_hung_loop_is_silent_whatever_its_other_threads_do() {
     let place = Place::new();
     let path = place.path("notify");
     let mut manager = Manager::new(UnixDatagram::bind(&path).unwrap());
     let period = Duration::from_millis(200);
     let mut launch = launch(&place, &[&probe("probe.0", "", "")], path.to_str().unwrap(), 200);
     wait("it pings", || (manager.pings() >= 2).then_some(()));
-    // The loop is the main thread's. Its child's end must not be asked for while it is traced.
+    // The loop is the main thread's. The end of its child must not be awaited while it is traced.
     let held = match Held::hold(launch.pid()) {
         Ok(held) => held,
         Err(error) => return skipped(&format!("whether a launch that hangs falls silent (ptrace: {error})")),
@@ -143,10 +145,10 @@ fn a_launch_whose_loop_hangs_is_silent_whatever_its_other_threads_do() {
     launch.stop();
 }
 
-/// A pipe that is full, and that nobody reads.
+/// A full pipe without a reader.
 fn full_pipe() -> (PipeReader, PipeWriter) {
     let (reader, writer) = std::io::pipe().unwrap();
-    // Opened once more, so that not waiting is a matter of this descriptor alone.
+    // Opened a second time, so that only this descriptor is non-blocking.
     let again = format!("/proc/self/fd/{}", writer.as_raw_fd());
     let mut again = File::options().write(true).custom_flags(nix::libc::O_NONBLOCK).open(again).unwrap();
     while again.write(&[b'\n'; 4096]).is_ok() {}
@@ -155,7 +157,7 @@ fn full_pipe() -> (PipeReader, PipeWriter) {
 }
 
 #[test]
-fn a_launch_whose_words_nobody_reads_goes_on_and_ends_in_order() {
+fn a_launch_with_unread_output_goes_on_and_ends_in_order() {
     let place = Place::new();
     let path = place.path("notify");
     let mut manager = Manager::new(UnixDatagram::bind(&path).unwrap());

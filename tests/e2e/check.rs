@@ -1,4 +1,4 @@
-//! `rohrpost check`, as a person or a program reads it.
+//! `rohrpost check`, for people and programs.
 
 use crate::harness::Place;
 
@@ -56,13 +56,15 @@ show = [
 "#;
 
 const SAID: [&str; 11] = [
-    "13: module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, laser",
+    "13: module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, \
+     laser",
     "17: module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
      `laser-noise-m`, `odometry-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
     "21: module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz",
     "28: module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`",
     "34: module `pilot.1`: settings: `laser` is `odometry.0`, but must be of class `laser`, whose functions it calls",
-    "35: module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean `motor`?",
+    "35: module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean \
+     `motor`?",
     "40: module `mapper.0`: settings: `resolution-m` is 5; use 0.005 to 1",
     "40: module `mapper.0`: settings: `laser` is `laser.7`, which no [[module]] defines; add one, or name another",
     "44: module `pilot.2`: settings: missing field `laser`",
@@ -77,7 +79,7 @@ fn settings_of_builtin_modules_are_checked_before_anything_runs() {
     let expected: Vec<String> = SAID.iter().map(|line| format!("wrong.toml:{line}")).collect();
     let told = place.say(&["check", "wrong.toml"]).fails();
     assert_eq!(told.trim_end().lines().collect::<Vec<_>>(), expected);
-    // Launch says the same, and starts nothing.
+    // Launch reports the same, and starts nothing.
     assert_eq!(place.say(&["launch", "wrong.toml"]).fails(), told);
     place.assert_empty();
 
@@ -95,7 +97,7 @@ fn settings_of_builtin_modules_are_checked_before_anything_runs() {
 #[test]
 fn what_a_file_means_can_be_read_by_programs() {
     let place = Place::new();
-    // Every key there is; its settings are none that the builtin mapper knows.
+    // All keys; the builtin mapper does not know its settings.
     let full = include_str!("../../config/tests/full.toml").replace("builtin = \"mapper\"", "program = \"./mapper\"");
     std::fs::write(place.path("full.toml"), &full).unwrap();
     let json = place.say(&["check", "full.toml", "--json"]).json();
@@ -118,13 +120,13 @@ fn what_a_file_means_can_be_read_by_programs() {
     let system = installation["system"]["id"].as_u64().unwrap();
     assert_eq!(number(motor), system << 24 | motor["priority"].as_u64().unwrap() << 16);
     assert_eq!((&motor["required"], &motor["optional"]), (&true.into(), &false.into()));
-    // The opposite of what it says of itself.
+    // The opposite of its own declaration.
     std::fs::write(place.path("sealed.toml"), full.replace("security = \"none\"", "security = \"keys\"")).unwrap();
     let json_of_sealed = place.say(&["check", "sealed.toml", "--json"]).json();
     assert_eq!(json_of_sealed["installation"]["network"]["security"], "keys");
     let json = place.say(&["check", "full.toml", "--json", "--node", "desk"]).json();
     assert_eq!(json["installation"]["nodes"].as_array().unwrap().len(), 1, "one node only");
-    // Why a picture may wait is told to people and programs alike.
+    // People and programs get the same reason why a picture may wait.
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo.toml");
     let json = place.say(&["check", demo, "--json"]).json();
     let modules = json["installation"]["nodes"][0]["modules"].as_array().unwrap();

@@ -1,13 +1,14 @@
-//! What a shell offers at a press of the tab key, by the scripts that `rohrpost completions` prints.
+//! Completions of a shell at the tab key, by the scripts that `rohrpost completions` prints.
 
 use crate::harness::{NETWORK, OUTPUT, Place, probe, skipped};
 use std::process::Command;
 
-/// What bash offers for the last of these words.
+/// Completions of bash for the last of these words.
 pub(crate) fn offered(place: &Place, words: &[&str]) -> Vec<String> {
     let [before @ .., last] = words else { panic!("no words") };
     let list = words.iter().map(|word| format!("'{word}'")).collect::<Vec<_>>().join(" ");
-    // What bash itself does at the key: it sets the words, and calls the function with command, word and the one before.
+    // As bash itself does at the key: sets the words, and calls the function with the command, the word and the one
+    // before.
     let script = format!(
         "set -e; source <(\"$ROHRPOST\" completions bash); complete -p rohrpost >/dev/null
          COMP_WORDS=({list}); COMP_CWORD={}; COMP_TYPE=9
@@ -67,7 +68,7 @@ fn bash_offers_what_the_running_node_has() {
     assert_eq!(offered(&place, &["rohrpost", "log", "--module", "o"]), ["output.0"]);
     assert_eq!(offered(&place, &["rohrpost", "log", "--level", "d"]), ["debug"]);
     assert_eq!(offered(&place, &["rohrpost", "run", "m"]), ["mapper"]);
-    // What modules have noted of themselves, built in or one's own.
+    // From modules' own descriptions, built in or the user's.
     assert_eq!(offered(&place, &["rohrpost", "call", "output.0", "li"]), ["lines_from"]);
     assert_eq!(offered(&place, &["rohrpost", "echo", "output.0", ""]), ["line"]);
     let functions = offered(&place, &["rohrpost", "call", "probe.0", ""]);
@@ -86,7 +87,8 @@ fn without_a_node_the_named_configuration_is_asked() {
     place.config_of(
         "arm",
         &format!(
-            "[nodes.base]\naddress = \"127.0.0.1\"\ntools = [0, 1]\n[nodes.desk]\naddress = \"127.0.0.2\"\ntools = [2, 3]\n{NETWORK}"
+            "[nodes.base]\naddress = \"127.0.0.1\"\ntools = [0, 1]\n[nodes.desk]\naddress = \"127.0.0.2\"\n\
+             tools = [2, 3]\n{NETWORK}"
         ),
         &["[[module]]\nname = \"probe.7\"\nnode = \"desk\"\nprogram = \"nowhere\"\n"],
     );
@@ -94,7 +96,7 @@ fn without_a_node_the_named_configuration_is_asked() {
     assert_eq!(offered(&place, &["rohrpost", "call", "--config", "arm.toml", "pro"]), ["probe.7"]);
     assert_eq!(offered(&place, &["rohrpost", "check", "arm.toml", "--node", ""]), ["base", "desk"]);
     assert_eq!(offered(&place, &["rohrpost", "check", "ar"]), ["arm.toml"]);
-    // A configuration that is wrong is no reason to disturb the one who types.
+    // A wrong configuration must not disturb the user's typing.
     std::fs::write(place.path("wrong.toml"), "nonsense").unwrap();
     assert_eq!(offered(&place, &["rohrpost", "call", "--config", "wrong.toml", ""]), [""; 0]);
     assert_eq!(offered(&place, &["rohrpost", "new", "pro"]), [""; 0], "a name that there is not yet");
@@ -108,7 +110,7 @@ fn every_shell_can_read_its_script() {
         assert!(script.contains("ROHRPOST_COMPLETE"), "{script}");
         let file = place.path(shell);
         std::fs::write(&file, script).unwrap();
-        // Only those that are here can be asked.
+        // Only installed shells can be asked.
         match Command::new(shell).arg("-n").arg(&file).output() {
             Ok(said) => assert!(said.status.success(), "{shell}: {said:?}"),
             Err(error) => skipped(&format!("whether {shell} can read its completions ({shell}: {error})")),

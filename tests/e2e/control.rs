@@ -46,7 +46,7 @@ fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
     let said = place.say(&["start", "probe.0"]).ok();
     assert!(said.contains("probe.0 runs and is on"), "{said}");
     assert_eq!(place.say(&["call", "probe.0", "count", "1"]).ok(), "1\n");
-    // What a person did is not held against it: one restart by its policy is still to be had.
+    // A restart by a person does not count: one restart by its policy is left.
     let pid = robot.pid("probe.0");
     signal(pid, Signal::SIGKILL);
     assert_eq!(robot.wait_restarted("probe.0", pid).restarts, 1);
@@ -90,7 +90,7 @@ fn one_that_hangs_on_its_way_out_keeps_nobody_waiting_and_a_second_word_ends_it(
     assert_eq!(child(&robot, "probe.0").phase, Phase::Stopping);
     let late = place.say(&["stop", "probe.0", "--timeout", "0.2"]).fails();
     assert!(late.contains("probe.0 is still stopping after 200ms"), "{late}");
-    // The first word stops what can be stopped in order; those that follow, moments later, make an end of the rest.
+    // The first signal stops modules in order; a second one, moments later, kills the rest.
     wait("launch ends", || {
         launch.signal(Signal::SIGINT);
         std::thread::sleep(Duration::from_millis(100));
@@ -178,7 +178,7 @@ fn orders_that_cannot_be_carried_out_say_why() {
     }
     assert!(matches!(tool.start(tool.launcher(), "probe.0"), Err(CallError::Module(_, ControlError::Running(_)))));
     tool.close();
-    // Any tool can read what launch offers, and ask for it.
+    // Any tool can read launch's interface, and call it.
     let listing = place.say(&["call", "tool.0"]).ok();
     assert!(listing.contains("restart <module: text>"), "{listing}");
     place.say(&["call", "tool.0", "stop", "probe.0"]).ok();

@@ -1,4 +1,4 @@
-//! Launch dies: no module drives on, and what is left is cleared away without harm to what lives.
+//! Launch dies: no module drives on, and cleaning removes the remains without harm to living processes.
 
 use crate::harness::{PATIENCE, Place, Robot, halt, probe, runs, signal, wait};
 use crate::probe::COUNT;
@@ -69,7 +69,7 @@ fn a_module_that_was_stopped_when_launch_died_is_woken_and_switches_off() {
     halt(stopped);
     launch.signal(Signal::SIGKILL);
     launch.end();
-    // Mostly the kernel does this, with SIGHUP before it: not where the new parent is of the same session.
+    // Mostly the kernel does this, preceded by SIGHUP; not if the new parent is in the same session.
     let _ = kill(Pid::from_raw(stopped as i32), Signal::SIGCONT);
     wait_gone(&pids);
     assert_eq!(place.recorded("off"), 2);
@@ -172,7 +172,7 @@ fn clean_leaves_alone_what_is_no_node() {
     assert!(place.memory().join("notes/shopping").exists() && place.memory().join("list").exists());
 }
 
-/// Says that a test is over, also when it fails.
+/// Tells the others that a test is over, also when it fails.
 struct Ended<'a>(&'a AtomicBool);
 
 impl Drop for Ended<'_> {

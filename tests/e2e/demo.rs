@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/small.log");
 
-/// The number before these words.
+/// The number in front of these words.
 fn number(text: &str, words: &str) -> u64 {
     let before = text.split(words).next().filter(|before| before.len() < text.len());
     let before = before.unwrap_or_else(|| panic!("no `{words}` in:\n{text}"));
@@ -90,10 +90,7 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
                 panic!("{row}")
             };
             assert!(packages.parse::<u64>().unwrap() > 0 && slowest.ends_with('s') && bound.ends_with("ms"), "{row}");
-            assert_eq!(
-                beyond_of_kept, "0",
-                "whoever's slots were kept is in time: {kept} of at most {bound}:\n{flows}"
-            );
+            assert_eq!(beyond_of_kept, "0", "a flow with kept slots is in time: {kept} of at most {bound}:\n{flows}");
             let is_known = match flow {
                 "laser.0 → pilot.0 scan" => within == "10.00 ms",
                 "laser.0 → pilot.0 subscribe answered" => within == "900.00 ms",
@@ -120,7 +117,7 @@ fn it_ends_by_itself_after_the_time_that_was_given() {
 fn a_log_is_played_to_its_end_and_nothing_of_it_is_lost() {
     let place = Place::new();
     let said = place.say(&["demo", "--log", LOG, "--speed", "50", "--no-gui"]).ok();
-    // Counted here once more, by other means. Good lines end with the logger's own stamp, 20 s and more; the robot repeats
+    // Counted here again, in another way. Good lines end with the logger's own stamp, 20 s and more; the robot repeats
     // its odometry with stamps next to zero, and two lines are broken.
     let text = std::fs::read_to_string(LOG).unwrap();
     let of = |word: &str| text.lines().filter(|line| line.starts_with(word)).count() as u64;
@@ -161,7 +158,7 @@ fn ctrl_c_ends_the_demo_with_its_summary() {
         let list = place.say(&["list", "--json"]).json();
         let pids: Vec<u64> = list["modules"].as_array().unwrap().iter().filter_map(|m| m["pid"].as_u64()).collect();
         assert!(pids.len() >= 3, "{list}");
-        // Told to end before launch knows that all are, it would be a start that failed.
+        // An earlier signal, before launch has all modules on, would be a failed start.
         let robot =
             place.robot_at(Path::new(if log { "../config/demo-log.toml" } else { "../config/demo.toml" }), "main");
         let launcher = launcher_of(&robot.installation, "main").unwrap();

@@ -1,10 +1,10 @@
-//! `rohrpost doctor` on the computer that the tests run on. What it says of others is tested beside its code.
+//! `rohrpost doctor` on the computer that runs the tests. Findings of other computers are tested beside its code.
 
 use crate::harness::{NETWORK, OUTPUT, Place, probe, wait};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-/// Its findings; the exit code says whether one is bad.
+/// Its findings; the exit code reports a bad one.
 fn examine(place: &Place, arguments: &[&str]) -> Vec<Value> {
     let said = place.say(&[&["doctor", "--json"], arguments].concat());
     let json: Value = serde_json::from_str(&said.out).unwrap_or_else(|error| panic!("{error}: {said:?}"));
@@ -32,13 +32,13 @@ fn this_computer_is_examined() {
     assert!(memory.contains("test.toml needs 8"), "two modules of 444 KiB: {memory}");
     let directory = find(&findings, "node directory")["is"].as_str().unwrap();
     assert!(directory.starts_with(place.memory().to_str().unwrap()), "{directory}");
-    // For people, with the same words.
+    // For people, in the same words.
     let page = place.say(&["doctor"]).out;
     assert!(page.contains(" warnings, ") && page.contains("ok    kernel"), "{page}");
     place.assert_empty();
 }
 
-/// Both nodes are this computer, at addresses of the loopback, on which nobody else's router is.
+/// Both nodes are this computer, at addresses of the loopback device, without any other router.
 #[test]
 fn the_network_of_a_configuration_is_examined() {
     let place = Place::new();
@@ -55,7 +55,7 @@ fn the_network_of_a_configuration_is_examined() {
     assert_eq!(is("time stamps"), "sending and receiving");
     assert_eq!(is("peer"), "arm at 127.251.7.2: is there; no router runs on it yet");
     assert!(is("packet size").starts_with("1500 B of the 65"), "{}", is("packet size"));
-    // A port that somebody has, and an address that nobody has (RFC 5737).
+    // A port in use, and an address that nobody has (RFC 5737).
     let taken = std::net::UdpSocket::bind("127.251.7.1:21118").unwrap();
     let findings = examine(&place, &["--config", config.to_str().unwrap(), "--node", "base"]);
     assert_eq!(find(&findings, "port of time")["is"], "UDP 21118, another program has it");
@@ -70,7 +70,7 @@ fn the_network_of_a_configuration_is_examined() {
     place.assert_empty();
 }
 
-/// What the file says of security is told, as text and as JSON, and whether what that takes is here.
+/// The file's security settings are shown, as text and as JSON, and whether their requirements are met.
 #[test]
 fn the_security_of_a_configuration_is_told() {
     let place = Place::new();
@@ -80,7 +80,8 @@ fn the_security_of_a_configuration_is_told() {
         };
         let text = node("base", 1, "[0, 3]") + &node("arm", 2, "[4, 7]");
         format!(
-            "{text}[network]\nsecurity = \"{security}\"\n[tcp]\naddress = \"127.251.8.1\"\n{tcp}\n[time]\nsource = \"master\"\n"
+            "{text}[network]\nsecurity = \"{security}\"\n[tcp]\naddress = \"127.251.8.1\"\n{tcp}\n[time]\n\
+             source = \"master\"\n"
         )
     };
     let module = probe("probe.0", "", "node = \"arm\"");
@@ -114,7 +115,7 @@ fn the_security_of_a_configuration_is_told() {
     let [lan, tcp] = told(&sealed);
     assert!(lan.0 == "ok" && lan.1.starts_with("key 1 of ") && lan.1.contains("udp.keys"), "{lan:?}");
     assert!(tcp.0 == "ok" && tcp.1.starts_with("TLS 1.3 with certificates in "), "{tcp:?}");
-    // Of another node, nothing is needed here.
+    // For another node, nothing is needed here.
     for file in ["arm.system-1.pem", "arm.system-1.key"] {
         std::fs::remove_file(place.path("certificates").join(file)).unwrap();
     }
@@ -124,7 +125,7 @@ fn the_security_of_a_configuration_is_told() {
     assert!(tcp.0 == "bad" && tcp.1.contains("base.system-1.key"), "{tcp:?}");
 }
 
-/// Whoever launched the bridge may have had another PATH.
+/// The bridge may have been launched with another PATH.
 #[test]
 fn a_bridge_that_runs_is_found() {
     let place = Place::new();

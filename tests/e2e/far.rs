@@ -1,5 +1,5 @@
-//! Nodes that are reached through the TCP router alone, as a laptop of a robot: all nodes of the file in namespaces of their own, `base` and `arm` on
-//! a LAN, `far` on a link of its own to `base`.
+//! Nodes that only the TCP router reaches, such as a robot's laptop: all nodes of the file in namespaces of their own,
+//! `base` and `arm` on a LAN, `far` on a link of its own to `base`.
 
 use crate::harness::{PATIENCE, Place, lacks_namespaces, probe, signal, wait};
 use crate::process::{Running, Said};
@@ -10,7 +10,8 @@ use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::path::PathBuf;
 
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";
-const TWO: &str = "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\ntools = [16, 31]\n\
+const TWO: &str = "[nodes.base]\naddress = \"10.77.0.1\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"10.77.0.2\"\n\
+    tools = [16, 31]\n\
                    [time]\nsource = \"master\"\n";
 const OPEN: &str = "[network]\nsecurity = \"none\"\n[tcp]\nsecurity = \"none\"\n";
 const SEALED: &str = "[network]\nsecurity = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertificates = \"certificates\"\n";
@@ -23,8 +24,8 @@ struct Field {
 }
 
 impl Field {
-    /// probe.0 on `base`, which follows far's, probe.1 on `arm` if it is there, probe.2 on `far`, which follows base's. None where namespaces are
-    /// not permitted.
+    /// probe.0 on `base`, which follows far's, probe.1 on `arm` if it is there, probe.2 on `far`, which follows base's.
+    /// None where namespaces are not permitted.
     fn launched(nodes: &[&'static str], lan: &str, security: &str) -> Option<Self> {
         let place = Place::new();
         let mut modules = vec![
@@ -35,7 +36,8 @@ impl Field {
             modules.push(probe("probe.1", "", "node = \"arm\""));
         }
         let text = format!(
-            "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n{CLASSES}{FAR}{lan}{security}address = \"192.168.7.1\"\nserver = \
+            "installation = \"test\"\n[system]\nname = \"robot\"\nid = 1\n\
+             {CLASSES}{FAR}{lan}{security}address = \"192.168.7.1\"\nserver = \
              \"base\"\n{}",
             modules.concat()
         );
@@ -60,12 +62,12 @@ impl Field {
         self.place.say_at(&self.config, node, arguments)
     }
 
-    /// What a tool shows of all nodes.
+    /// The view of a tool for all nodes.
     fn shows(&self, arguments: &[&str]) -> Said {
         self.place.say(&[arguments, &["--config", self.config.to_str().unwrap()]].concat())
     }
 
-    /// What a call brings, as soon as it comes through.
+    /// The result of a call, as soon as one succeeds.
     fn calls(&self, node: &str, module: &str) {
         wait(format!("{module} from {node}"), || {
             (self.says(node, &["call", module, "count", "1"]).code == Some(0)).then_some(())
@@ -77,7 +79,7 @@ impl Field {
         self.place.record().iter().filter(|line| line.starts_with(&head)).count()
     }
 
-    /// Data go both ways between `base` and `far`, from now on.
+    /// Waits until data arrive both ways between `base` and `far`.
     fn wait_heard(&self) {
         let before = ["probe.0", "probe.2"].map(|module| self.heard(module));
         wait("beats both ways", || {
@@ -95,7 +97,7 @@ impl Field {
         self.wait_heard();
     }
 
-    /// All tools know it.
+    /// All tools show it.
     fn check_tools(&self) {
         let list = self.shows(&["list"]).ok();
         for module in ["probe.0", "probe.2", "tcp.0", "tcp.255"] {
@@ -110,7 +112,7 @@ impl Field {
         let json = self.shows(&["time", "--json"]).json();
         let far = json["nodes"].as_array().unwrap().iter().find(|node| node["node"] == "far").unwrap();
         let error_ns = far["beyond"]["error_ns"].as_u64().unwrap();
-        // All of it is one computer: what it says it is off base's is, at most.
+        // All clocks are one computer's, so the stated error is an upper bound.
         let clocks = ["base", "far"].map(|node| SystemClock::open(&self.place.robot_at(&self.config, node).node));
         let now = monotonic_ns();
         let [base, far] = clocks.map(|clock| clock.at(now));
@@ -124,7 +126,7 @@ impl Field {
         assert!(edge("probe.0", "probe.2") && edge("probe.2", "probe.0"), "{graph}");
     }
 
-    /// What far's client of the TCP router tells, if it does now.
+    /// The counts of far's client of the TCP router, if it answers.
     fn beyond(&self) -> Option<serde_json::Value> {
         let told: serde_json::Value = serde_json::from_str(self.shows(&["net", "--json"]).out.trim()).ok()?;
         let far = told.as_array()?.iter().find(|node| node["node"] == "far")?;
@@ -167,7 +169,7 @@ fn sealed_it_reaches_all_nodes_of_a_lan_and_an_outage_costs_a_gap() {
         field.check_talk();
         let (began_ns, ended_ns) = wait("it says how long it was away", || {
             let beyond = field.beyond()?;
-            // A busy computer may have made others before.
+            // A busy computer may have caused earlier ones.
             beyond["outages"].as_u64().filter(|outages| *outages > before)?;
             Some((beyond["outage"]["began_ns"].as_u64()?, beyond["outage"]["ended_ns"].as_u64()?))
         });

@@ -1,11 +1,11 @@
-//! `graph`: who sends what to whom, as a table, as JSON, and drawn.
+//! `graph`: all flows with sender and receiver, as a table, as JSON, and drawn.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, probe, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-/// A mailbox of a module's own takes data, whichever local id it has; output lines go to the collector alone.
+/// A module's own mailbox takes data, whatever its local id; output lines go to the collector alone.
 #[test]
 fn data_in_a_mailbox_of_ones_own_are_named() {
     let place = Place::new();
@@ -31,7 +31,7 @@ fn data_in_a_mailbox_of_ones_own_are_named() {
 }
 
 #[test]
-fn graph_shows_who_sends_what_to_whom() {
+fn graph_shows_senders_receivers_and_data() {
     let place = Place::new();
     let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", "")]);
     let mut echo = Running::start(place.command(&["echo", "probe.0", "beat"]));
@@ -83,7 +83,7 @@ fn graph_shows_who_sends_what_to_whom() {
     assert_eq!(told, "in 0 s nothing is sent; try --seconds 2\n");
     let told = place.say(&["graph", "--seconds", "0.1", "-o", "nowhere/graph.txt"]).fails();
     assert!(told.contains("name a file in a folder that is there"), "{told}");
-    // With nobody sending, it says so.
+    // Without any sender, it says so.
     robot.tool(PATIENCE).close();
     assert_eq!(
         place.say(&["graph", "--seconds", "0.1"]).ok(),

@@ -1,4 +1,4 @@
-//! A place of its own for each test: shared memory, files, processes. All of it is gone when the place is dropped.
+//! A place of its own for each test: shared memory, files, processes. Everything is removed when the place is dropped.
 
 use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
@@ -19,10 +19,10 @@ use tempfile::TempDir;
 
 /// The command under test.
 const ROHRPOST: &str = env!("CARGO_BIN_EXE_rohrpost");
-/// What takes longer does not come any more, however busy the computer is.
+/// Limit of all waits, long enough for a busy computer.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Head of all configurations: no scheduling in real time, so that tests run beside each other.
+/// Head of all configurations: no real-time scheduling, so that tests run beside each other.
 const HEAD: &str = r#"
 [system]
 name = "robot"
@@ -36,7 +36,7 @@ tool = { id = 16 }
 real-time-from = 256
 "#;
 
-/// Waits until there is something, and fails with what was waited for.
+/// Waits until there is a value, and fails with the name of what was awaited.
 pub(crate) fn wait<T>(what: impl Debug, mut look: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
     loop {
@@ -48,7 +48,7 @@ pub(crate) fn wait<T>(what: impl Debug, mut look: impl FnMut() -> Option<T>) -> 
     }
 }
 
-/// What a person asks for who waits until a busy computer has the time to answer, longer than the second that is usual; unless that is said.
+/// The `--timeout` of commands on a busy computer, longer than the usual second; unless a test sets its own.
 pub(crate) fn patient<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     const PATIENT: [&str; 2] = ["--timeout", "20"];
     let is_said = arguments.iter().any(|word| word.starts_with("--timeout"));
@@ -59,12 +59,12 @@ pub(crate) fn patient<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     }
 }
 
-/// Says that something was not tested here, past the test harness, which keeps what passing tests print to itself.
+/// Reports that something was not tested here, past the test harness, which hides the output of passing tests.
 pub(crate) fn skipped(why: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: {why}");
 }
 
-/// Whether this was said for want of network namespaces; then what needs them was not tested.
+/// Whether a test was skipped for lack of network namespaces.
 pub(crate) fn lacks_namespaces(said: &str) -> bool {
     let lacks = said.contains("network namespaces cannot be made here");
     if lacks {
@@ -81,25 +81,25 @@ pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
     )
 }
 
-/// What a configuration of several nodes has beside them.
+/// Sections of a configuration with several nodes.
 pub(crate) const NETWORK: &str = "[network]\nsecurity = \"none\"\n[time]\nsource = \"master\"\n";
 
 pub(crate) const OUTPUT: &str = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\n";
 
-/// Whether a process of this number runs (one that only waits to be reaped does not, and holds nothing any more).
+/// Whether a process of this number runs. A zombie does not, and holds no resources.
 pub(crate) fn runs(pid: u32) -> bool {
-    // Its threads die one by one, and the first may be a zombie while another still holds its files.
+    // Threads die one by one, and the first may be a zombie while another still holds the files.
     let threads = std::fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
     threads.map(|thread| state(&thread.path().join("stat"))).any(|state| !matches!(state, 'Z' | 'X'))
 }
 
-/// State of a process or thread: the letter after the name, which may hold anything; `X` when there is none any more.
+/// State of a process or thread: the letter after the name, which may contain anything; `X` if there is none.
 pub(crate) fn state(stat: &Path) -> char {
     let text = std::fs::read_to_string(stat).unwrap_or_default();
     text.rsplit_once(") ").and_then(|(_, rest)| rest.chars().next()).unwrap_or('X')
 }
 
-/// Stops a process as Ctrl-Z does, and waits until it stands.
+/// Stops a process as Ctrl-Z does, and waits until it is stopped.
 pub(crate) fn halt(pid: u32) {
     signal(pid, Signal::SIGSTOP);
     wait(format!("{pid} stands"), || (state(Path::new(&format!("/proc/{pid}/stat"))) == 'T').then_some(()));
@@ -109,7 +109,7 @@ pub(crate) fn signal(pid: u32, signal: Signal) {
     kill(Pid::from_raw(pid as i32), signal).unwrap();
 }
 
-/// Where one test's processes live.
+/// The place of one test's processes.
 pub(crate) struct Place {
     /// Configurations and records.
     folder: TempDir,
@@ -134,7 +134,7 @@ impl Place {
         self.folder.path().join(name)
     }
 
-    /// Where nodes lie.
+    /// Directory of nodes.
     pub(crate) fn memory(&self) -> &Path {
         self.memory.path()
     }
@@ -157,7 +157,7 @@ impl Place {
         text.lines().map(str::to_owned).collect()
     }
 
-    /// Lines of the record that say `what`, after the module's name.
+    /// Lines of the record with `what`, after the module's name.
     pub(crate) fn recorded(&self, what: &str) -> usize {
         self.record().iter().filter(|line| line.split_once(' ').is_some_and(|(_, rest)| rest == what)).count()
     }
@@ -174,7 +174,7 @@ impl Place {
         command
     }
 
-    /// Runs a command to its end, patiently: `echo`, which waits a second for its answers whatever it is told, again.
+    /// Runs a command to its end, with retries for `echo`, which has a fixed timeout of a second.
     pub(crate) fn say(&self, arguments: &[&str]) -> Said {
         let began = Instant::now();
         loop {
@@ -186,7 +186,7 @@ impl Place {
         }
     }
 
-    /// Runs it as it is.
+    /// Runs it without retries.
     pub(crate) fn say_at_once(&self, arguments: &[&str]) -> Said {
         Running::start(self.command(arguments)).said()
     }
@@ -211,7 +211,7 @@ impl Place {
         (launch, robot)
     }
 
-    /// Waits until a node is there.
+    /// Waits until a node exists.
     pub(crate) fn robot(&self, config: &Path, node_name: &str, launch: &mut Running) -> Robot {
         let installation = Installation::load(config).unwrap();
         let base = node_directory(&installation.name, node_name);
@@ -223,7 +223,7 @@ impl Place {
         Robot { installation, node, node_name: node_name.into() }
     }
 
-    /// A node that is there, whoever launched it.
+    /// A running node, however it was launched.
     pub(crate) fn robot_at(&self, config: &Path, node_name: &str) -> Robot {
         let installation = Installation::load(config).unwrap();
         let base = node_directory(&installation.name, node_name);
@@ -251,7 +251,7 @@ impl Drop for Place {
     }
 }
 
-/// A node that runs, seen by a test that takes part as a tool.
+/// A running node, seen by a test that takes part as a tool.
 pub(crate) struct Robot {
     pub(crate) installation: Installation,
     pub(crate) node: Arc<Node>,
@@ -304,14 +304,14 @@ impl Robot {
                 (self.state(&name) == state).then_some(())
             });
         }
-        // Launch takes the first place of a tool. Until it has heard from each module, a stop is a start that failed.
+        // Launch takes the first place of a tool. Before all modules have answered, a stop would be a failed start.
         let tools = self.installation.node(&self.node_name).unwrap().tools.clone();
         let replies = Name::new(self.installation.system.id, 16, *tools.start(), local::REPLIES);
         wait("launch has heard from all", || {
             let heard = self.node.look_at(replies)?.classes.iter().map(|class| class.received).sum::<u64>();
             (heard >= on).then_some(())
         });
-        // Who has answered holds the package for a moment longer; and a busy one may have been asked twice.
+        // A module that has answered still holds the package for a moment; and a busy one may have been asked twice.
         for module in self.installation.modules_on(&self.node_name) {
             let name = self.installation.classes.format(module.name);
             if name.starts_with("probe.") {
@@ -325,7 +325,7 @@ impl Robot {
         self.node.look_at(self.name(module)).map_or(0, |mailbox| mailbox.depth)
     }
 
-    /// Waits until the module runs in another process than this one, and works.
+    /// Waits until the module runs in another process than this one, and answers.
     pub(crate) fn wait_restarted(&self, module: &str, old_pid: u32) -> ParticipantInfo {
         wait(format!("{module} is not on again"), || {
             self.process(module).filter(|p| p.pid != old_pid && p.state == Some(rohrpost_mailbox::ModuleState::On))

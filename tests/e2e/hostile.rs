@@ -1,8 +1,8 @@
-//! The demo's robot while a hostile node of its LAN, with the key, and a hostile teammate, with a certificate, do what they can: it drives as before, each
-//! attempt is counted by cause, and no process takes more memory.
+//! The demo's robot, while a hostile node of its LAN, with the key, and a hostile teammate, with a certificate, attack
+//! it: it drives as before, each attempt is counted by cause, and no process takes more memory.
 //!
-//! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the whole minute:
-//! `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
+//! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the
+//! whole minute: `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
 
 use crate::harness::{PATIENCE, Place, Robot, skipped};
 use crate::process::{Running, Said};
@@ -18,12 +18,14 @@ use std::time::{Duration, Instant};
 
 const NODES: [(&str, &str); 4] =
     [("base", "10.77.0.1"), ("brain", "10.77.0.2"), ("desk", "10.77.0.3"), ("away", "10.77.0.9")];
-/// What runs of the robot; `desk` is the hostile node's place.
+/// Running processes of the robot; `desk` is the hostile node's place.
 const RUNNING: [&str; 2] = ["base", "brain"];
-const SECURITY: &str = "security = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertificates = \"certificates\"\naddress = \"10.77.0.1\"\n\
-                        server = \"base\"\n[access]\nmotor = [\"pilot\"]\nodometry = [\"pilot\", \"mapper\", \"tool\"]\n\
+const SECURITY: &str = "security = \"keys\"\n[tcp]\nsecurity = \"tls\"\ncertificates = \"certificates\"\n\
+    address = \"10.77.0.1\"\n\
+                        server = \"base\"\n[access]\nmotor = [\"pilot\"]\n\
+                        odometry = [\"pilot\", \"mapper\", \"tool\"]\n\
                         laser = [\"pilot\", \"mapper\", \"tool\"]\n";
-/// A process may take so much more than before: what its bounded queues and tables hold.
+/// Allowed growth of a process: its bounded queues and tables.
 const GROWTH_KIB_MAX: u64 = 16 << 10;
 
 struct Field {
@@ -103,7 +105,7 @@ impl Field {
         all
     }
 
-    /// How far the robot's wheels take it in so long, m.
+    /// The distance that the robot's wheels drive in this time, m.
     fn drives(&self, time: Duration) -> f64 {
         let mut tool = self.robot().tool(PATIENCE);
         let odometry = self.robot().name("odometry.0");
@@ -141,7 +143,8 @@ fn resident_kib(pid: u32) -> u64 {
     line.trim().trim_end_matches(" kB").parse().unwrap()
 }
 
-/// The demo's robot on three nodes, sealed, with a TCP router; what it draws is left out, and its lines are collected on a node that runs.
+/// The demo's robot on three nodes, sealed, with a TCP router; without drawing, and with its lines collected on a
+/// running node.
 fn robot() -> String {
     let text = include_str!("../../config/demo-nodes.toml");
     let (text, _) = text.split_once("# A program of its own").unwrap();
@@ -184,7 +187,7 @@ fn a_robot_drives_as_before_beside_a_hostile_node_and_a_hostile_teammate() {
     field.stop();
 }
 
-/// What routers count by cause, wherever it stands in what `net` says.
+/// Counts of routers by cause, anywhere in the output of `net`.
 fn causes(told: &serde_json::Value, sums: &mut BTreeMap<String, u64>) {
     match told {
         serde_json::Value::Array(all) => all.iter().for_each(|each| causes(each, sums)),
@@ -199,7 +202,7 @@ fn causes(told: &serde_json::Value, sums: &mut BTreeMap<String, u64>) {
     }
 }
 
-/// Each kind of attempt stands in a count of its own cause, where it was refused.
+/// Each kind of attempt is counted under its own cause, where it was refused.
 fn check_counted(field: &Field, tried: &[BTreeMap<String, u64>]) {
     let mut sums = BTreeMap::new();
     let told: serde_json::Value = serde_json::from_str(field.says("base", &["net", "--json"]).out.trim()).unwrap();
@@ -243,7 +246,7 @@ fn check_counted(field: &Field, tried: &[BTreeMap<String, u64>]) {
     assert!(tried[1]["registration refused"] > 0, "{tried:?}");
 }
 
-/// What a hostile module says of itself moves no terminal.
+/// A hostile module's text has no effect on the terminal.
 fn check_said(field: &Field) {
     for arguments in [&["call", "2.mapper.0.0"][..], &["status", "2.mapper.0.0"], &["list"], &["log", "--last", "50"]] {
         let said = field.says("base", arguments);

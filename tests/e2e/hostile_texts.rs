@@ -1,4 +1,5 @@
-//! What others wrote, shown by each tool: names, texts, units, values, faults and lines of a module that wants to drive the terminal.
+//! Foreign texts in each tool: names, texts, units, values, faults and lines of a module that tries to control the
+//! terminal.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, wait};
 use rohrpost::interface::{Interface, Serve};
@@ -9,10 +10,10 @@ use rohrpost::wire::append;
 use rohrpost::{Context, Fault, Module, ModuleError};
 use std::time::Duration;
 
-/// One character of each kind that a terminal obeys, and the beginning of a line that seems to be a tool's own.
+/// One character of each kind that a terminal interprets, and the beginning of a line that imitates a tool's own.
 const HOSTILE: &str =
     "x\u{1b}[2J\u{1b}]0;title\u{7}\r\u{9b}31m\u{90}\u{202e}\u{2066}\u{200f}\u{2028}\u{8}\u{7f}\nFORGED: all is well\n";
-/// Functions that fail, and that tell.
+/// Functions with failures and results.
 const FAILS: u16 = 16;
 const TELLS: u16 = 17;
 const REFUSES: u16 = 18;
@@ -32,7 +33,7 @@ fn module() {
     }
 }
 
-/// A type whose every name is hostile.
+/// A type with only hostile names.
 fn structure(inner: Type) -> Type {
     let field = Field::new(HOSTILE, inner).said(HOSTILE, HOSTILE);
     Type::Struct(Named::new(HOSTILE, Members::Fields(vec![field])).said(HOSTILE))
@@ -147,7 +148,7 @@ impl Module for Hostile {
     }
 }
 
-/// Nothing that a terminal obeys, but ends of lines and tabs of the tool's own; and no line that others began.
+/// No terminal control characters except the tool's own line ends and tabs; and no line that starts with foreign text.
 #[track_caller]
 fn assert_plain(what: &[&str], text: &str) {
     let obeyed: Vec<char> = text.chars().filter(|c| is_obeyed(*c) && !matches!(c, '\n' | '\t')).collect();
@@ -155,7 +156,7 @@ fn assert_plain(what: &[&str], text: &str) {
     assert!(!text.lines().any(|line| line.starts_with("FORGED")), "{what:?} lets others begin a line: {text}");
 }
 
-/// Subcommands that print nothing that a module, a node or a program beyond wrote.
+/// Subcommands that print nothing that a module, a node or an outside program wrote.
 const OWN_WORDS: [&str; 16] = [
     "check",
     "launch",
@@ -293,7 +294,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
     assert_plain(&["launch"], &launch.err());
 }
 
-/// Whether a text in it is the one that was written.
+/// Whether a text in it is the original one.
 fn holds(json: &serde_json::Value) -> bool {
     match json {
         serde_json::Value::String(text) => text == HOSTILE,

@@ -1,5 +1,5 @@
-//! Two nodes of one system on this computer, each with its router, at addresses of the loopback: what goes from one to the other, and
-//! what is told when it does not.
+//! Two nodes of one system on this computer, each with its router, at addresses of the loopback device: packages
+//! between them, and messages about failures.
 
 use crate::harness::{NETWORK, PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::ProbingInterface;
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
 
-/// Routers that joined so long ago are not young any more.
+/// A router that joined longer ago than this is not young any more.
 const YOUNG_NS: u64 = 1_500_000_000;
 
 /// Two nodes, `base` with probe.0 and `arm` with probe.1.
@@ -38,7 +38,8 @@ pub(crate) fn addresses() -> [String; 2] {
 fn configured(place: &Place, name: &str, addresses: &[String; 2], further: &str) -> PathBuf {
     let [base, arm] = addresses;
     let nodes = format!(
-        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}{further}"
+        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n\
+         {NETWORK}{further}"
     );
     let modules = [probe("probe.0", "", "node = \"base\""), probe("probe.1", "rate-hz = 20.0", "node = \"arm\"")];
     place.config_of(name, &nodes, &[&modules[0], &modules[1]])
@@ -50,7 +51,7 @@ impl Lan {
         Self::launched_with("", &[])
     }
 
-    /// The same, with further sections of the configuration, and things in the environment.
+    /// The same, with further sections of the configuration, and environment variables.
     fn launched_with(further: &str, environment: &[(&str, &str)]) -> Self {
         let place = Place::new();
         let config = configured(&place, "test", &addresses(), further);
@@ -59,7 +60,8 @@ impl Lan {
             let started = lan.start(node, environment);
             lan.nodes.push(started);
         }
-        // A router says nothing of what comes in its first half second: that may be a copy of what the one before it has delivered.
+        // A router is silent about packages in its first half second: they may be duplicates of what its predecessor
+        // has delivered.
         wait("routers that answer", || {
             let routers = lan.nodes.iter().zip(["router.0", "router.1"]);
             let mut began_ns = routers.filter_map(|((_, robot), router)| Some(robot.process(router)?.joined_ns));
@@ -85,12 +87,12 @@ impl Lan {
         &self.nodes[1].1
     }
 
-    /// A command of a person at `base`.
+    /// A person's command at `base`.
     fn say(&self, arguments: &[&str]) -> crate::process::Said {
         self.place.say_at(&self.config, "base", arguments)
     }
 
-    /// What counting at `arm` brings, called from `base`.
+    /// The result of counting at `arm`, called from `base`.
     fn count(&self, number: u32) -> Result<u64, CallError> {
         let mut tool = self.base().tool(Duration::from_secs(1));
         let write = |body: &mut Vec<u8>| append(body, &(number,));
@@ -100,7 +102,7 @@ impl Lan {
         counted
     }
 
-    /// What a call from `base` to `arm` is refused with; none when it was run, or nobody answered.
+    /// The fault of a call from `base` to `arm`; none when it was run, or nobody answered.
     fn fault(&self) -> Option<Fault> {
         match self.count(0) {
             Err(CallError::Fault(_, fault)) => Some(fault),
@@ -177,7 +179,7 @@ fn a_full_mailbox_on_another_node_is_told() {
             (answer.is_some() || lan.arm().waiting("probe.1") > before).then_some(answer)
         });
         tool.link.forget(call);
-        // Who has no time for a second is taken for silent.
+        // A module without processor time for a second counts as silent.
         answer.filter(|answer| !matches!(answer, Err(CallError::Fault(_, Fault::NodeSilent { .. }))))
     });
     assert!(matches!(full, Err(CallError::Fault(_, Fault::MailboxFull))), "{full:?}");
@@ -193,8 +195,8 @@ fn routers_may_be_killed_at_any_time_and_nothing_runs_twice() {
     for (robot, router) in [(lan.base(), "router.0"), (lan.arm(), "router.1"), (lan.base(), "router.0")] {
         let pid = robot.pid(router);
         signal(pid, Signal::SIGKILL);
-        // Through the transit mailbox, in which it waits for the next router; or refused, when launch was quicker.
-        // A call that timed out may have been run all the same: the next one is another.
+        // Through the transit mailbox, in which it waits for the next router; or refused, if launch was quicker.
+        // A call that timed out may have run all the same: the next one is a new call.
         for _ in 0..3 {
             let number = wait("a call comes through", || {
                 let number = numbers.next()?;
@@ -261,9 +263,9 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
         wait("a call comes through", || lan.count(number).ok());
     }
     let counted = lan.place.counted();
-    // A call that timed out was made anew, as another one: what one call runs, it runs once.
+    // After a timeout the tool makes a new call: one call runs at most once.
     assert!((0..20).all(|number| counted.contains(&number)), "{counted:?}");
-    // Known when it is clear that they do not come late.
+    // Known once it is clear that they are not just late.
     wait("losses and duplicates are counted", || {
         let told = lan.say(&["echo", "router.0", "links", "--count", "1", "--json"]).json();
         let peer = &told["value"]["peers"][0];
@@ -276,7 +278,7 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
 }
 
 #[test]
-fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
+fn net_shows_links_losses_and_the_master_of_time() {
     repeated_on_stall(Watched::Ordinary, || {
         let mut lan = Lan::launched();
         let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
@@ -288,7 +290,7 @@ fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
             let told: serde_json::Value = serde_json::from_str(&all(&lan, &["--json"]).out).unwrap();
             let alive = (0..2).all(|node| state(&told, node) == "alive");
             let slave = (0..2).any(|node| told[node]["clock"]["role"] == "slave");
-            // They say that they are there.
+            // They report that they are there.
             let sends = told[0]["rates"][0]["sent_bytes_s"].as_f64() > Some(0.0);
             (alive && slave && sends).then_some(told)
         });
@@ -297,7 +299,7 @@ fn net_shows_who_hears_whom_what_was_lost_and_whose_time_it_is() {
         for words in ["base", "arm", "alive", "slave of", "there and back"] {
             assert!(text.contains(words), "no `{words}` in:\n{text}");
         }
-        // A command to a mailbox that nobody has is lost at its node, and that is told.
+        // A command to a missing mailbox is lost at its node, and that is reported.
         assert_eq!(lan.say(&["stop", "probe.1"]).code, Some(0));
         wait("it is refused", || (lan.fault() == Some(Fault::NoMailbox)).then_some(()));
         wait("the loss is told", || all(&lan, &[]).out.contains("no-mailbox").then_some(()));
@@ -335,7 +337,7 @@ fn net_shows_what_was_refused_and_what_to_do() {
     let IpAddr::V4(base_v4) = base else { panic!("{base}") };
     let [a, b, c, d] = base_v4.octets();
     let stranger = UdpSocket::bind((Ipv4Addr::new(a, b, c, d + 7), 0)).unwrap();
-    stranger.send_to(b"who is there?", (base, port)).unwrap();
+    stranger.send_to(b"is anybody there?", (base, port)).unwrap();
     let text = wait("all are counted", || {
         let text = lan.say(&["net"]).out;
         (text.contains("3 datagrams refused") && text.contains("1 datagram dropped")).then_some(text)

@@ -1,4 +1,4 @@
-//! Every tool works for any module on any node, from any node; a node that is silent is told as such, and nobody waits for it.
+//! Every tool works for any module on any node, from any node; a silent node is reported, and no tool waits for it.
 
 use crate::harness::{NETWORK, OUTPUT, Place, Robot, halt, probe, signal, wait};
 use crate::lan::addresses;
@@ -21,7 +21,8 @@ impl Two {
         let place = Place::new();
         let [base, arm] = addresses();
         let nodes = format!(
-            "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}"
+            "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n\
+             {NETWORK}"
         );
         let modules = [
             format!("{OUTPUT}node = \"base\"\n"),
@@ -49,7 +50,7 @@ impl Two {
         two
     }
 
-    /// Without options: the tool finds its way.
+    /// Without options: the tool finds its node.
     fn say(&self, arguments: &[&str]) -> Said {
         self.place.say(arguments)
     }
@@ -68,7 +69,7 @@ impl Two {
     }
 }
 
-/// Whether these are data that go to this module.
+/// Whether these are data for this module.
 fn is_beat_to(flow: &FlowInfo, module: &str, robot: &Robot) -> bool {
     flow.to.module() == robot.name(module) && flow.kind.0 < 0 && flow.to.local() >= 2
 }
@@ -111,8 +112,8 @@ fn all_nodes_are_listed_from_each_of_them() {
         );
         assert!(far["uptime_s"].as_f64() < Some(600.0), "{far}");
         let rate = far["sends_to"].as_array().unwrap().iter().find(|peer| peer["module"] == "probe.0").unwrap();
-        // It hears each beat twice, in two mailboxes: a hundred a second, fewer on a computer that is busy. Counted once more where they
-        // are delivered, they would be more.
+        // It receives each beat twice, in two mailboxes: a hundred a second, fewer on a busy computer. If they were
+        // counted again at delivery, there would be more.
         let per_s = rate["packages_per_s"].as_f64().unwrap();
         assert!((10.0..130.0).contains(&per_s), "counted once, where they are sent: {per_s}");
         assert_eq!(two.say(&["status", "--json"]).json().as_array().unwrap().len(), 5, "with both routers");
@@ -157,7 +158,7 @@ fn figures_of_another_node_are_as_those_of_ones_own() {
             "{graph}"
         );
         let per_s = beats[0]["packages_per_s"].as_f64().unwrap();
-        // Into its data mailbox, and into one of its own.
+        // Into its data mailbox, and into another one of its own.
         assert!((10.0..130.0).contains(&per_s), "{per_s}");
         assert_eq!(module(&graph, "probe.1")["node"], "arm");
         wait("something of the arm is drawn", || {
@@ -188,7 +189,7 @@ fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
                     .contains("probe.1 has no mailbox `probe.1.9`; it has")
             );
         }
-        // What a module on `arm` says, the collector on `base` has.
+        // The collector on `base` has the lines of a module on `arm`.
         let line = |from: &str| {
             let log = two.say_at(from, &["log", "--module", "probe.1"]).out;
             log.lines().any(|line| line.contains("arm/probe.1: far away")).then_some(())
@@ -270,7 +271,7 @@ fn a_silent_node_is_told_and_nobody_waits_for_it() {
         let router = two.arm.1.pid("router.1");
         halt(launch);
         let began = Instant::now();
-        // Its router still runs: nobody but launch is asked in vain, and that not for long.
+        // Its router still runs: only launch is asked in vain, and only briefly.
         let list = two.say(&["list"]).ok();
         assert!(list.contains("node arm is silent: no answer within 1s"), "{list}");
         assert!(began.elapsed() < Duration::from_secs(20), "{:?}", began.elapsed());
@@ -282,7 +283,7 @@ fn a_silent_node_is_told_and_nobody_waits_for_it() {
         });
         let far = module(&silent, "probe.1");
         assert_eq!((&far["state"], &far["node"], &far["pid"]), (&"unreachable".into(), &"arm".into(), &Value::Null));
-        // It tells so twice a second.
+        // It reports so twice a second.
         wait("its router knows since when", || {
             two.say(&["list"]).ok().contains("node arm is silent since ").then_some(())
         });

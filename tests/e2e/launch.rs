@@ -41,7 +41,7 @@ fn what_a_configuration_resolved_to_lies_beside_the_mailboxes() {
     let names = ["output.0", "probe.0"];
     assert_eq!(told, names.map(|name| (name, robot.name(name).raw().into())));
     assert_eq!((&modules[0]["optional"], &modules[1]["optional"]), (&false.into(), &true.into()));
-    // What is there by the name is a mailbox.
+    // The link of this name leads to a mailbox.
     let mailbox = format!("{:08x}.mbx", modules[1]["number"].as_u64().unwrap());
     assert!(robot.node.path().join(mailbox).exists());
     let checked = place.say(&["check", "test.toml", "--json"]).json();
@@ -82,7 +82,7 @@ fn a_module_that_will_not_stop_is_killed_and_named() {
     wait("probe.3 works", || (place.recorded("work begins") == 1).then_some(()));
     tool.close();
     launch.signal(Signal::SIGTERM);
-    // Whoever passes a word on at once says it a second time, and means the same.
+    // A launcher may forward a signal at once: a second one within moments means the same.
     launch.signal(Signal::SIGINT);
     assert!(launch.end().success());
     for (module, killed) in [("probe.0", false), ("probe.1", true), ("probe.2", true)] {

@@ -1,4 +1,4 @@
-//! The collector believes nobody who speaks in another's name, of times to come, or without end.
+//! The collector rejects lines in another's name, of future times, or without end.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe, wait};
 use rohrpost::common::{DataHead, OutputLevel};
@@ -17,7 +17,7 @@ fn refused(robot: &Robot, tool: &mut ToolLink) -> RefusedLines {
     tool.call(collector, REFUSED, hash, |_| Ok(()), |bytes| from_bytes(bytes)).unwrap()
 }
 
-/// Sends a line as whoever has this name; false when there was no room.
+/// Sends a line under this name; false if there was no room.
 fn send(robot: &Robot, tool: &mut ToolLink, from: Name, line: &OutputLine) -> bool {
     let head = DataHead { stamp_ns: line.time_ns, sequence: 0, missed: line.lost, incarnation: 0 };
     let mut body = head.to_bytes().to_vec();
@@ -27,7 +27,8 @@ fn send(robot: &Robot, tool: &mut ToolLink, from: Name, line: &OutputLine) -> bo
     tool.link.send(robot.name("output.0").with_local(LINES), &label, &[&body]).is_ok()
 }
 
-/// The log as soon as it has this: `output` tells a refusal by a line of its own, which comes the way of all lines.
+/// The log as soon as it contains this: `output` reports a refusal by a line of its own, which takes the path of all
+/// lines.
 fn told(place: &Place, words: &str) -> String {
     wait(words, || {
         let log = place.say(&["log"]).ok();
@@ -59,7 +60,7 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
         assert!(send(&robot, &mut tool, from, &line));
     }
     let expected = RefusedLines { foreign_name: 2, other_system: 2, ahead: 1, losses: 1, ..RefusedLines::default() };
-    wait("all were checked", || (refused(&robot, &mut tool) == expected).then_some(()));
+    wait("all lines are checked", || (refused(&robot, &mut tool) == expected).then_some(()));
     let log = told(&place, "lines in the name of others were dropped");
     assert!(!log.contains("forged") && !log.contains("by another system"), "{log}");
     assert!(log.contains(": said in its own name"), "{log}");
@@ -71,7 +72,7 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
 }
 
 #[test]
-fn who_says_lines_without_end_has_its_share_and_what_others_said_stays() {
+fn a_module_with_endless_lines_has_its_share_and_lines_of_others_stay() {
     let place = Place::new();
     let ring = format!("[output]\nring = {RING}\n");
     let (mut launch, robot) = place.launched(&[&ring, OUTPUT, &probe("probe.0", "", "")]);

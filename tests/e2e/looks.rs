@@ -1,4 +1,4 @@
-//! Launch shows its node page by page to whoever cannot look into its shared memory: here to a tool that can, and compares.
+//! Launch shows its node page by page to tools without access to its shared memory. Here a tool with access compares.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, halt, probe, signal, wait};
 use nix::sys::signal::Signal;
@@ -31,7 +31,7 @@ fn mailbox(tool: &mut ToolLink, name: Name) -> Option<Box<MailboxSnapshot>> {
     }
 }
 
-/// What flows are, without their counts, but for those of who looks: the looks themselves are among them.
+/// The flows without their counts, and without those of the observer, since snapshots cause flows themselves.
 fn kinds(flows: &[FlowInfo], looker: Name) -> Vec<(u32, Name, Name, i16)> {
     let others = flows.iter().filter(|flow| ![flow.from.module(), flow.to.module()].contains(&looker));
     let mut kinds: Vec<_> = others.map(|flow| (flow.incarnation, flow.from, flow.to, flow.kind.0)).collect();
@@ -42,7 +42,7 @@ fn kinds(flows: &[FlowInfo], looker: Name) -> Vec<(u32, Name, Name, i16)> {
 #[test]
 fn a_look_from_afar_shows_what_a_look_from_near_does() {
     let place = Place::new();
-    // No collector: the first line that launch passes on to it would be a flow that not each look has seen.
+    // No collector: launch's first line to it would be a flow that only some snapshots show.
     let (_launch, robot) = place.launched(&[&probe("probe.0", "rate-hz = 50.0", ""), &probe("probe.1", "", "")]);
     let mut tool = robot.tool(PATIENCE);
     tool.status(robot.name("probe.0")).unwrap();
@@ -147,7 +147,7 @@ fn another_version_is_refused_and_an_old_look_is_gone() {
     assert_eq!((second.look, second.total, second.from), (look, total, 100));
     let beyond = ask(LOOK_ON, &next(u32::MAX)).unwrap();
     assert!(beyond.bytes.is_empty());
-    // Sixteen newer ones take its place.
+    // Sixteen newer ones replace it.
     for _ in 0..16 {
         ask(LOOK, &|body| append(body, &(what, form, 100u16)).unwrap()).unwrap();
     }
@@ -167,7 +167,7 @@ fn a_launch_that_stands_is_silent_in_time() {
     assert!(matches!(seen, Err(LookFailure::Silent(_))), "{seen:?}");
     assert!(began.elapsed() >= timeout);
     signal(launch.pid(), Signal::SIGCONT);
-    // What was asked meanwhile does not disturb what is asked now.
+    // An earlier question does not disturb the present one.
     assert_eq!(survey(&mut tool, Scope::Modules).modules.len(), 1);
     tool.close();
 }

@@ -1,4 +1,4 @@
-//! `rohrpost mailbox`: a mailbox whose receiver stands still, seen from outside.
+//! `rohrpost mailbox`: a mailbox with a stopped receiver, seen from outside.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, wait};
 use crate::process::Running;
@@ -40,7 +40,7 @@ fn file_of(robot: &Robot, name: &str) -> PathBuf {
 }
 
 #[test]
-fn a_full_mailbox_of_a_stopped_receiver_shows_who_fills_it_and_what_was_lost() {
+fn a_full_mailbox_of_a_stopped_receiver_shows_its_senders_and_losses() {
     let place = Place::new();
     let keys = "stop-within = \"200 ms\"\n[module.mailbox.commands]\nslots = 4\nmax-age = \"90 s\"";
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);
@@ -53,7 +53,7 @@ fn a_full_mailbox_of_a_stopped_receiver_shows_who_fills_it_and_what_was_lost() {
     let label = Label { priority: TOOL, kind: Type::command(16), ..Label::default() };
     (0..4).for_each(|_| sender.send(&label, &[b"nonsense"]).unwrap());
     assert!(matches!(sender.send(&label, &[]), Err(SendError::Full(_))));
-    // Both before one dies: else the other takes its place in the node's table, and its number is gone.
+    // Both before one dies: else the other takes its place in the node's table, and its number is lost.
     let (mut dead, alive) = (fill(&robot), fill(&robot));
     let dead_pid = dead.pid();
     dead.signal(Signal::SIGKILL);
@@ -76,7 +76,7 @@ fn a_full_mailbox_of_a_stopped_receiver_shows_who_fills_it_and_what_was_lost() {
     let receiver = &looked["receiver"];
     assert_eq!((&receiver["pid"], &receiver["module"]), (&pid.into(), &"probe.0".into()));
     assert_eq!((&receiver["alive"], &receiver["stopped"]), (&true.into(), &true.into()));
-    // What is being written has pushed somebody out, who is only counted when that is done, or given up.
+    // A package being written has displaced another, which is only counted when the write is done or given up.
     let tool = looked["classes"].as_array().unwrap().iter().find(|class| class["class"] == "tool").unwrap();
     assert_eq!((&tool["priority"], &tool["lost_by_cause"]["refused"]), (&16.into(), &1.into()));
     let slots = looked["slot_states"].as_array().unwrap();
@@ -151,7 +151,7 @@ fn mailboxes_that_are_not_there_or_not_ours_are_told_with_what_would_be_right() 
     let told = place.say(&["mailbox", "probe.0"]).fails();
     assert!(told.contains(&format!("another version (layout 99, this program {LAYOUT_VERSION})")), "{told}");
     write_version(&file, LAYOUT_VERSION);
-    // Beside the mailbox, as if somebody had put it there.
+    // Beside the mailbox, as a foreign file.
     std::fs::write(robot.node.path().join("01600900.mbx"), b"a letter").unwrap();
     let told = place.say(&["mailbox", "probe.9"]).fails();
     assert!(told.contains("mailbox probe.9: its file is no mailbox, or damaged"), "{told}");

@@ -1,4 +1,4 @@
-//! What becomes of packages when their receiver ends, stops, or chokes on one.
+//! Packages of a receiver that ends, stops, or crashes on one.
 
 use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::{ABORT, COUNT};
@@ -37,7 +37,7 @@ fn packages_accepted_while_a_module_was_dead_or_stopped_arrive_in_order() {
         }
         if number == Signal::SIGSTOP {
             assert_eq!(robot.waiting("probe.0"), 20);
-            // Killed while it is stopped: what waited for it is kept for its next incarnation.
+            // Killed while it is stopped: waiting packages are kept for its next incarnation.
             signal(pid, Signal::SIGKILL);
         }
         wait("all have been counted", || (place.counted().len() >= 20).then_some(()));
@@ -75,7 +75,7 @@ fn a_poison_package_is_handed_out_twice_and_the_module_lives_on() {
     let restart = "restart = { policy = \"always\", backoff = \"50 ms\", at-most = 20 }";
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", restart)]);
     let mut tool = robot.tool(PATIENCE);
-    // `abort` is idempotent, so that nothing but the mailbox ends its deaths.
+    // `abort` is idempotent, so that only the mailbox ends the crashes.
     throw(&robot, &mut tool, "probe.0", ABORT, &());
     throw(&robot, &mut tool, "probe.0", COUNT, &(7u32,));
     wait("the next package is counted", || (place.counted() == [7]).then_some(()));

@@ -1,8 +1,8 @@
 //! End to end: real processes in shared memory of their own, watched as a user watches them.
 //!
-//! `harness` gives each test a place of its own, `process` watches what runs there, `probe` is the module that misbehaves as
-//! a test asks it to; each other file is a theme.
-//! Nothing here sleeps for luck: tests wait for what they need to see, with deadlines that a busy computer keeps.
+//! `harness` gives each test a place of its own, `process` watches what runs there, `probe` is the module that
+//! misbehaves as a test asks it to; each other file is a theme. Nothing here sleeps for luck: tests wait for what they
+//! need to see, with deadlines that a busy computer keeps.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

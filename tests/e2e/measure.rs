@@ -1,4 +1,4 @@
-//! The tools that measure, against a source that keeps its own record; and that looking changes nothing.
+//! The measuring tools, compared with a source that keeps its own record; and observing changes nothing.
 
 use crate::harness::{PATIENCE, Place, Robot, patient, probe, wait};
 use crate::probe::ProbingInterface;
@@ -20,7 +20,7 @@ pub(crate) fn last(tool: &Running, holds: impl Fn(&Value) -> bool) -> Option<Val
     lines(tool).into_iter().rev().find(holds)
 }
 
-/// Within one in a hundred of what the source knows, which itself is known between two bounds.
+/// Within one percent of the source's own figure, which itself lies between two bounds.
 #[track_caller]
 fn agrees(what: &str, figure: &Value, (low, high): (f64, f64)) {
     let figure = figure.as_f64().unwrap_or_else(|| panic!("{what}: {figure}"));
@@ -54,7 +54,7 @@ struct Taken {
     bytes: u64,
 }
 
-/// Takes what comes, slowly, so that packages wait for times that are long beside the measuring of them.
+/// Takes packages slowly, so that they wait for times that are long compared with the measurement.
 fn take_slowly(data: &mut Receiver, taken: &mut Vec<Taken>) {
     loop {
         let before = monotonic_ns();
@@ -91,7 +91,7 @@ fn figures_agree_with_a_known_source() {
         });
     }
     let mut taken = Vec::new();
-    // What came is taken meanwhile: the mailbox has room for less than a second of it.
+    // Packages are taken meanwhile: the mailbox has room for less than a second of them.
     let order = |data: &mut Receiver, taken: &mut Vec<Taken>, word| {
         let mut said = Running::start(place.command(&patient(&["call", "probe.0", word])));
         let done = wait("it is done", || {
@@ -121,7 +121,7 @@ fn figures_agree_with_a_known_source() {
     let long = ((end.before - first.after) / 1e9, (end.after - first.before) / 1e9);
 
     let line = wait("hz has counted all", || last(hz, |line| line["values"] == all));
-    // The source has stopped by now, and the rate goes down with each line; what it was is in the intervals.
+    // The source has stopped by now, and the rate falls with each line; the earlier rate is in the intervals.
     let silent_s = |line: &Value| line["silent_s"].as_f64().unwrap_or(0.0);
     let until = silent_s(&line);
     agrees("rate", &line["values_per_s"], (count / (long.1 + until), count / (long.0 + until)));
@@ -130,7 +130,7 @@ fn figures_agree_with_a_known_source() {
     let most = |of: fn((f64, f64)) -> f64| intervals().map(of).fold(0.0, f64::max) / 1e9;
     agrees("shortest interval", &line["interval_min_s"], (least(|i| i.0), least(|i| i.1)));
     agrees("longest interval", &line["interval_max_s"], (most(|i| i.0), most(|i| i.1)));
-    // Distances from the mean, each as small and as large as it can have been.
+    // Deviations from the mean, each as small and as large as possible.
     let mean = (long.0 + long.1) / 2.0 / count * 1e9;
     let off = |interval: (f64, f64)| {
         let ends = ((interval.0 - mean).abs(), (interval.1 - mean).abs());
@@ -179,7 +179,7 @@ fn figures_agree_with_a_known_source() {
         &row["waited_max_ever_s"],
         (longest(|taken| taken.waited.0), longest(|taken| taken.waited.1)),
     );
-    // The histogram has two buckets to the octave.
+    // The histogram has two buckets per octave.
     let mut waits: Vec<u64> = taken.iter().map(|taken| taken.waited.0).collect();
     waits.sort_unstable();
     for (figure, share) in [("waited_p50_s", 0.5), ("waited_p99_s", 0.99)] {
@@ -194,7 +194,7 @@ fn figures_agree_with_a_known_source() {
     tool.close();
 }
 
-/// Everything that is counted on a node, as text.
+/// All counts of a node, as text.
 fn all_counts(robot: &Robot) -> String {
     let node = &robot.node;
     let mailboxes: Vec<_> = node.mailboxes().unwrap().into_iter().map(|name| node.look_at(name).unwrap()).collect();
@@ -222,8 +222,8 @@ fn looking_changes_nothing() {
         incarnation
     };
     place.say(&["call", "probe.0", "count", "1"]).ok();
-    let (before, life) = (all_counts(&robot), incarnation());
-    // Who has come and gone again has left nothing.
+    let (before, newest) = (all_counts(&robot), incarnation());
+    // A tool that has come and gone has left nothing.
     assert_same(&all_counts(&robot), &before);
     let watching: Vec<Running> = [
         &["hz", "probe.0", "--count", "2"][..],
@@ -247,7 +247,7 @@ fn looking_changes_nothing() {
     // Packages, losses, waits, flows, participants.
     assert_same(&all_counts(&robot), &before);
     // The first tool's calls have one as well.
-    assert_eq!(incarnation(), life + 2, "nobody joined meanwhile");
+    assert_eq!(incarnation(), newest + 2, "nobody joined meanwhile");
     let status = place.say(&["status", "--json"]).json();
     assert_eq!((&status[0]["subscribers"], &status[1]["subscribers"]), (&0.into(), &0.into()));
 }

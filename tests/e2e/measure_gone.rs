@@ -1,4 +1,4 @@
-//! What the tools that measure say of what never was, stops, dies, or is launched again.
+//! The measuring tools with a source that never was, stops, dies, or is launched again.
 
 use crate::harness::{Place, halt, probe, signal, wait};
 use crate::measure::{last, lines};
@@ -25,7 +25,7 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
     ] {
         assert_eq!(place.say(arguments).fails(), error);
     }
-    // What has stopped is not called slow.
+    // A stopped source is not called slow.
     halt(robot.pid("probe.0"));
     let text = place.say(&["hz", "probe.0", "beat", "--seconds", "0.3"]).ok();
     assert!(text.contains("nothing new in this window; the last came "), "{text}");
@@ -49,7 +49,7 @@ fn what_stops_is_silent_and_no_longer_as_quick_as_it_was() {
     }
     halt(robot.pid("probe.0"));
     for (tool, [count, per_s]) in tools.iter_mut().zip(names) {
-        // Within the window of ten seconds, of which most is good.
+        // Within the window of ten seconds, most of which is good.
         let is_silent = |line: &Value| line[count].as_u64() > Some(1) && line["silent_s"].as_f64() > Some(1.0);
         let line = wait("it is silent", || last(tool, is_silent));
         let [sent, rate, silent_s] = [count, per_s, "silent_s"].map(|name| line[name].as_f64().unwrap());

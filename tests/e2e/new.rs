@@ -1,4 +1,4 @@
-//! `rohrpost new`: what it makes is built, tested, launched and called, as its README says.
+//! `rohrpost new`: its project is built, tested, launched and called, as its README says.
 
 use crate::harness::{Place, wait};
 use std::path::Path;
@@ -6,8 +6,8 @@ use std::process::Command;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// Cargo in the new project, without the network. It builds into the folder and by the profile of this workspace, so that
-/// what was built for these tests is not built again.
+/// Cargo in the new project, without the network. It builds into the folder and by the profile of this workspace, so
+/// that nothing is compiled twice.
 fn cargo(project: &Path, command: &str) -> Command {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     // The target folder is reached as `target`, so that robot.toml finds the program where it looks for it.
@@ -61,7 +61,7 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
     assert_eq!(set, "wind-vane.0 rate-hz: 10 -> 200 Hz\n");
     let refused = place.say(&["param", "set", "wind-vane.0", "rate-hz", "0"]).fails();
     assert!(refused.contains("out of range: 0.1..=1000 Hz"), "{refused}");
-    // Ten a second could not count so far in this time.
+    // At ten a second it could not have counted so far in this time.
     let counted = || place.say(&["call", "wind-vane.0", "get", "count", "--json"]).json().as_u64().unwrap();
     let (first, began) = (counted(), std::time::Instant::now());
     wait("it counts at the new rate", || {
@@ -70,7 +70,7 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
     });
     launch.stop();
     place.assert_empty();
-    // What was built for a project in a folder that is gone is of no use to anybody.
+    // Build products of a removed project are useless.
     let cleaned = cargo(&project, "clean").args(["--package", "wind-vane"]).output().unwrap();
     assert!(cleaned.status.success(), "{cleaned:?}");
 }

@@ -1,4 +1,4 @@
-//! At most once, from end to end: whatever is lost, repeated or restarted, no command runs twice.
+//! At most once, from end to end: with any loss, duplicate or restart, no command runs twice.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::output::lines;
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 /// Of launch.
 const RESTART: u16 = 17;
 
-/// Packages as a caller would send them, with every field in the test's hand.
+/// Packages as a caller would send them, with every field under the test's control.
 struct Raw {
     replies: Receiver,
     sender: Sender,
@@ -52,8 +52,8 @@ impl Raw {
         self.sender.send(&label, &[&body]).unwrap();
     }
 
-    /// The next answer to this call. A server that is killed between answering and letting go of a command leaves it to its
-    /// next incarnation, which answers it too.
+    /// The next answer to this call. If a server is killed between its answer and the release of a command, its
+    /// next incarnation answers the command, too.
     fn answer_to(&mut self, sequence: u32) -> Result<u64, Fault> {
         loop {
             let (envelope, result) = self.answer();
@@ -110,7 +110,7 @@ fn duplicates_of_an_order_to_launch_restart_a_module_once() {
         assert_eq!(raw.answer_as::<Result<u32, ControlError>>().1, Ok(Ok(2)), "its second process");
     }
     wait("it runs again", || robot.process("probe.0").filter(|process| process.pid != pid));
-    // Also when the first order has been carried out long since.
+    // Also when the first order was carried out long ago.
     raw.send_with(RESTART, order(1000), "probe.0");
     assert_eq!(raw.answer_as::<Result<u32, ControlError>>().1, Ok(Ok(2)));
     let mut tool = robot.tool(PATIENCE);
@@ -122,7 +122,7 @@ fn duplicates_of_an_order_to_launch_restart_a_module_once() {
 }
 
 #[test]
-fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
+fn a_restarted_caller_begins_anew_and_its_earlier_incarnation_is_not_heard() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
     let mut raw = Raw::new(&robot, "probe.0");
@@ -131,14 +131,14 @@ fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
         let (envelope, result) = raw.answer();
         assert_eq!((envelope, result), (ReplyEnvelope { incarnation, sequence }, Ok(u64::from(number))));
     }
-    // Late packages of the earlier incarnation: one that ran, and one that never came before. If that incarnation is none, but a program whose node's
-    // clock was set back, it learns why it is not served.
+    // Late packages of the earlier incarnation: one that ran, and one that arrives for the first time. If the sender is
+    // no earlier incarnation, but a program after its clock was set back, it learns why it is refused.
     for (sequence, age_us, number) in [(2, 500, 5), (3, 0, 6)] {
         raw.send(COUNT, Raw::envelope(7, sequence, age_us), number);
         let refused = (ReplyEnvelope { incarnation: 7, sequence }, Err(Fault::EarlierIncarnation));
         assert_eq!(raw.answer(), refused);
     }
-    // The server says so too, once in a while.
+    // The server reports it, too, at a limited rate.
     wait("the server's line", || {
         let log = lines(&place, "probe.0");
         let told = log.iter().filter(|line| {
@@ -163,7 +163,7 @@ fn a_restarted_caller_begins_anew_and_its_earlier_life_is_not_heard() {
 }
 
 #[test]
-fn a_restarted_server_runs_no_repeat_of_what_its_earlier_life_may_have_run() {
+fn a_restarted_server_runs_no_repeat_of_a_call_that_its_earlier_incarnation_may_have_run() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "restart = { backoff = \"50 ms\" }")]);
     let mut raw = Raw::new(&robot, "probe.0");
@@ -180,7 +180,7 @@ fn a_restarted_server_runs_no_repeat_of_what_its_earlier_life_may_have_run() {
         raw.send(function, Raw::envelope(7, sequence, age_us(began)), sequence);
         assert_eq!(raw.answer_to(sequence), answer, "tried before the new incarnation: {sequence}");
     }
-    // What it hears for the first time is no repeat, whatever came before.
+    // A first arrival is no repeat, whatever came before.
     raw.send(COUNT, Raw::envelope(7, 4, 0), 4);
     assert_eq!(raw.answer_to(4), Ok(2));
     assert_eq!(place.counted(), [1, 3, 4]);
@@ -236,7 +236,7 @@ fn replies_that_find_no_room_are_asked_for_again_and_nothing_runs_twice() {
     for round in 0..5u32 {
         let timeout = Duration::from_secs(3);
         let calls: Vec<u32> = (0..8).map(|call| begin(&robot, &mut link, round * 8 + call, timeout).unwrap()).collect();
-        // All have run, and seven answers found no room, before the first is taken out.
+        // All have run, and seven answers found no room, before the first is taken.
         wait("the round has run", || (place.counted().len() >= (round as usize + 1) * 8).then_some(()));
         for call in calls {
             match link.wait(call, |bytes| rohrpost::wire::from_bytes::<u64>(bytes)) {
@@ -267,7 +267,8 @@ fn callers_in_a_crowd_before_a_small_mailbox_and_a_halting_server_never_run_twic
     let keys = "[module.mailbox.commands]\nslots = 6\nfull = \"reject\"";
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", keys)]);
     let pid = robot.pid("probe.0");
-    // Time enough for an answer when the server runs, too little when it is stopped: repeats, expiry and time-outs happen.
+    // Time enough for an answer when the server runs, too little when it is stopped: repeats, expiry and time-outs
+    // happen.
     let (callers, each, timeout) = (6, 60, Duration::from_millis(60));
     let work = |caller: u32| {
         let mut tool = robot.tool(timeout);

@@ -32,7 +32,7 @@ fn calls_are_told_apart_where_their_numbers_wrap() {
 }
 
 #[test]
-fn calls_whose_ids_are_equal_have_their_own_answers() {
+fn calls_with_equal_ids_have_their_own_answers() {
     let place = Place::new();
     let (mut launch, robot) = place.launched(&[&probe("probe.0", "", "")]);
     let mut tool = robot.tool(PATIENCE);

@@ -1,4 +1,4 @@
-//! What modules say arrives: through floods, panics, full disks and the collector's own death.
+//! Output of modules arrives: through floods, panics, full disks and the collector's own death.
 
 use crate::harness::{OUTPUT, Place, probe, signal, wait};
 use crate::process::Running;
@@ -6,7 +6,7 @@ use nix::sys::signal::Signal;
 use serde_json::Value;
 use std::fs;
 
-/// The lines that the collector has, of a module.
+/// The collector's lines of a module.
 pub(crate) fn lines(place: &Place, module: &str) -> Vec<Value> {
     let text = place.say(&["log", "--json", "--timeout", "60", "--module", module]).ok();
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
@@ -17,8 +17,9 @@ pub(crate) fn call(place: &Place, arguments: &[&str]) {
     place.say(&[&["call", "--timeout", "60"], arguments].concat()).ok();
 }
 
-/// Whether a module's line is its own, and not one that a test asked a probe for: that it is on; and what the test program
-/// that a probe is says of itself, which launch passes on a moment after it was printed, so at any time.
+/// Whether a line is a module's own, and not one that a test asked a probe for: the report that it is on, and the
+/// output of the test program as which a probe runs. Launch forwards the latter a moment after it was printed, so at
+/// any time.
 pub(crate) fn is_own(text: &str) -> bool {
     ["is on", "running 1 test"].contains(&text)
 }
@@ -41,13 +42,13 @@ fn a_flood_of_one_module_hides_no_error() {
     flood.said().ok();
     call(&place, &["probe.0", "say", "error", "my own"]);
     let said = |all: &[Value]| texts(all).iter().filter(|text| text.starts_with("flood ")).count() as u64;
-    // What was suppressed is told when nothing came for a while, which on a busy computer may be in the middle, too.
+    // Suppressed lines are reported after a pause, which on a busy computer may be in the middle, too.
     let all = wait("its own error, and how much was suppressed", || {
         let all = lines(&place, "probe.0");
         let whole = texts(&all).contains(&"my own") && said(&all) + sum(&all, "suppressed") >= 100_000;
         whole.then_some(all)
     });
-    // Not one is missing from the account.
+    // Not one is unaccounted for.
     let said = said(&all);
     assert!((200..2_000).contains(&said), "{said} of 100000 at 100 a second");
     assert_eq!((said + sum(&all, "suppressed"), sum(&all, "lost_before")), (100_000, 0));
@@ -79,7 +80,7 @@ fn errors_have_an_allowance_of_their_own() {
     }
 }
 
-/// Without a limit worth the name, the mailbox of the collector is the limit; what it does not take is counted.
+/// Without an effective limit, the collector's mailbox is the limit; refused lines are counted.
 #[test]
 fn a_collector_that_is_flooded_takes_errors_of_others() {
     let place = Place::new();
@@ -154,7 +155,7 @@ fn a_killed_collector_loses_no_line_of_the_file() {
             let count = text.matches(&format!("info  main/probe.0: flood {number}\n")).count();
             assert!(count >= round, "flood {number} is there {count} times after {round} floods");
         }
-        // The line that it had in hand is handed to its successor too.
+        // The successor also gets the line that it had in hand.
         let twice = text.matches("flood ").count() - 300 * round;
         assert!(twice <= round, "{twice} lines stand there twice after {round} deaths");
     }

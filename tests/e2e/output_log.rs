@@ -12,7 +12,7 @@ fn log(place: &Place, arguments: &[&str]) -> crate::process::Said {
     place.say(&[&PATIENT, arguments].concat())
 }
 
-/// What was said, without time and node, without the modules' own words, and without what `log` says of lines that are gone.
+/// Lines without time and node, without the modules' own reports, and without the notes of `log` about lost lines.
 fn shown(place: &Place, arguments: &[&str]) -> Vec<String> {
     let text = log(place, arguments).ok();
     let said = text.lines().filter(|line| !line.starts_with('…')).map(|line| line.split_once("main/").unwrap().1);

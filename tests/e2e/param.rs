@@ -25,7 +25,7 @@ fn launched(place: &Place, modules: &[&str]) -> (Running, Robot) {
     (launch, robot)
 }
 
-/// What the module itself has, once it says this.
+/// The module's own values, once they contain this.
 #[track_caller]
 fn wait_for(place: &Place, all: &str) {
     wait(format!("probe.0 never had {all}"), || {
@@ -38,7 +38,7 @@ fn wait_for(place: &Place, all: &str) {
 fn parameters_are_listed_with_unit_range_and_text() {
     let place = Place::new();
     let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "mount = \"roof\"", "start = \"off\"")]);
-    // Switched off: its parameters are there all the same.
+    // Switched off: its parameters exist all the same.
     let table = place.say(&["param", "get", "probe.0"]).ok();
     let lines: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
     assert_eq!(lines[0], ["parameter", "value", "unit", "range", "text"]);
@@ -49,8 +49,8 @@ fn parameters_are_listed_with_unit_range_and_text() {
     let one = place.say(&["param", "get", "probe.0", "near-m"]).ok();
     assert_eq!(one.lines().count(), 2, "{one}");
     let json = place.say(&["param", "get", "probe.0", "far-m", "--json"]).json();
-    let expected = serde_json::json!([{ "module": "probe.0", "parameter": "far-m", "value": 9, "unit": "m", "type": "u16",
-        "min": 0, "max": 100, "text": "Farthest thing that counts." }]);
+    let expected = serde_json::json!([{ "module": "probe.0", "parameter": "far-m", "value": 9, "unit": "m",
+        "type": "u16", "min": 0, "max": 100, "text": "Farthest thing that counts." }]);
     assert_eq!(json, expected);
     let all = place.say(&["param", "list"]).ok();
     assert!(all.contains("\nprobe.0  gain"), "{all}");
@@ -162,7 +162,7 @@ fn saved_values_come_back_after_a_kill_and_at_the_next_start() {
     {
         assert!(text.contains(words), "no `{words}` in:\n{text}");
     }
-    // What was not saved is gone with the process.
+    // Unsaved values are lost with the process.
     place.say(&["param", "set", "probe.0", "far-m", "50"]).ok();
     let old = robot.pid("probe.0");
     signal(old, Signal::SIGKILL);
@@ -186,7 +186,7 @@ fn a_file_is_loaded_whole_or_not_at_all_module_by_module() {
     let place = Place::new();
     let (_launch, _robot) = launched(&place, &[OUTPUT, &tuned("probe.0", "", ""), &tuned("probe.1", "", "")]);
     let file = |text: &str| std::fs::write(place.path("other.toml"), text).unwrap();
-    // Only together they are right: each alone would be refused.
+    // Only together they are valid: each alone would be refused.
     file("[\"probe.0\"]\nnear-m = 20\nfar-m = 30\ngain = 2\n[\"probe.1\"]\ngain = 11\nside = \"straight-ahead\"\n");
     for dry in [true, false] {
         let said = place.say(&[&["param", "load", "other.toml"][..], if dry { &["--dry-run"] } else { &[] }].concat());
@@ -268,7 +268,7 @@ fn a_bad_file_is_told_before_anything_runs_or_by_the_module() {
         ("[\"probe.0\"]\nmuont = \"roof\"\n", "tuned.toml:2: settings of module `probe.0`: unknown field `muont`"),
     ] {
         tuned_file(text);
-        // What a program of one's own takes is its own to know.
+        // Only the user's own program knows its settings.
         place.say(&["check", file]).ok();
         let mut launch = Running::start(place.command(&["launch", file]));
         launch.end();
@@ -335,7 +335,7 @@ fn no_bytes_bring_a_module_down() {
     let parameters = tool.parameters(module).unwrap();
     assert_eq!(parameters.len(), 6);
     for parameter in &parameters {
-        // Whatever was set has passed the check.
+        // All values that were set have passed the check.
         let values = vec![(parameter.field.name.clone(), parameter.value.clone())];
         tool.set_parameters(module, &SetParameters { values, only_check: true }).unwrap();
     }

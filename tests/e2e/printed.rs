@@ -1,4 +1,4 @@
-//! What modules print becomes output, as far as they did not say it themselves.
+//! Printed text of modules becomes output, unless it already is.
 
 use crate::harness::{OUTPUT, Place, probe, signal, wait};
 use crate::output::{call, lines};
@@ -16,9 +16,9 @@ fn texts(lines: &[Value], level: &str) -> Vec<String> {
 fn what_a_module_prints_is_a_line_of_its_own() {
     let place = Place::new();
     let (_launch, _robot) = place.launched(&[OUTPUT, &probe("probe.0", "", "")]);
-    call(&place, &["probe.0", "print", "stdout", "a greeting", "1"]);
+    call(&place, &["probe.0", "print", "stdout", "a remark", "1"]);
     call(&place, &["probe.0", "print", "stderr", "a complaint", "1"]);
-    // Printed by its own output layer too, for launch to repeat; it must not come twice.
+    // Also printed by its own output layer, for launch to repeat; it must not come twice.
     call(&place, &["probe.0", "say", "error", "said and printed"]);
     call(&place, &["probe.0", "print", "stdout", "the end", "1"]);
     let all = wait("the last line", || {
@@ -26,7 +26,7 @@ fn what_a_module_prints_is_a_line_of_its_own() {
         texts(&all, "info").contains(&"the end 0".into()).then_some(all)
     });
     let info = texts(&all, "info");
-    assert!(info.contains(&"a greeting 0".into()), "{all:#?}");
+    assert!(info.contains(&"a remark 0".into()), "{all:#?}");
     assert_eq!(texts(&all, "warn"), ["a complaint 0"], "{all:#?}");
     assert_eq!(texts(&all, "error"), ["said and printed"], "{all:#?}");
 }

@@ -1,7 +1,7 @@
 //! A module as a user writes one, with settings and functions that make it misbehave.
 //!
-//! It is this test program itself, started by launch with the one test [`module`] to run: so it is built whenever the tests
-//! are, and no program for tests alone is ever installed.
+//! It is this test program itself, started by launch with the one test [`module`] to run: so it is built whenever the
+//! tests are, and no program for tests alone is ever installed.
 
 use nix::sys::signal::{SigHandler, Signal, raise, signal};
 use rohrpost::serde::Deserialize;
@@ -149,7 +149,7 @@ pub(crate) struct Settings {
     hang_at_start: bool,
     /// Hears each beat of this probe twice: in its data mailbox, and in [`NEWEST`].
     hears: Option<String>,
-    /// Hears each beat and each blob of this probe in its data mailbox; in the other order if there is a file [`SWAPPED`].
+    /// Hears each beat and each blob of this probe in its data mailbox; in the other order with a file [`SWAPPED`].
     mixes: Option<String>,
     /// Does nothing on any signal that asks it to end.
     ignore_stop: bool,

@@ -1,4 +1,4 @@
-//! A process that a test started, and what it says.
+//! A process of a test, and its output.
 
 use crate::harness::{PATIENCE, signal};
 use nix::sys::resource::{Resource, setrlimit};
@@ -9,7 +9,7 @@ use std::process::{Child, Command, ExitStatus};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// What a command said.
+/// The output of a command.
 #[derive(Debug)]
 pub(crate) struct Said {
     pub(crate) out: String,
@@ -40,14 +40,14 @@ impl Said {
     }
 }
 
-/// A process, and what it prints.
+/// A process with its output.
 pub(crate) struct Running {
     child: Child,
     out: Printed,
     err: Printed,
 }
 
-/// What came through a pipe so far, and the thread that reads it.
+/// Output of a pipe so far, and its reading thread.
 struct Printed {
     text: Arc<Mutex<String>>,
     reader: Option<std::thread::JoinHandle<()>>,
@@ -71,11 +71,12 @@ impl Printed {
     }
 }
 
-/// Takes the right to real time from a command, also where root runs the tests.
+/// Takes the right to real-time scheduling from a command, even if root runs the tests.
 pub(crate) fn without_real_time(command: &mut Command) {
     const CAP_SYS_NICE: nix::libc::c_ulong = 23;
     let give_up = || {
-        // SAFETY: a system call with a number; it touches no memory. Who is not root has no such right, and may not do this.
+        // SAFETY: a system call with a number; it touches no memory. Without root there is no such right, and the call
+        // fails.
         unsafe { nix::libc::prctl(nix::libc::PR_CAPBSET_DROP, CAP_SYS_NICE, 0, 0, 0) };
         setrlimit(Resource::RLIMIT_RTPRIO, 0, 0)?;
         Ok(())
@@ -125,7 +126,7 @@ impl Running {
         }
     }
 
-    /// Whether it looks after Ctrl-C itself by now, instead of dying of it.
+    /// Whether it already handles Ctrl-C, instead of dying of it.
     pub(crate) fn heeds_control_c(&self) -> bool {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap_or_default();
         let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
@@ -149,7 +150,7 @@ impl Running {
             std::thread::sleep(Duration::from_millis(5));
         };
         for printed in [&mut self.out, &mut self.err] {
-            // A process that outlives it may hold the pipe; what it prints is not waited for.
+            // A process that outlives it may hold the pipe; its output is not awaited.
             let deadline = Instant::now() + Duration::from_secs(5);
             while printed.reader.as_ref().is_some_and(|reader| !reader.is_finished()) && Instant::now() < deadline {
                 std::thread::sleep(Duration::from_millis(2));
@@ -159,7 +160,7 @@ impl Running {
         status
     }
 
-    /// All that it says, to its end.
+    /// All output, to its end.
     #[track_caller]
     pub(crate) fn said(mut self) -> Said {
         let status = self.end();

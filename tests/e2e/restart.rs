@@ -117,7 +117,8 @@ fn launch_stops_while_a_module_waits_to_be_started_again() {
     place.assert_empty();
 }
 
-/// The first ends are told whole, the tenth, the twentieth and so on in one line each; so on the terminal, and in the log.
+/// The first ends are told whole, the tenth, the twentieth and so on in one line each; so on the terminal, and in the
+/// log.
 #[test]
 fn a_module_that_ends_again_and_again_floods_neither_the_terminal_nor_the_log() {
     for (settings, cause, lines_of_each_end) in [

@@ -1,4 +1,4 @@
-//! Modules that are stuck, fail or do not fit are seen from outside, in the same words everywhere, and the others go on.
+//! Stuck, failed and incompatible modules are visible from outside, in the same words everywhere, and the others go on.
 
 use crate::harness::{OUTPUT, Place, Robot, probe, wait};
 use crate::output::lines;
@@ -10,7 +10,7 @@ use rohrpost::survey::Standing;
 use serde_json::Value;
 use std::time::Duration;
 
-/// What a tool says of this module.
+/// A tool's line about this module.
 fn told(place: &Place, tool: &[&str], module: &str) -> Option<Value> {
     let said = place.say(tool);
     let json: Value = serde_json::from_str(&said.out).unwrap_or_else(|_| panic!("{said:?}"));
@@ -18,7 +18,7 @@ fn told(place: &Place, tool: &[&str], module: &str) -> Option<Value> {
     modules.as_array()?.iter().find(|line| line["module"] == module).cloned()
 }
 
-/// All tools say the same of how it stands; what that is, and the last error, when `list` says this state.
+/// All tools show the same state. Returns its description and the last error, when `list` shows this state.
 fn standing(place: &Place, module: &str, state: &str) -> Value {
     let listed = wait(format!("{module} is {state}"), || {
         told(place, &["list", "--json"], module).filter(|line| line["state"] == state)

@@ -1,4 +1,4 @@
-//! Who subscribes says into which of its mailboxes the data go, and takes there what it asked for, and nothing else.
+//! A subscriber names the mailbox for the data, and takes only what it asked for there.
 
 use crate::harness::{PATIENCE, Place, Robot, halt, probe, signal, wait};
 use crate::probe::{NEWEST, ProbingInterface, SWAPPED};
@@ -9,7 +9,7 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{Kind, Label, Loss, Name, Options, Participant, Shape, Type, local};
 use rohrpost_modules::call::CallEnvelope;
 
-/// The newest beat that has been published: whoever subscribed to each of them has been sent it.
+/// The newest published beat: it has been sent to all subscribers of each beat.
 fn beat(robot: &Robot, tool: &mut ToolLink) -> u64 {
     let (module, hash) = (robot.name("probe.0"), ProbingInterface::hash());
     let number = ProbingInterface::BEAT.number;
@@ -81,7 +81,7 @@ fn data_do_not_go_where_commands_and_replies_go() {
     launch.stop();
 }
 
-/// Asks `probe.1` what it did not take until that is this.
+/// Asks `probe.1` for its dropped data until the counts are these.
 fn refuses(robot: &Robot, tool: &mut ToolLink, expected: Refused) {
     let module = robot.name("probe.1");
     wait(format!("{expected:?}"), || (tool.status(module).ok()?.refused == expected).then_some(()));
@@ -90,7 +90,7 @@ fn refuses(robot: &Robot, tool: &mut ToolLink, expected: Refused) {
 #[test]
 fn data_that_nobody_asked_for_are_dropped_and_counted_by_cause() {
     let place = Place::new();
-    // The test itself is the publisher: so it knows what was asked for, and can send all but that.
+    // The test itself is the publisher: so it knows the subscription, and can send everything else.
     let (mut launch, robot) = place.launched(&[&probe("probe.1", "hears = \"probe.7\"", "")]);
     let mut tool = robot.tool(PATIENCE);
     let (module, publisher) = (robot.name("probe.1"), robot.name("probe.7"));
@@ -114,7 +114,7 @@ fn data_that_nobody_asked_for_are_dropped_and_counted_by_cause() {
     send(stranger, id, number, incarnation, 1);
     send(robot.name("probe.1"), id, number, incarnation, 2);
     send(publisher, id + 7, number, incarnation, 3);
-    // Of the other subscription, whose data go to another mailbox.
+    // Of the other subscription, which has another mailbox.
     send(publisher, 0, number, incarnation, 4);
     send(publisher, id, number + 1, incarnation, 5);
     send(publisher, id, number, incarnation - 1, 6);
@@ -156,7 +156,7 @@ fn a_subscriber_that_restarts_with_its_subscriptions_in_another_order_takes_no_o
     signal(pid, Signal::SIGKILL);
     robot.wait_restarted("probe.1", pid);
     wait("it hears again", || (mixed("beat").len() > before + 20).then_some(()));
-    // What its earlier incarnation asked for came to it, and the beats are the publisher's own.
+    // Data for its earlier incarnation arrived, and the beats are the publisher's own.
     let refused = tool.status(robot.name("probe.1")).unwrap().refused;
     let said = place.record().join("\n");
     assert!(refused.earlier_incarnation + refused.other_number > 0, "{refused:?}: nothing of before came");

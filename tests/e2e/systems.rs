@@ -1,5 +1,5 @@
-//! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south` (system 2) reaches it.
-//! Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
+//! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south`
+//! (system 2) reaches it. Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
 
 use crate::harness::{NETWORK, Place, Robot, probe, skipped, wait};
 use crate::probe::ProbingInterface;
@@ -38,7 +38,7 @@ pub(crate) struct Systems {
 }
 
 impl Systems {
-    /// None launched. None at all, and said so, where namespaces are not permitted.
+    /// Without any launch. None, with a report, where namespaces are not permitted.
     pub(crate) fn new(security: &str) -> Option<Self> {
         let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
         let lab = match Lab::new(&NODES.map(spec), 1500) {
@@ -81,7 +81,8 @@ impl Systems {
         let text = std::fs::read_to_string(&config).unwrap();
         let [(_, north), _, (_, arm)] = NODES;
         let nodes = format!(
-            "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\ntools = [16, 31]\n{NETWORK}[tcp]"
+            "[nodes.north]\naddress = \"{north}\"\ntools = [0, 15]\n[nodes.arm]\naddress = \"{arm}\"\n\
+             tools = [16, 31]\n{NETWORK}[tcp]"
         );
         let text = text.replace("[nodes.north]\n[tcp]", &nodes)
             + "node = \"north\"\n"
@@ -89,7 +90,7 @@ impl Systems {
         std::fs::write(&config, text).unwrap();
     }
 
-    /// `arm`, of a system of its own, takes no part, and both it and the TCP router say why.
+    /// `arm`, of a system of its own, is refused, and both it and the TCP router report the reason.
     pub(crate) fn wait_refused(&self, here: &str, there: &str) {
         wait(format!("arm is refused: {here}"), || {
             let told = self.client("arm");
@@ -111,7 +112,7 @@ impl Systems {
         self.nodes.push((node, launch, robot));
     }
 
-    /// What `net` says of a node's client of the TCP router.
+    /// The output of `net` about a node's client of the TCP router.
     pub(crate) fn client(&self, node: &str) -> serde_json::Value {
         let said = self.says(node, &["net", "--json"]);
         let told: serde_json::Value = serde_json::from_str(said.out.trim()).unwrap_or_default();
@@ -122,7 +123,7 @@ impl Systems {
         wait(format!("{node} takes part"), || (self.client(node)["state"] == "up").then_some(()));
     }
 
-    /// A command of a person at a node.
+    /// A person's command at a node.
     pub(crate) fn says(&self, node: &str, arguments: &[&str]) -> Said {
         self.place.say_at(&self.config(node), node, arguments)
     }
@@ -153,7 +154,7 @@ impl Systems {
         &self.nodes.iter().find(|(known, ..)| *known == node).unwrap().2
     }
 
-    /// What counting at `south` brings, called from `north`.
+    /// The result of counting at `south`, called from `north`.
     pub(crate) fn count(&self, number: u32) -> Result<u64, CallError> {
         let north = self.robot("north");
         let mut tool = north.tool(Duration::from_secs(1));
@@ -179,13 +180,14 @@ pub(crate) fn configured(node: &str, id: u8, security: &str) -> String {
     // South's module follows north's.
     let hears = if id == 2 { ", hears = \"1.probe.0.0\"" } else { "" };
     format!(
-        "installation = \"test\"\n[system]\nname = \"{node}\"\nid = {id}\n{CLASSES}[nodes.{node}]\n[tcp]\n{security}\naddress = \"{address}\"\n\
+        "installation = \"test\"\n[system]\nname = \"{node}\"\nid = {id}\n{CLASSES}[nodes.{node}]\n[tcp]\n{security}\n\
+         address = \"{address}\"\n\
          {server}{}",
         probe("probe.0", &format!("rate-hz = 20.0{hears}"), "")
     )
 }
 
-/// What crosses, both ways.
+/// Traffic both ways.
 pub(crate) fn check_crossing(systems: &Systems) {
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "1"]).ok(), "1\n");
     assert_eq!(systems.says("north", &["call", "2.probe.0.0", "count", "2"]).ok(), "2\n", "by another tool");

@@ -1,4 +1,5 @@
-//! The demo in time slots, whose master's router is killed: what is told of it, and that next to nothing of a declared flow is lost.
+//! The demo in time slots with its master's router killed: it is reported, and almost no package of a declared flow is
+//! lost.
 
 use crate::harness::{Place, Robot, lacks_namespaces, signal, wait};
 use crate::process::{Running, Said};
@@ -24,14 +25,16 @@ fn kills() -> usize {
     std::env::var("ROHRPOST_KILLS").ok().map_or(3, |kills| kills.parse().unwrap())
 }
 
-/// What waits for longer than a second is given up, and what came for a router that is not there is too old for anybody after 400 ms. A router that is
-/// killed is back in its slots long before, but not where most of the slots are left out: at 28 of 100 taken by the hypervisor it is 40 to 75 of 100.
+/// A package that waits for longer than a second is dropped, and packages for an absent router are too old after 400
+/// ms. A router that is killed is back in its slots long before, but not where most slots are omitted: with 28 % taken
+/// by the hypervisor, 40 to 75 % are.
 const LEFT_OUT_MAX: f64 = 0.33;
 
-/// After so many the others have a new master.
+/// After so many cycles the others have a new master.
 const CYCLES_MAX: u64 = 4;
 
-/// What a router has taken for a slot just then dies with it: that is in its hands for less than a thousandth of the time.
+/// Packages that a router has taken for a slot are lost when it dies: it holds them for less than a thousandth of the
+/// time.
 fn assert_kept(said: &str, kills: usize) {
     let lost: u64 = losses(said).sum();
     if is_starved(said) {
@@ -41,8 +44,8 @@ fn assert_kept(said: &str, kills: usize) {
     assert!(lost <= kills as u64 / 20, "{lost} lost by {kills} kills:\n{said}");
 }
 
-/// What was sealed to the incarnation that died is lost with it, and nothing can be sealed to the next before that has joined: of each flow a
-/// part of so many at most.
+/// Packages sealed to the dead incarnation are lost, and nothing can be sealed to the next before it has joined: of
+/// each flow at most one in so many.
 fn assert_lost_of(said: &str, part: u64) {
     for row in flows(said) {
         let figure = |text: &str| text.parse::<u64>().unwrap();
@@ -52,7 +55,7 @@ fn assert_lost_of(said: &str, part: u64) {
     }
 }
 
-/// Whether this computer had not enough time for its slots; then what is lost says nothing about takeovers.
+/// Whether this computer had too little time for its slots; then losses say nothing about takeovers.
 fn is_starved(said: &str) -> bool {
     let (mut kept, mut left_out) = (0, 0);
     for node in NODES {
@@ -88,7 +91,7 @@ fn flows(said: &str) -> Vec<Vec<&str>> {
     rows.into_iter().map(|row| row.split_whitespace().collect()).collect()
 }
 
-/// What the router of a node says of itself, if it answers.
+/// The report of a node's router, if it answers.
 fn said<T: Data>(robot: &Robot, router: &str, port: DataPort<T>) -> Option<T> {
     let mut tool = robot.tool(SOON);
     let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
@@ -98,7 +101,7 @@ fn said<T: Data>(robot: &Robot, router: &str, port: DataPort<T>) -> Option<T> {
     said.ok().map(|(_, said)| said)
 }
 
-/// The node that all take for the master, once they know the time and no router was started a moment ago.
+/// The node that all take for the master, once they know the time and no router was just started.
 fn settled(robots: &[Robot; 3]) -> Option<usize> {
     let mut masters = Vec::new();
     for (robot, index) in robots.iter().zip(0..) {
@@ -111,7 +114,7 @@ fn settled(robots: &[Robot; 3]) -> Option<usize> {
     NODES.iter().position(|node| masters == [*node])
 }
 
-/// The demo, whose master's router is killed again and again; what it said, and whether it ended well.
+/// The demo with its master's router killed again and again; its output, and whether it ended well.
 fn killed_again(place: &Place) -> Option<Said> {
     let demo = ["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet", "-v"];
     let mut demo = Running::start(place.command(&demo));
@@ -145,7 +148,8 @@ fn killed_again_and_again_the_master_costs_no_package_of_a_declared_flow() {
         let said = said.out;
         let events = said.lines().filter(|line| line.contains("not by this command); there again ")).count();
         assert_eq!(events, kills(), "{said}");
-        // Where slots are left out masters change by themselves, so that it may not be the master any more that is killed.
+        // Where slots are omitted, masters change by themselves, so that the killed node may not be the master any
+        // more.
         let masters = said.lines().filter(|line| line.contains("It was the master. ")).count();
         assert!(if is_starved(&said) { masters > 0 } else { masters == kills() }, "{masters} masters:\n{said}");
         assert!(
@@ -200,7 +204,7 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
     });
 }
 
-/// Sealed, its next incarnation knows nobody, and hears the time before anybody has shown that it lives.
+/// With sealing, its next incarnation knows no peer, and hears the time before any peer has proved that it lives.
 #[test]
 fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
     repeated_on_stall(Watched::Ordinary, || {

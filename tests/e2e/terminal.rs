@@ -1,4 +1,4 @@
-//! A terminal of its own for a command, with a screen as a person sees it, and a keyboard.
+//! A terminal of its own for a command, with a screen and a keyboard.
 
 use crate::harness::{PATIENCE, Place, wait};
 use crate::process::Running;
@@ -19,10 +19,10 @@ use std::thread::JoinHandle;
 
 nix::ioctl_write_ptr_bad!(set_size, nix::libc::TIOCSWINSZ, Winsize);
 
-/// Whoever reads the screen looks so often whether the terminal is being closed, ms.
+/// The reader of the screen checks this often whether the terminal is being closed, ms.
 const LOOK_MS: u16 = 20;
 
-/// A terminal, and what was drawn on it.
+/// A terminal, and its content.
 pub(crate) struct Terminal {
     master: File,
     seen: Arc<Mutex<Seen>>,
@@ -31,9 +31,9 @@ pub(crate) struct Terminal {
 }
 
 struct Seen {
-    /// All that came.
+    /// All output so far.
     drawn: String,
-    /// What it makes of the screen.
+    /// The screen after this output.
     parser: vt100::Parser,
 }
 
@@ -44,7 +44,7 @@ const fn size(rows: u16, columns: u16) -> Winsize {
 impl Terminal {
     /// Starts a command in it.
     pub(crate) fn start(place: &Place, arguments: &[&str], rows: u16, columns: u16) -> (Self, Running) {
-        // Not by `openpty`, whose files other tests' processes would inherit and keep open.
+        // Not by `openpty`: processes of other tests would inherit its files and keep them open.
         let master = posix_openpt(OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC).unwrap();
         grantpt(&master).unwrap();
         unlockpt(&master).unwrap();
@@ -77,12 +77,12 @@ impl Terminal {
         self.seen.lock().unwrap().parser.screen().contents()
     }
 
-    /// Waits until something was drawn, whatever has become of it.
+    /// Waits until something was drawn, whatever it is now.
     pub(crate) fn wait_for(&self, words: &str) {
         wait(format!("`{words}` on the screen"), || self.drawn().contains(words).then_some(()));
     }
 
-    /// Waits for a screen, and tells what was there instead.
+    /// Waits for a screen, and fails with the present one.
     #[track_caller]
     pub(crate) fn wait_screen(&self, what: &str, is_it: impl Fn(&str) -> bool) -> String {
         let start = std::time::Instant::now();
@@ -116,11 +116,11 @@ impl Terminal {
         self.seen.lock().unwrap().parser.screen_mut().set_size(number(rows), number(columns));
         // SAFETY: the file is open, and the size lives for the call.
         unsafe { set_size(self.master.as_raw_fd(), &size(rows, columns)) }.unwrap();
-        // The kernel tells those only whose controlling terminal it is.
+        // The kernel only notifies processes that have it as their controlling terminal.
         running.signal(Signal::SIGWINCH);
     }
 
-    /// Whether it is as a shell wants it: the usual screen, a cursor, letters echoed and lines edited.
+    /// Whether it is in a shell's mode: the usual screen, a cursor, letters echoed and lines edited.
     #[track_caller]
     pub(crate) fn assert_restored(&self) {
         let left = |seen: &Seen| !seen.parser.screen().alternate_screen() && !seen.parser.screen().hide_cursor();
@@ -129,7 +129,7 @@ impl Terminal {
         assert!(flags.contains(LocalFlags::ECHO | LocalFlags::ICANON | LocalFlags::ISIG), "{flags:?}");
     }
 
-    /// Closes it under the command's hands.
+    /// Closes it while the command runs.
     pub(crate) fn close(mut self) {
         self.closing.store(true, Ordering::Release);
         self.reader.take().unwrap().join().unwrap();

@@ -1,4 +1,4 @@
-//! What a user types at a node that runs, and what is said to mistakes.
+//! A user's commands at a running node, and the messages about mistakes.
 
 use crate::harness::{OUTPUT, Place, patient, probe, wait};
 use crate::process::Running;
@@ -7,7 +7,8 @@ use std::process::{Command, Stdio};
 /// All subcommands, as the command itself lists them.
 pub(crate) fn commands(place: &Place) -> Vec<String> {
     let help = place.say(&["--help"]).ok();
-    // In groups, each under a head; a name is indented by two, and its text may go on in lines that are indented further.
+    // In groups, each under a head; a name is indented by two, and its text may go on in lines that are indented
+    // further.
     let listed = help.lines().take_while(|line| *line != "Options:").filter_map(|line| line.strip_prefix("  "));
     let named = listed.filter(|line| line.starts_with(|letter: char| letter.is_ascii_lowercase()));
     let all: Vec<String> = named.filter_map(|line| line.split(' ').next()).map(str::to_owned).collect();
@@ -15,8 +16,8 @@ pub(crate) fn commands(place: &Place) -> Vec<String> {
     all.into_iter().filter(|command| command != "help").collect()
 }
 
-/// What to say after the name of a command to have it look at a node with `probe.0`; none for those that look at no node
-/// that runs. A command that is not known here must be added.
+/// Arguments that make a command look at a node with `probe.0`; none for commands that look at no running
+/// node. A new command must be added here.
 pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
     let after: &[&str] = match command {
         "list" | "status" | "log" => &[],

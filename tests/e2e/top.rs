@@ -7,7 +7,7 @@ use nix::sys::signal::Signal;
 use rohrpost::launcher::{ChildState, Phase};
 use std::process::Stdio;
 
-/// Top looks often, so that tests need not wait.
+/// Top refreshes often, so that tests need not wait.
 const TOP: [&str; 3] = ["top", "--interval", "0.2"];
 
 fn robot(place: &Place) -> (Running, Robot) {
@@ -101,7 +101,7 @@ fn all_keys_move_the_mark_and_a_pause_stands_still() {
     terminal.keys(home);
     terminal.wait_screen("the mark at the start", |screen| screen.contains("> output.0 "));
     let before = terminal.screen();
-    // Something happens that would be seen, if it looked.
+    // Something changes that a refresh would show.
     place.say(&["call", "probe.0", "off"]).ok();
     assert_eq!(robot.state("probe.0"), "off");
     // The mark still moves, so it has drawn since; all else is as it was.
@@ -215,7 +215,7 @@ fn a_module_that_hangs_does_not_freeze_the_screen() {
     halt(pid);
     terminal.keys("jf");
     terminal.wait_screen("that it is tried", |screen| screen.contains("switching probe.0 off"));
-    // Meanwhile it is of use: the other one is switched.
+    // Meanwhile it is usable: the other one is switched.
     terminal.keys("jf");
     terminal.wait_row("probe.1", &["off"]);
     terminal.wait_screen("that it was in vain", |screen| screen.contains("probe.0: no answer within 1 s"));
@@ -252,7 +252,7 @@ fn any_size_will_do() {
         wait("it is drawn anew", || (terminal.drawn().len() > before).then_some(()));
     }
     terminal.resize(&top, 12, 40);
-    // What was drawn for the larger one is cut at first, and has this column.
+    // The larger drawing is cut at first, and has this column.
     terminal.wait_screen("the small one, with the columns for which there is room", |screen| {
         screen.lines().all(|line| line.chars().count() <= 40)
             && screen.contains("> output.0")
@@ -331,7 +331,7 @@ fn it_waits_for_a_node_to_be_launched_again() {
     let config = robot.installation.path.clone();
     let (terminal, top) = Terminal::start(&place, &TOP, 24, 80);
     terminal.wait_row("probe.0", &["on"]);
-    // Stopped before it is through with them, launch says that they did not start.
+    // Stopped before all modules are on, launch reports a failed start.
     let mut tool = robot.tool(PATIENCE);
     let through = |children: Vec<ChildState>| children.iter().all(|child| child.phase == Phase::Running);
     wait("launch is through with all", || through(tool.children(tool.launcher()).unwrap()).then_some(()));

@@ -1,4 +1,5 @@
-//! A module with parameters of every kind, for tests of `rohrpost param`. Like the probe it is this test program itself.
+//! A module with parameters of every kind, for tests of `rohrpost param`. Like the probe it is this test program
+//! itself.
 
 use crate::process::Said;
 use rohrpost::parameter::ParameterSet;

@@ -1,4 +1,4 @@
-//! Programs of another version: nobody guesses, each names both versions and what to do.
+//! Programs of another version: none guesses, each names both versions and a remedy.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, Robot, probe};
 use crate::tools::{at_a_node, commands};

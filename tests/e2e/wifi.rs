@@ -1,5 +1,5 @@
-//! A laptop of a robot, `far`, by a bad Wi-Fi: the robot publishes more than the line carries, and the laptop follows that in a mailbox in which
-//! only the newest counts.
+//! A robot's laptop, `far`, by a bad Wi-Fi: the robot publishes more than the link carries, and the laptop follows in a
+//! mailbox that keeps the newest only.
 
 use crate::harness::{PATIENCE, Place, Robot, probe, skipped, wait};
 use crate::probe::{COUNT, ProbingInterface};
@@ -13,12 +13,12 @@ use std::path::PathBuf;
 /// Carries 64 KiB a second; the robot publishes 156 KiB.
 const BAD: &str = "rate=64KiB,delay=20ms,jitter=10ms,loss=0.5%,seed=7";
 const BLOB: &str = "blob-hz = 40.0, blob-bytes = 4000";
-/// Older ones wait no longer: without newer ones in their place all would be about as old.
+/// Older ones are dropped: without newer ones in their place, all would have about this age.
 const WAIT_MAX_US: u64 = rohrpost_routers::session::WAIT_MAX_NS / 1000;
 /// Blobs that are looked at.
 const BLOBS: usize = 40;
 const NODES: [(&str, &str); 2] = [("base", "10.79.2.1"), ("far", "10.79.2.2")];
-/// Tools are more important than what is followed.
+/// Tools are more important than the followed data.
 const CONFIG: &str = r#"
 installation = "test"
 [system]
@@ -53,7 +53,7 @@ struct Wifi {
 }
 
 impl Wifi {
-    /// None, and said so, where namespaces are not permitted.
+    /// None, with a report, where namespaces are not permitted.
     fn launched() -> Option<Self> {
         let spec = |(name, address): (&str, &str)| NodeSpec { name: name.into(), address: address.parse().unwrap() };
         let lab = match Lab::new(&NODES.map(spec), 1500) {
@@ -94,14 +94,14 @@ impl Wifi {
         &self.nodes.iter().find(|(known, ..)| *known == node).unwrap().2
     }
 
-    /// What `net` says of a node.
+    /// The output of `net` about a node.
     fn net(&self, node: &str) -> serde_json::Value {
         let said = self.place.say_at(&self.config, node, &["net", "--json"]);
         let told: serde_json::Value = serde_json::from_str(said.out.trim()).unwrap_or_default();
         told.as_array().and_then(|all| all.iter().find(|told| told["node"] == node)).cloned().unwrap_or_default()
     }
 
-    /// Packages that newer ones took the place of while they waited for the laptop.
+    /// Packages that newer ones replaced while they waited for the laptop.
     fn replaced(&self) -> u64 {
         let net = self.net("base");
         let classes = net["clients"]["classes"].as_array().into_iter().flatten();
@@ -118,7 +118,7 @@ impl Wifi {
         record.iter().filter_map(parse).collect()
     }
 
-    /// What comes from now on is fresh, though more is published than the line carries.
+    /// Received data are fresh from now on, though more is published than the link carries.
     fn check_fresh(&self) {
         let (seen, replaced) = (self.blobs().len(), self.replaced());
         wait("blobs come, and newer ones took the place of older ones", || {
@@ -186,7 +186,7 @@ fn by_a_bad_wifi_what_comes_is_fresh_and_an_outage_costs_a_gap_and_nothing_else(
         let numbers: Vec<u64> = wifi.blobs().iter().map(|(number, _)| *number).collect();
         assert!(numbers.is_sorted_by(|one, next| one < next), "none twice, and none behind a newer one: {numbers:?}");
         let longest = numbers.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap();
-        // Three seconds and more until it is noticed that nobody is there.
+        // After three seconds and more the loss of the peer is noticed.
         assert!(longest > 40 * 3, "{longest} blobs are the gap of the outage");
         let counted = wifi.place.counted();
         assert_eq!((counted.len(), counted.iter().collect::<HashSet<_>>().len()), (20, 20), "each command ran once");

@@ -13,12 +13,12 @@ const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/sm
 /// What the demo draws into.
 const FILE: &str = "rohrpost-demo.rrd";
 
-/// A demo that was run to its end: what it said, and how many rows its drawing has of each entity.
+/// A demo that ran to its end: its output, and the number of rows of each entity in its drawing.
 struct Drawing {
     said: String,
     rows: BTreeMap<String, u64>,
     folder: TempDir,
-    /// How long it ran, with all that it does before and behind.
+    /// Its run time, including start and end.
     took: Duration,
 }
 
@@ -51,7 +51,7 @@ impl Drawing {
         let verified = rrd(&rerun, "verify", &file);
         assert!(verified.contains("1 file verified without error"), "{verified}");
         let rows = rows(&rrd(&rerun, "print", &file));
-        // The two commands read the file by ways of their own.
+        // The two commands read the file differently.
         let entities: Vec<&String> = rows.keys().collect();
         assert_eq!(entities, entities_of(&rrd(&rerun, "stats", &file)).iter().collect::<Vec<_>>());
         Some(Self { said, rows, folder, took })
@@ -74,7 +74,7 @@ impl Drawing {
         assert!(rows.contains(&count), "{entity}: {count} rows, not {rows:?}\n{:#?}\n{}", self.rows, self.said);
     }
 
-    /// What is drawn of every robot: its modules, what they say, and what its packages do, twice a second.
+    /// Drawings of every robot: its modules, their lines, and the traffic of its packages, twice a second.
     fn has_robot(&self, modules: &[&str], busy: &[&str]) {
         let charts = 4..=2 * self.took.as_secs() + 3;
         for module in modules {
@@ -85,7 +85,7 @@ impl Drawing {
                 self.has(&entity, charts.clone());
             }
         }
-        // Drawn only for spans in which packages came, so this checks modules that send all the time.
+        // Drawn only for spans with packages, so only checked for modules with steady traffic.
         for class in busy {
             self.has(&format!("/latency/{class}/p50"), charts.clone());
             self.has(&format!("/latency/{class}/p99"), charts.clone());
@@ -110,7 +110,7 @@ fn the_simulated_robot_is_drawn() {
     });
 }
 
-/// Each node draws what its router tells of its slots, and of the flows that leave it.
+/// Each node draws its router's report of slots, and of flows that leave it.
 #[test]
 fn time_slots_and_flows_are_drawn() {
     repeated_on_stall(Watched::Ordinary, || {
@@ -141,7 +141,7 @@ fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
         let said = &drawing.said;
         assert!(said.contains("The TCP router died") && said.contains("killed on purpose); there again"), "{said}");
         assert!(said.contains("the accounts balance"), "{said}");
-        // When packages could not come, as the drawing itself tells.
+        // Times of the outage, by the drawing itself.
         let lane = timed_rows(&drawing.file(), r"/modules/TCP\ router\,\ from\ desk");
         let states: Vec<bool> = lane.iter().map(|(_, state)| state.contains("on")).collect();
         assert!(states.chunks(2).all(|pair| pair[0] && pair.get(1) != Some(&true)) && states.len() >= 3, "{lane:?}");
@@ -159,7 +159,7 @@ fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
                 times.len()
             );
         }
-        // What is of its moment is gone when the gap begins.
+        // Entities of the moment are cleared when the gap begins.
         let cleared = times_ns(&drawing.file(), "/world/scan");
         assert!(cleared.first().is_some_and(|ns| *ns <= ended_ns) && cleared.is_sorted(), "{cleared:?}, {lane:?}");
         assert!(!said.contains("out-of-order"), "{said}");

@@ -15,7 +15,7 @@ pub(crate) struct Launched {
 }
 
 impl Launched {
-    /// Launches what a file in this folder configures.
+    /// Launches a configuration file of this folder.
     pub(crate) fn start(folder: &Path, config: &str) -> Self {
         let said = |name| File::create(folder.join(name)).unwrap();
         let launch =
@@ -28,14 +28,14 @@ impl Launched {
         command(&self.folder, arguments).output().unwrap()
     }
 
-    /// What the bridge counts, if it is there.
+    /// The bridge's counts, if it is there.
     pub(crate) fn count(&self, name: &str) -> Option<u64> {
         let counts = self.tool(&["call", "gui.0", "counts", "--json"]);
         let counts: serde_json::Value = serde_json::from_slice(&counts.stdout).ok()?;
         counts[name].as_u64()
     }
 
-    /// Ends it in order; what it said.
+    /// Ends it in order; returns its output.
     pub(crate) fn end(mut self) -> String {
         self.ask();
         let status = self.launch.wait().unwrap();
@@ -54,7 +54,7 @@ impl Drop for Launched {
         if self.launch.try_wait().is_ok_and(|ended| ended.is_some()) {
             return;
         }
-        // It is asked to end, so that its modules do; then made to.
+        // Asked to end first, so that its modules end; then killed.
         self.ask();
         let start = Instant::now();
         while self.launch.try_wait().is_ok_and(|ended| ended.is_none()) && start.elapsed() < super::robot::PATIENCE {

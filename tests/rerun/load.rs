@@ -1,8 +1,8 @@
 //! One processor for a robot that is measured, which is never idle.
 //!
 //! Where the kernel puts which process, and how deep a processor sleeps, changes latencies more than any bridge does; a
-//! robot is even faster the more others do, because it then finds processors awake. So the modules that are measured
-//! share one processor, and that has work all the time, which yields to all other threads.
+//! robot is even faster with more load from others, because it then finds processors awake. So the measured modules
+//! share one processor, which also has idle-priority work all the time.
 
 use nix::libc;
 use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
@@ -13,7 +13,7 @@ use std::thread::JoinHandle;
 
 const ME: Pid = Pid::from_raw(0);
 
-/// Does this with one processor, the first that there is; processes and threads that are started meanwhile keep to it.
+/// Runs this on one processor, the first that is allowed; processes and threads that are started meanwhile stay on it.
 pub(crate) fn on_one_processor<T>(work: impl FnOnce() -> T) -> T {
     let all = sched_getaffinity(ME).unwrap();
     let first = (0..CpuSet::count()).find(|processor| all.is_set(*processor).unwrap()).unwrap();
@@ -25,7 +25,7 @@ pub(crate) fn on_one_processor<T>(work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Work that gives way, until it is dropped.
+/// Work at idle priority, until it is dropped.
 pub(crate) struct Load {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -52,7 +52,7 @@ impl Drop for Load {
     }
 }
 
-/// From here on this thread works only when nobody else wants to.
+/// From here on this thread runs only on an otherwise idle processor.
 fn give_way() {
     let parameters = libc::sched_param { sched_priority: 0 };
     // SAFETY: reads the parameters, which live here; 0 is the calling thread.

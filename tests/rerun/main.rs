@@ -1,7 +1,7 @@
-//! The GUI bridge with Rerun's own command line: what is in a drawing, and what a viewer that misbehaves does to a
+//! The GUI bridge with Rerun's own command line: the content of a drawing, and the effect of a faulty viewer on a
 //! robot.
 //!
-//! Behind the feature `rerun-tests`, since they need two programs that no other test needs; `cargo xtask test` brings
+//! Behind the feature `rerun-tests`, since they need two programs that nobody else does; `cargo xtask test` brings
 //! both.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]

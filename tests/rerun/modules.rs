@@ -25,13 +25,13 @@ fn module() {
     std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
 }
 
-/// Something that happened, as an entity of its own in a drawing.
+/// An event, as an entity of its own in a drawing.
 #[rohrpost::data]
 #[derive(Clone, Debug)]
 pub(crate) enum Mark {
     /// The beginning.
     Begun(u64),
-    /// The viewer stood still for a while.
+    /// The viewer was frozen for a while.
     Frozen(u64),
     /// The viewer was killed and another one started.
     Killed(u64),
@@ -39,7 +39,7 @@ pub(crate) enum Mark {
     Flooded(u64),
 }
 
-/// How late beats came.
+/// Delays of beats.
 #[rohrpost::data]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Times {
@@ -85,7 +85,7 @@ pub(crate) trait Sending {
 /// Receives.
 #[rohrpost::interface(class = "sink")]
 pub(crate) trait Receiving {
-    /// What came since this was asked last.
+    /// Figures since the last question.
     #[command(16)]
     fn take(&mut self) -> Times;
 }
@@ -117,7 +117,7 @@ impl Module for Source {
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let Some(began_ns) = self.began_ns else {
-            // From here on beats are due: the first tick was late, and would be taken for the grid of all others.
+            // Beats are due from here on: the first tick was late, and would set the grid of all others.
             self.began_ns = Some(monotonic_ns());
             context.set_period(BEAT);
             return Ok(());
@@ -158,7 +158,7 @@ fn patch(number: u64) -> OccupancyGrid {
     OccupancyGrid { origin, resolution_m: 0.05, columns: 64, rows: 64, cells }
 }
 
-/// A call as one module would make it of another, with the patience of one.
+/// A call as a module would make it, with a module's timeout.
 fn ask(port: u16) {
     let Ok(mut viewer) = TcpStream::connect(("127.0.0.1", port)) else { return };
     let _ = viewer.set_read_timeout(Some(4 * BEAT));

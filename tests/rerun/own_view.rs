@@ -1,4 +1,4 @@
-//! A bridge with a view of a user's own: the example `own_view` draws a type that only it knows.
+//! A bridge with a user's own view: the example `own_view` draws a type that only it knows.
 
 use super::launched::Launched;
 use super::programs::{bridge, rerun, rows, rrd};
@@ -7,7 +7,7 @@ use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Module, ModuleError};
 use std::time::Duration;
 
-/// What the example draws: the type counts, not the module that declares it.
+/// The example draws by type, whatever module declares it.
 #[rohrpost::data]
 struct Fires {
     places_m: Vec<[f32; 2]>,

@@ -60,19 +60,19 @@ pub(crate) fn entities_of(stats: &str) -> BTreeSet<String> {
     lines.filter(|line| line.starts_with('/')).filter_map(|line| Some(line.rsplit_once(": ")?.0.to_owned())).collect()
 }
 
-/// What is in a drawing. One that is still being written may be torn at its end.
+/// The content of a drawing. One that is still being written may be torn at its end.
 pub(crate) fn printed(file: &Path, how: &[&str]) -> String {
     let mut print = Command::new(rerun());
     print.args(["rrd", "print"]).args(how).arg(file).env("NO_COLOR", "1");
     String::from_utf8_lossy(&print.output().unwrap().stdout).into_owned()
 }
 
-/// The rows of an entity that have a time, in order: when, ns since 1970, and what stands behind that.
+/// The rows of an entity that have a time, in order: the time, ns since 1970, and the data.
 pub(crate) fn timed_rows(file: &Path, entity: &str) -> Vec<(u64, String)> {
     let all = printed(file, &["-vvv"]);
     let head = format!(" - {entity} - ");
     let chunks = all.split("\nChunk(").filter(|chunk| chunk.lines().next().unwrap().contains(&head));
-    // Columns: row, time since the beginning, system time, then data. What is there for all times has none.
+    // Columns: row, time since the beginning, system time, then data. Timeless data have no time.
     let rows = chunks.filter(|chunk| chunk.contains(" system_time ")).flat_map(str::lines);
     let rows: Vec<Vec<&str>> =
         rows.filter(|line| line.contains(" row_")).map(|line| line.split('┆').map(str::trim).collect()).collect();

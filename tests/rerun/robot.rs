@@ -15,10 +15,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// What takes longer does not come any more, however busy the computer is.
+/// Limit of all waits, long enough for a busy computer.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Waits until there is something, and fails with what was waited for.
+/// Waits until there is a value, and fails with the name of what was awaited.
 #[track_caller]
 pub(crate) fn wait<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -90,7 +90,7 @@ impl Robot {
     /// The median lateness of so many beats, ns.
     pub(crate) fn window(&mut self, beats: u64) -> u64 {
         self.take();
-        // A computer that stands still for a window brings no beat in it.
+        // A computer that stalls for a window brings no beat in it.
         for _ in 0..10 {
             // Not asked meanwhile: asking is work, too.
             std::thread::sleep(BEAT * u32::try_from(beats).unwrap());
@@ -129,7 +129,7 @@ impl Robot {
         self.node.look_at(self.name("gui.0").with_local(local)).unwrap()
     }
 
-    /// Data that a module should have got and did not.
+    /// Data that a module missed.
     pub(crate) fn lost_by(&mut self, module: &str) -> u64 {
         let module = self.name(module);
         self.tool.status(module).unwrap().lost
@@ -155,12 +155,12 @@ impl Robot {
         assert_eq!((bridge.state, bridge.restarts), (Some(ModuleState::On), 0), "{}", self.said());
     }
 
-    /// What modules have said.
+    /// Lines of the modules.
     pub(crate) fn said(&self) -> String {
         self.say(&["log"])
     }
 
-    /// What a tool says of it.
+    /// A tool's output.
     pub(crate) fn say(&self, arguments: &[&str]) -> String {
         let mut tool = Command::new(env!("CARGO_BIN_EXE_rohrpost"));
         let output = tool.args(arguments).env("ROHRPOST_DIR", self.memory.path().join("nodes")).output().unwrap();
@@ -174,7 +174,7 @@ impl Robot {
 
 impl Drop for Robot {
     fn drop(&mut self) {
-        // It is asked to end, so that its modules do; then made to.
+        // Asked to end first, so that its modules end; then killed.
         let pid = nix::unistd::Pid::from_raw(self.launch.id() as i32);
         let _ = nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM);
         let start = Instant::now();
@@ -186,7 +186,7 @@ impl Drop for Robot {
     }
 }
 
-/// No scheduling in real time, so that it runs where that is not allowed, and what the bridge takes is felt.
+/// No real-time scheduling, so that it runs where that is not allowed, and so that the bridge's load has an effect.
 fn configuration(drawing: &str, settings: &str) -> String {
     let me = std::env::current_exe().unwrap();
     let program = format!("[{me:?}, \"--exact\", \"modules::module\", \"--nocapture\"]");

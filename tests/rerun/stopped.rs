@@ -1,4 +1,4 @@
-//! The bridge itself stands still for a while, as on a computer that is too busy, and goes on.
+//! The bridge itself is stopped for a while, as on a computer that is too busy, and goes on.
 
 use super::programs::{printed, rows, times_ns};
 use super::robot::{Robot, wait};
@@ -8,12 +8,12 @@ use rohrpost_mailbox::{ClassTraffic, Loss, OverflowPolicy, local};
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 
 const SCAN: &str = "/world/scan/source.0";
-/// The bridge's mailbox for what tells how things are.
+/// The bridge's mailbox for states.
 const NEWEST: u8 = 3;
 /// Patches of the source's map.
 const PATCHES: usize = 64;
-/// Patches that come while the bridge stands still: a second, which is less than a subscription lives without being
-/// renewed.
+/// Patches that arrive while the bridge is stopped: for a second, which is less than the lifetime of a subscription
+/// without renewal.
 const WAITING: u32 = 10;
 
 fn is_stopped(pid: u32) -> bool {
@@ -33,8 +33,7 @@ fn a_bridge_that_stood_still_goes_on_with_the_newest() {
         signal(Signal::SIGSTOP);
         wait("the bridge stands still", || is_stopped(pid).then_some(()));
         let stopped_ns = robot.newest_scan_ns();
-        // Of what was published, that which was followed by something sent has been sent itself, however slow the
-        // computer is.
+        // A published value with a later value that was sent has been sent itself, however slow the computer is.
         let (mut continued_ns, mut last) = (stopped_ns, (stopped_ns, u64::MAX));
         wait("patches wait", || {
             let sent = robot.bridge_mailbox(NEWEST).sent;

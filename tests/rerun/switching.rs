@@ -1,4 +1,5 @@
-//! The bridge is switched off and on, killed and started again: what was recorded stays, and the new drawing is whole.
+//! The bridge is switched off and on, killed and started again: earlier recordings stay, and the new drawing is
+//! complete.
 
 use super::launched::Launched;
 use super::programs::{bridge, ok, rerun, rows, rrd};
@@ -15,7 +16,7 @@ use std::time::Duration;
 #[serde(crate = "rohrpost::serde", deny_unknown_fields)]
 struct Settings {}
 
-/// Its map never changes: it publishes the map on request only.
+/// Its map never changes: it publishes it on request only.
 struct Quiet {
     asked: bool,
 }
@@ -104,8 +105,8 @@ fn a_drawing_that_is_switched_on_again_is_whole_and_the_last_one_is_kept() {
     let (file, old) = (folder.path().join("map.rrd"), folder.path().join("map.old.rrd"));
     std::fs::write(folder.path().join("map.toml"), configuration(r#"file = "map.rrd""#)).unwrap();
     let launch = Launched::start(folder.path(), "map.toml");
-    // States and charts come each half second, some twenty rows; after several times the map, which is asked for at
-    // once, has come, too.
+    // States and charts come each half second, some twenty rows. After several times as long the map has come, too: it
+    // is requested at once.
     let enough = |launch: &Launched| wait("something is drawn", || (launch.count("drawn")? > 100).then_some(()));
     enough(&launch);
     ok("off", &launch.tool(&["call", "gui.0", "off"]));
@@ -118,7 +119,7 @@ fn a_drawing_that_is_switched_on_again_is_whole_and_the_last_one_is_kept() {
         let rows = drawn(file);
         let has = |entity: &str| rows.keys().any(|name| name.starts_with(entity));
         assert!(has("/world/map/mapper.0/"), "{}: {rows:#?}", file.display());
-        // It was said before the bridge was there, and not again.
+        // The line is older than the bridge, and was not repeated.
         assert!(has("/output/mapper.0"), "{}: {rows:#?}", file.display());
         let verified = rrd(&rerun(), "verify", file);
         assert!(verified.contains("1 file verified without error"), "{verified}");

@@ -2,15 +2,15 @@
 //!
 //! The robot has one processor, which is never idle ([`Load`]); bridge and viewer run wherever the kernel puts them.
 //!
-//! What is compared is how late beats came in short windows, and of all windows the lower quartile: what else the
-//! computer does only adds, and comes and goes; what a fault does stays. Faults are interleaved with two kinds of quiet
-//! phases: a viewer that is `well`, which costs the computer more than one that does nothing; and none at all,
-//! `absent`, which costs it less. With a fault the robot must be no slower than with either. How many windows there are
-//! does not depend on what they say: only when peace itself is noisy are they as many again, once, and all count.
+//! The figure is the lower quartile of the median delay of beats in short windows: other load of the computer only adds
+//! to it, and comes and goes; the effect of a fault stays. Faults are interleaved with two kinds of peace: a viewer
+//! that is `well`, which costs the computer more than one that does nothing; and none at all, `absent`, which costs it
+//! less. With a fault the robot must be no slower than with either. How many windows there are does not depend on what
+//! they say: only when peace itself is noisy is their number doubled, once, and all count.
 //!
-//! A few rounds on a computer that others use as well tell a robot that waits for its viewer from one that does not,
-//! and no tenth: they are held to a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` makes each fault come
-//! that often, and holds them to the narrow one.
+//! A few rounds on a shared computer distinguish a robot that waits for its viewer from one that does not, but show no
+//! difference of 10 %: they have a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` repeats each fault that
+//! often, and applies the narrow one.
 
 use super::load::{Load, on_one_processor};
 use super::modules::Mark;
@@ -19,7 +19,7 @@ use super::viewer::{Viewer, free_port};
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};
 
-/// The robot's latencies with a viewer that misbehaves, by those in peace; in as many rounds as somebody asked for.
+/// Ratio of the robot's delay with a faulty viewer to that in peace, at most; with a requested number of rounds.
 const RATIO_MAX: f64 = 1.1;
 /// The same in the few rounds of the usual tests.
 const RATIO_MAX_OF_FEW: f64 = 2.0;
@@ -32,14 +32,14 @@ const WINDOWS: u32 = 6;
 const ROUNDS: usize = 3;
 /// Longer than the watch takes to cut a frozen viewer off (3 s).
 const FREEZE: Duration = Duration::from_millis(4000);
-/// All that could fill up is full after this time.
+/// All buffers that could fill up are full after this time.
 const LONG_FREEZE: Duration = Duration::from_secs(11);
-/// After it nothing is left of the fault but the absence.
+/// After it only the absence of the viewer is left of the fault.
 const SETTLED: Duration = Duration::from_secs(1);
-/// The bridge's memory, whatever happens: its own bounds, and the program.
+/// Limit of the bridge's memory in all cases: its own bounds, and the program.
 const MIB_MAX: u64 = 120;
 
-/// What became of the drawing; the same as the bridge's own type.
+/// The state of the drawing; the same as the bridge's own type.
 #[rohrpost::data]
 #[derive(Clone, Copy, Debug)]
 struct Counts {
@@ -122,7 +122,7 @@ impl Test {
     }
 }
 
-/// Medians of windows, ns, by what was going on.
+/// Medians of windows, ns, by situation.
 #[derive(Default)]
 struct Figures {
     well: Vec<u64>,
@@ -171,7 +171,7 @@ impl Figures {
         spread(&self.well).max(spread(&self.absent)) > SPREAD_MAX
     }
 
-    /// The worst ratio of a fault to a peace; tells all.
+    /// The worst ratio of a fault to a peace; prints all.
     fn worst(&self, when: &str) -> f64 {
         let mut worst: f64 = 0.0;
         for (peace, windows) in [("well", &self.well), ("absent", &self.absent)] {
@@ -253,7 +253,7 @@ fn a_viewer_that_misbehaves_does_not_slow_the_robot() {
     });
 }
 
-/// The measurement can fail: a robot that waits for its viewer is found out.
+/// The measurement can fail: a robot that waits for its viewer is detected.
 #[test]
 fn a_robot_that_waits_for_its_viewer_is_found_out() {
     repeated_on_stall(Watched::Ordinary, || {

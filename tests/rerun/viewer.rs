@@ -1,4 +1,4 @@
-//! A viewer that is treated badly, and what came to it.
+//! A viewer with faults, and the data that it received.
 //!
 //! It is Rerun's proxy: the server that is also inside of each viewer, and what a bridge connects to, without the
 //! window.
@@ -45,7 +45,7 @@ impl Viewer {
         kill(Pid::from_raw(self.process.id() as i32), signal).unwrap();
     }
 
-    /// Reads what it has got and gets, until these entities are there, and so many below one of them.
+    /// Reads its data until these entities are there, and so many below one of them.
     #[track_caller]
     pub(crate) fn shows(&self, folder: &Path, entities: &[&str], (below, many): (&str, usize)) {
         let file = folder.join("seen.rrd");

@@ -1,7 +1,8 @@
 //! The files of a crate, and which names which.
 //!
-//! A file *names* another when a path in it leads to something defined there: `use crate::a::B`, `super::B`, `a::B` with `a` imported or declared
-//! here. Re-exports are looked through. A parent that declares `mod a;` and re-exports from below does not name what it re-exports. Tests are left out.
+//! A file *names* another when a path in it leads to something defined there: `use crate::a::B`, `super::B`, `a::B`
+//! with `a` imported or declared here. Re-exports are looked through. A parent that declares `mod a;` and re-exports
+//! from below does not name what it re-exports. Tests are left out.
 
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,7 +35,7 @@ struct Module {
     children: BTreeSet<String>,
     /// Names brought by `use`, and where they lead.
     imports: BTreeMap<String, Place>,
-    /// Modules all of whose names are brought.
+    /// Modules with a glob import of all their names.
     globs: Vec<Place>,
     defined: BTreeSet<String>,
 }

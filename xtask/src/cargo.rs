@@ -1,10 +1,10 @@
-//! Where things are, and how other programs are run.
+//! Paths, and calls of other programs.
 
 use crate::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 
-/// The package whose build compiles all of Rerun.
+/// The package with a build that compiles all of Rerun.
 pub(crate) const BRIDGE: &str = "rohrpost-gui-bridge";
 /// The profile that this package is built in, and the folder below `target` that this makes.
 pub(crate) const BRIDGE_PROFILE: &str = "bridge";
@@ -15,7 +15,7 @@ pub(crate) fn root() -> PathBuf {
     here.parent().unwrap_or(here).to_path_buf()
 }
 
-/// Where Cargo puts what it builds.
+/// Folder of Cargo's build products.
 pub(crate) fn target() -> PathBuf {
     // A relative path counts from where Cargo was called, which is where this runs.
     let asked = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
@@ -37,14 +37,14 @@ pub(crate) fn host() -> Result<String, Failure> {
     host.map(str::to_owned).ok_or_else(|| "rustc -vV names no host".into())
 }
 
-/// Says what is run and why, runs it, and fails if it does.
+/// Prints the command and its reason, runs it, and fails if it does.
 pub(crate) fn run(why: &str, command: &mut Command) -> Result<(), Failure> {
     eprintln!("==> {why}\n    {}", shown(command));
     let status = status(command)?;
     if status.success() { Ok(()) } else { Err(format!("{why}: `{}` ended with {status}", shown(command))) }
 }
 
-/// Runs to the end, whatever it is.
+/// Runs any command to its end.
 pub(crate) fn status(command: &mut Command) -> Result<ExitStatus, Failure> {
     command.status().map_err(|error| format!("cannot run `{}`: {error}", shown(command)))
 }

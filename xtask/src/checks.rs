@@ -13,14 +13,14 @@ use std::process::{Command, ExitCode};
 
 /// All tests.
 pub(crate) fn test() -> Result<ExitCode, Failure> {
-    // All of them, so that one run says all that fails.
+    // All of them, so that one run shows all failures.
     let all = ["test", "--workspace", "--exclude", BRIDGE, "--no-fail-fast"];
     cargo::run("testing all but the GUI bridge", &mut cargo(&all))?;
     tsan::run()?;
     fuzz::short()?;
     let bridge = ["--profile", BRIDGE_PROFILE, "--package", BRIDGE];
     cargo::run("testing the GUI bridge", cargo(&["test"]).args(bridge))?;
-    // The example is a bridge with a view of one's own, which a test starts.
+    // The example is a bridge with a user's own view, which a test starts.
     let bins = ["--bin", BRIDGE, "--example", "own_view"];
     cargo::run("building the GUI bridge", cargo(&["build"]).args(bridge).args(bins))?;
     let rerun = venv::venv()?.rerun;
@@ -44,7 +44,7 @@ pub(crate) fn test() -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What has to pass before anything lands.
+/// Checks that must pass before anything lands.
 pub(crate) fn ci() -> Result<ExitCode, Failure> {
     cargo::run("looking at the format", &mut cargo(&["fmt", "--all", "--check"]))?;
     let deny = ["--all-targets", "--", "--deny", "warnings"];
@@ -55,11 +55,11 @@ pub(crate) fn ci() -> Result<ExitCode, Failure> {
     test()
 }
 
-/// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the compiler of
-/// the workspace's own crates, clippy takes Rerun as it was built: 10 seconds.
+/// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the
+/// compiler of the workspace's own crates, clippy takes Rerun as it was built: 10 seconds.
 fn bridge_clippy() -> Command {
     let mut command = cargo(&["build", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--all-targets"]);
-    // What `cargo clippy -- --deny warnings` hands to its driver.
+    // The flags of `cargo clippy -- --deny warnings` for its driver.
     command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver").env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
     command
 }

@@ -1,4 +1,4 @@
 //! How commands fail.
 
-/// A failure as it is told to the user: what went wrong, and what to do.
+/// A failure for the user: the error, and what to do.
 pub(crate) type Failure = String;

@@ -1,7 +1,7 @@
-//! `cargo xtask fuzz`: builds the fuzz targets with the compiler's coverage counters, for the stable compiler has them too, and
-//! lets libFuzzer run them.
+//! `cargo xtask fuzz`: builds the fuzz targets with the compiler's coverage counters, which the stable compiler has,
+//! too, and lets libFuzzer run them.
 //!
-//! What it finds of new ways is kept below `target/fuzz/found`, for longer runs to go on from; an input that breaks a
+//! Inputs with new coverage are kept below `target/fuzz/found`, as a start for longer runs. An input that breaks a
 //! promise is a file in `target/fuzz`, and goes into `tests/fuzz/corpus` once the mistake is fixed.
 
 use crate::cargo::{self, cargo, host};
@@ -11,20 +11,21 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
 const PACKAGE: &str = "rohrpost-fuzz";
-/// As `cargo fuzz` builds: coverage of every edge, and of what is compared with what. Own code checks its arithmetic.
+/// As `cargo fuzz` builds: coverage of every edge, and of comparisons. Own code checks its arithmetic.
 const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
     -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1";
-/// Dependencies that nearly all inputs go through.
+/// Dependencies that nearly all inputs pass through.
 const OPTIMISED: [&str; 7] = ["toml", "toml_parser", "winnow", "serde_core", "serde_json", "postcard", "tempfile"];
-/// No input takes longer, also on a busy machine; the slowest of the corpus takes some hundredths of a second.
+/// Time limit of an input, also on a busy machine; the slowest of the corpus takes some hundredths of a second.
 const INPUT_SECONDS_MAX: u32 = 30;
-/// Nothing here needs more; a claimed length that is believed does.
+/// Memory limit, above all needs; a trusted claimed length exceeds it.
 const MEGABYTES_MAX: u32 = 1024;
 /// An input of this length holds a whole small configuration.
 const INPUT_BYTES_MAX: u32 = 4096;
 
-/// `cargo xtask fuzz [TARGET...] [--seconds N]`: long runs, each beginning where the last one ended. `--short`: as in CI.
+/// `cargo xtask fuzz [TARGET...] [--seconds N]`: long runs, each beginning where the last one ended. `--short`: as in
+/// CI.
 pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     if args == ["--short"] {
         return short().map(|()| ExitCode::SUCCESS);
@@ -46,7 +47,7 @@ pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A short run of all targets, the same each time; first, that what is planted is found.
+/// A short run of all targets, the same each time; first, the planted mistake must be found.
 pub(crate) fn short() -> Result<(), Failure> {
     if Command::new("c++").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_err() {
         eprintln!("==> SKIPPED: fuzzing needs a C++ compiler (g++), since libFuzzer is compiled from its source");
@@ -62,11 +63,11 @@ pub(crate) fn short() -> Result<(), Failure> {
 }
 
 enum Effort {
-    /// Until it is found; some 100 000 inputs do mostly, in seconds.
+    /// Until the mistake is found; mostly by some 100 000 inputs, in seconds.
     Planted,
     /// From the kept corpus alone, with one seed, so many inputs.
     Short,
-    /// From all that was ever found.
+    /// From all inputs found so far.
     Long { seconds: u32 },
 }
 
@@ -108,7 +109,7 @@ impl Fuzzer {
 
     fn run(&self, name: &str, effort: &Effort) -> Result<(), Failure> {
         let told = |path: &Path, error| format!("{}: {error}", path.display());
-        // In memory, where nodes belong; by one name, since those of a target that was stopped in the middle stay.
+        // In memory, where nodes belong; under one name, since files of an interrupted target stay.
         let memory = Path::new("/dev/shm");
         let around = if memory.is_dir() { memory } else { &self.work };
         let nodes = around.join(format!("rohrpost-fuzz-{}", std::process::id()));

@@ -1,6 +1,6 @@
 //! `cargo xtask picture`: a drawing as a viewer shows it, without a screen.
 //!
-//! The viewer runs headless with a software renderer, a folder of its own for what it remembers, and a free port. It is
+//! The viewer runs headless with a software renderer, a folder of its own for its state, and a free port. It is
 //! asked for the picture only after a while: first it loads, and shows notices over the views.
 
 use crate::failure::Failure;
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 const ASK: &str = "import sys; from rerun.experimental import ViewerClient; \
                    ViewerClient.connect(sys.argv[1]).save_screenshot(sys.argv[2])";
 
-/// How long a viewer may take to start, and to write a picture.
+/// Limit of a viewer's start, and of writing a picture.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 struct Order {
@@ -29,7 +29,7 @@ pub(crate) fn run(args: &[String]) -> Result<ExitCode, Failure> {
     let order = order(args)?;
     renderer()?;
     let venv = venv::venv()?;
-    // The viewer writes the file itself, and whether it has is told by the file alone.
+    // The viewer writes the file itself, and only the file shows that it has.
     let _ = std::fs::remove_file(&order.picture);
     let memory = std::env::temp_dir().join(format!("rohrpost-viewer-{}", std::process::id()));
     let (mut viewer, port) = viewer(&venv, &order, &memory)?;

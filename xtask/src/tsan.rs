@@ -1,6 +1,6 @@
 //! `cargo xtask tsan`: the slot core and its broken variants under ThreadSanitizer (see `mailbox/proof/threads`).
 //!
-//! The stable toolchain brings ThreadSanitizer's library, but asks to be told that one means it (`RUSTC_BOOTSTRAP`). That is said
+//! The stable toolchain includes ThreadSanitizer's library, but enables it only with `RUSTC_BOOTSTRAP`. That is set
 //! for this build alone.
 
 use crate::cargo::{self, cargo, host};
@@ -10,10 +10,10 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 
 const PACKAGE: &str = "rohrpost-proof-threads";
-/// The standard library was built without; the crate's first comment says why that does no harm.
+/// The standard library was built without it; the crate's first comment says why that does no harm.
 const FLAGS: &str = "-Zsanitizer=thread -Cunsafe-allow-abi-mismatch=sanitizer";
 
-/// Builds and judges; says so aloud when this toolchain cannot.
+/// Builds and checks; reports it if this toolchain cannot.
 pub(crate) fn run() -> Result<ExitCode, Failure> {
     let host = host()?;
     if !has_sanitizer(&host)? {

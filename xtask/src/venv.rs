@@ -1,6 +1,6 @@
 //! Rerun's own command line and viewer, from PyPI into `target/venv`.
 //!
-//! Its version is that of the `rerun` crate: a viewer reads the drawings of its own version best.
+//! Its version is that of the `rerun` crate: a viewer reads drawings of its own version best.
 
 use crate::cargo;
 use crate::failure::Failure;
@@ -14,7 +14,8 @@ const PACKAGE: &str = "rerun-sdk==0.36.3";
 pub(crate) struct Venv {
     /// The interpreter.
     pub(crate) python: PathBuf,
-    /// The viewer and command line. Not the script of the same name, which would leave the viewer behind when it is ended.
+    /// The viewer and command line. Not the script of the same name, which would leave the viewer running when it is
+    /// killed.
     pub(crate) rerun: PathBuf,
 }
 
@@ -22,7 +23,7 @@ pub(crate) struct Venv {
 pub(crate) fn venv() -> Result<Venv, Failure> {
     let folder = cargo::target().join("venv");
     let python = folder.join("bin").join("python");
-    // Written last: what is there without it was interrupted.
+    // Written last: a folder without it was interrupted.
     let stamp = folder.join("rohrpost-stamp");
     if std::fs::read_to_string(&stamp).is_ok_and(|made| made == PACKAGE) {
         return Ok(Venv { rerun: program(&python)?, python });

@@ -4,10 +4,10 @@ use crate::harness::Failure;
 use crate::rounds::Row;
 use crate::settings::Settings;
 
-/// What goes wrong in a turn that does many different things.
+/// Errors in a turn that does several kinds of work.
 pub(super) type Done<T> = Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
-/// As a turn has to say it. What was skipped remains so.
+/// The error as a turn reports it. What was skipped stays skipped.
 pub(super) fn as_failure(what: &str) -> impl Fn(Box<dyn std::error::Error + Send + Sync>) -> Failure {
     move |error| match error.downcast::<Failure>() {
         Ok(failure) => *failure,
@@ -15,14 +15,14 @@ pub(super) fn as_failure(what: &str) -> impl Fn(Box<dyn std::error::Error + Send
     }
 }
 
-/// Something that is measured, against whom, and with which target.
+/// One measurement: its contenders, what they are compared with, and the targets.
 pub trait Case {
-    /// As `--only` and the table call it.
+    /// Name in `--only` and in the table.
     fn name(&self) -> String;
 
-    /// Measures. A contender that fails or is skipped is a row that says so; `Err` is for what hits the whole case.
+    /// Measures. A contender that fails or is skipped gives a row that says so; `Err` is an error of the whole case.
     ///
     /// # Errors
-    /// When the case cannot be begun.
+    /// When the case cannot start.
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure>;
 }

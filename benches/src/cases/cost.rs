@@ -1,7 +1,7 @@
 //! What one send costs its sender while the receiver is awake, on another processor.
 //!
-//! The receiver has taken everything before the clock starts, and looks for more. Only the sends are timed; what the clock
-//! itself takes is measured beforehand and subtracted.
+//! The receiver has taken everything before the clock starts, and polls for more. Only the sends are timed; the time of
+//! the clock reading itself is measured before and subtracted.
 
 use super::case::Case;
 use crate::floors::ring::DEPTH;
@@ -16,22 +16,23 @@ use std::time::{Duration, Instant};
 
 const BYTES: usize = 64;
 const WARM_UP: usize = 200;
-/// From the receiver's last word to the next burst: by then it looks for more.
-/// So many bursts, each with its own clock readings, make one figure: some processors count in steps of 10 ns.
+/// From the receiver's last message to the next burst: by then the receiver polls again.
+/// Bursts for one figure, each with its own clock readings: some processors count in steps of 10 ns.
 const GROUP: usize = 16;
 const PAUSE_NS: u64 = 400;
 const PATIENCE: Duration = Duration::from_secs(15);
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    // The floor of one send does what any queue must whose receiver may sleep; that of many is the bare queue.
+    // The floor of one send includes what any queue with a sleeping receiver needs; the floor of many is the bare
+    // queue.
     let single = Versus { name: "Vyukov, wakeable", p50: Some(Target::AtMost(1.3)), p99: None };
     let many = Versus { name: "Vyukov", p50: Some(Target::AtMost(2.0)), p99: None };
     vec![Box::new(Cost { burst: 1, versus: single }), Box::new(Cost { burst: 16, versus: many })]
 }
 
 struct Cost {
-    /// Packages sent one after the other.
+    /// Packages sent in a row.
     burst: usize,
     versus: Versus,
 }
@@ -65,7 +66,7 @@ fn vyukov<const FENCED: bool>(burst: usize, bursts: usize) -> Result<Vec<f64>, F
 struct CostTurn {
     gate: Gate,
     samples: Samples,
-    /// On lines of its own: whoever sends looks at it again and again.
+    /// Has cache lines of its own: the sender polls it.
     received: crate::floors::ring::CacheLine<AtomicU64>,
 }
 
@@ -123,7 +124,7 @@ fn cost<I: Sink, O: Source>(
     Ok(turn.samples.all())
 }
 
-/// Until the receiver has got all, and a while longer.
+/// Waits until the receiver has everything, and a while longer.
 fn await_received(received: &AtomicU64, sent: u64) -> Result<(), Failure> {
     let give_up = monotonic_ns() + PATIENCE.as_nanos() as u64;
     while received.load(Ordering::Acquire) < sent {
@@ -136,10 +137,10 @@ fn await_received(received: &AtomicU64, sent: u64) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Times spans of some tens of nanoseconds: the processor's counter, where it has one that can be read in order.
+/// Times spans of tens of nanoseconds: by the processor's counter if it can be read in order.
 struct CycleCounter {
     ns_per_tick: f64,
-    /// Of two readings with nothing in between, the median.
+    /// Median of two readings with nothing in between.
     own_ticks: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Something urgent each millisecond, past a lower class that keeps the mailbox full.
+//! An urgent package each millisecond, while a lower class keeps the mailbox full.
 //!
 //! ```text
 //!  processor 0                                    processor 1
@@ -6,8 +6,8 @@
 //!                                             ├─▶ receiver: urgent first, works 5 µs on each
 //!  urgent, FIFO 60: one each ms, while full ──┘
 //! ```
-//! The flooder pauses for 2 ms in 20, so that the receiver sleeps now and then and the kernel's fair server stays out. Only
-//! what was sent while the mailbox was full counts: from before the send until it has been copied out.
+//! The flooder pauses for 2 ms in 20, so that the receiver sleeps now and then and the kernel's fair server stays out.
+//! Only what was sent while the mailbox was full counts: from before the send until it has been copied out.
 
 use super::case::Case;
 use crate::floors::ring::DEPTH;
@@ -23,20 +23,20 @@ use std::time::{Duration, Instant};
 const BYTES: usize = 64;
 const LOW: u8 = 10;
 const URGENT: u8 = 200;
-/// Above the flooder, on its processor.
+/// Above the flooder, on the same processor.
 const URGENT_FIFO: u8 = 60;
 const TICK: Duration = Duration::from_millis(1);
 const WORK_NS: u64 = 5_000;
 const FLOOD: Duration = Duration::from_millis(18);
 const LULL: Duration = Duration::from_millis(2);
-/// How long a flooder sleeps that is refused.
+/// Sleep of a flooder after a refused package.
 const REFUSED: Duration = Duration::from_micros(50);
 const PATIENCE: Duration = Duration::from_secs(20);
-/// In front of a message: when it was sent, or one of these.
+/// Head of a message: when it was sent, or one of these.
 const ORDINARY: u64 = 0;
 const LAST: u64 = u64::MAX;
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     vec![Box::new(Flood)]
 }
@@ -50,7 +50,8 @@ impl Case for Flood {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let urgent = settings.count(1_000);
-        // Where the urgent can be refused, as they are by no means under `displace` and `latest`, their sender tries again.
+        // Where the urgent can be refused, as they are by no means under `displace` and `latest`, their sender tries
+        // again.
         let ours = |full, states, room: Option<u64>| {
             move || {
                 let ground = OwnNode::new(DEPTH, BYTES, full)?;
@@ -80,7 +81,7 @@ impl Case for Flood {
             two_rings,
             Contender::sampled("posix-mq", queue(1)),
             Contender::sampled("rohrpost, latest", ours(OverflowPolicy::Latest, 2 * DEPTH as u16, None)),
-            // What rejects has no room for the urgent unless somebody leaves it.
+            // A contender that rejects packages has no room for urgent ones unless the flooder leaves some.
             Contender::sampled(
                 "rohrpost, reject, 8 left free",
                 ours(OverflowPolicy::Reject, 1, Some(DEPTH as u64 - 8)),
@@ -99,12 +100,12 @@ impl Case for Flood {
 #[repr(C)]
 struct FloodTurn {
     gate: Gate,
-    /// Ordinary ones sent and received.
+    /// Ordinary packages sent and received.
     sent: AtomicU64,
     received: AtomicU64,
-    /// Not 0: so many were sent without a pause that it is full.
+    /// Not 0: the mailbox is full after this many packages were sent without a pause.
     full: AtomicU64,
-    /// Not 0: the urgent ones have all been sent.
+    /// Not 0: all urgent packages are sent.
     over: AtomicU64,
     samples: Samples,
 }
@@ -112,10 +113,10 @@ struct FloodTurn {
 // SAFETY: atomics only.
 unsafe impl Zeroable for FloodTurn {}
 
-/// Microseconds that each of so many urgent messages took. With `room` the flooder leaves as many of the ordinary ones on the way.
+/// Microseconds of each urgent message. With `room`, the flooder keeps that many ordinary messages in flight.
 ///
 /// # Errors
-/// When an urgent one is refused or lost, before all else.
+/// When an urgent message is refused or lost; this error comes first.
 fn flood<I: Sink, L: Sink, O: Source>(
     urgent: usize,
     room: Option<u64>,
@@ -141,7 +142,7 @@ fn flood<I: Sink, L: Sink, O: Source>(
         turn.gate.meet(3)?;
         let mut sink = urgent_sink()?;
         settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
-        // Refused, the environment says so.
+        // If the kernel refuses, the environment line says so.
         let _ = sys::schedule(sys::Scheduling::Fifo(URGENT_FIFO));
         turn.gate.meet(5)?;
         send_urgent(&mut sink, &turn, urgent)
@@ -161,7 +162,7 @@ fn send_urgent(sink: &mut impl Sink, turn: &FloodTurn, urgent: usize) -> Result<
     let mut sent = 0;
     while sent < urgent {
         std::thread::sleep(TICK);
-        // A receiver that the kernel keeps from running for long would find nothing but urgent ones.
+        // A receiver that the kernel stops for long would find only urgent messages.
         let waiting = sent - turn.samples.len();
         if turn.full.load(Ordering::Acquire) == 0 || waiting > DEPTH / 2 {
             continue;

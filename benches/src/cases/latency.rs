@@ -1,7 +1,7 @@
 //! How long a package is on its way, one at a time: to a receiver that sleeps, one that spins, one on the same core.
 //!
-//! All echo; one way is half of the round trip. Everything is copied in and out, except where it is loaned: there 16 bytes are
-//! written and read at each end, whatever the size.
+//! All echo; one way is half of the round trip. Everything is copied in and out, except where it is loaned: there 16
+//! bytes are written and read at each end, whatever the size.
 
 use super::case::Case;
 use super::rivals::Rival;
@@ -21,7 +21,7 @@ const WARM_UP: usize = 2_000;
 /// With a package each 0.5 ms there is time for fewer.
 const MESSAGES_PACED: usize = 1_500;
 
-/// A turn of who sleeps may be longer than one of who spins: see [`Cell::cap`].
+/// A turn of a sleeping contender may be longer than one of a spinning contender: see [`Cell::cap`].
 const CAP_ASLEEP: Duration = Duration::from_secs(2);
 const CAP_AWAKE: Duration = Duration::from_millis(600);
 

@@ -122,8 +122,8 @@ impl Many {
         Ok(Self { scratch, node, receivers: receivers? })
     }
 
-    /// For each mailbox, as a participant that has never seen it: nanoseconds to open it by name and to have sent there.
-    /// The receivers then check that each got its package.
+    /// For each mailbox, as a participant that has never seen it: nanoseconds to open it by name and to have sent
+    /// there. The receivers then check that each got its package.
     fn first_sends_ns(&mut self) -> Done<Vec<u64>> {
         let participant = Participant::join(&Node::open(self.node.path())?, Name::NONE)?;
         let label = Label { kind: Type::data(0), priority: Priority(100), ..Label::default() };

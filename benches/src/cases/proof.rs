@@ -1,7 +1,8 @@
-//! What a send to a receiver that is awake asks of the kernel and of the heap: nothing. Counted, not timed.
+//! System calls and heap uses of a send to a receiver that is awake: none. Counted, not timed.
 //!
-//! One thread sends some and then receives them, so its receiver never sleeps. System calls are counted by a tracer: between two
-//! marks, which are system calls themselves. Beside it stands something that is known to use what is counted.
+//! One thread sends some packages and then receives them, so its receiver never sleeps. A tracer counts system calls
+//! between two marks, which are system calls themselves. Beside it stands a contender that is known to use what is
+//! counted.
 
 use super::case::Case;
 use crate::counting::heap_uses;
@@ -21,13 +22,13 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 const BYTES: usize = 64;
-/// Sent one after the other, then received.
+/// Packages sent in a row, then received.
 const BATCH: usize = 32;
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Asks for what nobody here asks for; between two such calls is what counts.
+/// A system call that nobody here uses otherwise; what happens between two of them counts.
 const MARK: libc::c_long = libc::SYS_getpgrp;
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     vec![Box::new(Proof::SystemCalls), Box::new(Proof::HeapUses)]
 }
@@ -66,7 +67,7 @@ impl Case for Proof {
     }
 }
 
-/// A contender whose figure is counted in a process of its own.
+/// A contender with its figure counted in a process of its own.
 fn counted<'a>(name: &'static str, count: impl Fn() -> Result<f64, Failure> + 'a) -> Contender<'a> {
     let turn = move || {
         let counts = sample_in_child(PATIENCE, |samples| {
@@ -85,7 +86,7 @@ fn mailbox_under(batches: usize, mut mark: impl FnMut()) -> Result<usize, Failur
     let mut sink = ground.sink(100, Retry::Never)?;
     let mut message = [0; BYTES];
     for batch in 0..=batches {
-        // The first one makes the row of its traffic table, and is not counted.
+        // The first send makes the row of its traffic table, and is not counted.
         let counts = batch > 0;
         if counts {
             mark();
@@ -150,7 +151,8 @@ fn mark() {
     unsafe { libc::syscall(MARK) };
 }
 
-/// Does `body`, which gives the number of its sends, in a traced child. Gives system calls a send between its marks.
+/// Runs `body`, which returns the number of its sends, in a traced child. Returns system calls per send between its
+/// marks.
 fn traced(body: impl FnOnce() -> Result<usize, Failure>) -> Result<f64, Failure> {
     // SAFETY: this process has one thread.
     match unsafe { fork() }.map_err(|error| Failure::of("fork", error))? {
@@ -159,7 +161,7 @@ fn traced(body: impl FnOnce() -> Result<usize, Failure>) -> Result<f64, Failure>
                 .and_then(|()| raise(Signal::SIGSTOP))
                 .map_err(|_| ())
                 .and_then(|()| body().map_err(|_| ()));
-            // What was sent is said by a last mark, which has it as its argument.
+            // The last mark has the number of sends as its argument.
             // SAFETY: as above, then the end of this process.
             unsafe {
                 if let Ok(sent) = sent {
@@ -185,7 +187,7 @@ fn count_calls(child: Pid) -> Result<f64, Failure> {
         nix::Error::EPERM => Failure::Skipped("no process may be traced here".into()),
         error => Failure::of("ptrace", error),
     };
-    // What follows an opening mark counts only once the closing one has come.
+    // System calls after an opening mark count only once the closing one has come.
     let (mut window, mut calls, mut sent) = (None, 0u64, 0u64);
     let mut first = true;
     loop {
@@ -202,7 +204,7 @@ fn count_calls(child: Pid) -> Result<f64, Failure> {
             WaitStatus::PtraceSyscall(_) => {
                 let info = ptrace::syscall_info(child).map_err(failed)?;
                 if info.op == libc::PTRACE_SYSCALL_INFO_ENTRY {
-                    // SAFETY: `op` says which of the union is there.
+                    // SAFETY: `op` says which field of the union is valid.
                     let entry = unsafe { info.u.entry };
                     if entry.nr == MARK as u64 {
                         window = match window.take() {

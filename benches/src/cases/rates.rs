@@ -1,6 +1,6 @@
-//! How many packages a second: one sender or four, the mailbox always about to be full.
+//! Packages a second: one sender or four, the mailbox always about to be full.
 //!
-//! The mailbox rejects what finds no room and its sender tries again, so nothing is lost: the rings and queues beside it make
+//! A full mailbox rejects, and its sender tries again, so nothing is lost. The rings and queues beside it make
 //! their senders wait, too.
 
 use super::case::Case;
@@ -16,11 +16,12 @@ use std::time::Duration;
 
 /// Long enough for some hundred thousand packages, short enough that the kernel's fair server stays out.
 const TURN: Duration = Duration::from_millis(500);
-/// Turns of an empty loop before a refused sender tries again: about what the receiver takes for some packages.
+/// Turns of an empty loop before a refused sender tries again: about the time that the receiver needs for some
+/// packages.
 const RETRY: Retry = Retry::Spin(64);
 const PRIORITIES: [u8; 4] = [20, 50, 80, 110];
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let one = |spins, bytes, bound| -> Box<dyn Case> { Box::new(OneSender { spins, bytes, bound }) };
     vec![one(false, 64, 1.0), one(false, 4096, 1.0), one(true, 64, 0.25), one(true, 4096, 0.85), Box::new(FourSenders)]
@@ -30,7 +31,7 @@ struct OneSender {
     /// Whether the receiver spins; else it sleeps.
     spins: bool,
     bytes: usize,
-    /// Of the floor's rate.
+    /// Share of the floor's rate.
     bound: f64,
 }
 
@@ -93,7 +94,7 @@ impl Case for FourSenders {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let (one, four) = (stream(settings, 64, 1), stream(settings, 64, PRIORITIES.len()));
-        // All senders share a processor: who is refused lets the others go on.
+        // All senders share a processor: a refused sender yields to the others.
         let four = rated("rohrpost", move || ours(&four, true, Retry::Yield));
         let one = rated("one sender", move || ours(&one, true, Retry::Yield));
         let subject = Subject { case: self.name(), bytes: Some(64), unit: "packages/s" };

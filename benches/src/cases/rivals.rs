@@ -1,4 +1,4 @@
-//! Who ping-pong is played against.
+//! Contenders of ping-pong beside ours.
 
 use crate::floors::{HandOver, Lanes, Queues, Wake};
 use crate::harness::{Cell, Failure, Shared, time_two_processes};
@@ -13,9 +13,9 @@ use crate::{
 pub(super) enum Rival {
     /// Bare shared memory, woken by a futex.
     Futex,
-    /// Bare shared memory, looked at again and again.
+    /// Bare shared memory, polled.
     Spin,
-    /// The same with [`SMALL`] bytes, whatever the size of the case: the floor of what is not copied.
+    /// The same with [`SMALL`] bytes, whatever the size of the case: the floor of messages that are not copied.
     SpinSmall,
     /// The kernel's priority queue.
     PosixQueue,
@@ -34,7 +34,7 @@ pub(super) enum Rival {
 const SMALL: usize = 64;
 
 impl Rival {
-    /// As the table calls it.
+    /// Name in the table.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Futex => "futex",
@@ -52,7 +52,7 @@ impl Rival {
         }
     }
 
-    /// One turn. Of what is loaned, so many bytes are touched.
+    /// One turn. Of a loaned message, this many bytes are touched.
     pub(super) fn turn(self, cell: &Cell, #[allow(unused_variables)] touched: usize) -> Result<Vec<f64>, Failure> {
         match self {
             Self::Futex => hand_over(cell, Wake::Futex),

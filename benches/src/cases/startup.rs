@@ -1,13 +1,13 @@
 //! From exec of a program to the first package in its hand, beside the same program with POSIX queues.
 //!
 //! ```text
-//!  bench: takes the time ──exec──▶ program: main ─ opens, makes its mailbox ─ says hello to the hub ─ has the answer: time
+//!  bench: takes the time ──exec──▶ program: main ─ opens, makes its mailbox ─ sends hello to hub ─ has answer: time
 //!                                                                               hub (bench) opens the mailbox, answers
 //! ```
-//! `new` is as drawn: the mailbox is made, and its first package comes from a process that has to find it. `waiting` is a
-//! program that was started again: its mailbox is there, with a package in it. Each program is the bench itself in a hidden
-//! role, so that exec costs all the same; what they do after `main` has rows of its own. All have their defaults: a mailbox of
-//! `Shape::default()`, a queue of the kernel's default size.
+//! `new` is as drawn: the mailbox is made, and its first package comes from a process that has to find it. `waiting` is
+//! a program that was started again: its mailbox is there, with a package in it. Each program is the bench itself in a
+//! hidden role, so that exec costs all the same; what they do after `main` has rows of its own. All have their
+//! defaults: a mailbox of `Shape::default()`, a queue of the kernel's default size.
 
 use super::case::{Case, Done, as_failure};
 use crate::harness::{End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};

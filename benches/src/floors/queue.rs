@@ -8,11 +8,11 @@ use nix::sys::stat::Mode;
 use std::fs;
 use std::sync::Once;
 
-/// Messages in a queue of the latency cases, where more than one never waits. Little, since large messages meet
+/// Messages in a queue of the latency cases, where at most one waits. Few, since large messages reach
 /// RLIMIT_MSGQUEUE, 800 KiB for all queues of a user.
 const DEPTH: usize = 4;
 
-/// A queue without a name: whoever is forked from now on has it too, and it is gone with the last of them.
+/// A queue without a name: processes forked from now on share it, and it ends with the last of them.
 pub struct Queue {
     /// None while it is dropped.
     open: Option<MqdT>,
@@ -65,12 +65,12 @@ impl Queue {
 
 impl Drop for Queue {
     fn drop(&mut self) {
-        // All queues of a user together have a limit, so they must go.
+        // All queues of a user have a common limit, so they must be removed.
         let _ = self.open.take().map(mq_close);
     }
 }
 
-/// Takes a namespace of its own and raises the limits there, if that is allowed; else the usual ones hold.
+/// Enters a namespace of its own and raises the limits there, if that is allowed; else the usual limits apply.
 fn raise_limits() {
     let _ = setrlimit(Resource::RLIMIT_MSGQUEUE, RLIM_INFINITY, RLIM_INFINITY);
     if unshare(CloneFlags::CLONE_NEWIPC).is_ok() {

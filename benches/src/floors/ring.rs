@@ -1,6 +1,7 @@
-//! A ring for one sender and one receiver: what two processors can hand over at best, in order and once.
+//! A ring for one sender and one receiver: the best rate between two processors, in order and without duplicates.
 //!
-//! It knows no priorities, no second sender and no death. [`BareRing`] spins when it is empty or full, [`Futex`] sleeps.
+//! It has no priorities, no second sender and no recovery from death. [`BareRing`] spins when it is empty or full,
+//! [`Futex`] sleeps.
 
 use crate::Failure;
 use crate::harness::Zeroable;
@@ -26,7 +27,8 @@ pub struct RingMemory {
     slots: CacheLine<UnsafeCell<[u8; DEPTH * BYTES_MAX]>>,
 }
 
-// SAFETY: a slot's bytes are written by the sender before it says `produced` and read by the receiver before it says `consumed`.
+// SAFETY: the sender writes a slot's bytes before it advances `produced`, and the receiver reads them before it
+// advances `consumed`.
 unsafe impl Sync for RingMemory {}
 // SAFETY: atomics and an `UnsafeCell` of bytes; zeroes are an empty ring.
 unsafe impl Zeroable for RingMemory {}
@@ -46,10 +48,11 @@ unsafe impl Zeroable for SharedRing {}
 pub struct Bell(CacheLine<AtomicU32>);
 
 impl Bell {
-    /// Sleeps unless something is found once it is said that we do.
+    /// Sleeps unless `found` is true after the announcement of the sleep.
     pub fn sleep_unless(&self, found: impl Fn() -> bool) {
         let word = &self.0.0;
-        // ORDERING: SeqCst, as are the sender's store of what is found here and its look at the word: one of both sees the other.
+        // ORDERING: SeqCst, as are the sender's store of what `found` looks at and its load of the word: one side sees
+        // the other's store.
         word.store(1, Ordering::SeqCst);
         if found() {
             word.store(0, Ordering::Relaxed);
@@ -59,7 +62,7 @@ impl Bell {
         unsafe { libc::syscall(libc::SYS_futex, word.as_ptr(), libc::FUTEX_WAIT, 1, std::ptr::null::<()>()) };
     }
 
-    /// Wakes whoever sleeps; without a system call if nobody does. What they look for has been stored by SeqCst before.
+    /// Wakes a sleeping process; no system call if none sleeps. What it looks for has been stored by SeqCst before.
     pub fn ring(&self) {
         let word = &self.0.0;
         if word.load(Ordering::SeqCst) != 0 {

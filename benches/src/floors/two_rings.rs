@@ -1,5 +1,5 @@
-//! A ring for each of two priorities, the urgent one looked at first, and one word to sleep on: the least that gets something
-//! urgent past a flood. It has exactly two priorities, and one sender for each.
+//! A ring for each of two priorities, the urgent one looked at first, and one word to sleep on: the least that gets
+//! something urgent past a flood. It has exactly two priorities, and one sender for each.
 
 use super::ring::{Bell, RingMemory, RingReceiver, RingSender};
 use crate::Failure;

@@ -1,8 +1,9 @@
-//! Vyukov's bounded queue, which any number may send to: a sender takes a number, and each slot says whose turn it is.
+//! Vyukov's bounded queue for any number of senders: a sender takes a number, and each slot shows the number that has
+//! its turn.
 //!
-//! [`Vyukov`] never wakes anybody. A queue whose receiver may sleep has to fence after each message and to look whether it does;
-//! with `FENCED` that is done too, though here the receiver never sleeps. It knows no priorities, and a sender that dies with a
-//! number closes it for ever.
+//! [`Vyukov`] never wakes anybody. A queue with a sleeping receiver needs a fence after each message and a check
+//! whether it sleeps; with `FENCED` that is done too, though here the receiver never sleeps. It has no priorities. A
+//! sender that dies with a number blocks it for ever.
 
 use super::ring::{BYTES_MAX, CacheLine, DEPTH};
 use crate::Failure;
@@ -23,7 +24,7 @@ pub struct QueueMemory {
     slots: CacheLine<UnsafeCell<[u8; DEPTH * (BYTES_MAX + 128)]>>,
 }
 
-// SAFETY: a slot's bytes belong to the sender whose number it shows, or to the receiver when that is one more.
+// SAFETY: a slot's bytes belong to the sender of the slot's number, or to the receiver when the number is one more.
 unsafe impl Sync for QueueMemory {}
 // SAFETY: atomics and an `UnsafeCell` of bytes; zeroes are made a queue by `Vyukov::format`.
 unsafe impl Zeroable for QueueMemory {}
@@ -43,7 +44,7 @@ impl<'a, const FENCED: bool> Vyukov<'a, FENCED> {
         Self { memory, stride: (TURN_BYTES + bytes).next_multiple_of(64), received: 0 }
     }
 
-    /// Makes it an empty queue. Before anybody else uses it.
+    /// Makes it an empty queue. Call it before any other use.
     pub fn format(&self) {
         (0..DEPTH as u64).for_each(|number| self.turn(number).store(number, Ordering::Release));
     }
@@ -55,7 +56,7 @@ impl<'a, const FENCED: bool> Vyukov<'a, FENCED> {
     }
 
     fn turn(&self, number: u64) -> &AtomicU64 {
-        // SAFETY: aligned (slots are multiples of 64 B apart), and nobody reaches these bytes but as this atomic.
+        // SAFETY: aligned (slots are multiples of 64 B apart), and these bytes are only used as this atomic.
         unsafe { AtomicU64::from_ptr(self.slot(number).cast()) }
     }
 
@@ -82,7 +83,7 @@ impl<const FENCED: bool> Sink for Vyukov<'_, FENCED> {
         unsafe { std::ptr::copy_nonoverlapping(message.as_ptr(), self.slot(number).add(TURN_BYTES), message.len()) };
         self.turn(number).store(number + 1, Ordering::Release);
         if FENCED {
-            // ORDERING: as a queue must that wakes: the message before the look at who sleeps.
+            // ORDERING: as in a queue that wakes: the message before the check for a sleeping receiver.
             fence(Ordering::SeqCst);
             if self.memory.sleeping.0.load(Ordering::Relaxed) != 0 {
                 return Err(Failure::Failed("the queue's receiver sleeps, which it never does".into()));

@@ -1,4 +1,4 @@
-//! Ctrl-C: what runs is ended and what was made is removed, as at any other end.
+//! Ctrl-C: ends running processes and removes files, as at any other end.
 
 use super::Failure;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -6,21 +6,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// Who waits for long looks this often.
+/// A long wait polls this often.
 const LOOK_EACH: Duration = Duration::from_millis(50);
 
 static INTERRUPTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// From now on a signal to end only says so, by [`interrupted`]. The processes of a turn inherit that: their parent ends them.
+/// From now on a terminating signal only sets [`interrupted`]. The processes of a turn inherit that: their parent ends
+/// them.
 pub fn heed() {
     let flag = INTERRUPTED.get_or_init(Arc::default);
     for signal in [SIGHUP, SIGINT, SIGTERM] {
-        // Refused, the signal ends the process as it always does, and the next run removes what is left.
+        // If the handler is refused, the signal ends the process as usual, and the next run removes the files.
         let _ = signal_hook::flag::register(signal, flag.clone());
     }
 }
 
-/// Whether somebody wants an end.
+/// Whether a signal asked for an end.
 pub fn interrupted() -> bool {
     INTERRUPTED.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
@@ -28,7 +29,7 @@ pub fn interrupted() -> bool {
 /// Sleeps for so long.
 ///
 /// # Errors
-/// When somebody wants an end meanwhile.
+/// When a signal asks for an end meanwhile.
 pub fn rest(duration: Duration) -> Result<(), Failure> {
     let over = Instant::now() + duration;
     while !interrupted() {

@@ -1,4 +1,5 @@
-//! What the computer did meanwhile that no router can help: time that the hypervisor kept, and time spent waiting for a processor.
+//! What the computer did meanwhile that no router can help: time that the hypervisor kept, and time spent waiting for a
+//! processor.
 
 use std::fs;
 

@@ -4,7 +4,7 @@ use super::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Z
 use rohrpost_mailbox::monotonic_ns;
 use std::time::{Duration, Instant};
 
-/// With so few a turn that is over goes on: where others keep the processors busy and nothing is real-time, a round trip can
+/// A finished turn with fewer samples goes on: on busy processors without real-time scheduling, a round trip can
 /// take milliseconds.
 const SAMPLES_MIN: usize = 50;
 
@@ -17,9 +17,9 @@ const STOP: u64 = u64::MAX;
 /// After this the far end waits for the first message.
 const HEAD_START: Duration = Duration::from_millis(10);
 
-/// A turn that takes so much longer than its cap hangs, and is killed.
+/// A turn that exceeds its cap by so much hangs, and is killed.
 const GRACE: Duration = Duration::from_secs(30);
-/// The second end has so long when the first has ended: the last word to it may be lost, which it has to notice itself.
+/// Time for the second end after the first has ended: the last message to it may be lost, which it must notice itself.
 const SECOND_ENDS: Duration = Duration::from_secs(8);
 
 /// One end of a connection in both directions.
@@ -52,8 +52,8 @@ pub struct Cell {
     pub scheduling: Scheduling,
     /// Sleep before each message; none: one after the other.
     pub pace: Option<Duration>,
-    /// Ends the turn with the samples there are; a quarter of it ends the warm-up. Below 0.9 s for who never sleeps: the kernel's fair server stops a real-time
-    /// process that keeps others out for 50 ms in each second.
+    /// Ends the turn with the samples so far; a quarter of it ends the warm-up. Below 0.9 s for spinning contenders:
+    /// the kernel's fair server stops a real-time process that keeps others from running for 50 ms in each second.
     pub cap: Duration,
 }
 
@@ -61,7 +61,8 @@ impl Cell {
     /// Round trips of a turn over a network.
     pub const HOP_MESSAGES: usize = 10_000;
 
-    /// Over a network: a core for each end, in real time, one message after the other. All sleep, so the kernel's fair server stays out.
+    /// Over a network: a core for each end, real-time scheduling, one message after the other. All sleep, so the
+    /// kernel's fair server stays out.
     pub fn hop(bytes: usize, messages: usize) -> Self {
         Self {
             bytes,

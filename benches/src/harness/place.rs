@@ -42,8 +42,8 @@ pub fn processors() -> Vec<usize> {
     (0..CpuSet::count()).filter(|processor| allowed.is_set(*processor) == Ok(true)).collect()
 }
 
-/// Places and schedules the calling process, and keeps its memory from being paged out. Where the kernel refuses, it goes
-/// on as it is: [`crate::environment`] asks beforehand, and says so.
+/// Places and schedules the calling process, and keeps its memory from being paged out. Where the kernel refuses, it
+/// goes on as it is: [`crate::environment`] asks beforehand, and says so.
 ///
 /// # Errors
 /// [`Failure::Skipped`] when there are too few processors.

@@ -1,4 +1,4 @@
-//! Files in shared memory that go when a turn is over, or when the next run finds that their maker is gone.
+//! Files in shared memory. They are removed at the end of a turn, or by the next run when their maker is dead.
 
 use super::Failure;
 use std::fs;
@@ -8,10 +8,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Where shared memory is.
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// All names begin with this; the process id of the maker follows, then a number.
+/// Prefix of all names; the process id of the maker follows, then a number.
 const PREFIX: &str = "rohrpost-bench-";
 
-/// A name that nobody else has, and a directory of that name. Dropped, everything in shared memory whose name begins so is
+/// A unique name, and a directory of that name. On drop, everything in shared memory with that prefix is
 /// removed.
 pub struct Scratch {
     name: String,
@@ -35,7 +35,7 @@ impl Scratch {
         Path::new(SHARED_MEMORY).join(&self.name)
     }
 
-    /// How names in shared memory have to begin to be removed with it.
+    /// Prefix of names in shared memory that are removed with it.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -47,7 +47,7 @@ impl Drop for Scratch {
     }
 }
 
-/// Removes what runs that were killed have left. What belongs to a process that lives stays.
+/// Removes the files of killed runs. Files of a living process stay.
 pub fn sweep() {
     remove(|name| {
         let maker = name.strip_prefix(PREFIX).and_then(|rest| rest.split('-').next()?.parse::<u32>().ok());
@@ -55,7 +55,7 @@ pub fn sweep() {
     });
 }
 
-/// Removes what has such a name. What cannot be removed stays for the next run.
+/// Removes everything with such a name. What cannot be removed stays for the next run.
 fn remove(is_ours: impl Fn(&str) -> bool) {
     for entry in fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten() {
         if entry.file_name().to_str().is_some_and(&is_ours) {

@@ -1,4 +1,4 @@
-//! Memory that the parent and the processes it forks all see.
+//! Memory that the parent and its forked processes share.
 
 use super::Failure;
 use std::num::NonZeroUsize;
@@ -10,17 +10,17 @@ use std::time::{Duration, Instant};
 /// What may lie in [`Shared`] memory.
 ///
 /// # Safety
-/// Zeroes are a valid value; everything in it is an atomic or an `UnsafeCell`, so that other processes may write it; it has no
-/// pointer and need not be dropped.
+/// Zeroes are a valid value; everything in it is an atomic or an `UnsafeCell`, so that other processes may write it; it
+/// has no pointer and need not be dropped.
 pub unsafe trait Zeroable: Sync {}
 
-/// One `T` in anonymous memory, zeroed and in place before anyone is timed. Gone with the last process that has it.
+/// One `T` in anonymous memory, zeroed and resident before any timing. Freed with the last process that has it.
 pub struct Shared<T: Zeroable> {
     at: NonNull<T>,
 }
 
 impl<T: Zeroable> Shared<T> {
-    /// Makes it; whoever is forked from now on sees the same memory.
+    /// Makes it; processes forked from now on see the same memory.
     ///
     /// # Errors
     /// When the kernel has no memory to give.
@@ -38,14 +38,16 @@ impl<T: Zeroable> Deref for Shared<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        // SAFETY: mapped until drop, aligned to pages (no T asks for more), and a `Zeroable` is valid whatever others write.
+        // SAFETY: mapped until drop, aligned to pages (no T asks for more), and a `Zeroable` is valid whatever others
+        // write.
         unsafe { self.at.as_ref() }
     }
 }
 
 impl<T: Zeroable> Drop for Shared<T> {
     fn drop(&mut self) {
-        // SAFETY: mapped in `new` with this length; the borrow checker saw the last use. It cannot fail for such a mapping.
+        // SAFETY: mapped in `new` with this length; the borrow checker saw the last use. It cannot fail for such a
+        // mapping.
         let _ = unsafe { nix::sys::mman::munmap(self.at.cast(), size_of::<T>().max(1)) };
     }
 }
@@ -58,7 +60,7 @@ unsafe impl<T: Zeroable> Sync for Shared<T> {}
 /// Opening a link takes milliseconds, on a busy computer a second.
 const GATE_OPENS_WITHIN: Duration = Duration::from_secs(20);
 
-/// Where processes wait for each other, any number of times.
+/// A barrier for processes, for any number of rounds.
 #[repr(transparent)]
 pub struct Gate(AtomicU32);
 
@@ -66,12 +68,12 @@ pub struct Gate(AtomicU32);
 unsafe impl Zeroable for Gate {}
 
 impl Gate {
-    /// Waits, asleep, until this was called so often by all together.
+    /// Sleeps until all processes together have called this so often.
     ///
     /// # Errors
     /// When the others do not come in time.
     pub fn meet(&self, calls: u32) -> Result<(), Failure> {
-        // ORDERING: what each did before it came is seen by all who leave.
+        // ORDERING: all that leave see what each did before it came.
         self.0.fetch_add(1, Ordering::AcqRel);
         let give_up = Instant::now() + GATE_OPENS_WITHIN;
         while self.0.load(Ordering::Acquire) < calls {

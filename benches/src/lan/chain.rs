@@ -1,12 +1,12 @@
-//! What a hop over two routers costs at least: from module to relay, by UDP to the other relay, from there to the module.
+//! The least cost of a hop over two routers: from module to relay, by UDP to the other relay, from there to the module.
 //!
 //! ```text
 //!  ping ──▶ relay ══UDP══▶ relay ──▶ pong
 //!  ping ◀── relay ◀══UDP══ relay ◀── pong
 //! ```
-//! Each relay is a process and carries one direction, so that none ever waits for two things at once. Nothing is looked at on
-//! the way. [`time_chain`] hands over by one slot and a futex, [`time_mailbox_chain`] by mailboxes: what a router adds to that is
-//! its own.
+//! Each relay is a process and carries one direction, so that none ever waits for two things at once. No relay inspects
+//! messages. [`time_chain`] hands over by one slot and a futex, [`time_mailbox_chain`] by mailboxes: what a router
+//! costs beyond that is its own.
 
 use super::Wire;
 use super::udp::Datagrams;
@@ -50,7 +50,7 @@ pub fn time_mailbox_chain(wire: &Wire, cell: &Cell) -> Result<Vec<f64>, Failure>
     time(wire, cell, relay, |end, _| station(end, Some(MODULE), RELAY))
 }
 
-/// What a relay does with the node it stands on.
+/// What a relay does on its node.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Goes {
     /// Carries from the module to the network.
@@ -86,7 +86,7 @@ impl Relays {
             [(End::Ping, Goes::Out), (End::Ping, Goes::In), (End::Pong, Goes::Out), (End::Pong, Goes::In)]
         {
             let relay = Child::start(|| {
-                // A port for each direction: who only sends must not get what comes.
+                // A port for each direction: an end that only sends must not receive.
                 let there = (goes == Goes::Out) == (end == End::Ping);
                 let port = PORTS[usize::from(!there)];
                 let mut network = Datagrams::between(wire, end, [port, port])?;
@@ -100,7 +100,7 @@ impl Relays {
             })?;
             relays.0.push(relay);
         }
-        // One that fails before it meets says why in `check`.
+        // A relay that fails before it reaches the gate gives its reason in `check`.
         if let Err(late) = gate.meet(ALL) {
             relays.check()?;
             return Err(late);
@@ -119,7 +119,7 @@ impl Relays {
     }
 }
 
-/// The relays, and who starts them.
+/// The relays, and the process that starts them.
 const ALL: u32 = 5;
 
 fn carry(from: &mut impl Link, to: &mut impl Link, bytes: usize) -> Result<(), Failure> {

@@ -1,4 +1,4 @@
-//! Two modules on two nodes, by nothing but the public interface of mailboxes.
+//! Two modules on two nodes, by the public interface of mailboxes alone.
 
 use super::flow::{Inlet, Outlet, SILENCE};
 use super::nodes::{self, Nodes};
@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Slots of a mailbox that a whole window may come into at once.
+/// Slots of a mailbox that must hold a whole window at once.
 const SLOTS: u16 = 256;
 
 /// One end of a ping-pong.
@@ -27,13 +27,13 @@ impl Module {
     /// Opens an end, in the process that will use it.
     ///
     /// # Errors
-    /// When the mailboxes cannot be made, or there is no way to the other node.
+    /// When the mailboxes cannot be made, or there is no route to the other node.
     pub fn open(nodes: &Nodes, end: End, turn: u8, bytes: usize, meetings: &mut Meetings) -> Result<Self, Failure> {
         let other = nodes::bench(if end == End::Ping { End::Pong } else { End::Ping }, turn);
         Self::between(&nodes.directory(end), [nodes::bench(end, turn), other], bytes, meetings)
     }
 
-    /// An end on the node with this directory; names are its own and the other's.
+    /// An end on the node with this directory; the names are its own and the other's.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -52,7 +52,7 @@ impl Module {
         Ok(Self { receiver, sender, label, patience: None })
     }
 
-    /// From now on holds a package for lost that does not come in time.
+    /// From now on a package that does not arrive in time counts as lost.
     #[must_use]
     pub fn with_patience(self, patience: Duration) -> Self {
         Self { patience: Some(patience), ..self }
@@ -72,7 +72,7 @@ impl Link for Module {
     }
 }
 
-/// Where a stream of packages goes in.
+/// The sending side of a stream of packages.
 pub struct LanSource {
     sender: Sender,
     label: Label,
@@ -82,7 +82,7 @@ impl LanSource {
     /// A sender on the node with this directory, of the priority of its class.
     ///
     /// # Errors
-    /// When there is no way to the other node.
+    /// When there is no route to the other node.
     pub fn open(directory: &Path, own: Name, to: Name) -> Result<Self, Failure> {
         let participant = join(directory, own)?;
         let sender = participant.sender(to).map_err(|error| Failure::of("way to the other node", error))?;
@@ -118,7 +118,7 @@ impl Inlet for LanSource {
     }
 }
 
-/// Where it comes out.
+/// The receiving side.
 pub struct LanSink {
     receiver: Receiver,
 }
@@ -136,7 +136,7 @@ impl LanSink {
         Ok(Self { receiver })
     }
 
-    /// Takes all that is there, and tells how many.
+    /// Takes all packages that are there, and returns how many.
     pub fn drain(&mut self) -> u64 {
         let taken = std::iter::from_fn(|| self.receiver.try_receive().map(drop));
         taken.count() as u64
@@ -145,7 +145,7 @@ impl LanSink {
 
 impl Outlet for LanSink {
     fn receive(&mut self, message: &mut [u8]) -> Result<bool, Failure> {
-        // With something there it looks at no clock.
+        // With a package there it reads no clock.
         let waiting = match self.receiver.try_receive() {
             Some(package) => return copy(package.body(), message).map(|()| true),
             None => Waiting { spin: Duration::ZERO, deadline: Some(Instant::now() + SILENCE) },

@@ -1,4 +1,4 @@
-//! Messages in one direction as fast as they go, where some may be lost: what comes is counted, and what does not.
+//! Messages in one direction at the full rate, with losses allowed: received and lost messages are counted.
 
 use crate::Failure;
 use crate::floors::ring::Bell;
@@ -7,7 +7,7 @@ use rohrpost_mailbox::{monotonic_ns, sys};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Where messages go in.
+/// The sending side.
 pub trait Inlet {
     /// Sends a message; never waits for its receiver.
     ///
@@ -16,7 +16,7 @@ pub trait Inlet {
     fn send(&mut self, message: &[u8]) -> Result<(), Failure>;
 }
 
-/// Where they come out.
+/// The receiving side.
 pub trait Outlet {
     /// Receives the next message, of exactly this length; false when none came within [`SILENCE`].
     ///
@@ -28,13 +28,13 @@ pub trait Outlet {
 /// A message is its number, filler, and its number again.
 const NUMBER_BYTES: usize = 8;
 const FILLER: u8 = 0x5a;
-/// All of every so many-th message is looked at, of the others both ends: else looking would be what takes the time.
+/// Every so many-th message is checked whole, the others at both ends: else checking would take most of the time.
 const LOOK_EVERY: u64 = 61;
-/// The sender looks at the clock after so many.
+/// The sender looks at the clock after so many messages.
 const CLOCK_EVERY: u64 = 16;
-/// After this silence nothing more is on its way.
+/// After this silence nothing more is in flight.
 pub const SILENCE: Duration = Duration::from_millis(250);
-/// A turn that takes so much longer than its cap hangs, and is killed.
+/// A turn that exceeds its cap by so much hangs, and is killed.
 const GRACE: Duration = Duration::from_secs(30);
 
 /// One turn of one contender.
@@ -44,7 +44,7 @@ pub struct Flow {
     pub bytes: usize,
     /// Messages, at most.
     pub messages: u64,
-    /// How many may be on their way; none: any number, as long as the contender takes them.
+    /// Messages in flight, at most; none: any number, as long as the contender takes them.
     pub window: Option<u64>,
     /// Where the sender runs.
     pub sender: End,
@@ -54,7 +54,7 @@ pub struct Flow {
     pub cap: Duration,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Flown {
     /// Messages sent.
@@ -90,11 +90,11 @@ struct FlowTurn {
 // SAFETY: atomics only.
 unsafe impl Zeroable for FlowTurn {}
 
-/// Sends from one process to another. Each opens its own side; the receiving one first. What comes must be whole and in order,
-/// nothing twice.
+/// Sends from one process to another. Each opens its own side; the receiver first. Messages must be whole and in order,
+/// without duplicates.
 ///
 /// # Errors
-/// What the receiver failed with, else the sender; also when nothing came.
+/// What the receiver failed with, else the sender; also when nothing arrived.
 pub fn flow<I: Inlet, O: Outlet>(
     flow: &Flow,
     inlet: impl Fn() -> Result<I, Failure>,
@@ -111,7 +111,7 @@ pub fn flow<I: Inlet, O: Outlet>(
         turn.gate.meet(2)?;
         let mut inlet = inlet()?;
         settle(flow.sender, Placement::TwoCores, Scheduling::Fifo)?;
-        // Refused, the environment says so.
+        // If the kernel refuses, the environment line says so.
         let _ = sys::schedule(sys::Scheduling::Fifo(flow.sender_fifo));
         send_all(&mut inlet, flow, &turn)
     })?;
@@ -147,18 +147,18 @@ fn send_all(inlet: &mut impl Inlet, flow: &Flow, turn: &FlowTurn) -> Result<(), 
 /// What the receiver tells a sender that keeps to a window.
 #[repr(C)]
 struct Credit {
-    /// One more than the number of the newest message that came.
+    /// One more than the number of the newest received message.
     next: AtomicU64,
-    /// What that must be for the sender to be woken.
+    /// The value of it at which the sender is woken.
     wanted: AtomicU64,
-    /// How often nothing came for long.
+    /// How often nothing arrived for long.
     silences: AtomicU64,
     bell: Bell,
 }
 
 impl Credit {
     fn arrived(&self, next: u64) {
-        // ORDERING: SeqCst, as the bell wants it of what its sleeper looks for.
+        // ORDERING: SeqCst, as the bell needs it for its sleeper's condition.
         self.next.store(next, Ordering::SeqCst);
         if next >= self.wanted.load(Ordering::SeqCst) {
             self.bell.ring();
@@ -171,15 +171,15 @@ impl Credit {
     }
 }
 
-/// What may be on its way.
+/// The window of messages in flight.
 struct Window {
     size: u64,
-    /// Messages before this one are lost, if they did not come.
+    /// Messages before this one are lost, if they were not received.
     lost_before: u64,
 }
 
 impl Window {
-    /// Sleeps, if the window is full, until half of it is free, or nothing comes any more.
+    /// If the window is full, sleeps until half of it is free, or until nothing arrives any more.
     fn await_room(&mut self, sent: u64, credit: &Credit) {
         let arrived = || credit.next.load(Ordering::SeqCst);
         let silences = credit.silences.load(Ordering::SeqCst);
@@ -211,7 +211,7 @@ fn receive_all(outlet: &mut impl Outlet, flow: &Flow, turn: &FlowTurn) -> Result
     let (mut next, mut received) = (0, 0);
     let (mut first_ns, mut last_ns) = (0, 0);
     loop {
-        // Asked before: what is sent is on its way when this is said.
+        // Loaded before: all sent messages are in flight when this is stored.
         let is_over = turn.sent.load(Ordering::Acquire) != 0;
         if !outlet.receive(&mut message)? {
             if is_over {

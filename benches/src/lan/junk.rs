@@ -1,15 +1,15 @@
-//! Somebody who sends what nobody wants to know, as fast as a processor can.
+//! A sender of unwanted datagrams, as fast as a processor can send.
 
 use crate::harness::{Child, End, Failure, Gate, Placement, Scheduling, Shared, Zeroable, settle};
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// As long as a datagram of time, so that nobody can tell it by its length.
+/// As long as a time datagram, so that the length does not show that it is junk.
 const BYTES: usize = 108;
-/// To each port so many a second, if the processor can.
+/// Datagrams a second to each port, if the processor can.
 const WANTED_S: u64 = 500_000;
-/// Sent without a look at the clock.
+/// Datagrams between two looks at the clock.
 const BURST: u64 = 64;
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
@@ -23,10 +23,11 @@ struct JunkCounts {
 // SAFETY: atomics only.
 unsafe impl Zeroable for JunkCounts {}
 
-/// Junk on its way to a node, until it is ended or dropped.
+/// A stream of junk to a node, until it is ended or dropped.
 ///
-/// Who makes it has the near processor with what else runs there: with two processors there is no third for it. What a datagram costs until it is dropped
-/// or in a socket is spent on that processor too, since the network of namespaces carries each datagram in the thread that sends it.
+/// The sender shares the near processor: with two processors there is no third for it. The cost of a datagram until it
+/// is dropped or in a socket is also spent on that processor, since the network of namespaces carries each datagram in
+/// the thread that sends it.
 pub struct Junk {
     counts: Shared<JunkCounts>,
     child: Child,
@@ -35,7 +36,7 @@ pub struct Junk {
 }
 
 impl Junk {
-    /// Starts it, to these ports of a node. `go`: to where it comes from.
+    /// Starts it, to these ports of a node. `go` enters the sender's place on the network.
     ///
     /// # Errors
     /// When there can be no further process, or no socket.
@@ -52,7 +53,7 @@ impl Junk {
         Ok(Self { counts, child, began: Instant::now(), ports: ports.len() as u64 })
     }
 
-    /// Ends it, and tells how many a second went to each port.
+    /// Ends it, and returns the datagrams a second to each port.
     ///
     /// # Errors
     /// What it failed with.
@@ -74,7 +75,7 @@ fn open(to: SocketAddr) -> Result<UdpSocket, Failure> {
     opened().map_err(|error: std::io::Error| Failure::of("udp socket", error))
 }
 
-/// Each port in turn, until it is over.
+/// Sends to each port in turn, until the end.
 fn send(sockets: &[UdpSocket], counts: &JunkCounts) -> Result<(), Failure> {
     let (began, message) = (Instant::now(), [0x5a; BYTES]);
     let wanted_s = WANTED_S * sockets.len() as u64;
@@ -85,7 +86,7 @@ fn send(sockets: &[UdpSocket], counts: &JunkCounts) -> Result<(), Failure> {
             continue;
         }
         for socket in sockets.iter().cycle().take(BURST as usize) {
-            // Nobody may listen there, or the queue is full: it has cost what it costs.
+            // No socket may be open there, or its queue may be full: the cost is the same.
             let _ = socket.send(&message);
         }
         counts.sent.store(sent + BURST, Ordering::Release);

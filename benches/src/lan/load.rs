@@ -1,4 +1,4 @@
-//! What makes clocks and time slots hard to keep: processors that have no rest, and a network that is full of others' datagrams.
+//! Load that makes clocks and time slots hard to keep: busy processors, and a network full of foreign datagrams.
 
 use super::udp::Datagrams;
 use crate::harness::{Child, End, Failure, Link, Placement, Scheduling, settle};
@@ -44,7 +44,7 @@ impl Load {
             let message = vec![7; BYTES];
             loop {
                 for _ in 0..BURST {
-                    // Refused until the swamp is there.
+                    // Refused until the swamp is ready.
                     let _ = datagrams.send(&message);
                 }
                 std::thread::sleep(EACH);

@@ -3,10 +3,10 @@
 //! ```text
 //!  processor 0, namespace `near`                      processor 1, namespace `far`
 //!  ping ─▶ mailbox ─▶ router ══╗                ╔══▶ router ─▶ mailbox ─▶ pong       ours
-//!  ping ─▶ futex   ─▶ relay  ══╬══ veth, bridge ╬══▶ relay  ─▶ futex   ─▶ pong       `chain`: what a router costs at least
+//!  ping ─▶ futex   ─▶ relay  ══╬══ veth, bridge ╬══▶ relay  ─▶ futex   ─▶ pong       `chain`: least cost of a router
 //!  ping ═══════════════════════╝                ╚══════════════════════▶ pong       `udp`: the network alone
 //! ```
-//! Every process is one of its own, and both relays of a node are, as the two threads of a router.
+//! Each drawn step is a process of its own; a node has two relays, like the two threads of a router.
 
 pub mod chain;
 pub mod ends;

@@ -55,7 +55,7 @@ impl Nodes {
             let spec = spec(end, &command, &config, &scratch);
             let router = Router::start(&spec, || {
                 wire.enter(end)?;
-                // Pinned; how it is scheduled the router knows itself.
+                // Pinned; the router sets its own scheduling.
                 settle(end, Placement::TwoCores, Scheduling::Normal)
             })?;
             nodes.routers.push(router);
@@ -92,7 +92,8 @@ fn index(end: End) -> u8 {
     u8::from(end == End::Pong)
 }
 
-/// The mailbox of a timed module at this end. Each turn has one of its own, so that nothing of the last one is in it.
+/// The mailbox of a timed module at this end. Each turn has one of its own, so that it holds nothing of an earlier
+/// turn.
 pub fn bench(end: End, turn: u8) -> Name {
     Name::new(SYSTEM, BENCH.0, index(end), turn)
 }
@@ -109,7 +110,7 @@ fn configuration(network: &Network) -> String {
     let modules = [("bench", End::Ping), ("bench", End::Pong), ("flood", End::Ping), ("flood", End::Pong)];
     let modules = modules.map(|(class, end)| {
         let (instance, node) = (index(end), name_of(end));
-        // Nobody launches them: the processes of a turn are them.
+        // Never launched: the processes of a turn take their place.
         format!(
             "[[module]]\nname = \"{class}.{instance}\"\nnode = \"{node}\"\nprogram = \"{class}\"\noptional = true\n"
         )

@@ -1,4 +1,4 @@
-//! One real router, as launch would start it: `rohrpost router`, in the place that its node has on the network.
+//! One real router, as launch would start it: `rohrpost router`, at its node's place on the network.
 
 use crate::Failure;
 use crate::harness::Child;
@@ -16,7 +16,7 @@ pub const SYSTEM: u8 = 1;
 pub const ROUTER: Class = Class(250);
 /// Reading a configuration and making a mailbox takes milliseconds, on a busy computer a second.
 const READY_WITHIN: Duration = Duration::from_secs(20);
-/// Within this a router that is told to end has told its peers.
+/// A router told to end has told its peers within this time.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 const LOOK_EACH: Duration = Duration::from_millis(5);
 
@@ -32,7 +32,7 @@ pub struct RouterSpec<'a> {
     pub node: String,
     /// Place of the node in it, from 0.
     pub index: u8,
-    /// Where directories of nodes and what routers say goes.
+    /// Directories of nodes and output of routers.
     pub scratch: &'a Path,
 }
 
@@ -43,7 +43,7 @@ impl RouterSpec<'_> {
         self.scratch.join(file.file_name().unwrap_or_default())
     }
 
-    /// What the router says.
+    /// The file of the router's output.
     fn log(&self) -> PathBuf {
         self.scratch.join(format!("router-{}.log", self.node))
     }
@@ -60,7 +60,7 @@ pub struct Router {
 }
 
 impl Router {
-    /// Starts it; `prepare` is done in its process before, to put it where it belongs.
+    /// Starts it; `prepare` runs in its process before, to move it to its place.
     ///
     /// # Errors
     /// When there can be no further process.
@@ -84,10 +84,10 @@ impl Router {
         Ok(Self { child, index, node, directory: spec.directory(), log: spec.log(), transit })
     }
 
-    /// Until its mailbox for others' packages is there, which it makes last.
+    /// Waits until its mailbox for others' packages exists, which it makes last.
     ///
     /// # Errors
-    /// What it said, if it ended or did not get ready.
+    /// Its output, if it ended or did not get ready.
     pub fn await_ready(&mut self) -> Result<(), Failure> {
         let give_up = Instant::now() + READY_WITHIN;
         while !has_mailbox(&self.directory, self.transit) {
@@ -108,7 +108,7 @@ impl Router {
         self.index
     }
 
-    /// What it has said.
+    /// Its output.
     pub fn said(&self) -> String {
         fs::read_to_string(&self.log).unwrap_or_default()
     }

@@ -1,11 +1,11 @@
-//! How far off a slave's time is by RTnet's formula (RTnet's TDMA revision 2.1a): a broadcast each cycle, and nothing remembered.
+//! Error of a slave's time by RTnet's formula (RTnet's TDMA revision 2.1a): a broadcast each cycle, and no filter.
 //!
 //! ```text
-//!  slave   ── request ──▶ master ── reply ──▶ slave        100 times, once at the start: the mean is what one way takes
+//!  slave   ── request ──▶ master ── reply ──▶ slave        100 times, once at the start: the mean is one way
 //!  master  ── synchronisation, each cycle, with the time at which it was handed to the network ──▶ slave
 //!  offset = time in it + one way − the kernel's receive stamp
 //! ```
-//! Both ends read the same clock, so whatever offset the slave computes is its error.
+//! Both ends read the same clock, so any offset that the slave computes is its error.
 
 use super::wire::{Wire, address};
 use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
@@ -35,10 +35,10 @@ struct ExchangeTurn {
 // SAFETY: atomics only.
 unsafe impl Zeroable for ExchangeTurn {}
 
-/// How far off a slave on the far end was after each of so many synchronisations, µs.
+/// Error of a slave on the far end after each of so many synchronisations, µs.
 ///
 /// # Errors
-/// When an end cannot do its part.
+/// When an end fails.
 pub fn errors_us(wire: &Wire, synchronisations: usize) -> Result<Vec<f64>, Failure> {
     let turn = Shared::<ExchangeTurn>::new()?;
     let open = |end| {
@@ -86,14 +86,14 @@ fn slave(socket: &Stamped, synchronisations: usize, samples: &Samples) -> Result
     Ok(())
 }
 
-/// A socket that tells when the kernel received something.
+/// A socket that reports the kernel's receive stamps.
 struct Stamped(UdpSocket);
 
 impl Stamped {
     fn open(wire: &Wire, end: End) -> Result<Self, Failure> {
         wire.enter(end)?;
         let opened = || {
-            // Not bound to the end's own address, which broadcasts are not for.
+            // Not bound to the end's own address, which receives no broadcasts.
             let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, PORT))?;
             socket.set_broadcast(true)?;
             setsockopt(&socket, sockopt::ReceiveTimestampns, &true)?;
@@ -129,7 +129,7 @@ impl Stamped {
     }
 }
 
-/// Now, signed: differences are.
+/// Now, signed, since differences are.
 fn realtime() -> i64 {
     realtime_ns() as i64
 }

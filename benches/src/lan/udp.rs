@@ -10,10 +10,10 @@ use std::time::Duration;
 
 /// Of the raw floor; its relays take the next ones.
 const PORT: u16 = 20_117;
-/// What may wait in the kernel for who receives, as much as a router has.
+/// Receive buffer of the socket, as large as a router's.
 const RECEIVE_BYTES: usize = 8 << 20;
 
-/// A socket that sends to one other, and hears from it alone.
+/// A socket that sends to one other, and receives from that one alone.
 pub struct Datagrams(UdpSocket);
 
 impl Datagrams {
@@ -43,7 +43,7 @@ impl Datagrams {
     pub fn connect(own: SocketAddr, other: SocketAddr) -> Result<Self, Failure> {
         let opened = || -> io::Result<UdpSocket> {
             let socket = UdpSocket::bind(own)?;
-            // Only root may have more than the system's limit; who is refused keeps what that gives.
+            // Only root may exceed the system's limit; other users keep the limit.
             if setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES).is_err() {
                 setsockopt(&socket, sockopt::RcvBuf, &RECEIVE_BYTES)?;
             }
@@ -53,7 +53,7 @@ impl Datagrams {
         opened().map(Self).map_err(|error| Failure::of("udp socket", error))
     }
 
-    /// From now on waits no longer for a datagram.
+    /// Sets the timeout of receiving.
     ///
     /// # Errors
     /// When the kernel refuses it.
@@ -69,7 +69,7 @@ impl Datagrams {
                 Ok(bytes) if bytes == message.len() => return Ok(true),
                 Ok(bytes) => return Err(Failure::Failed(format!("{bytes} bytes came, not {}", message.len()))),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(false),
-                // The far socket was not there yet when something was sent; this one only tells.
+                // The far socket was not open yet when something was sent; this error only reports that.
                 Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {}
                 Err(error) => return Err(Failure::of("recv", error)),
             }

@@ -4,7 +4,7 @@ use crate::harness::{End, Failure};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec, become_able};
 use std::net::{IpAddr, Ipv4Addr};
 
-/// Where each end has its address. Gone with the last process that has it.
+/// The address of each end. Freed with the last process that uses it.
 pub struct Wire {
     lab: Lab,
 }
@@ -13,7 +13,7 @@ impl Wire {
     /// Makes it; `mtu` is the largest packet of its links, bytes.
     ///
     /// # Errors
-    /// [`Failure::Skipped`] when the system lets nobody make namespaces.
+    /// [`Failure::Skipped`] when the system allows no namespaces.
     pub fn new(mtu: u16) -> Result<Self, Failure> {
         let node = |end| NodeSpec { name: name_of(end).into(), address: address(end) };
         Lab::new(&[node(End::Ping), node(End::Pong)], mtu).map(|lab| Self { lab }).map_err(failure)
@@ -29,7 +29,7 @@ impl Wire {
         Lab::new(&[node(End::Ping), node(End::Pong), stranger], mtu).map(|lab| Self { lab }).map_err(failure)
     }
 
-    /// The calling process goes to the third computer, and stays.
+    /// Moves the calling process to the third computer for good.
     ///
     /// # Errors
     /// When it may not.
@@ -37,7 +37,7 @@ impl Wire {
         self.go(STRANGER)
     }
 
-    /// The calling process goes to this end, and stays: what it opens and starts from now on is there.
+    /// Moves the calling process to this end for good: what it opens and starts from now on is there.
     ///
     /// # Errors
     /// When it may not.
@@ -56,7 +56,8 @@ impl Wire {
 /// The third computer.
 const STRANGER: &str = "stranger";
 
-/// Lets this process make such networks, also if it is not root's. First thing in `main`; where it is refused, the cases say so.
+/// Lets this process make such networks, also without root. Call it first in `main`; if it is refused, the cases say
+/// so.
 pub fn prepare() {
     let _ = become_able();
 }

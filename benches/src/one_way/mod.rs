@@ -86,8 +86,8 @@ impl StreamTurn {
     }
 }
 
-/// Sends from some processes to another, and gives messages a second, from the first one received to the last. Each sender's
-/// messages must come whole, in order, and all of them.
+/// Sends from some processes to another, and gives messages a second, from the first one received to the last. Each
+/// sender's messages must come whole, in order, and all of them.
 ///
 /// `source` is called in the receiving process; when it has returned, `sink` is in each sending one, with its number.
 ///

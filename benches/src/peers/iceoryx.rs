@@ -107,7 +107,8 @@ impl Link for Iceoryx {
                 for (byte, value) in loan.payload_mut().iter_mut().zip(message) {
                     byte.write(*value);
                 }
-                // SAFETY: bytes; those that were not written are what the shared memory had, zeroes or an older message.
+                // SAFETY: bytes; those that were not written are what the shared memory had, zeroes or an older
+                // message.
                 unsafe { loan.assume_init() }
             }
             Waits::Listener | Waits::Spinning => loan.write_from_slice(message),

@@ -1,4 +1,5 @@
-//! iceoryx2, one way: the publisher and the subscriber of one service, with a notifier and a listener if it is to sleep.
+//! iceoryx2, one way: the publisher and the subscriber of one service, with a notifier and a listener if it is to
+//! sleep.
 
 use super::iceoryx::{Service, configuration, events, failed, messages};
 use crate::harness::{Failure, Scratch};

@@ -1,7 +1,7 @@
-//! Many sessions in one process: one thread with one epoll, as the TCP router at the other end of them.
+//! Many sessions in one process: one thread with one epoll, like the TCP router at the other end.
 //!
-//! Each sends to the one that is half of the crowd further, all together so many packages a second, evenly. A package counts from when it was
-//! due: if this process comes late itself, that is in the figure.
+//! Each sends to the session that is half of the crowd further, all together so many packages a second, evenly. The
+//! delay of a package counts from when it was due: a delay of this process is part of the figure.
 
 use super::guest::{Guest, House};
 use super::pace::{Pace, ticks};
@@ -15,13 +15,13 @@ use nix::sys::timerfd::TimerFd;
 use rohrpost_mailbox::monotonic_ns;
 use std::time::{Duration, Instant};
 
-/// Each session does what time asks for this often.
+/// Each session does its periodic work this often.
 const POLLED_EACH_NS: u64 = 50_000_000;
 /// Sessions that connect at the same time.
 const JOINING: usize = 64;
-/// A thousand handshakes take a second or two, on a busy computer many.
+/// A thousand handshakes take a second or two, on a busy computer longer.
 const UP_WITHIN: Duration = Duration::from_secs(60);
-/// What is under way comes within this, or in one of the next spans: a computer may stand still that long.
+/// Packages in flight arrive within this, or within one of the next spans: a computer may stall for that long.
 const DRAIN_NS: u64 = 500_000_000;
 const DRAINS_MAX: usize = 10;
 const EVENTS: usize = 256;
@@ -49,7 +49,7 @@ pub struct Habits {
     pub counted: Duration,
 }
 
-/// A crowd at work; gone when this is dropped.
+/// A crowd of sessions; ended when this is dropped.
 pub struct Crowd {
     /// None once it has ended.
     child: Option<Child>,
@@ -73,35 +73,35 @@ impl Crowd {
         Ok(crowd)
     }
 
-    /// Until what counts begins.
+    /// Waits until measuring begins.
     ///
     /// # Errors
-    /// What it failed with meanwhile.
+    /// Its failure meanwhile.
     pub fn await_begin(&mut self) -> Result<(), Failure> {
         self.await_until(self.habits.warm_up + UP_WITHIN, |tally| tally.phase.get() >= 1)
     }
 
-    /// Until what counts is over.
+    /// Waits until measuring is over.
     ///
     /// # Errors
-    /// What it failed with meanwhile.
+    /// Its failure meanwhile.
     pub fn await_end(&mut self) -> Result<(), Failure> {
         self.await_until(self.habits.counted + UP_WITHIN, |tally| tally.phase.get() >= 2)
     }
 
-    /// Until what was under way has come, and the crowd has ended.
+    /// Waits until packages in flight have arrived, and the crowd has ended.
     ///
     /// # Errors
-    /// What it failed with.
+    /// Its failure.
     pub fn finish(self) -> Result<Shared<Tally>, Failure> {
         self.child.map_or(Ok(()), |child| child.finish(Instant::now() + UP_WITHIN))?;
         Ok(self.tally)
     }
 
-    /// Whether it is at work still; no more after it has done all.
+    /// Whether it still runs; false after it has done all.
     ///
     /// # Errors
-    /// What it failed with.
+    /// Its failure.
     pub fn is_there(&mut self) -> Result<bool, Failure> {
         match self.child.take_if(|child| child.has_ended() != Ok(false)) {
             Some(ended) => ended.finish(Instant::now()).map(|()| false),
@@ -109,7 +109,7 @@ impl Crowd {
         }
     }
 
-    /// What it counts.
+    /// Its counts.
     pub fn tally(&self) -> &Tally {
         &self.tally
     }
@@ -215,13 +215,13 @@ impl<'a> Work<'a> {
         }
         if self.habits.one_stalls {
             let last = self.guests.pop().and_then(|last| last.into_stream(&self.house));
-            let stream = last.ok_or_else(|| Failure::Failed("who should stall has no connection".into()))?;
+            let stream = last.ok_or_else(|| Failure::Failed("the stalling session has no connection".into()))?;
             self.stalled = Some(Stalled::new(stream, monotonic_ns())?);
         }
         Ok(())
     }
 
-    /// What is due, and what comes, until a time.
+    /// Sends and receives until a time.
     fn turn(&mut self, until_ns: u64) -> Result<(), Failure> {
         while monotonic_ns() < until_ns {
             self.wait()?;
@@ -229,10 +229,10 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Sleeps until something comes, or the next tick; then does what is due.
+    /// Sleeps until something arrives, or the next tick; then does what is due.
     fn wait(&mut self) -> Result<(), Failure> {
         let mut events = [EpollEvent::empty(); EVENTS];
-        // Interrupted by a signal, it looks again.
+        // Interrupted by a signal, it checks again.
         let count = self.house.epoll.wait(&mut events, EpollTimeout::NONE).unwrap_or(0);
         for event in &events[..count] {
             if event.data() == TIMER {
@@ -252,7 +252,8 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Sends what is due: each guest in turn to the one that is half of the crowd further, and some of them to who reads nothing.
+    /// Sends what is due: each guest in turn to the one that is half of the crowd further, and some of them to the
+    /// stalled session.
     fn send(&mut self) -> Result<(), Failure> {
         let all = self.guests.len();
         while let Some((number, due_ns)) = self.packages.next_due(monotonic_ns()) {
@@ -269,7 +270,7 @@ impl<'a> Work<'a> {
     }
 }
 
-/// Each session takes a descriptor. If the system does not grant so many, connecting says so.
+/// Each session takes a descriptor. If the system does not grant so many, connecting fails.
 fn raise_descriptors(wanted: u64) {
     if let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_NOFILE)
         && soft < wanted

@@ -1,4 +1,4 @@
-//! What a relay does with the module beside it: takes what that sends, and hands over what comes for it.
+//! The link between a relay and its module: takes what the module sends, and hands over what arrives for it.
 
 use crate::floors::{HandOver, Lanes, Wake};
 use crate::harness::{End, Failure, Link, Shared};
@@ -18,8 +18,8 @@ const RELAY: Name = Name::new(1, 2, 0, 0);
 
 /// Between a relay and its module.
 pub(super) trait Door {
-    /// Sleeps until the module has sent something or the socket has something to read, and hands on what the module has sent; whether the
-    /// socket has something.
+    /// Sleeps until the module has sent something or the socket is readable, and hands on what the module has sent.
+    /// Returns whether the socket is readable.
     ///
     /// # Errors
     /// When that fails.

@@ -16,7 +16,7 @@ use std::net::SocketAddr;
 /// Bytes at the head of each body: its number, and when it was due. All other bytes follow from the number.
 const STAMPS_BYTES: usize = 16;
 const QUOTA_BYTES: usize = 1 << 20;
-/// Nothing here is bulk.
+/// The class is no bulk class.
 const LEVELS: [u8; 256] = [0; 256];
 
 /// What all guests have in common.
@@ -41,7 +41,7 @@ pub(super) struct Guest {
     is_begun: bool,
     awaits_room: bool,
     next_number: u64,
-    /// Number of the next package that may come: each guest hears from one other.
+    /// Number of the next package that may arrive: each guest receives from one other.
     expected: u64,
 }
 
@@ -85,13 +85,13 @@ impl Guest {
         self.act(house, now_ns)
     }
 
-    /// Its connection, of which nobody is told any more.
+    /// Its connection, for which no events are reported any more.
     pub(super) fn into_stream(self, house: &House<'_>) -> Option<Stream> {
         let stream = self.stream?;
         house.epoll.delete(&stream).is_ok().then_some(stream)
     }
 
-    /// Something happened to its socket.
+    /// Handles an event of its socket.
     pub(super) fn happened(&mut self, house: &House<'_>, flags: EpollFlags, piece: &mut [u8]) -> Result<(), Failure> {
         let now_ns = monotonic_ns();
         let Some(stream) = &mut self.stream else { return Ok(()) };
@@ -112,7 +112,7 @@ impl Guest {
         self.act(house, now_ns)
     }
 
-    /// Does what time asks for.
+    /// Does its periodic work.
     pub(super) fn act(&mut self, house: &House<'_>, now_ns: u64) -> Result<(), Failure> {
         loop {
             let mut inbox = Inbox { house, expected: &mut self.expected, wrong: None };
@@ -165,7 +165,7 @@ impl Guest {
             Moved::Nothing => self.client.took(monotonic_ns(), 0),
             Moved::Over(error) => return Err(Failure::of("write", error.map_or_else(String::new, |e| e.to_string()))),
         }
-        // While it shakes hands, it waits for room anyway.
+        // During the handshake it waits for room anyway.
         self.await_room(house, !is_all)
     }
 
@@ -184,7 +184,7 @@ impl House<'_> {
     }
 }
 
-/// Where packages of one guest come out.
+/// Receives packages of one guest.
 struct Inbox<'a> {
     house: &'a House<'a>,
     expected: &'a mut u64,
@@ -234,7 +234,7 @@ fn fill(body: &mut [u8], number: u64, due_ns: u64) {
     body[STAMPS_BYTES..].fill(number as u8);
 }
 
-/// Number and due time of a body. Some before it may be lost, but none comes twice, or later than the next.
+/// Number and due time of a body. Earlier ones may be lost, but none is duplicated or reordered.
 fn read(body: &[u8], expected: u64) -> Result<(u64, u64), Failure> {
     let Some((stamps, rest)) = body.split_first_chunk::<STAMPS_BYTES>() else {
         return Err(Failure::Failed(format!("a package of {} bytes came", body.len())));

@@ -1,4 +1,4 @@
-//! Programs that are no clients: connections with garbage in them, and some that say a hello a byte at a time.
+//! Hostile programs: connections with garbage, and some that send a hello a byte at a time.
 
 use super::tally::Tally;
 use crate::harness::{Child, Failure, Shared};
@@ -10,16 +10,16 @@ use std::time::{Duration, Instant};
 
 /// Connections with garbage, a second.
 pub const PER_S: u32 = 1_000;
-/// Connections that say a byte of a hello each so often: the TCP router does not wait for the last one.
+/// Connections that send a byte of a hello each so often: the TCP router closes them before the last byte.
 const SLOW: usize = 64;
 const BYTE_EACH: Duration = Duration::from_millis(100);
-/// In such groups, since nobody sleeps so briefly.
+/// In groups of so many, since no process sleeps for so short a time.
 const GROUP: u32 = 10;
-/// Another computer than that of the crowd.
+/// The address of another computer than the crowd's.
 const FROM: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 66);
 const GARBAGE_BYTES: usize = 512;
 
-/// At work until this is dropped.
+/// Active until this is dropped.
 pub struct Hostile {
     child: Child,
     tally: Shared<Tally>,
@@ -64,7 +64,7 @@ fn disturb(to: SocketAddr, tally: &Tally) -> Result<(), Failure> {
             slow.iter_mut().for_each(|slow| creep(slow, to, &hello));
         }
         if let Ok(mut stream) = reach(to) {
-            // The other end may be quicker to close it.
+            // The other end may close it first.
             let _ = stream.write_all(&garbage.next(number, &hello));
             tally.hostile.add(1);
         }
@@ -72,7 +72,7 @@ fn disturb(to: SocketAddr, tally: &Tally) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The next byte of a hello; when it was said or the connection closed, another begins.
+/// Sends the next byte of a hello; after the last one, or when the connection is closed, another begins.
 fn creep(slow: &mut Option<(TcpStream, usize)>, to: SocketAddr, hello: &[u8]) {
     let Some((mut stream, at)) = slow.take().or_else(|| Some((reach(to).ok()?, 0))) else { return };
     if hello.get(at).is_some_and(|byte| stream.write_all(&[*byte]).is_ok()) {
@@ -80,7 +80,7 @@ fn creep(slow: &mut Option<(TcpStream, usize)>, to: SocketAddr, hello: &[u8]) {
     }
 }
 
-/// Closed without a farewell, so that no port is taken for a minute.
+/// Closed by a reset, so that no port is blocked for a minute.
 fn reach(to: SocketAddr) -> std::io::Result<TcpStream> {
     let SocketAddr::V4(to) = to else { return Err(std::io::ErrorKind::Unsupported.into()) };
     let made = socket(AddressFamily::Inet, SockType::Stream, SockFlag::SOCK_CLOEXEC, None)?;
@@ -92,7 +92,7 @@ fn reach(to: SocketAddr) -> std::io::Result<TcpStream> {
     Ok(made.into())
 }
 
-/// A hello as it should be, of an installation that nobody has.
+/// A valid hello of an unknown installation.
 fn hello() -> Vec<u8> {
     let mut bytes = Vec::new();
     let digest = 0x0bad;
@@ -110,7 +110,7 @@ fn hello() -> Vec<u8> {
     bytes
 }
 
-/// What differs from connection to connection (xorshift).
+/// Random numbers for the connections (xorshift).
 struct Garbage(u64);
 
 impl Garbage {

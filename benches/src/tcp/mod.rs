@@ -1,12 +1,14 @@
-//! Systems that meet at the TCP router: its real process, clients of nodes, and a crowd of sessions in one process of the bench.
+//! Systems that meet at the TCP router: its real process, clients of nodes, and a crowd of sessions in one process of
+//! the bench.
 //!
 //! ```text
 //!  processor 0                                      processor 1
-//!  crowd: 1000 sessions, one thread ═══ TCP ══════▶ TCP router            how many, how quickly, beside whom
+//!  crowd: 1000 sessions, one thread ═══ TCP ══════▶ TCP router            throughput and delay, beside other load
 //!  ping ─▶ client of `near` ═══ TCP ══▶ TCP router ═══ TCP ══▶ client of `far` ─▶ pong     ours
-//!  ping ─▶ relay            ═══ TCP ══▶ relay      ═══ TCP ══▶ relay           ─▶ pong     `relays`: what that costs at least
+//!  ping ─▶ relay            ═══ TCP ══▶ relay      ═══ TCP ══▶ relay           ─▶ pong     `relays`: the least cost
 //! ```
-//! All over the loopback device. Everything that is timed runs at `SCHED_FIFO` 50; whoever disturbs it runs as any other process.
+//! All over the loopback device. Everything that is timed runs at `SCHED_FIFO` 50; disturbing programs run as any other
+//! process.
 
 pub mod crowd;
 mod door;

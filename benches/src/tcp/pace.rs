@@ -1,4 +1,4 @@
-//! Things that are due again and again, more often than a process can wake up: at each tick those that fall into it.
+//! Periodic events, more often than a process can wake up: each tick has those that are due in it.
 
 use nix::sys::time::{TimeSpec, TimeValLike};
 use nix::sys::timerfd::{ClockId, Expiration, TimerFd, TimerFlags, TimerSetTimeFlags};
@@ -6,7 +6,7 @@ use nix::sys::timerfd::{ClockId, Expiration, TimerFd, TimerFlags, TimerSetTimeFl
 /// From tick to tick.
 pub(super) const TICK_NS: u64 = 200_000;
 
-/// Something that is due again and again.
+/// A periodic event.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pace {
     began_ns: u64,
@@ -20,7 +20,8 @@ impl Pace {
         Self { began_ns, each_ns, done: 0 }
     }
 
-    /// Number of the next one, from 0, and the beginning of its tick, if that has come: it counts as done.
+    /// Number of the next event, from 0, and the beginning of its tick, if that has come. The event then counts as
+    /// done.
     pub(super) fn next_due(&mut self, now_ns: u64) -> Option<(u64, u64)> {
         let due_ns = self.began_ns.saturating_add(self.done * self.each_ns / TICK_NS * TICK_NS);
         (due_ns <= now_ns).then(|| {
@@ -42,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_comes_late_has_the_same_things_to_do_and_knows_when_they_were_due() {
+    fn a_late_tick_has_all_missed_events_with_their_due_times() {
         let mut pace = Pace::new(1000, TICK_NS / 2);
         assert_eq!(pace.next_due(999), None);
         let due = |pace: &mut Pace, now_ns| std::iter::from_fn(|| pace.next_due(now_ns)).collect::<Vec<_>>();

@@ -1,11 +1,11 @@
-//! What a hop over a TCP router costs at least: the same processes and hand-overs, which look at nothing on the way.
+//! The least cost of a hop over a TCP router: the same processes and hand-overs, without any inspection of messages.
 //!
 //! ```text
 //!  ping ──pipe──▶ relay ══TCP══▶ relay ══TCP══▶ relay ──futex──▶ pong
 //!  ping ◀─futex── relay ◀══TCP══ relay ◀══TCP══ relay ◀──pipe─── pong
 //! ```
-//! As the client of a node, the outer relays sleep on what their module hands over and on their socket at once, so a module wakes them by a
-//! pipe; the middle one sleeps in epoll.
+//! As the client of a node, an outer relay sleeps on its module's messages and on its socket at once, so a module wakes
+//! it by a pipe; the middle one sleeps in epoll.
 
 use super::door::{Door, Hall, MailboxDoor};
 use super::systems::free_address;
@@ -15,9 +15,9 @@ use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
-/// The relays, and who starts them.
+/// The relays, and the process that starts them.
 const ALL: u32 = 4;
-/// The middle one listens within this.
+/// The middle relay listens within this time.
 const CONNECTS_WITHIN: Duration = Duration::from_secs(5);
 const PIECE_BYTES: usize = 64 * 1024;
 
@@ -31,7 +31,8 @@ pub fn time_relays(cell: &Cell) -> Result<Vec<f64>, Failure> {
     time(cell, |end, _| hall(end).door(), |end| hall(end).module())
 }
 
-/// The same with our mailboxes between modules and relays: what the TCP router and its clients add to that is their own.
+/// The same with our mailboxes between modules and relays: what the TCP router and its clients cost beyond that is
+/// their own.
 ///
 /// # Errors
 /// As [`time_relays`].
@@ -118,7 +119,7 @@ fn middle(address: SocketAddr, gate: &Gate) -> Result<(), Failure> {
     }
 }
 
-/// A connection, and which outer relay it is of.
+/// A connection, and the outer relay at its other end.
 fn accept(listener: &TcpListener) -> io::Result<(u8, TcpStream)> {
     let (mut socket, _) = listener.accept()?;
     socket.set_nodelay(true)?;
@@ -127,7 +128,7 @@ fn accept(listener: &TcpListener) -> io::Result<(u8, TcpStream)> {
     Ok((end[0], socket))
 }
 
-/// A connection to the middle relay, which is told whose it is.
+/// A connection to the middle relay; its first byte names the outer relay.
 fn reach(address: SocketAddr, end: End) -> Result<TcpStream, Failure> {
     let give_up = Instant::now() + CONNECTS_WITHIN;
     let mut socket = loop {

@@ -1,4 +1,4 @@
-//! A session that says that it is there, takes packages, and reads none.
+//! A session that sends keep-alives, receives packages, and reads none.
 
 use super::pace::Pace;
 use crate::harness::Failure;
@@ -6,12 +6,12 @@ use nix::sys::socket::{setsockopt, sockopt};
 use rohrpost_routers::session::frame::Message;
 use rohrpost_routers::tcp::{Moved, Stream};
 
-/// Sent to it each so often: a MiB a second.
+/// Period of packages to it: a MiB a second.
 const BYTES: usize = 1024;
 const EACH_NS: u64 = 1_000_000;
-/// Silent for longer than 3.5 s, it would be closed.
+/// After 3.5 s of silence it would be closed.
 const ALIVE_EACH_NS: u64 = 500_000_000;
-/// What the kernel keeps for it, so that it stands still soon.
+/// Its receive buffer in the kernel; small, so that it stalls soon.
 const KEPT_BYTES: usize = 16 * 1024;
 const PIECE_BYTES: usize = 64 * 1024;
 
@@ -30,13 +30,13 @@ impl Stalled {
         Ok(Self { stream, packages, signs, body: [0; BYTES], sent: 0 })
     }
 
-    /// Number of the next package that is to be sent to it, if one is due. Also says that it is there.
+    /// Number of the next package to send to it, if one is due. Also sends keep-alives.
     pub(super) fn next_due(&mut self, now_ns: u64) -> Result<Option<u64>, Failure> {
         if self.signs.next_due(now_ns).is_some() {
             let mut sign = Vec::new();
             Message::Ask(now_ns).write(&mut sign);
             if let Moved::Over(_) = self.stream.write(&sign, false) {
-                return Err(Failure::Failed("who reads nothing was closed before the turn was over".into()));
+                return Err(Failure::Failed("the stalled session was closed before the turn was over".into()));
             }
         }
         let due = self.packages.next_due(now_ns);
@@ -49,10 +49,10 @@ impl Stalled {
         &mut self.body
     }
 
-    /// It must have stood still: less has come to its door than was sent.
+    /// It must have stalled: fewer bytes arrived at its socket than were sent.
     pub(super) fn check(mut self) -> Result<(), Failure> {
         let (mut piece, mut came) = (vec![0; PIECE_BYTES], 0);
-        // What is in the kernel still; more does not follow at once.
+        // Bytes still in the kernel; more does not follow at once.
         while let Moved::Bytes(bytes) = self.stream.read(&mut piece) {
             came += bytes as u64;
         }
@@ -60,6 +60,6 @@ impl Stalled {
         if came < sent / 2 {
             return Ok(());
         }
-        Err(Failure::Failed(format!("who should stall had {came} of {sent} bytes")))
+        Err(Failure::Failed(format!("the stalling session got {came} of {sent} bytes")))
     }
 }

@@ -116,10 +116,10 @@ impl Systems {
         self.scratch.directory().join(file.file_name().unwrap_or_default())
     }
 
-    /// Fails with what a process said that has ended.
+    /// Fails with the output of an ended process.
     ///
     /// # Errors
-    /// Exactly then.
+    /// If one has ended.
     pub fn check(&mut self) -> Result<(), Failure> {
         for process in &mut self.processes {
             if process.child.has_ended()? {
@@ -184,7 +184,7 @@ impl Systems {
             .env("ROHRPOST_DIR", self.scratch.directory())
             .output();
         let output = asked.map_err(|error| Failure::of("rohrpost net", error))?;
-        // Before the client has said anything there is nothing to read.
+        // The file is empty until the client writes.
         let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).unwrap_or_default();
         Ok(told.into_iter().filter_map(|told| told.beyond).any(|beyond| beyond.state == "up"))
     }
@@ -206,7 +206,8 @@ pub fn bench(end: End, turn: u8) -> Name {
     Name::new(system_of(end), BENCH.0, 0, turn)
 }
 
-/// The mailbox of a session of the crowd, which are all of the second system. Not of its module's names: those are its node's.
+/// The mailbox of a session of the crowd, all of which belong to the second system. No name of its module, since those
+/// belong to its node.
 pub fn guest(index: u16) -> Name {
     let [instance, local] = (index + 256).to_be_bytes();
     Name::new(system_of(End::Pong), BENCH.0, instance, local)
@@ -220,7 +221,8 @@ fn config(scratch: &Scratch, end: End) -> PathBuf {
     Path::new(&scratch.directory()).join(format!("{}.toml", name_of(end)))
 }
 
-/// One that nobody has now. Of a loopback address of this process alone: nobody connects from there, and so takes the port meanwhile.
+/// A free port of a loopback address of this process alone: nobody else connects from there, and so takes the port
+/// meanwhile.
 pub(super) fn free_address() -> Result<SocketAddr, Failure> {
     let [_, high, middle, low] = std::process::id().to_be_bytes();
     // 127.128.0.0/9 without its first and last addresses; a PID has 22 bits.

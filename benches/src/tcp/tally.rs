@@ -1,4 +1,4 @@
-//! What a crowd counts, where its parent sees it.
+//! Counts of a crowd, visible to its parent.
 
 use crate::harness::{Samples, Zeroable};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Tally {
     /// Sessions that are registered.
     pub up: Count,
-    /// 1 as soon as what happens counts, 2 when that is over.
+    /// 1 while measuring, 2 afterwards.
     pub phase: Count,
     /// Packages sent that count.
     pub sent: Count,
-    /// Of these, those that came.
+    /// Of these, received.
     pub came: Count,
-    /// Packages that came while it counted, whenever they were sent.
+    /// Packages received while measuring, whenever they were sent.
     pub meanwhile: Count,
     /// Connections that a hostile program made.
     pub hostile: Count,

@@ -1,4 +1,5 @@
-//! zenoh through its router, as a peer: programs of a package of their own (`benches/zenoh`), so that nobody compiles zenoh who does not want to.
+//! zenoh through its router, as a peer. Its programs are a package of their own (`benches/zenoh`), so that zenoh is
+//! only compiled on demand.
 
 use super::systems::free_address;
 use crate::harness::{Cell, Child, Failure, Scratch, interrupted};
@@ -11,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// The program; it stands beside this one.
 pub const PROGRAM: &str = "rohrpost-bench-zenoh";
-/// After the last of its lines everything has been said.
+/// The last of its lines starts with this.
 const END: &str = "end";
 const READY_WITHIN: Duration = Duration::from_secs(20);
 const GRACE: Duration = Duration::from_secs(20);

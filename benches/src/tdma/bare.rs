@@ -1,7 +1,8 @@
-//! The floor of time slots: threads that wake up for them as routers do, and send nothing. How late these are no router can better.
+//! The floor of time slots: threads that wake up for them as routers do, and send nothing. No router can be earlier
+//! than these.
 //!
-//! A master of which nothing comes in three cycles in a row has a successor. So whoever misses all windows of three cycles would be
-//! taken for dead, however well it lives.
+//! A master that is silent in three cycles in a row has a successor. So a master that misses all windows of three
+//! cycles is taken for dead, even if it runs.
 
 use super::plan::Plan;
 use super::stage::{NODES, Stage};
@@ -13,23 +14,23 @@ use rohrpost_routers::tdma::{GATE_NS, Kind, Window};
 use rohrpost_routers::time::TIME_BYTES;
 use std::time::Duration;
 
-/// So much of a cycle is reserved for each.
+/// Time of each cycle that is reserved for a thread.
 const SHARE: u64 = 4;
 /// Until reservations are granted and the load is there.
 const SETTLES: Duration = Duration::from_secs(1);
-/// A master that is not heard in so many cycles has a successor.
+/// A master that is not heard for so many cycles has a successor.
 const STANDSTILL_CYCLES: u64 = 3;
 
 /// How late bare threads were.
 #[derive(Clone, Debug)]
 pub struct BareThreads {
-    /// Of each slot of each node: how long after its beginning, µs.
+    /// Wake-up after the beginning of each slot of each node, µs.
     pub late_us: Vec<f64>,
-    /// How often one of those who may be master missed all its windows of three cycles in a row.
+    /// How often a possible master missed all its windows of three cycles in a row.
     pub standstills: usize,
 }
 
-/// What a thread says of itself.
+/// Results of a thread.
 struct Said {
     late_us: Shared<Samples>,
     /// Cycles that each standstill took.
@@ -71,19 +72,20 @@ impl BareThreads {
         Ok(Self { late_us: late_us.collect(), standstills })
     }
 
-    /// Slots for which it was too late, percent: a router leaves these out.
+    /// Slots with a wake-up too late to send, percent: a router omits these.
     pub fn omitted_percent(&self) -> f64 {
         self.later_percent(GATE_NS as f64 / 1000.0)
     }
 
-    /// Slots for which it was later than this, percent.
+    /// Slots with a wake-up later than this, percent.
     pub fn later_percent(&self, than_us: f64) -> f64 {
         let late = self.late_us.iter().filter(|late_us| **late_us > than_us).count();
         late as f64 * 100.0 / self.late_us.len().max(1) as f64
     }
 }
 
-/// The monotonic clock is system time here: a slot is anywhere in the cycle, but where the others are it is not.
+/// The monotonic clock is system time here: the phase of a slot in the cycle is arbitrary, but not its distance from
+/// others.
 fn wake_up(plan: &Plan, own: u8, ready: &Gate, said: &Said) -> Result<(), Failure> {
     let table = plan.table(own)?;
     let period_ns = table.cycle_ns();
@@ -111,7 +113,7 @@ fn wake_up(plan: &Plan, own: u8, ready: &Gate, said: &Said) -> Result<(), Failur
     }
 }
 
-/// Waits for a window as a router does; how long after its beginning it is then.
+/// Waits for a window as a router does; returns how long after its beginning the wake-up came.
 fn late_ns(window: &Window, spin_ns: u64) -> u64 {
     let sleeps_ns = window.begin_ns.saturating_sub(spin_ns).saturating_sub(monotonic_ns());
     std::thread::sleep(Duration::from_nanos(sleeps_ns));

@@ -18,26 +18,26 @@ use std::time::{Duration, Instant};
 /// Most frames, and most packages of declared flows, of one turn.
 const FRAMES_MAX: usize = 1 << 20;
 const ARRIVALS_MAX: usize = 1 << 17;
-/// What is there is read this often.
+/// Interval of reading.
 const PATIENCE: Duration = Duration::from_millis(20);
 /// Readings of two clocks; the closest pair counts.
 const READINGS: usize = 100;
-/// Type of packages that say when they were published.
+/// Type of packages that hold their time of publication.
 pub const STAMPED: Type = Type::data(7);
-/// Bytes that they end with: monotonic ns.
+/// Their last bytes: monotonic ns.
 pub const STAMP_BYTES: usize = 8;
 
-/// What a frame is, as far as it matters here.
+/// Kind of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum FrameKind {
-    /// Packages, or a part of one.
+    /// Packages, or a fragment of one.
     Packages,
     /// A master's synchronisation.
     Sync,
-    /// A backup's synchronisation in the place of a silent master's.
+    /// A backup's synchronisation in place of a silent master's.
     Replacement,
-    /// What routers say to each other besides.
+    /// Other messages between routers.
     Said,
 }
 
@@ -48,14 +48,14 @@ pub struct Crossed {
     pub at_ns: u64,
     /// Node that sent it.
     pub from: u8,
-    /// What it is.
+    /// Its kind.
     pub what: FrameKind,
 }
 
-/// A package that said when it was published.
+/// A package that holds its time of publication.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Arrived {
-    /// When its last part came to the bridge, monotonic ns.
+    /// When its last fragment came to the bridge, monotonic ns.
     pub at_ns: u64,
     /// When it was published, monotonic ns.
     pub published_ns: u64,
@@ -70,16 +70,16 @@ struct CaptureMemory {
     gate: Gate,
     frames: AtomicU64,
     arrivals: AtomicU64,
-    /// When; and who and what.
+    /// Time; sender and kind.
     frame: [[AtomicU64; 2]; FRAMES_MAX],
-    /// When; when it was published; whose.
+    /// Time of arrival; time of publication; sender.
     arrival: [[AtomicU64; 3]; ARRIVALS_MAX],
 }
 
 // SAFETY: atomics only.
 unsafe impl Zeroable for CaptureMemory {}
 
-/// Watches, in a process of its own, until it is dropped.
+/// Captures, in a process of its own, until it is dropped.
 pub struct Capture {
     seen: Shared<CaptureMemory>,
     /// One process.
@@ -90,7 +90,7 @@ impl Capture {
     /// Begins.
     ///
     /// # Errors
-    /// When the system lets nobody watch.
+    /// When the system allows no capture.
     pub fn start(stage: &Stage) -> Result<Self, Failure> {
         let seen = Shared::<CaptureMemory>::new()?;
         let mut watcher = vec![Child::start(|| {
@@ -103,7 +103,7 @@ impl Capture {
         Ok(Self { seen, watcher })
     }
 
-    /// How many frames there are by now; what comes from here on follows them.
+    /// Number of frames so far; later ones follow them.
     pub fn len(&self) -> usize {
         self.seen.frames.load(Ordering::Acquire) as usize
     }
@@ -125,10 +125,10 @@ impl Capture {
         self.seen.arrival[..count].iter().map(arrived).collect()
     }
 
-    /// Fails if it does not watch any more, or had no room.
+    /// Fails if it does not run any more, or had no room.
     ///
     /// # Errors
-    /// Why.
+    /// The reason.
     pub fn check(&mut self) -> Result<(), Failure> {
         if self.len() == FRAMES_MAX || self.seen.arrivals.load(Ordering::Acquire) as usize == ARRIVALS_MAX {
             return Err(Failure::Failed("more crossed the bridge than there is room for".into()));
@@ -149,8 +149,8 @@ fn crossed(words: &[AtomicU64; 2]) -> Option<Crossed> {
 }
 
 fn arrived(words: &[AtomicU64; 3]) -> Arrived {
-    let [at_ns, published_ns, whose] = words.each_ref().map(|word| word.load(Ordering::Relaxed));
-    let [from, class, ..] = whose.to_le_bytes();
+    let [at_ns, published_ns, sender] = words.each_ref().map(|word| word.load(Ordering::Relaxed));
+    let [from, class, ..] = sender.to_le_bytes();
     Arrived { at_ns, published_ns, class, from }
 }
 
@@ -161,12 +161,12 @@ impl CaptureMemory {
     }
 
     fn arrival(&self, arrival: &Arrived) {
-        let whose = u64::from_le_bytes([arrival.from, arrival.class, 0, 0, 0, 0, 0, 0]);
-        append(&self.arrivals, &self.arrival, [arrival.at_ns, arrival.published_ns, whose]);
+        let sender = u64::from_le_bytes([arrival.from, arrival.class, 0, 0, 0, 0, 0, 0]);
+        append(&self.arrivals, &self.arrival, [arrival.at_ns, arrival.published_ns, sender]);
     }
 }
 
-/// Adds one; what is too many is left out, and [`Capture::check`] says so.
+/// Appends one if there is room; otherwise [`Capture::check`] reports it.
 fn append<const WORDS: usize>(count: &AtomicU64, all: &[[AtomicU64; WORDS]], words: [u64; WORDS]) {
     let at = count.load(Ordering::Relaxed);
     let Some(free) = all.get(at as usize) else { return };
@@ -176,7 +176,7 @@ fn append<const WORDS: usize>(count: &AtomicU64, all: &[[AtomicU64; WORDS]], wor
 }
 
 fn watch(socket: &OwnedFd, seen: &CaptureMemory) -> Result<(), Failure> {
-    // Both clocks are slewed alike, so it stays as it is unless somebody sets one.
+    // Both clocks are slewed alike, so the offset is constant unless somebody sets one.
     let ahead_ns = realtime_ahead_ns();
     let (mut bytes, mut space) = ([0; 2048], nix::cmsg_space!(TimeSpec));
     loop {
@@ -197,7 +197,7 @@ fn watch(socket: &OwnedFd, seen: &CaptureMemory) -> Result<(), Failure> {
     }
 }
 
-/// Remembers a datagram, and the stamped packages in it.
+/// Records a datagram, and the stamped packages in it.
 fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
     let Ok((head, frame)) = Frame::parse(datagram) else { return };
     let from = head.from;
@@ -209,7 +209,7 @@ fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
             FrameKind::Packages
         }
         Frame::Fragment(part) => {
-            // Parts leave in their order.
+            // Fragments leave in order.
             if part.head.kind == STAMPED && part.index + 1 == part.count {
                 arrive(seen, at_ns, from, part.head.from, part.bytes);
             }
@@ -232,7 +232,8 @@ fn arrive(seen: &CaptureMemory, at_ns: u64, from: u8, sender: Name, end: &[u8]) 
     }
 }
 
-/// By how much the clock of stamps is ahead of the monotonic one, ns: from the readings that were closest to each other.
+/// By how much the clock of stamps is ahead of the monotonic one, ns: from the readings that were closest to each
+/// other.
 fn realtime_ahead_ns() -> i64 {
     let read = |_| {
         let (before, real, after) = (monotonic_ns(), realtime_ns(), monotonic_ns());

@@ -1,4 +1,4 @@
-//! What routers say of their slots, by `rohrpost net`, as a user would ask.
+//! What routers report of their slots, by `rohrpost net`, as for a user.
 
 use super::stage::{NODES, Place};
 use crate::harness::{Failure, interrupted};
@@ -16,11 +16,11 @@ pub struct Counts {
     pub used: u64,
     /// Slots in which nothing had to be sent.
     pub empty: u64,
-    /// Slots left out since the wake-up came too late.
+    /// Slots omitted since the wake-up came too late.
     pub late: u64,
-    /// Slots that went by without a wake-up.
+    /// Slots that passed without a wake-up.
     pub skipped: u64,
-    /// Slots without packages since the time was not sure enough.
+    /// Slots without packages since the time was too uncertain.
     pub silent: u64,
     /// `deadline`, `fifo` or `ordinary`.
     pub scheduled: String,
@@ -63,7 +63,7 @@ impl Counts {
         }
     }
 
-    /// Slots that were left out, for whatever reason.
+    /// Omitted slots, for whatever reason.
     pub fn omitted(&self) -> u64 {
         self.late + self.skipped + self.silent
     }
@@ -95,7 +95,7 @@ fn ask_all(command: &Path, config: &Path, scratch: &Path) -> Result<Vec<Counts>,
 fn answer(asked: Child) -> Result<Counts, Failure> {
     let output = asked.wait_with_output().map_err(|error| Failure::of("rohrpost net", error))?;
     let said = || format!("rohrpost net: {}", String::from_utf8_lossy(&output.stderr));
-    // It fails if a peer is silent, which is no concern of ours.
+    // It fails if a peer is silent, which does not matter here.
     let told: Vec<StatusJson> = serde_json::from_slice(&output.stdout).map_err(|error| Failure::of(&said(), error))?;
     let told = told.into_iter().next().ok_or_else(|| Failure::Failed(said()))?;
     told.slots.ok_or_else(|| Failure::Failed(told.failure.unwrap_or_else(said)))

@@ -1,4 +1,4 @@
-//! A packet socket that gets datagrams of routers alone: of a flood beside them nothing is copied.
+//! A packet socket that receives only datagrams of routers: a flood beside them is not copied.
 
 use crate::Failure;
 use libc::{BPF_ABS, BPF_B, BPF_H, BPF_JEQ, BPF_JMP, BPF_K, BPF_LD, BPF_RET, sock_filter, sock_fprog};
@@ -8,13 +8,13 @@ use std::io;
 use std::os::fd::{AsRawFd, OwnedFd};
 use std::time::Duration;
 
-/// Bytes before what a datagram says: Ethernet, IPv4, UDP.
+/// Headers before a datagram's payload: Ethernet, IPv4, UDP.
 pub const HEADS_BYTES: usize = 14 + 20 + 8;
-/// Room for what comes before somebody reads.
+/// Receive buffer.
 const RECEIVE_BYTES: usize = 64 << 20;
 
-/// Where the calling thread is, each datagram to one of these ports when it comes in, with the kernel's stamp. Waiting for one ends after
-/// `patience`.
+/// Each datagram to one of these ports that comes in at the calling thread's place, with the kernel's stamp. A wait for
+/// one ends after `patience`.
 ///
 /// # Errors
 /// When the system refuses it.
@@ -23,7 +23,7 @@ pub fn open(ports: [u16; 2], patience: Duration) -> Result<OwnedFd, Failure> {
     let socket = socket(AddressFamily::Packet, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::EthAll);
     let socket = socket.map_err(failed)?;
     attach(&socket, &mut program(ports)).map_err(|error| Failure::of("filter of a packet socket", error))?;
-    // Only root may have more than the system's limit; who is refused keeps what there is.
+    // Only root may exceed the system's limit; other users keep the limit.
     let _ = setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES);
     setsockopt(&socket, sockopt::ReceiveTimestampns, &true).map_err(failed)?;
     let patience = TimeVal::microseconds(i64::try_from(patience.as_micros()).unwrap_or(i64::MAX));
@@ -31,7 +31,8 @@ pub fn open(ports: [u16; 2], patience: Duration) -> Result<OwnedFd, Failure> {
     Ok(socket)
 }
 
-/// Takes IPv4 without options, UDP, to one of these ports, as a port of the bridge receives it, and not as one passes it on.
+/// Accepts IPv4 without options, UDP, to one of these ports, as a port of the bridge receives it, and not as a port
+/// forwards it.
 fn program(ports: [u16; 2]) -> [sock_filter; 11] {
     const PACKET_TYPE: i32 = libc::SKF_AD_OFF + libc::SKF_AD_PKTTYPE;
     /// As `packet(7)` has it.
@@ -41,7 +42,7 @@ fn program(ports: [u16; 2]) -> [sock_filter; 11] {
     const PORT: i32 = 36;
     let load =
         |size, at: i32| sock_filter { code: (BPF_LD | size | BPF_ABS) as u16, jt: 0, jf: 0, k: at.cast_unsigned() };
-    // So many instructions further on, if it is so and if it is not.
+    // Offsets of the next instruction: on a match, and otherwise.
     let is = |value: u32, jt, jf| sock_filter { code: (BPF_JMP | BPF_JEQ | BPF_K) as u16, jt, jf, k: value };
     let takes = |bytes| sock_filter { code: (BPF_RET | BPF_K) as u16, jt: 0, jf: 0, k: bytes };
     [
@@ -62,7 +63,8 @@ fn program(ports: [u16; 2]) -> [sock_filter; 11] {
 fn attach(socket: &OwnedFd, program: &mut [sock_filter]) -> io::Result<()> {
     let attached = sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
     let (at, bytes) = ((&raw const attached).cast(), size_of::<sock_fprog>() as libc::socklen_t);
-    // SAFETY: the kernel reads so many bytes there, and the instructions that they point to; all outlive the call, and it keeps neither.
+    // SAFETY: the kernel reads so many bytes there, and the instructions that they point to; all outlive the call, and
+    // the kernel keeps no pointer.
     match unsafe { libc::setsockopt(socket.as_raw_fd(), libc::SOL_SOCKET, libc::SO_ATTACH_FILTER, at, bytes) } {
         0 => Ok(()),
         _ => Err(io::Error::last_os_error()),

@@ -1,4 +1,4 @@
-//! How slots were kept: what the capture saw, held against the table by the master's time.
+//! How well slots were kept: the captured frames compared with the table by the master's time.
 
 use super::capture::{Crossed, FrameKind};
 use super::stage::NODES;
@@ -9,11 +9,11 @@ use rohrpost_routers::tdma::{Kind, Table, Window};
 /// What became of the frames of some cycles.
 #[derive(Clone, Default, Debug)]
 pub struct Kept {
-    /// Of each slot's first frame: how far from the beginning, µs; in its window less the median of its node.
+    /// Offset of each slot's first frame from the slot's beginning, µs; in its window minus the median of its node.
     pub off_us: Vec<f64>,
-    /// Frames, those of synchronisation and what routers say to each other included.
+    /// Frames, including synchronisation and other messages between routers.
     pub frames: usize,
-    /// Of these, in no window of their sender.
+    /// Of these, outside any window of their sender.
     pub outside: usize,
     /// Of those outside, in another's window.
     pub in_anothers: usize,
@@ -22,9 +22,9 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// A frame is its sender's if it begins in a window of it or in the guard behind, or so little before that the guard of who was there
-    /// before still holds. Any other is outside, and off as far as the nearest slot of its sender is, if it could be the first of that.
-    /// `tables`: as each node reads them.
+    /// A frame is its sender's if it begins in a window of the sender or in the guard behind, or so little before that
+    /// the guard of the slot before still covers it. Any other is outside. Its offset is that from the nearest slot of
+    /// its sender, if it could be the first of that. `tables`: as each node reads them.
     pub fn of(frames: &[Crossed], tables: &[Table], time: &TimeRecord) -> Self {
         let mut kept = Self { frames: frames.len(), ..Self::default() };
         let mut nodes: [Sender; NODES as usize] = Default::default();
@@ -55,13 +55,13 @@ impl Kept {
         kept
     }
 
-    /// Slots whose first frame was further off than this.
+    /// Slots with a first frame further off than this.
     pub fn further_off(&self, than_us: f64) -> usize {
         self.off_us.iter().filter(|off_us| **off_us > than_us).count()
     }
 }
 
-/// What is known of a node while frames are looked at.
+/// State of a node while frames are examined.
 #[derive(Default)]
 struct Sender {
     /// Of the first frame of each of its slots: how long after the beginning, µs.
@@ -71,7 +71,8 @@ struct Sender {
 }
 
 impl Sender {
-    /// How long after the beginning of its slot a frame came, µs; negative if before. None if it is not the first, or it is no slot.
+    /// Offset of a frame from the beginning of its slot, µs; negative if before. None if it is not the first, or is in
+    /// no slot.
     fn first_in(&mut self, window: Window, at_ns: u64) -> Option<f64> {
         let is_first = self.last.replace(window) != Some(window) && matches!(window.kind, Kind::Slot { .. });
         is_first.then(|| at_ns.wrapping_sub(window.begin_ns).cast_signed() as f64 / 1000.0)
@@ -119,7 +120,7 @@ mod tests {
         assert_eq!(off_us, [0.0, 0.0, 0.0, 0.0, 2.0, 298.0]);
         assert_eq!((kept.frames, kept.outside, kept.in_anothers, kept.further_off(250.0)), (7, 0, 0, 1));
         assert_eq!(kept.into_guard_us, 30.0, "310 us after the beginning of 280 us");
-        // 80 us before its slot is in the slot of another, 70 us are in the guard and allowed for.
+        // 80 us before its slot is in another's slot; 70 us are in the guard and allowed.
         let strangers = Kept::of(&frames(&[(1, 1_350), (1, 1_360), (2, 1_010), (2, 4_000)]), &tables, &TIME);
         assert_eq!((strangers.outside, strangers.in_anothers), (3, 2));
         // Node 2's slot is at 1860 us, and has one first frame.
@@ -129,11 +130,12 @@ mod tests {
     #[test]
     fn what_is_in_nobodys_time_is_far_off_and_its_slot_has_no_other_first_frame() {
         let tables = plans::LOADED.tables().unwrap();
-        // Behind the last slot, which ends at 2290 us: 1000 us and more behind node 2's beginning; and before the next cycle's.
+        // Behind the last slot, which ends at 2290 us: 1000 us and more behind node 2's beginning; and before the next
+        // cycle's.
         let late = Kept::of(&frames(&[(2, 2_860), (2, 2_900), (2, 6_400), (2, 6_860)]), &tables, &TIME);
         assert_eq!((late.outside, late.in_anothers), (3, 1));
         assert_eq!(late.off_us, [1_000.0, 460.0]);
-        // What is no slot's is outside alone.
+        // A frame in no slot only counts as outside.
         let sync = [Crossed { what: FrameKind::Sync, ..frames(&[(0, 3_000)])[0] }];
         let sync = Kept::of(&sync, &tables, &TIME);
         assert_eq!((sync.outside, sync.off_us.len()), (1, 0));

@@ -1,4 +1,4 @@
-//! Three nodes that send in time slots, and what sees from outside how they do.
+//! Three nodes that send in time slots, and an outside view of them.
 //!
 //! ```text
 //!  n0: feeder ─▶ router ═══╗            ╔═══ flooder ┐
@@ -6,9 +6,9 @@
 //!  n2: feeder ─▶ router ═══╝      │     ╚═══ swamp ◀─┘
 //!                                 └─▶ capture: the kernel's stamp of each frame of a router
 //! ```
-//! All have this computer's clock, so a stamp of the capture and the master's page of time say how long after the beginning of
-//! its slot a frame really came. Routers are the real ones ([`routers`]); where clocks have to be wrong, to be judged, they are threads of a child
-//! ([`shells`]).
+//! All have this computer's clock, so a stamp of the capture and the master's time page show how long after the
+//! beginning of its slot a frame really came. Routers are the real ones ([`routers`]); where clocks must be wrong, they
+//! are threads of a child process ([`shells`]).
 
 pub mod bare;
 pub mod capture;

@@ -1,4 +1,4 @@
-//! The slot tables, and the configuration that says so.
+//! The slot tables, and their configuration.
 
 use super::stage::{NODES, Place};
 use crate::Failure;
@@ -13,9 +13,9 @@ use std::path::Path;
 pub const INSTALLATION: &str = "bench-tdma";
 /// Where routers take packages; datagrams of time go to the next one.
 pub const PORT: u16 = 21_117;
-/// Class of those that always have packages for others.
+/// Class of modules that always have packages for others.
 const FLOOD: Class = Class(100);
-/// Class of those that take declared flows.
+/// Class of the receivers of declared flows.
 const EAR: Class = Class(210);
 
 /// When nodes send. Their slots follow each other, behind the windows of the masters.
@@ -62,7 +62,7 @@ impl Declared {
     }
 }
 
-/// The mailbox of who floods from a node, and takes what others flood it with.
+/// The mailbox of the flooding module of a node, which also takes the flood from others.
 pub fn flood(node: u8) -> Name {
     Name::new(SYSTEM, FLOOD.0, node, 0)
 }
@@ -154,7 +154,7 @@ masters = [{masters}]
         )
     }
 
-    /// Nobody launches them: processes of the bench are them.
+    /// Never launched: processes of the bench take their place.
     fn modules(&self) -> String {
         let module = |class: &str, node: u8, more: &str| {
             let at = Place::Node(node).name();
@@ -170,7 +170,8 @@ masters = [{masters}]
                 let to = (node + hop) % NODES;
                 text += &module(class, node, &format!("calls = [\"ear.{to}\"]\n"));
                 text += &format!(
-                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = \"{bytes} B\"\nperiod = \"{period_us} us\"\n"
+                    "[[flow]]\nfrom = \"{class}.{node}\"\nto = \"ear.{to}\"\nsize = \"{bytes} B\"\n\
+                     period = \"{period_us} us\"\n"
                 );
             }
         }

@@ -14,11 +14,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A node that joins listens to some cycles and measures; ordinary processes on busy processors take longer.
+/// A joining node listens to some cycles and measures; ordinary processes on busy processors take longer.
 const SENDS_WITHIN: Duration = Duration::from_secs(60);
-/// So many datagrams with packages, and the node has found its slots.
+/// After so many datagrams with packages the node has found its slots.
 const FRAMES: usize = 10;
-/// A thread of a router that sends in its slots is called so.
+/// Name of a router's thread that sends in its slots.
 const SLOTS_THREAD: &str = "slots";
 const LOOK_EACH: Duration = Duration::from_millis(10);
 
@@ -39,7 +39,7 @@ impl<'a> Routers<'a> {
     /// What a router failed with; [`Failure::Skipped`] when the command is not there.
     pub fn start(stage: &'a Stage, plan: &Plan, rights: Rights, settings: &Settings) -> Result<Self, Failure> {
         let (command, scratch) = (settings.command()?, Scratch::new()?);
-        // Else three routers say the same.
+        // Without it, three routers report the same.
         plan.installation()?;
         let config = scratch.directory().join("bench-tdma.toml");
         fs::write(&config, plan.text()).map_err(|error| Failure::of("configuration", error))?;
@@ -60,7 +60,7 @@ impl<'a> Routers<'a> {
         })
     }
 
-    /// Kills one as nothing else can, so that it tells nobody.
+    /// Kills one with SIGKILL, so that it tells nobody.
     pub fn kill(&mut self, node: u8) {
         // Dropped, its process is killed.
         self.routers.retain(|router| router.index() != node);
@@ -91,7 +91,7 @@ impl<'a> Routers<'a> {
         Ok(SystemClock::open(&node))
     }
 
-    /// What they say of their slots.
+    /// What they report of their slots.
     ///
     /// # Errors
     /// When one does not answer.
@@ -104,10 +104,10 @@ impl<'a> Routers<'a> {
         Machine::look(&self.routers.iter().map(Router::pid).collect::<Vec<_>>(), SLOTS_THREAD)
     }
 
-    /// Until each of these nodes has sent some packages from now on.
+    /// Waits until each of these nodes has sent some more packages.
     ///
     /// # Errors
-    /// What the others say, if one does not.
+    /// What the others report, if one does not.
     pub fn await_packages(&self, nodes: &[u8], capture: &mut Capture) -> Result<(), Failure> {
         let from = capture.len();
         let give_up = Instant::now() + SENDS_WITHIN;

@@ -1,4 +1,5 @@
-//! Routers of three nodes as threads of one process, whose clocks are made wrong: so the true error of each is known.
+//! Routers of three nodes as threads of one process. Their clocks are wrong on purpose, so that the true error of each
+//! is known.
 
 use super::plan::Plan;
 use super::stage::{NODES, Place, Stage};
@@ -15,12 +16,12 @@ use rohrpost_routers::time::Role;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// As many exchanges as the filter of a clock remembers.
+/// As many exchanges as the filter of a clock holds.
 const SETTLED: u64 = 64;
 const SETTLES_WITHIN: Duration = Duration::from_secs(60);
 const LOOK_EACH: Duration = Duration::from_millis(5);
 
-/// Nobody commands anything here.
+/// No commands are used here.
 struct Silence;
 
 impl Faults for Silence {
@@ -29,7 +30,7 @@ impl Faults for Silence {
     }
 }
 
-/// One node: how wrong its clock is, and its router while it runs.
+/// One node: the error of its clock, and its router while it runs.
 struct Member {
     skew: Skew,
     shell: Option<Shell>,
@@ -41,7 +42,7 @@ pub struct Shells {
 }
 
 impl Shells {
-    /// Starts them, in a process that nothing else happens in: it goes from node to node. The first node's clock is right.
+    /// Starts them, in a process of their own, since it moves from node to node. The first node's clock is right.
     ///
     /// # Errors
     /// When a router does not start.
@@ -51,7 +52,8 @@ impl Shells {
         Ok(Self { members: members.collect::<Result<_, _>>()? })
     }
 
-    /// Until all others follow one master, the first one or who took its place where that stood still, and have measured enough; who it is.
+    /// Waits until all others follow one master (the first one, or its successor after a standstill) and have measured
+    /// enough. Returns the master.
     ///
     /// # Errors
     /// What they show, if one does not.
@@ -76,7 +78,7 @@ impl Shells {
         }
     }
 
-    /// Who takes itself for the master, if that is one alone.
+    /// The node that takes itself for the master, if there is exactly one.
     pub fn master(&self) -> Option<u8> {
         let mut masters = (0..NODES).zip(&self.members).filter(|(_, member)| member.is(Role::Master));
         masters.next().map(|(node, _)| node).filter(|_| masters.next().is_none())
@@ -89,7 +91,7 @@ impl Shells {
         }
     }
 
-    /// What a node has for its page of time.
+    /// What a node has for its time page.
     ///
     /// # Errors
     /// When its router has ended.
@@ -114,7 +116,8 @@ impl Member {
         } else {
             Skew { begin_ns: monotonic_ns(), offset_ns: u64::from(own) * SKEW.offset_ns, ..SKEW }
         };
-        // A page is written and read by this computer's clock, which is another than the node's here: so nobody writes it.
+        // A page is written and read by this computer's clock, which differs from the node's clock here: so nobody
+        // writes it.
         let clock = ClockParts::new(&settings, installation, &node);
         let clock = clock.map(|parts| ClockParts { skew: Some(skew), node: None, ..parts });
         let name = Name::new(SYSTEM, ROUTER.0, own, 0);

@@ -10,19 +10,19 @@ use std::net::{IpAddr, Ipv4Addr};
 
 /// So many nodes send in slots.
 pub const NODES: u8 = 3;
-/// What a network of today has.
+/// Of a current Ethernet.
 const MTU: u16 = 1_500;
 /// Of the bystanders' flood.
 const FLOOD_PORT: u16 = 20_117;
 
-/// Somewhere on the network.
+/// A place on the network.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Place {
     /// The node with this index.
     Node(u8),
-    /// Who floods, and has no slots.
+    /// The flooder, without slots.
     Flooder,
-    /// Who takes the flood.
+    /// The receiver of the flood.
     Swamp,
 }
 
@@ -49,7 +49,7 @@ impl Place {
     }
 }
 
-/// Gone with the last process that is on it.
+/// Freed with the last process on it.
 pub struct Stage {
     lab: Lab,
 }
@@ -58,13 +58,13 @@ impl Stage {
     /// Makes it.
     ///
     /// # Errors
-    /// [`Failure::Skipped`] when the system lets nobody make namespaces.
+    /// [`Failure::Skipped`] when the system allows no namespaces.
     pub fn new() -> Result<Self, Failure> {
         let specs = Place::ALL.map(|place| NodeSpec { name: place.name(), address: place.address() });
         Lab::new(&specs, MTU).map(|lab| Self { lab }).map_err(failure)
     }
 
-    /// The calling process goes there, and stays.
+    /// Moves the calling process there for good.
     ///
     /// # Errors
     /// When it may not.
@@ -73,7 +73,7 @@ impl Stage {
         self.lab.enter(&place.name()).map(std::mem::forget).map_err(failure)
     }
 
-    /// The calling process goes to the bridge, and stays.
+    /// Moves the calling process to the bridge for good.
     ///
     /// # Errors
     /// When it may not.

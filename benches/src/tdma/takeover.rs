@@ -1,4 +1,4 @@
-//! A master that is killed, and what others do about it, as the capture and their pages show it.
+//! A killed master, and the reaction of the others, as the capture and their pages show it.
 
 use super::capture::{Capture, Crossed, FrameKind};
 use super::plan::Plan;
@@ -11,29 +11,29 @@ use rohrpost_routers::tdma::{Kind, Table, Window};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-/// So many cycles before and behind it are looked at.
+/// So many cycles before and after it are examined.
 const CYCLES: u32 = 20;
 const SYNCHRONISED_WITHIN: Duration = Duration::from_secs(10);
 const TAKEN_OVER_WITHIN: Duration = Duration::from_secs(10);
 /// How often pages are read meanwhile.
 const LOOK_EACH: Duration = Duration::from_micros(500);
 
-/// What became of it.
+/// The result.
 #[derive(Clone, Copy, Debug)]
 pub struct TakenOver {
-    /// Who was killed.
+    /// The killed node.
     pub dead: u8,
     /// From the last synchronisation of the old master to the first one in its place, cycles.
     pub replaced_cycles: f64,
     /// To the first one of the new master.
-    pub reigns_cycles: f64,
+    pub new_master_cycles: f64,
     /// Slots of the others that went by without a frame.
     pub slots_lost: u64,
     /// How much a page has moved against the old master's time, µs.
     pub step_us: f64,
 }
 
-/// Who synchronised last as the master.
+/// The node that synchronised last as the master.
 fn master(frames: &[Crossed]) -> Option<u8> {
     frames.iter().rev().find(|frame| frame.what == FrameKind::Sync).map(|frame| frame.from)
 }
@@ -44,16 +44,16 @@ pub fn changes_of_master(frames: &[Crossed]) -> usize {
     masters().zip(masters().skip(1)).filter(|(before, after)| before != after).count()
 }
 
-/// How many of so many cycles had no master's synchronisation, percent.
+/// Share of so many cycles without a master's synchronisation, percent.
 pub fn without_sync_percent(frames: &[Crossed], cycle: Duration, cycles: f64) -> f64 {
     let syncs = || frames.iter().filter(|frame| frame.what == FrameKind::Sync).map(|frame| frame.at_ns);
-    // Of one cycle are those that follow each other within half of one: each slave gets one.
+    // Frames within half a cycle belong to one cycle: each slave gets one.
     let half_ns = cycle.as_nanos() as u64 / 2;
     let begun = syncs().zip(syncs().skip(1)).filter(|(before, at)| at - before > half_ns).count() + 1;
     (cycles - begun as f64).max(0.0) * 100.0 / cycles
 }
 
-/// Kills the master after some part of a cycle, and waits until another reigns.
+/// Kills the master after some part of a cycle, and waits until another node is the master.
 ///
 /// # Errors
 /// When none takes its place.
@@ -80,7 +80,7 @@ pub fn kill_master(
     let mut pages = Pages::begin(clocks, time)?;
     let killed_ns = time.at(monotonic_ns()).ns;
     routers.kill(dead);
-    await_reign(capture, first, dead, cycle, &mut pages)?;
+    await_new_master(capture, first, dead, cycle, &mut pages)?;
     let frames = capture.since(first);
     let never = || Failure::Failed("nobody synchronised in a dead master's place".into());
     let last =
@@ -97,14 +97,15 @@ pub fn kill_master(
     Ok(TakenOver {
         dead,
         replaced_cycles: cycles_until(&[FrameKind::Sync, FrameKind::Replacement]).ok_or_else(never)?,
-        reigns_cycles: cycles_until(&[FrameKind::Sync]).ok_or_else(never)?,
+        new_master_cycles: cycles_until(&[FrameKind::Sync]).ok_or_else(never)?,
         slots_lost,
         step_us: pages.moved_ns as f64 / 1000.0,
     })
 }
 
-/// Until another than the dead master has synchronised as one for some cycles; all the time pages are read.
-fn await_reign(
+/// Waits until another node than the dead master has synchronised as the master for some cycles; pages are read all the
+/// time.
+fn await_new_master(
     capture: &mut Capture,
     first: usize,
     dead: u8,
@@ -127,7 +128,7 @@ fn await_reign(
     Ok(())
 }
 
-/// Slots of a node, those that begin in this part of system time, in which it sent nothing.
+/// Slots of a node that begin in this part of system time, in which it sent nothing.
 fn unused(frames: &[Crossed], table: &Table, time: &TimeRecord, of: &std::ops::Range<u64>) -> u64 {
     let its = frames.iter().filter(|frame| frame.from == table.own());
     let window = |frame: &Crossed| -> Option<Window> {
@@ -140,10 +141,10 @@ fn unused(frames: &[Crossed], table: &Table, time: &TimeRecord, of: &std::ops::R
     table.slots_between(of.start, of.end).saturating_sub(used.len() as u64)
 }
 
-/// The pages of those that live on, against the time of the one that does not.
+/// The pages of the living nodes, compared with the time of the dead one.
 struct Pages {
     time: TimeRecord,
-    /// Each with by how much it was ahead at first, ns.
+    /// Each with its initial lead, ns.
     pages: Vec<(SystemClock, i64)>,
     moved_ns: u64,
 }
@@ -163,7 +164,7 @@ impl Pages {
     }
 }
 
-/// By how much a page is ahead of a time.
+/// Lead of a page over a time.
 fn ahead_ns(clock: &SystemClock, time: &TimeRecord) -> Result<i64, Failure> {
     let record = clock.record().ok_or_else(|| Failure::Failed("a node has no time".into()))?;
     let now_ns = monotonic_ns();

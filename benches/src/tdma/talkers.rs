@@ -1,7 +1,7 @@
-//! Modules of declared flows, on each node: one process that publishes, and one that takes what others publish.
+//! Modules of declared flows, on each node: one process that publishes, and one that takes the packages of others.
 //!
-//! A package is published somewhat later than its flow may, and each flow drifts through the cycle at a pace of its own: so each is published
-//! at all moments of the cycle, and all of them together at some.
+//! Each package is due somewhat later than its flow allows, and each flow drifts through the cycle at its own rate. So
+//! each flow is published at all moments of the cycle, and sometimes all flows at once.
 
 use super::capture::{STAMP_BYTES, STAMPED};
 use super::plan::{Declared, Plan, ear};
@@ -15,11 +15,11 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// How much later each next package comes than it may, at least; those of further flows a little more.
+/// Extra time between packages, at least; a little more for further flows.
 const DRIFT_US: u64 = 37;
-/// Who takes packages looks this often.
+/// Receivers poll this often.
 const EAR_EACH: Duration = Duration::from_millis(1);
-/// What is not there by then does not come any more.
+/// A package that has not arrived by then is lost.
 const COMES_WITHIN: Duration = Duration::from_secs(2);
 
 #[repr(C)]
@@ -34,7 +34,7 @@ struct TalkerCounts {
 // SAFETY: atomics only.
 unsafe impl Zeroable for TalkerCounts {}
 
-/// Until this is dropped.
+/// Runs until this is dropped.
 pub struct Talkers {
     counts: Shared<TalkerCounts>,
     children: Vec<Child>,
@@ -87,7 +87,7 @@ impl Talkers {
     }
 }
 
-/// Takes whatever comes for declared flows.
+/// Takes all packages of declared flows.
 fn listen(directory: &Path, node: u8, plan: &Plan, counts: &TalkerCounts) -> Result<(), Failure> {
     let largest = plan.flows.iter().map(|flow| flow.bytes).max().unwrap_or_default();
     let mut sink = LanSink::open(directory, ear(node), largest as usize)?;
@@ -98,7 +98,7 @@ fn listen(directory: &Path, node: u8, plan: &Plan, counts: &TalkerCounts) -> Res
     }
 }
 
-/// All of them, and who starts them.
+/// All of them, and the process that starts them.
 const ALL: u32 = 2 * NODES as u32 + 1;
 
 /// A flow, and when its next package is due.
@@ -114,7 +114,7 @@ impl<'a> Due<'a> {
     fn open(directory: &Path, flow: &'a Declared, node: u8, place: u64) -> Result<Self, Failure> {
         let (own, to): (Name, Name) = (flow.sender(node), flow.receiver(node));
         let source = LanSource::open(directory, own, to)?.of_type(STAMPED);
-        // No two flows have the same pace, so that their moments meet in all ways.
+        // No two flows have the same rate, so that their moments meet in all combinations.
         let drift_us = DRIFT_US + 5 * (place + 3 * u64::from(node));
         let each_ns = (flow.period_us + drift_us) * 1000;
         Ok(Self { flow, source, body: vec![9; flow.bytes as usize], at_ns: monotonic_ns(), each_ns })
@@ -140,7 +140,8 @@ fn talk(directory: &Path, node: u8, plan: &Plan, counts: &TalkerCounts) -> Resul
     while over.load(Ordering::Acquire) == 0 {
         let Some(next) = flows.iter_mut().min_by_key(|due| due.at_ns) else { break };
         std::thread::sleep(Duration::from_nanos(next.at_ns.saturating_sub(monotonic_ns())));
-        // Counted before, so that nothing is taken that was not published. What the router's mailbox refuses is lost.
+        // Counted before, so that no package is taken before it is counted. A package that the router's mailbox refuses
+        // is lost.
         counts.published.fetch_add(1, Ordering::AcqRel);
         next.publish()?;
     }

@@ -1,4 +1,5 @@
-//! Those who always have packages for others, on each node: one process that floods the next node, and takes what it is flooded with.
+//! Modules that always have packages for others, on each node: one process that floods the next node, and takes what it
+//! is flooded with.
 
 use super::plan::flood;
 use super::routers::Routers;
@@ -10,7 +11,7 @@ use std::time::Duration;
 
 /// Fills a datagram of 1500 bytes, all heads counted.
 const BYTES: usize = 1_420;
-/// More than slots carry: what waits in the queue lasts for a while when this process gets no processor.
+/// More than slots carry: the queue outlasts a while without processor time for this process.
 const BURST: usize = 4;
 const EACH: Duration = Duration::from_millis(1);
 
@@ -37,7 +38,7 @@ impl Traffic {
                 loop {
                     sink.drain();
                     let offered = (0..BURST).try_for_each(|_| source.offer(&package).map(drop));
-                    // Its router is gone, and perhaps there again.
+                    // Its router is gone, and perhaps back.
                     if let (Err(_), Ok(again)) = (offered, LanSource::open(&directory, flood(node), to)) {
                         source = again;
                     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// What the note of a contender begins with that failed.
+/// Prefix of a failed contender's note.
 pub(crate) const FAILED: &str = "FAILED";
 
 /// Longer than anything here takes on a busy computer.
@@ -20,10 +20,11 @@ pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
     command
 }
 
-/// The rows of a run, each checked, after an end without failure: a message that is damaged, missing or out of order would be one.
+/// The rows of a run, each checked, after an end without failure: a message that is damaged, missing or out of order
+/// would be one.
 pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
     let text = String::from_utf8_lossy(&output.stdout);
-    // Of much that was said, what failed comes last.
+    // Failures come last in long output.
     let (said, failed) = (String::from_utf8_lossy(&output.stderr), failures(output));
     assert!(output.status.success(), "{text}\n{said}\n{failed:#?}");
     let mut lines: Vec<Map<String, Value>> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -52,13 +53,13 @@ pub(crate) fn prefix(child: &Child) -> String {
     format!("rohrpost-bench-{}-", child.id())
 }
 
-/// What of it is there still.
+/// Its remaining names in shared memory.
 pub(crate) fn left_behind(prefix: &str) -> Vec<String> {
     let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
     entries.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| name.starts_with(prefix)).collect()
 }
 
-/// Waits until it is so; fails when that takes too long.
+/// Waits until the condition holds; fails when that takes too long.
 pub(crate) fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
     let deadline = Instant::now() + PATIENCE;
     while !is_so() {
@@ -83,7 +84,7 @@ const KEYS: [&str; 13] = [
     "met",
 ];
 
-/// Units of which there may be none.
+/// Units for which zero is allowed.
 const COUNTS: [&str; 12] = [
     "a send",
     "%",
@@ -99,18 +100,18 @@ const COUNTS: [&str; 12] = [
     "of no junk",
 ];
 
-/// Keys are there; figures are times or rates that can be; ratios are there where both have figures.
+/// Keys are there; figures are possible times or rates; ratios are there where both have figures.
 pub(crate) fn check_row(row: &Map<String, Value>) {
     let missing: Vec<&&str> = KEYS.iter().filter(|key| !row.contains_key(**key)).collect();
     assert!(missing.is_empty(), "{row:?} lacks {missing:?}");
     let number = |key: &str| row[key].as_f64();
     for key in ["p50", "p99", "p999", "max", "ratio_p50", "ratio_p99"] {
-        // Nothing is a good count, of system calls or losses say; no time and no rate is nothing.
+        // Zero is a good count of system calls or losses, but no time and no rate.
         let may_be_0 = COUNTS.iter().any(|unit| row["unit"] == *unit);
         let can_be = |value: f64| value.is_finite() && (value > 0.0 || value == 0.0 && may_be_0);
         assert!(number(key).is_none_or(can_be), "{key} of {row:?}");
     }
-    // The limits of POSIX queues may be too small for whoever is not root, a container may forbid tracing or namespaces, and the
+    // The limits of POSIX queues may be too small without root, a container may forbid tracing or namespaces, and the
     // command may not have been built.
     let excuses = [
         "a POSIX queue of",
@@ -139,7 +140,7 @@ pub(crate) fn children(parent: &Child) -> Vec<String> {
     std::fs::read_to_string(list).unwrap_or_default().split_whitespace().map(String::from).collect()
 }
 
-/// Whether none of these is a process of the bench's any more.
+/// Whether none of these is still a process of the bench.
 pub(crate) fn are_gone(pids: &[String]) -> bool {
     !pids.iter().any(|pid| {
         let name = std::fs::read_to_string(Path::new("/proc").join(pid).join("comm")).unwrap_or_default();

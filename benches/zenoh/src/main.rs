@@ -1,4 +1,5 @@
-//! zenoh between two processes through its router, for `rohrpost-bench tcp` to stand beside: scouting is off, every message leaves at once.
+//! zenoh between two processes through its router, for `rohrpost-bench tcp` to stand beside: scouting is off, every
+//! message leaves at once.
 //!
 //! ```text
 //!  rohrpost-bench-zenoh router tcp/127.0.0.1:7447

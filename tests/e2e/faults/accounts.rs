@@ -1,4 +1,4 @@
-//! A bad network: what is lost, delayed, doubled and overtaken, every package of it accounted for.
+//! A bad network: every lost, delayed, duplicated and reordered package is accounted for.
 
 use super::calls::{Calls, assert_once};
 use super::flow::{PLAIN, Sink, Source, balance};
@@ -11,7 +11,7 @@ const IMPAIR: &str = "loss=5%,delay=2ms,reorder=5%,duplicate=1%,seed=7";
 const PACKAGES: u64 = 3000;
 /// One call after so many packages.
 const CALL_EVERY: u64 = 30;
-/// As many as a tool may have under way.
+/// As many as a tool may have in flight.
 const CALLS: usize = rohrpost_modules::call::REPLIES_KEPT;
 /// Repeated after a third of it.
 const CALL: Duration = Duration::from_millis(900);
@@ -23,7 +23,8 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
         field.launch(&["base", "arm"], &[("ROHRPOST_IMPAIR", IMPAIR)]);
         let mut sink = Sink::new(field.robot("arm"), "arm");
         let mut source = Source::new(field.robot("base"), "base", "arm", PLAIN);
-        // A younger server cannot tell whether one before it has run what is repeated, and says that the outcome is unknown.
+        // A younger server cannot tell whether its predecessor has run a repeated call, and answers that the outcome is
+        // unknown.
         let (probe, old) = (field.robot("base").name("probe.1"), (CALL + TRANSIT_MAX).as_millis() as u64);
         wait("probe.1 is old enough", || {
             let mut tool = field.robot("base").tool(CALL);
@@ -46,15 +47,15 @@ fn on_a_bad_network_accounts_balance_order_holds_and_no_call_runs_twice() {
 
         let numbers = sink.numbers(PLAIN);
         assert!(numbers.is_sorted_by(|one, next| one < next), "in order, none twice");
-        // Of a twentieth that the network lost, every one is known; and what else is missing there never carried a package.
+        // Of the 5 % that the network lost, every one is known; the other missing datagrams carried no package.
         assert!((PACKAGES / 40..PACKAGES / 10).contains(&accounts.wire), "{accounts:?}");
         let peer = field.peer("arm", "base");
         assert!(accounts.datagrams_lost - accounts.wire <= accounts.datagrams_other, "{accounts:?}");
         assert!(peer.counters.duplicates > 0 && peer.counters.reordered > 0, "{peer:?}");
         let late = accounts.arm.lost.iter().find(|loss| loss.cause == "late").map_or(0, |loss| loss.packages);
-        assert!(late > 0, "what was overtaken is not delivered: {accounts:?}");
+        assert!(late > 0, "reordered datagrams are not delivered: {accounts:?}");
 
-        // Each has three tries: of a tenth that is lost on the way there or back, hardly any is lost three times.
+        // Each has three tries: with 10 % lost on the way there or back, hardly any is lost three times.
         assert!(last >= 20 && calls.answered().len() as u32 > last * 9 / 10, "{:?}", calls.answers);
         assert_once(&field, "probe.1", &calls.close());
         drop((source, sink));

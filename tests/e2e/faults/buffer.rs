@@ -1,4 +1,4 @@
-//! A router does not read, and the kernel's buffer of its socket runs over.
+//! A router does not read, and the kernel's buffer of its socket overflows.
 
 use super::Field;
 use super::flow::{ALONE_BYTES, PLAIN, Sink, Source, URGENT, balance, carried, lost};
@@ -8,7 +8,7 @@ use rohrpost::interfaces::LinkState;
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::Duration;
 
-/// Datagrams that a node's kernel dropped since a buffer was full.
+/// Datagrams that a node's kernel dropped because a buffer was full.
 fn dropped(field: &Field, node: &str) -> u64 {
     let _inside = field.lab.enter(node).unwrap();
     let text = std::fs::read_to_string("/proc/thread-self/net/snmp").unwrap();
@@ -26,7 +26,8 @@ fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_afte
         let mut sink = Sink::new(field.robot("arm"), "arm");
         let mut flood = Source::new(field.robot("base"), "base", "arm", PLAIN);
         let router = field.router("arm");
-        // What the base said before the arm listened; that it did is known with the first that the arm has heard, at either port.
+        // Datagrams of the base before the arm listened count as lost; the first one that the arm receives, at either
+        // port, shows that it listens.
         field.wait_for_state("arm", "base", LinkState::Alive);
         wait("the first of the flow", || {
             flood.send();
@@ -34,7 +35,7 @@ fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_afte
             (!sink.came.is_empty()).then_some(())
         });
         let before = field.peer("arm", "base").counters.lost;
-        // A busy computer may not flood it in the second until it counts as silent; then once more.
+        // A busy computer may fail to flood it in the second until it counts as silent; then it tries again.
         wait("the buffer runs over", || {
             field.wait_for_state("base", "arm", LinkState::Alive);
             halt(router);

@@ -15,7 +15,7 @@ pub(super) struct Calls {
     timeout: Duration,
     /// Numbers, and the calls that carry them.
     open: Vec<(u32, u32)>,
-    /// What came of each number.
+    /// The outcome of each number.
     pub(super) answers: Vec<(u32, Result<u64, CallError>)>,
 }
 
@@ -36,7 +36,7 @@ impl Calls {
         }
     }
 
-    /// Takes the answers that have come; how many are still to come.
+    /// Takes the answers that have arrived; returns how many are still open.
     pub(super) fn look(&mut self) -> usize {
         let Self { tool, open, answers, .. } = self;
         tool.link.collect();
@@ -55,12 +55,12 @@ impl Calls {
         wait("calls end", || (self.look() == 0).then_some(()));
     }
 
-    /// Waits for none of them any more, and repeats none.
+    /// Stops waiting for them, and repeats none.
     pub(super) fn forget(&mut self) {
         self.open.drain(..).for_each(|(_, call)| self.tool.link.forget(call));
     }
 
-    /// Removes its mailbox; what came of the calls.
+    /// Removes its mailbox; returns the outcome of the calls.
     pub(super) fn close(self) -> Vec<(u32, Result<u64, CallError>)> {
         self.tool.close();
         self.answers
@@ -72,7 +72,8 @@ impl Calls {
     }
 }
 
-/// The server's record and the callers' answers agree: no number was counted twice, and each answer tells the place of its number.
+/// The server's record and the callers' answers agree: no number was counted twice, and each answer has the position of
+/// its number.
 pub(super) fn assert_once(field: &Field, module: &str, answers: &[(u32, Result<u64, CallError>)]) {
     let counted = field.counted(module);
     let once: BTreeSet<u32> = counted.iter().copied().collect();

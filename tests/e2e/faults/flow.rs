@@ -1,4 +1,4 @@
-//! Numbered data from a mailbox of one node to one of another, and the accounts of it.
+//! Numbered data from a mailbox of one node to one of another, and their accounts.
 
 use super::{Field, mailbox_on, router_of};
 use crate::harness::{Robot, wait};
@@ -7,7 +7,8 @@ use rohrpost::{Class, Priority};
 use rohrpost_mailbox::{Label, Loss, Participant, Receiver, SendError, Sender, Shape, Type, local};
 use std::time::Duration;
 
-/// Classes that only flows have, so that their accounts are theirs alone. None is above that of probes, between which they pass.
+/// Classes that only flows have, so that they have accounts of their own. None is above the class of probes, between
+/// which they pass.
 pub(super) const PLAIN: Class = Class(60);
 pub(super) const URGENT: Class = Class(90);
 /// Less important than the calls of tools, and not real time.
@@ -48,7 +49,7 @@ impl Source {
 /// Receives.
 pub(super) struct Sink {
     receiver: Receiver,
-    /// Numbers that came, in order, with the class that they came with.
+    /// Received numbers, in order, with their class.
     pub(super) came: Vec<(u8, u64)>,
 }
 
@@ -78,7 +79,7 @@ fn read(package: &rohrpost_mailbox::Package<'_>) -> (u8, u64) {
     (package.head().priority.0, u64::from_le_bytes(package.body()[..8].try_into().unwrap()))
 }
 
-/// What a router did with a class.
+/// A router's counts of a class.
 pub(super) fn carried(links: &Links, class: Class) -> ClassCarried {
     let none = ClassCarried { class: class.0, taken: 0, sent: 0, came: 0, delivered: 0, lost: Vec::new(), age: None };
     links.classes.iter().find(|carried| carried.class == class.0).cloned().unwrap_or(none)
@@ -89,7 +90,7 @@ pub(super) fn lost(carried: &ClassCarried) -> u64 {
     carried.lost.iter().map(|loss| loss.packages).sum()
 }
 
-/// Accepted by a mailbox, and lost there: not counting what the sender was told.
+/// Accepted by a mailbox, and lost there; without losses that the sender learned of.
 fn lost_in_mailbox(robot: &Robot, name: rohrpost::Name, class: Class) -> u64 {
     let Some(mailbox) = robot.node.look_at(name) else { return 0 };
     let its = mailbox.classes.iter().filter(|row| row.class == Some(class));
@@ -109,8 +110,8 @@ pub(super) struct Accounts {
     pub(super) arm: ClassCarried,
 }
 
-/// Waits until nothing of a class is under way, and has every package accounted for: what was sent is what came, and what each on the
-/// way counts as lost.
+/// Waits until nothing of a class is in flight, and checks that every package is accounted for: sent packages are those
+/// received and those that a station on the way counts as lost.
 pub(super) fn balance(field: &Field, source: &Source, sink: &mut Sink, class: Class) -> Accounts {
     let (base, arm) = (field.robot("base"), field.robot("arm"));
     let transit = base.name(&router_of("base")).with_local(local::TRANSIT);
@@ -132,7 +133,7 @@ pub(super) fn balance(field: &Field, source: &Source, sink: &mut Sink, class: Cl
             ("delivered, and received", accounts.arm.delivered, sink.numbers(class).len() as u64 + mailbox),
         ];
         let is_even = sums.iter().all(|(_, one, other)| one == other);
-        // Gaps show up in the second after.
+        // Gaps are counted in the second after.
         (is_even && accounts.datagrams_lost >= accounts.wire).then_some(accounts)
     })
 }

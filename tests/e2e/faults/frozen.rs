@@ -1,4 +1,4 @@
-//! Processes of a node stand still for seconds, as a swapping computer's do, and go on.
+//! Processes of a node stop for seconds, as on a swapping computer, and go on.
 
 use super::calls::Calls;
 use super::{AT_ONCE, Field, TRANSIT_MAX};
@@ -9,10 +9,10 @@ use rohrpost::interfaces::LinkState;
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};
 
-/// Longer than any package may be under way.
+/// Longer than any package may be in flight.
 const FROZEN: Duration = Duration::from_millis(500).saturating_add(TRANSIT_MAX);
 
-/// Begins calls that nobody can take, of these numbers, and waits until they are too old to be run.
+/// Begins calls of these numbers, which nobody can take, and waits until they are too old to run.
 fn grow_old(field: &Field, node: &str, module: &str, numbers: std::ops::Range<u32>) {
     let begun = Instant::now();
     let mut calls = Calls::new(field, node, module, PATIENCE);
@@ -22,7 +22,7 @@ fn grow_old(field: &Field, node: &str, module: &str, numbers: std::ops::Range<u3
     calls.close();
 }
 
-/// What is told of a node that is frozen, by these processes; then it goes on, and all is as before.
+/// Checks the reports about a node with these frozen processes; then it goes on, and all is as before.
 fn freeze_arm(field: &Field, pids: &[u32], old: std::ops::Range<u32>, after: u32) {
     let silent = field.lines("router.0", &["node arm", "is silent"]).len();
     pids.iter().for_each(|pid| halt(*pid));

@@ -1,4 +1,4 @@
-//! Routers are killed, again and again, while packages are under way.
+//! Routers are killed, again and again, while packages are in flight.
 
 use super::calls::{Calls, assert_once};
 use super::flow::{BULK, Sink, Source};
@@ -14,14 +14,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Calls are answered again within this time after a router was killed: launch waits 100 ms, the router starts, and they take some
-/// milliseconds; the rest is for a computer so busy that a call must be repeated.
+/// Calls are answered again within this time after a router was killed: launch waits 100 ms, the router starts, and
+/// they take some milliseconds; the rest is for a computer so busy that a call must be repeated.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(20);
-/// What is answered within this time was sent once: a call is repeated after a third of its timeout.
+/// A call answered within this time was sent once: a call is repeated after a third of its timeout.
 const ONE_TRY: Duration = Duration::from_secs(10);
-/// What has waited longer is not sent any more.
+/// A package that has waited longer is not sent any more.
 const TOO_LATE: Duration = Duration::from_nanos(WAIT_MAX_NS);
-/// As many as a tool may have under way.
+/// As many as a tool may have in flight.
 const WAITING: usize = rohrpost_modules::call::REPLIES_KEPT;
 /// These are repeated several times meanwhile.
 const MANY_TRIES: Duration = Duration::from_millis(900);
@@ -31,8 +31,8 @@ fn rounds() -> u32 {
     std::env::var("ROHRPOST_FAULT_ROUNDS").ok().map_or(10, |rounds| rounds.parse().unwrap())
 }
 
-/// Numbered data from node to node, a thousand a second, all the time. They fill the mailbox of a router that is dead, and give way
-/// there to what is more important.
+/// Numbered data from node to node, a thousand a second, all the time. They fill the mailbox of a dead router, and give
+/// way there to more important packages.
 struct Traffic {
     ends: Arc<AtomicBool>,
     thread: JoinHandle<Vec<u64>>,
@@ -55,7 +55,7 @@ impl Traffic {
         Self { ends, thread: std::thread::spawn(flow) }
     }
 
-    /// The numbers that came.
+    /// The received numbers.
     fn end(self) -> Vec<u64> {
         self.ends.store(true, Ordering::Relaxed);
         self.thread.join().unwrap()
@@ -69,7 +69,7 @@ fn stale(field: &Field, node: &str) -> u64 {
     rows.iter().filter(|row| row.class == Some(Class(16))).map(|row| row.lost(Loss::Stale)).sum()
 }
 
-/// What became of the packages of tools, for who looks for one.
+/// Outcomes of the packages of tools, for diagnosis.
 fn account(field: &Field, node: &str, other: &str) -> String {
     let mailbox = field.robot(node).name(&router_of(node)).with_local(local::TRANSIT);
     let rows = field.robot(node).node.look_at(mailbox).map(|mailbox| mailbox.classes).unwrap_or_default();
@@ -85,7 +85,7 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
         let mut numbers = 0..;
         let mut answers = [Vec::new(), Vec::new()];
         for round in 0..rounds() {
-            // The other node's probe is called, so that commands wait in the mailbox of the router that is killed.
+            // The other node's probe is called, so that commands wait in the mailbox of the killed router.
             let (node, other, probe) = if round % 2 == 0 { ("base", "arm", 1) } else { ("arm", "base", 0) };
             let (before, stale_before) = (field.peer(other, node).counters.restarts, stale(&field, node));
             // The pause before a restart grows if there were others within a second.
@@ -103,14 +103,14 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
             let took = killed.elapsed();
             assert!(took < ANSWERED_WITHIN, "round {round}, {took:?}: {}", account(&field, node, other));
             if took < ONE_TRY {
-                // What waited was carried by the next router; should that have come late, it said so.
+                // The next router carried the waiting packages; late ones it reports.
                 let is_late = |answer: &Result<u64, CallError>| {
                     matches!(answer, Err(CallError::Fault(_, Fault::Delayed))) && took > TOO_LATE
                 };
                 let good = |(_, answer): &(u32, Result<u64, CallError>)| answer.is_ok() || is_late(answer);
                 assert!(waiting.answers.iter().all(good), "{took:?}: {:?}", waiting.answers);
             } else {
-                // The next router came when they were so old that even its mailbox dropped them; counted they are.
+                // The next router came when they were so old that its mailbox dropped them; they are counted.
                 assert!(
                     stale(&field, node) > stale_before,
                     "round {round}, {took:?}: {}",
@@ -131,7 +131,7 @@ fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_n
             assert_once(&field, &format!("probe.{probe}"), answers);
         }
         for came in traffic.map(Traffic::end) {
-            // What a router had in hand as it died, the next one sends again.
+            // Packages that a router had in hand when it died are sent again by the next one.
             assert!(came.len() > 1000 && came.is_sorted(), "{} came", came.len());
         }
         field.stop();

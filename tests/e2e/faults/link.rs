@@ -1,11 +1,11 @@
-//! The cable is pulled out and put in again; and a cable of which one direction is broken.
+//! The cable is unplugged and plugged in again; and a cable with one broken direction.
 
 use super::Field;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 
 #[test]
-fn a_link_that_is_cut_is_told_at_both_ends_and_once_mended_carries_as_before() {
+fn a_cut_link_is_reported_at_both_ends_and_carries_as_before_once_it_is_fixed() {
     let Some(field) = Field::launched() else { return };
     for round in 1..=2 {
         field.lab.cut("arm").unwrap();
@@ -17,7 +17,7 @@ fn a_link_that_is_cut_is_told_at_both_ends_and_once_mended_carries_as_before() {
         field.lab.fix("arm").unwrap();
         field.wait_counted("base", "probe.1", round as u32);
         field.wait_counted("arm", "probe.0", round as u32);
-        // Else what is known of the next cut would be that of this one.
+        // Otherwise the state of this cut would be taken for that of the next.
         field.wait_for_state("base", "arm", LinkState::Alive);
         field.wait_for_state("arm", "base", LinkState::Alive);
         field.wait_told("router.0", &["node arm", "is heard"], round + 1);

@@ -16,7 +16,7 @@ const NODES: [&str; 3] = ["base", "arm", "desk"];
 const TAKEN_OVER_WITHIN: Duration = Duration::from_secs(15);
 /// Readings of all nodes are this far apart.
 const READ_EVERY: Duration = Duration::from_millis(2);
-/// Readings that must have been good, before and after each change.
+/// Good readings that are required before and after each change.
 const READINGS: u64 = 200;
 
 /// Reads the time of all nodes, over and over, as modules there would.
@@ -62,7 +62,7 @@ impl Reader {
     }
 }
 
-/// On no node time went back within an epoch, and any two nodes differ by no more than both say that they may be off.
+/// On no node time goes back within an epoch, and any two nodes differ by no more than the sum of both stated errors.
 fn check(now: &[SystemTime; 3], last: &[Option<SystemTime>; 3], took_ns: u64) {
     for (node, (now, last)) in NODES.iter().zip(now.iter().zip(last)) {
         let is_on = last.is_none_or(|last| last.epoch < now.epoch || last.epoch == now.epoch && last.ns <= now.ns);
@@ -81,7 +81,7 @@ fn check(now: &[SystemTime; 3], last: &[Option<SystemTime>; 3], took_ns: u64) {
     }
 }
 
-/// What these nodes say, once they all know the time and one of them is the master of all.
+/// The time of these nodes, once they all know it and one of them is the master of all.
 fn agreed(field: &Field, nodes: &[&str]) -> (String, u64) {
     wait(format!("{nodes:?} have a master"), || {
         let said: Vec<ClockState> = nodes.iter().map(|node| field.said(node, RouterInterface::CLOCK)).collect();

@@ -1,7 +1,8 @@
-//! A network that fails in every way: real routers and modules in network namespaces, and what is told, lost, counted and run.
+//! A network with every fault: real routers and modules in network namespaces; what is reported, lost, counted and run.
 //!
-//! Each file is a fault. The nodes are `base` (probe.0 and the collector of lines), `arm` (probe.1) and, where three are needed, `desk`
-//! (probe.2); the test takes part on each as a tool. One lab at a time: each has its own processes, and the computer may be busy.
+//! Each file is a fault. The nodes are `base` (probe.0 and the collector of lines), `arm` (probe.1) and, where three
+//! are needed, `desk` (probe.2); the test takes part on each as a tool. One lab at a time: each has its own processes,
+//! and the computer may be busy.
 
 mod accounts;
 mod buffer;
@@ -33,7 +34,7 @@ use std::time::{Duration, Instant};
 const NODES: [(&str, &str, &str); 3] =
     [("base", "10.78.0.1", "[0, 15]"), ("arm", "10.78.0.2", "[16, 31]"), ("desk", "10.78.0.3", "[32, 47]")];
 const MTU: u16 = 1500;
-/// Packages older than this are not run any more; seed 002 has it in "at most once".
+/// Older packages are not run; seed 002 has this under "at most once".
 const TRANSIT_MAX: Duration = Duration::from_secs(2);
 /// "At once", on a busy computer; a call that is not answered takes [`PATIENCE`].
 const AT_ONCE: Duration = Duration::from_secs(5);
@@ -53,7 +54,8 @@ struct Field {
 }
 
 impl Field {
-    /// So many nodes, none of them launched, with further keys of `[network]`. None, and said so, where namespaces are not permitted.
+    /// So many nodes, none of them launched, with further keys of `[network]`. None, with a report, where namespaces
+    /// are not permitted.
     fn new(nodes: usize, network: &str) -> Option<Self> {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let spec = |(name, address, _): &(&str, &str, &str)| NodeSpec {
@@ -81,7 +83,8 @@ impl Field {
         Some(field)
     }
 
-    /// Launches nodes, all at once, with this in their environment, and waits until all modules are on and the routers hear each other.
+    /// Launches nodes, all at once, with this in their environment, and waits until all modules are on and the routers
+    /// hear each other.
     fn launch(&mut self, nodes: &[&'static str], environment: &[(&str, &str)]) {
         let config = self.config.clone();
         self.launch_from(&config, nodes, environment);
@@ -92,7 +95,7 @@ impl Field {
         }
     }
 
-    /// The same of another configuration; nobody need be heard.
+    /// The same with another configuration; no router needs to be heard.
     fn launch_from(&mut self, config: &Path, nodes: &[&'static str], environment: &[(&str, &str)]) {
         let begin = |node: &&'static str| {
             let mut command = self.place.command(&["launch", config.to_str().unwrap(), "--node", node]);
@@ -143,7 +146,7 @@ impl Field {
         Installation::load(&self.config).unwrap().digest().lan()
     }
 
-    /// What a router says of itself, at most half a second old.
+    /// A router's own report, at most half a second old.
     fn said<T: Data>(&self, node: &str, port: DataPort<T>) -> T {
         let robot = self.robot(node);
         let router = robot.name(&router_of(node));
@@ -152,7 +155,7 @@ impl Field {
             let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
             let said = tool.call::<(u64, T)>(router, GET_DATA, (port.hash)(), ask, |bytes| from_bytes(bytes));
             tool.close();
-            // Of a router that was just started there is nothing yet.
+            // A router that was just started has no report yet.
             said.ok().map(|(_, said)| said)
         })
     }
@@ -175,12 +178,12 @@ impl Field {
         lines(&self.place.path("robot.log"), module, words)
     }
 
-    /// Waits until a module has said so, for this many times in all.
+    /// Waits until a module has reported this so many times in all.
     fn wait_told(&self, module: &str, words: &[&str], times: usize) {
         wait(format!("{module} says {words:?}"), || (self.lines(module, words).len() >= times).then_some(()));
     }
 
-    /// What counting on another node brings, if the answer comes within the timeout.
+    /// The result of counting on another node, if the answer comes within the timeout.
     fn count(&self, node: &str, module: &str, number: u32, timeout: Duration) -> Result<u64, CallError> {
         let mut calls = calls::Calls::new(self, node, module, timeout);
         calls.begin(number);
@@ -188,12 +191,12 @@ impl Field {
         calls.close().remove(0).1
     }
 
-    /// Counts with ever new tries until one comes through.
+    /// Counts with new calls until one succeeds.
     fn wait_counted(&self, node: &str, module: &str, number: u32) {
         wait(format!("{module} counts for {node}"), || self.count(node, module, number, Duration::from_secs(2)).ok());
     }
 
-    /// The fault with which a call is answered at once, although it would wait for long.
+    /// The fault of a call that is answered at once, despite a long timeout.
     fn fault(&self, node: &str, module: &str) -> Fault {
         let begun = Instant::now();
         let answer = self.count(node, module, NEVER, PATIENCE);
@@ -240,7 +243,8 @@ fn lines(log: &Path, module: &str, words: &[&str]) -> Vec<String> {
     text.lines().filter(has).map(str::to_owned).collect()
 }
 
-/// A mailbox of the test's own on a node, beside those of its probe: what goes from one of them to another may have the class of probes.
+/// A mailbox of the test's own on a node, beside those of its probe: packages between two of them may have the class of
+/// probes.
 fn mailbox_on(node: &str) -> Name {
     let index = NODES.iter().position(|(name, ..)| *name == node).unwrap() as u8;
     Name::new(1, 96, index, 200)

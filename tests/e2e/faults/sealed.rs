@@ -1,4 +1,4 @@
-//! Nodes that seal what they send: what can be read of it, who takes no part, and how keys are changed.
+//! Nodes that seal their datagrams: nothing can be read, strangers are refused, and keys can be changed.
 
 use super::strangers::of_version_2;
 use super::{Field, LOG, configure, lines};
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 const KEYS: &str = "security = \"keys\"";
-/// Longer than a datagram, and nowhere else.
+/// Longer than a datagram, and used nowhere else.
 const SECRET: &str = "the combination of the safe is 4711. ";
 
 impl Field {
@@ -29,7 +29,7 @@ impl Field {
         self.place.say(&["keys", step, self.place.path(folder).to_str().unwrap()]).ok()
     }
 
-    /// The field's configuration, but with keys in this folder; or with this said of security.
+    /// The field's configuration, but with keys in this folder; or with these security settings.
     fn with(&self, name: &str, security: &str) -> PathBuf {
         let text = std::fs::read_to_string(&self.config).unwrap();
         let other = self.place.path(&format!("{name}.toml"));
@@ -41,17 +41,17 @@ impl Field {
         self.place.say_at(&self.config, node, arguments)
     }
 
-    /// A configuration of two nodes with this said of security, in which the collector of lines is on the other node.
+    /// A configuration of two nodes with these security settings, in which the collector of lines is on the other node.
     fn collects_on_arm(&self, security: &str) -> PathBuf {
         let log = LOG.replace("robot.log", "arm.log");
         let other = configure(&self.place, "other", 2, security, &[&format!("{OUTPUT}node = \"arm\"\n"), &log]);
-        // One installation, as far as shared memory knows.
+        // One installation for shared memory.
         let text = std::fs::read_to_string(&other).unwrap();
         std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
         other
     }
 
-    /// Each of the two has said why it takes nothing from the other.
+    /// Each of the two has reported why it accepts nothing from the other.
     fn wait_apart(&self, base: &[&str], arm: &[&str]) {
         self.wait_told("router.0", base, 1);
         let log = self.place.path("arm.log");
@@ -96,7 +96,7 @@ fn sealed_nodes_exchange_calls_and_data_and_nothing_of_it_can_be_read() {
 }
 
 #[test]
-fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
+fn a_node_with_another_key_or_none_takes_no_part_and_both_say_why() {
     let Some(mut field) = Field::sealed(2) else { return };
     field.keys("new", "others");
     field.keys("new", "second");
@@ -127,7 +127,7 @@ fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
         field.wait_apart(&[from_arm, base], &[from_base, arm]);
         let peer = field.peer("base", "arm");
         assert_eq!((peer.received.datagrams, peer.received.packages), (0, 0), "{name}: nothing of it was taken");
-        // Routers publish what they count twice a second.
+        // Routers publish their counts twice a second.
         let rejects = || {
             field
                 .links("base")
@@ -137,7 +137,7 @@ fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
         };
         let rejected = wait(format!("{name}: base counts"), rejects);
         assert!(rejected.datagrams > 0, "{rejected:?}");
-        // A caller learns why, and need not look into the other's log; so do those who look.
+        // A caller learns the reason without the other's log; so do tools.
         let hint = if name == "none" { "one of both seals" } else { "copy the folder of keys from the first computer" };
         let told =
             |fault: &Fault| matches!(fault, Fault::NodeRefuses { node, why } if node == "arm" && why.contains(hint));
@@ -157,7 +157,7 @@ fn who_has_another_key_or_none_takes_no_part_and_both_say_why() {
     let other = field.with("arm", "security = \"keys\"\nkeys = \"nowhere\"");
     let said = field.place.say(&["launch", other.to_str().unwrap(), "--node", "arm"]).fails();
     assert!(said.contains("nowhere/udp.keys") && said.contains("copy this folder from the first computer"), "{said}");
-    // With the right one it takes part.
+    // With the right key it takes part.
     field.launch(&["arm"], &[]);
     field.wait_counted("base", "probe.1", 1);
     field.stop();
@@ -250,11 +250,11 @@ fn a_command_of_a_class_that_is_not_listed_is_answered_with_the_rule() {
     std::fs::write(&field.config, format!("{text}\n[access]\nprobe = [\"probe\"]\n")).unwrap();
     field.launch(&["base", "arm"], &[]);
     let line = text.lines().count() + 3;
-    // From another node its router refuses it, and from its own the module itself.
+    // A command from another node is refused by the router, one from the same node by the module itself.
     for from in ["base", "arm"] {
         let fault = wait("a fault", || match field.count(from, "probe.1", super::NEVER, Duration::from_secs(2)) {
             Err(CallError::Fault(_, fault)) => Some(fault.to_string()),
-            // A router that has just begun answers nothing.
+            // A router that has just started answers nothing.
             _ => None,
         });
         let rule = format!("test.toml:{line}, [access]");

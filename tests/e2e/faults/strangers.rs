@@ -1,4 +1,4 @@
-//! Who speaks otherwise: a node with another configuration, and one with another version of the wire format.
+//! Incompatible nodes: one with another configuration, and one with another version of the wire format.
 
 use super::flow::{PLAIN, Sink, Source, carried, lost};
 use super::{Field, LOG, configure, lines};
@@ -16,7 +16,7 @@ fn nodes_with_different_configurations_refuse_each_other_and_both_say_why() {
     // The same two nodes; but the collector of lines is on the other one.
     let log = LOG.replace("robot.log", "arm.log");
     let other = configure(&field.place, "other", 2, "", &[&format!("{OUTPUT}node = \"arm\"\n"), &log]);
-    // One installation, as far as shared memory knows.
+    // One installation for shared memory.
     let text = std::fs::read_to_string(&other).unwrap();
     std::fs::write(&other, text.replace("installation = \"other\"", "installation = \"test\"")).unwrap();
     let config = field.config.clone();
@@ -30,9 +30,9 @@ fn nodes_with_different_configurations_refuse_each_other_and_both_say_why() {
         [("robot.log", "router.0", "node arm", theirs, ours), ("arm.log", "router.1", "node base", ours, theirs)]
     {
         let its = format!("its configuration has the digest {its}, this node's {own}");
-        for who in [format!("takes nothing from {peer} (10.78"), format!("{peer} (10.78.0.")] {
+        for start in [format!("takes nothing from {peer} (10.78"), format!("{peer} (10.78.0.")] {
             let log = field.place.path(log);
-            let words = [who.as_str(), its.as_str(), "launch all nodes from the same file"];
+            let words = [start.as_str(), its.as_str(), "launch all nodes from the same file"];
             wait(format!("{router} says {words:?}"), || (!lines(&log, router, &words).is_empty()).then_some(()));
         }
     }
@@ -103,13 +103,13 @@ fn a_node_with_another_version_is_refused_by_both_versions_and_told_so_once_a_se
     desk.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
     let (begun, mut refusals, mut sent) = (Instant::now(), 0, 0);
     let mut bytes = [0; 1500];
-    // Until it was told three times: at most once a second, and never what it is not.
+    // Until three refusals have arrived: at most one a second, and with the right reason.
     while refusals < 3 {
         assert!(begun.elapsed() < PATIENCE, "told {refusals} times");
         desk.send_to(&of_version_2(&head), ("10.78.0.1", 21117)).unwrap();
         sent += 1;
         let Ok((length, _)) = desk.recv_from(&mut bytes) else { continue };
-        // Beside refusals it is told that the base is there.
+        // Besides refusals it learns that the base is there.
         if let Ok((_, Frame::Refusal(refusal))) = Frame::parse(&bytes[..length]) {
             assert_eq!((refusal.version, refusal.reason), (1, Reason::Version));
             assert_eq!(refusal.digest, field.digest());

@@ -64,22 +64,22 @@ fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() 
             (!field.lines("router.0", &words).is_empty()).then_some(())
         });
         field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
-        // What is delivered: of the first until the second is heard, from there on of the second alone.
+        // Delivered packages: the first router's until the second is heard, the second's alone from there on.
         wait("all of the second came", || {
             sink.take(Duration::from_millis(1));
             (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
         });
         let numbers = sink.numbers(PLAIN);
-        // The first datagram of another incarnation is doubted until a second one says the same, and lost.
+        // The first datagram of another incarnation is lost: it only counts once a second one confirms it.
         let turn = numbers.iter().position(|number| *number >= SECOND).unwrap();
         assert!(turn <= 2, "{turn} of the first came before");
         assert!(
             (SECOND + 1..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
             "all of the second from then on, and nothing else"
         );
-        // How many there were only their own router knows: on a busy computer it cannot send all of a burst.
+        // Only its own router knows how many there were: a busy computer cannot send a whole burst.
         wait("those of the first are counted", || (field.peer("base", "arm").counters.refused > 0).then_some(()));
-        // The first notices that its peer hears another.
+        // The first notices that its peer accepts another router.
         wait("arm is not heard", || {
             second.send();
             (field.peer("arm", "base").state == LinkState::Unheard).then_some(())

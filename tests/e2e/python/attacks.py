@@ -1,6 +1,7 @@
-"""What a hostile program tries against the robot of the demo, as packages: whatever brings them there.
+"""What a hostile program tries against the robot of the demo, as packages, for any transport.
 
-Classes are those of the demo: router 250, motor 200, laser 150, mapper 96, tcp 64, output 32, tool 16; its pilot is 1.140.0.
+Classes are those of the demo: router 250, motor 200, laser 150, mapper 96, tcp 64, output 32, tool 16; its pilot is
+1.140.0.
 """
 
 import itertools
@@ -17,7 +18,7 @@ FOREVER = 0xFFFFFFFF
 
 
 def scan(range_m):
-    """A LaserScan of 181 beams that all end at once: whoever drives by it stops."""
+    """A LaserScan of 181 beams that all end at once: a module that drives by it stops."""
     beams = struct.pack("<f", range_m) * 181
     return struct.pack("<fff", -1.57, 0.01745, 8.0) + varint(181) + beams + b"\0"
 
@@ -30,12 +31,13 @@ def line(module, words, lost=0, ahead_s=0):
 class Attacks:
     """Each by its name: a package as (to, sender, kind, id, body, priority, options).
 
-    `own` are modules that the program may speak for; `laser` is the hash of the laser's interface, as it tells whoever asks.
+    `own` are modules that the program may speak for; `laser` is the hash of the laser's interface,
+    which the laser tells any caller.
     """
 
     def __init__(self, own, laser):
         self.own, self.laser, self.sequence = own, laser, itertools.count(1)
-        self.life = int(time.time()) & 0xFFFFFFFF
+        self.incarnation = int(time.time()) & 0xFFFFFFFF
 
     def all(self):
         return {
@@ -65,7 +67,7 @@ class Attacks:
 
     def call(self, to, sender, function, interface, valid_us, arguments):
         sequence = next(self.sequence)
-        body = command(interface, self.life, sequence, valid_us, arguments)
+        body = command(interface, self.incarnation, sequence, valid_us, arguments)
         return (to, sender | 1, function, sequence & 0xFFFF, body, 255, 0)
 
     def lease(self, sender):

@@ -1,9 +1,12 @@
-"""A program that is no node takes part at a TCP router. Written from docs/src/wire.md, with the standard library alone.
+"""A program that is no node takes part at a TCP router. Written from docs/src/wire.md, with the standard library
+alone.
 
-Arguments: address and port of the TCP router, both digests (hex, with `-` between), its own name (`3.96.0.0`), the byte order of its heads (`little` or
-`big`), the name of a probe (`1.96.0.0`), and, for a sealed session, the folder of certificates and the name of its own.
+Arguments: address and port of the TCP router, both digests (hex, with `-` between), its own name (`3.96.0.0`), the
+byte order of its heads (`little` or `big`), the name of a probe (`1.96.0.0`), and, for a sealed session, the folder
+of certificates and the name of its own.
 
-It hosts that name with one function, `double` (u32) -> u32, calls `count` of the probe, subscribes to its `beat`, and prints what comes.
+It hosts that name with one function, `double` (u32) -> u32, calls `count` of the probe, subscribes to its `beat`, and
+prints the results.
 """
 
 import struct

@@ -1,6 +1,7 @@
-"""A program asks a TCP router for names that are not its own, and prints what that says to each. Written from docs/src/wire.md.
+"""A program asks a TCP router for names that are not its own, and prints each answer. Written from docs/src/wire.md.
 
-Arguments: address and port of the TCP router, both digests (hex, with `-` between), its own name, and ranges, `1.96.0.0-1.96.0.255`.
+Arguments: address and port of the TCP router, both digests (hex, with `-` between), its own name, and ranges,
+`1.96.0.0-1.96.0.255`.
 """
 
 import sys

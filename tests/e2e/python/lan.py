@@ -63,7 +63,8 @@ def check_rfc():
     """The example of RFC 8439, 2.8.2."""
     key, nonce = bytes(range(0x80, 0xA0)), bytes.fromhex("070000004041424344454647")
     text = (
-        b"Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, sunscreen would be it."
+        b"Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, "
+        b"sunscreen would be it."
     )
     signed = bytes.fromhex("50515253c0c1c2c3c4c5c6c7")
     assert tag(key, nonce, signed, cipher(key, nonce, text)).hex() == "1ae10b594f09e26a7e902ecbd0600691"
@@ -78,17 +79,17 @@ def derived(secret, purpose, system, sender, receiver, of_sender=0, of_receiver=
 
 class Peer:
     def __init__(self):
-        self.challenge, self.life, self.key, self.hellos, self.sequence = 1, 0, b"", 0, 0
+        self.challenge, self.incarnation, self.key, self.hellos, self.sequence = 1, 0, b"", 0, 0
 
 
 class Node:
-    """One node among others, without modules: it knows the key of the installation, meets the others, and seals what it is told to."""
+    """One node without modules: it has the installation's key, takes part, and seals the given datagrams."""
 
     def __init__(self, digest, system, own, addresses, port, key_id, secret):
         check_rfc()
         self.digest, self.system, self.own, self.port = digest, system, own, port
         self.addresses, self.key_id, self.secret = addresses, key_id, secret
-        self.life = int.from_bytes(os.urandom(8), "little") | 1
+        self.incarnation = int.from_bytes(os.urandom(8), "little") | 1
         self.peers = {at: Peer() for at in range(len(addresses)) if at != own}
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind((addresses[own], port))
@@ -97,7 +98,7 @@ class Node:
     def datagram(self, kind, to, sequence, rest, key, nonce):
         head = struct.pack(
             "<2sBBBBBBQQQ",
-            b"Rp", 1, kind, self.system, self.own, to, self.key_id, self.digest, self.life, sequence,
+            b"Rp", 1, kind, self.system, self.own, to, self.key_id, self.digest, self.incarnation, sequence,
         )  # fmt: skip
         sealed = cipher(key, nonce, rest)
         sealed += tag(key, nonce, head, sealed)
@@ -113,12 +114,12 @@ class Node:
         peer = self.peers[to]
         peer.hellos += 1
         key = derived(self.secret, FOR_HELLO, self.system, self.own, to)
-        nonce = struct.pack("<QI", self.life, peer.hellos)
+        nonce = struct.pack("<QI", self.incarnation, peer.hellos)
         rest = struct.pack("<QQQQ", challenge, answer, peer.sequence, 0)
         self.emit(to, self.datagram(HELLO, to, peer.hellos, rest, key, nonce))
 
     def seal(self, to, kind, rest):
-        """A datagram that this life seals to the peer's."""
+        """A datagram that this incarnation seals to the peer's."""
         peer = self.peers[to]
         peer.sequence += 1
         sequence = peer.sequence - 1
@@ -136,32 +137,33 @@ class Node:
             except (BlockingIOError, TimeoutError):
                 continue
             if len(datagram) == 84 and datagram[3] == HELLO and address in self.addresses:
-                self.greet(datagram)
+                self.handshake(datagram)
 
-    def greet(self, datagram):
-        sender, life, number = datagram[5], *struct.unpack("<QQ", datagram[16:32])
+    def handshake(self, datagram):
+        sender, incarnation, number = datagram[5], *struct.unpack("<QQ", datagram[16:32])
         peer = self.peers[sender]
         key = derived(self.secret, FOR_HELLO, self.system, sender, self.own)
-        nonce = struct.pack("<QI", life, number)
+        nonce = struct.pack("<QI", incarnation, number)
         sealed = datagram[36:-16]
         assert tag(key, nonce, datagram[:32], sealed) == datagram[-16:], "a hello of another key"
         challenge, answer, _, _ = struct.unpack("<QQQQ", cipher(key, nonce, sealed))
         if answer == peer.challenge:
             peer.challenge = int.from_bytes(os.urandom(8), "little") | 1
-            if peer.life != life:
-                peer.life, peer.sequence = life, 0
-                peer.key = derived(self.secret, FOR_PACKAGES, self.system, self.own, sender, self.life, life)
+            if peer.incarnation != incarnation:
+                peer.incarnation, peer.sequence = incarnation, 0
+                ends = self.system, self.own, sender
+                peer.key = derived(self.secret, FOR_PACKAGES, *ends, self.incarnation, incarnation)
         if challenge:
             self.hello(sender, 0 if answer else peer.challenge, challenge)
 
     def alive(self, to):
         """Says that it is there and hears."""
-        self.emit(to, self.seal(to, ALIVE, struct.pack("<QQQ", self.peers[to].life, 0, 0)))
+        self.emit(to, self.seal(to, ALIVE, struct.pack("<QQQ", self.peers[to].incarnation, 0, 0)))
 
     def meet(self, to):
         """Until the peer has shown that it lives, for ten seconds at most."""
         until = time.monotonic() + 10
-        while not self.peers[to].life:
+        while not self.peers[to].incarnation:
             assert time.monotonic() < until, f"node {to} does not answer"
             self.hello(to, self.peers[to].challenge, 0)
             self.listen(0.2)

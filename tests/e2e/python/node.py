@@ -1,7 +1,7 @@
-"""A node of the LAN with the key, and with harm in mind: it runs in the place of `desk` of the demo, for so many seconds.
+"""A hostile node of the LAN with the key: it runs in the place of `desk` of the demo, for so many seconds.
 
-Arguments: seconds, digest of the LAN (hex), port, the file of keys, the hash of the laser's interface, its own place among the nodes, and the addresses of
-all nodes in their order. Prints what it tried, as one JSON object.
+Arguments: seconds, digest of the LAN (hex), port, the file of keys, the hash of the laser's interface, its own place
+among the nodes, and the addresses of all nodes in their order. Prints its attempts, as one JSON object.
 """
 
 import collections
@@ -20,7 +20,7 @@ from wire import name, package
 def junk(node, to):
     """Datagrams that nobody sealed, at both ports."""
     head = struct.pack(
-        "<2sBBBBBBQQQ", b"Rp", 1, 1, 1, node.own, to, 0, node.digest, node.life + 2, 2**48 - 1
+        "<2sBBBBBBQQQ", b"Rp", 1, 1, 1, node.own, to, 0, node.digest, node.incarnation + 2, 2**48 - 1
     )  # fmt: skip
     body = package(name("1.140.0.2"), name("1.150.0.0"), -16385, 0, os.urandom(64), 255)
     check = struct.pack("<I", zlib.crc32(head + body))

@@ -1,7 +1,8 @@
-"""A program with a valid certificate of another system, and with harm in mind: at the TCP router of the demo, for so many seconds.
+"""A hostile program with a valid certificate of another system: at the TCP router of the demo, for so many seconds.
 
-Arguments: seconds, address and port of the TCP router, both digests (hex, with `-` between), its own system, the hash of the laser's interface, the folder of
-certificates, and the name of its own. Prints what it tried, as one JSON object. Its own module SYSTEM.96.0 describes itself with escape sequences.
+Arguments: seconds, address and port of the TCP router, both digests (hex, with `-` between), its own system, the hash
+of the laser's interface, the folder of certificates, and the name of its own. Prints its attempts, as one JSON
+object. Its own module SYSTEM.96.0 describes itself with escape sequences.
 """
 
 import collections

@@ -1,4 +1,5 @@
-"""What `docs/src/wire.md` says of names, packages and sessions, with the standard library alone: for programs that are no nodes."""
+"""Names, packages and sessions by `docs/src/wire.md`, with the standard library alone: for programs that are no
+nodes."""
 
 import os
 import socket
@@ -68,7 +69,7 @@ class Session:
     def __init__(self, stream, own, digests, order):
         self.stream, self.own, self.digests = stream, own, digests
         self.order, self.kept, self.asked = (">" if order == "big" else "<"), b"", 0.0
-        self.life = self.incarnation = int(time.time() * 1000) & 0xFFFFFFFF
+        self.incarnation = int(time.time() * 1000) & 0xFFFFFFFF
         self.sequence = 0
 
     def say(self, kind, rest):
@@ -94,11 +95,11 @@ class Session:
             self.kept += piece
         return None, b""
 
-    def meet(self, ranges, who):
+    def meet(self, ranges, name):
         hello = struct.pack(
-            "<4sBBBBQQQQQ", MAGIC, 1, self.own >> 24, 0, 0, *self.digests, self.life, 1, time.monotonic_ns()
+            "<4sBBBBQQQQQ", MAGIC, 1, self.own >> 24, 0, 0, *self.digests, self.incarnation, 1, time.monotonic_ns()
         )
-        self.say(HELLO, hello + who.encode())
+        self.say(HELLO, hello + name.encode())
         kind, rest = self.frame()
         if kind == REFUSAL:
             raise SystemExit(f"refused, reason {rest[5]}: {rest[24:].decode()}")

@@ -1,4 +1,4 @@
-//! What comes in as a command, a reply or data: envelopes, arguments, and the decision whether a command runs.
+//! Incoming commands, replies and data: envelopes, arguments, and the decision whether a command runs.
 
 use crate::split::Bytes;
 use rohrpost_config::Principal;
@@ -46,7 +46,7 @@ fn envelopes(body: &[u8]) {
     }
 }
 
-/// Arguments that are read are written so that they are read as the same.
+/// Arguments survive a round trip.
 fn round<T: Data + std::fmt::Debug>(body: &[u8]) {
     let read: T = match read_arguments(body) {
         Ok(read) => read,
@@ -58,7 +58,7 @@ fn round<T: Data + std::fmt::Debug>(body: &[u8]) {
     assert_eq!(format!("{again:?}"), format!("{read:?}"));
 }
 
-/// Commands of some callers, in any order, with any age: what was run is not run again by the repeat that follows.
+/// Commands of some callers, in any order, with any age: a repeat of a command that has run does not run again.
 fn once(body: &[u8]) {
     let mut bytes = Bytes(body);
     let mut now_ns = bytes.long();

@@ -1,4 +1,4 @@
-//! Configuration files, whole: an installation, or what is wrong with it, line by line; and all that `rohrpost check` says.
+//! Whole configuration files: an installation, or its mistakes, line by line; and all output of `rohrpost check`.
 
 use crate::split;
 use rohrpost_config::{Errors, Installation, Problem, Saved, explain};
@@ -23,7 +23,7 @@ pub(crate) fn run(data: &[u8]) {
     check_saved(&installation).iter().for_each(|problem| told(problem, lines(text).max(lines(saved))));
 }
 
-/// There is a reason, and a place that can be found in the file.
+/// There is a reason, and a valid place in the file.
 pub(crate) fn validate(errors: &Errors, text: &str) {
     assert!(!errors.problems().is_empty(), "refused, and nobody says why");
     let lines = text.lines().count().max(1);

@@ -1,4 +1,4 @@
-//! Descriptions that modules give of themselves, and data read by them without a type: what a tool does with both.
+//! Modules' own descriptions, and data read by them without a type: as tools use both.
 
 use crate::split::Bytes;
 use rohrpost_modules::common::ParameterPage;
@@ -8,7 +8,7 @@ use rohrpost_modules::schema::{
     parse_argument,
 };
 
-/// The first byte says what: a description, a page of parameters, or a type and a value of it.
+/// The first byte selects: a description, a page of parameters, or a type and a value of it.
 pub(crate) fn run(data: &[u8]) {
     let Some((what, bytes)) = data.split_first() else { return };
     match what % 3 {
@@ -85,7 +85,7 @@ fn shown(value: &Value) {
     let _ = numbers(value, LIST_SHOWN);
 }
 
-/// What goes to JSON and comes back means the same.
+/// A round trip through JSON keeps the meaning.
 fn as_json(ty: &Type, value: &Value) {
     let json = serde_json::to_string(value).unwrap_or_else(|error| panic!("{value:?}: {error}"));
     // The reader of JSON has a bound of its own on nesting.

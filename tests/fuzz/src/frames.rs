@@ -1,4 +1,4 @@
-//! Datagrams of routers: what one says of itself was checked as a whole, so what was read is written again, byte for byte.
+//! Datagrams of routers: their check covers the whole, so a datagram is written again as it was read, byte for byte.
 
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, PARTS_MAX, VERSION};
@@ -6,7 +6,7 @@ use rohrpost_routers::time::message::Message;
 
 pub(crate) fn run(data: &[u8]) {
     validate(data);
-    // A fuzzer does not find the check by trying, so it is given, as by a sender that makes mistakes of its own.
+    // A fuzzer does not find the check by trying, so it is added, as by a sender with mistakes of its own.
     if let Some((head, rest)) = data.split_first_chunk::<HEAD_BYTES>() {
         validate(&[&checked(head, rest)[..], rest].concat());
     }

@@ -1,4 +1,5 @@
-//! Heads of packages: sixteen bytes are one, fewer are an error that says so, and what was read is written again.
+//! Heads of packages: sixteen bytes are one, fewer are an error that says so, and a head is written again as it was
+//! read.
 
 use rohrpost_mailbox::{HEAD_BYTES, Head, Kind, Options, Type};
 

@@ -1,4 +1,4 @@
-//! Impairments as people type them: what is understood is printed so that it is understood again as the same.
+//! Impairments as people type them: an accepted text is printed in a form that reads back as the same.
 
 use rohrpost_routers::impair::{Impairment, Output, Settings};
 

@@ -1,12 +1,12 @@
-//! Fuzz targets: each takes any bytes, hands them to what reads bytes of others, and panics if a promise is not kept.
+//! Fuzz targets: each takes any bytes, passes them to a reader of foreign bytes, and panics if a promise is broken.
 //!
 //! ```text
 //! corpus/NAME/*  ──┬── tests/corpus.rs    each file once, in every `cargo xtask test`
 //!                  └── libFuzzer          changes them, guided by what code they reach: `cargo xtask fuzz`
 //! ```
 //!
-//! The promise that all share: no panic, no read outside, an end in bounded time and memory. The others stand in the targets.
-//! An input that broke one stays in the corpus, under a name that says what it broke.
+//! The common promise: no panic, no read out of bounds, an end in bounded time and memory. Targets add others.
+//! An input that broke a promise stays in the corpus, under a name that describes the mistake.
 
 #![forbid(unsafe_code)]
 
@@ -34,7 +34,7 @@ mod split;
 pub struct Target {
     /// Its name, which is also its folder in `corpus/`.
     pub name: &'static str,
-    /// Reads the bytes; panics if a promise is not kept.
+    /// Reads the bytes; panics if a promise is broken.
     pub run: fn(&[u8]),
 }
 
@@ -58,7 +58,7 @@ pub const TARGETS: [Target; 16] = [
     Target { name: "impairments", run: impairments::run },
 ];
 
-/// A target that must fail: it shows that the fuzzer finds what is to be found.
+/// A target that must fail: it shows that the fuzzer finds planted mistakes.
 pub const PLANTED: Target = Target { name: "planted", run: planted::run };
 
 /// The target of this name.

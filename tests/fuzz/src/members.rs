@@ -1,5 +1,5 @@
-//! A TCP router and connections that do anything that frames can say, at any time: accounts balance, memory and places are bounded, a name has
-//! one host at most, and who is let in is whom the digests say.
+//! A TCP router and connections that send any frames at any time: accounts balance, memory and places are bounded, a
+//! name has one host at most, and the digests decide which connections are accepted.
 
 use crate::sessions::{BEGIN_NS, Deaf, MS, server};
 use crate::split::Bytes;
@@ -9,9 +9,9 @@ use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
 use rohrpost_routers::session::server::{Output, Server, State};
 
 const STEPS_MAX: usize = 300;
-/// Places of who takes part and of who is let in.
+/// Places of members and of accepted connections.
 const PLACES: usize = 5;
-/// Packages that wait, a batch, the largest frame on each side as vectors grow, ranges that wait, and the rest.
+/// Waiting packages, a batch, the largest frame on each side as vectors grow, waiting ranges, and the rest.
 const BYTES_MAX: usize = (64 + 16 + 2 * 2 * 66 + 32 + 16) << 10;
 
 struct World {
@@ -31,14 +31,14 @@ pub(crate) fn run(data: &[u8]) {
         world.step(&mut bytes);
         world.check();
     }
-    // At the end all leave, and nothing waits any more.
+    // At the end all leave, and no package waits any more.
     while let Some(client) = world.connections.pop() {
         world.server.closed(world.now_ns, client, &mut Deaf);
     }
     for (priority, class) in world.server.counts().classes() {
         assert_eq!(class.packages.get(), class.settled(), "class {}", priority.0);
     }
-    assert!(world.server.table().is_empty(), "who has gone hosts nothing");
+    assert!(world.server.table().is_empty(), "a program that has left hosts nothing");
 }
 
 impl World {
@@ -92,7 +92,7 @@ impl World {
         self.server.received(self.now_ns, client, &stream, &mut Deaf);
     }
 
-    /// Streams take what the input says of it.
+    /// Streams accept as many bytes as the input says.
     fn poll(&mut self, bytes: &mut Bytes<'_>) {
         loop {
             match self.server.poll(self.now_ns, &mut Deaf) {
@@ -124,7 +124,7 @@ impl World {
             let bytes = self.server.bytes_of(client);
             assert!(bytes <= BYTES_MAX, "{bytes} B for one connection");
             let hosts = hosted_by(client).count();
-            assert!(hosts == 0 || state == State::Member, "only who takes part hosts names");
+            assert!(hosts == 0 || state == State::Member, "only members host names");
         }
         let (mut packages, mut known) = (0, self.server.waiting() as u64);
         for (priority, class) in self.server.counts().classes() {

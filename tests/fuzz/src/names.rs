@@ -1,5 +1,5 @@
-//! Names of mailboxes and modules, durations and sizes as people type them: what is understood, is printed so that it is
-//! understood again as the same.
+//! Names of mailboxes and modules, durations and sizes as people type them: an accepted text is printed in a form that
+//! reads back as the same.
 
 use rohrpost_config::{Installation, duration_text, is_class_name, nearest, parse_duration, parse_size, size_text};
 use rohrpost_mailbox::Name;
@@ -33,7 +33,7 @@ pub(crate) fn run(data: &[u8]) {
         let _ = INSTALLATION.output_level(name);
     }
     if let Ok(duration) = parse_duration(text) {
-        // The text is for people and may be rounded; it is one all the same.
+        // The text is for people and may be rounded, but is valid all the same.
         assert!(parse_duration(&duration_text(duration)).is_ok(), "{}", duration_text(duration));
     }
     if let Ok(bytes) = parse_size(text) {

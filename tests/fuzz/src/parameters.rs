@@ -1,5 +1,5 @@
-//! Files of saved parameters (`param save`, `param load`) for the demonstration's installation: values with their lines,
-//! or what is wrong, line by line; and a value that a parameter takes reads back as the same.
+//! Files of saved parameters (`param save`, `param load`) for the demonstration's installation: values with their
+//! lines, or mistakes, line by line; and a value that a parameter accepts reads back as the same.
 
 use crate::config::validate;
 use crate::split;
@@ -57,7 +57,7 @@ fn types() -> [Type; 7] {
     ]
 }
 
-/// Whatever type takes it, gives it back, and writes it as TOML that reads back.
+/// A type that accepts the value gives it back, and writes it as TOML that reads back.
 fn taken(value: &Value) {
     for ty in types() {
         let Ok(bytes) = from_file(&ty, value) else { continue };

@@ -1,4 +1,4 @@
-//! A mistake that a fuzzer guided by coverage meets in seconds; a blind one would need some 2^40 tries.
+//! A mistake that a coverage-guided fuzzer finds in seconds; a blind one would need some 2^40 tries.
 
 pub(crate) fn run(data: &[u8]) {
     let mut rest = data;

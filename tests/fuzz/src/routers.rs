@@ -1,4 +1,4 @@
-//! Two routers and a wire that does anything: whatever comes, accounts balance, memory is bounded, and nothing of one incarnation of a
+//! Two routers and a wire with any faults: accounts balance, memory is bounded, and no package of one incarnation of a
 //! sender is delivered twice or out of order.
 
 use crate::frames::checked;
@@ -70,11 +70,11 @@ fn settings(own: NodeIndex, incarnation: u64) -> Settings {
     }
 }
 
-/// What a router told.
+/// A router's events.
 #[derive(Default)]
 struct Log {
     lost: u64,
-    /// Number of each package that was delivered, and its priority.
+    /// Number of each delivered package, and its priority.
     delivered: Vec<(u16, Priority)>,
 }
 
@@ -102,7 +102,7 @@ struct World {
     now_ns: u64,
     sender: (Outbound, Arc<Stats>, Log),
     receiver: (Inbound, Arc<Stats>, Log),
-    /// Datagrams that left; they arrive as the program says.
+    /// Sent datagrams; they arrive as the program says.
     wire: Vec<Vec<u8>>,
     next_id: u16,
     /// The program made datagrams of its own: then only memory and accounts are checked.
@@ -170,7 +170,7 @@ impl World {
         }
     }
 
-    /// One of those on the wire, which stays there or not.
+    /// Picks a datagram on the wire, which stays there or not.
     fn arrive(&mut self, which: u8, again: bool) {
         let count = self.wire.len();
         if count > 0 {
@@ -180,7 +180,7 @@ impl World {
         }
     }
 
-    /// A datagram with some bytes changed; the check shows it.
+    /// A datagram with some changed bytes; the check detects it.
     fn damage(&mut self, bytes: &mut Bytes<'_>) {
         let Some(mut datagram) = self.wire.pop() else { return };
         let (at, change) = (usize::from(bytes.half()) % datagram.len(), bytes.byte());
@@ -188,7 +188,7 @@ impl World {
         self.handle(&datagram, 0);
     }
 
-    /// A datagram that no router made, though it is checked.
+    /// A datagram that no router made, with a valid check.
     fn forge(&mut self, bytes: &mut Bytes<'_>) {
         self.forged = true;
         let (which, source, length) = (bytes.byte(), bytes.byte() % 3, usize::from(bytes.byte()));

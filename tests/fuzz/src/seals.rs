@@ -1,5 +1,6 @@
-//! Two routers that seal, and a wire that keeps all and does anything: what opens was sealed by the present incarnation of the one for the present
-//! incarnation of the other, is as it was, and opens once; and an incarnation begins only by what was said since the last one did.
+//! Two routers that seal, and a wire that keeps all datagrams and has any faults: an opened datagram was sealed by the
+//! present incarnation of one for the present incarnation of the other, is unchanged, and opens once; and an
+//! incarnation begins only by datagrams sent since the last one began.
 
 use crate::frames::checked;
 use crate::split::Bytes;
@@ -35,7 +36,7 @@ struct Router {
     next: [u64; 2],
     /// The step at which the peer's last incarnation began: the challenge is no older.
     drawn: usize,
-    /// Places on the wire of what it has opened.
+    /// Places on the wire of the datagrams that it has opened.
     opened: Vec<usize>,
 }
 
@@ -61,12 +62,12 @@ impl Router {
     }
 }
 
-/// What was on the wire, and who meant it for whom.
+/// A datagram on the wire, with its sender and receiver.
 struct Sent {
     datagram: Vec<u8>,
     from: NodeIndex,
     port: usize,
-    /// Incarnations of the sender, and of the incarnation that it sealed to; of a hello 0.
+    /// Incarnations of the sender, and of the receiver that it sealed to; 0 in a hello.
     lives: (u64, u64),
     text: Vec<u8>,
     step: usize,
@@ -127,7 +128,7 @@ impl World {
         }
     }
 
-    /// What was on the wire arrives, perhaps once more.
+    /// A datagram on the wire arrives, perhaps a second time.
     fn arrive(&mut self, place: usize) {
         let Some(sent) = self.wire.get(place) else { return };
         let router = &mut self.routers[usize::from(1 - sent.from)];
@@ -137,21 +138,21 @@ impl World {
         let answer = match router.opening[sent.port].open(&mut datagram) {
             Ok(Opened::Frame(head, text)) => {
                 assert_eq!(sent.lives.0, head.incarnation, "of this incarnation");
-                // Time is sealed to a node, whichever incarnation of it takes it.
+                // Time is sealed to a node, so any incarnation of it opens it.
                 assert!(sent.port == 1 || sent.lives.1 == router.incarnation, "to this incarnation");
                 assert_eq!((known, text), (Some(head.incarnation), &sent.text[..]));
                 assert!(!router.opened.contains(&place), "it was opened before");
                 router.opened.push(place);
                 None
             }
-            Ok(Opened::Hello(head, greeting)) => {
-                let greeted = router.handshake.greet(0, &head, &greeting, &mut room);
+            Ok(Opened::Hello(head, hello)) => {
+                let reply = router.handshake.greet(0, &head, &hello, &mut room);
                 router.handshake.begin();
-                if greeted.begins {
+                if reply.begins {
                     assert!(sent.step >= router.drawn, "an incarnation began by what was said before");
                     router.drawn = self.step;
                 }
-                greeted.reply_bytes
+                reply.reply_bytes
             }
             Err(_) => None,
         };
@@ -165,7 +166,7 @@ impl World {
         let Some(sent) = self.wire.get(usize::from(bytes.half())) else { return };
         let (mut datagram, to) = (sent.datagram.clone(), 1 - sent.from);
         let (at, change) = (usize::from(bytes.half()) % datagram.len().max(1), bytes.byte().max(1));
-        // The check alone is no part of what is signed.
+        // The check alone is not part of the signed bytes.
         if (HEAD_BYTES - 4..HEAD_BYTES).contains(&at) {
             return;
         }
@@ -175,7 +176,7 @@ impl World {
         }
     }
 
-    /// What nobody sealed as it is opens nowhere.
+    /// A datagram changed after sealing opens nowhere.
     fn strange(&mut self, to: NodeIndex, datagram: &[u8]) {
         let Some((head, rest)) = datagram.split_first_chunk::<HEAD_BYTES>() else { return };
         let datagram = [&checked(head, rest)[..], rest].concat();

@@ -1,5 +1,6 @@
-//! A node's files as another process may leave them: any bytes in a mailbox, in the table of participants, in a table of traffic, in
-//! the time page and in what owners say of themselves; before they are opened, and under those who use them.
+//! A node's files as another process may leave them: any bytes in a mailbox, in the table of participants, in a table
+//! of traffic, in the time page and in owners' descriptions of themselves; before they are opened, and while they are
+//! in use.
 //!
 //! The input is a program: what to do next, and which bytes to change before. Every second byte or so of it is an
 //! instruction, so that a fuzzer can put programs together.
@@ -41,7 +42,7 @@ pub(crate) fn run(data: &[u8]) {
     }
 }
 
-/// What a program works with. Whatever could not be made or opened is missing, and the program goes on without it.
+/// The state of a program. An object that could not be made or opened is missing, and the program goes on without it.
 struct Robot {
     path: PathBuf,
     shape: Shape,
@@ -127,7 +128,7 @@ impl Robot {
         }
     }
 
-    /// Sleeps at most for a moment, whatever the words say.
+    /// Sleeps only briefly, whatever the words contain.
     fn wait(&mut self) {
         let Some(receiver) = &mut self.receiver else { return };
         let _ = wait_any(&mut [&mut *receiver], Waiting::from(Duration::from_micros(1)), || false);
@@ -200,7 +201,7 @@ impl Robot {
         }
     }
 
-    /// One of the node's files, whoever made it.
+    /// One of the node's files, of any maker.
     fn file(&self, which: u8) -> PathBuf {
         let mailbox = |name: Name, kind: &str| format!("{:08x}.{kind}", name.raw());
         let name = match which % 7 {
@@ -215,7 +216,7 @@ impl Robot {
         self.path.join(name)
     }
 
-    /// Never cuts a file that somebody may have mapped: that is outside the contract, and ends the process.
+    /// Never truncates a file that a process may have mapped: that is outside the contract, and ends the process.
     fn lengthen(&self, bytes: &mut Bytes<'_>) {
         let path = self.file(bytes.byte());
         let more = u64::from(bytes.half()) * 16;
@@ -226,7 +227,7 @@ impl Robot {
         }
     }
 
-    /// A new file in the place of the old one, from its first byte on; the old one stays with those who have it.
+    /// A new file in place of the old one, from its first byte on; processes that have the old one open keep it.
     fn overwrite(&self, bytes: &mut Bytes<'_>) {
         let path = self.file(bytes.byte());
         let contents = bytes.take(4096).to_vec();

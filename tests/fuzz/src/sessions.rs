@@ -1,5 +1,5 @@
-//! Frames of sessions: a stream that anybody writes, to a TCP router and to a client. What was read is written again, byte for byte, however
-//! the stream is split, and nothing that was promised in it takes memory before it came.
+//! Frames of sessions: a stream from anybody, to a TCP router and to a client. Frames are written again as they were
+//! read, byte for byte, however the stream is split, and announced bytes take no memory before they arrive.
 
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
@@ -10,7 +10,7 @@ use rohrpost_routers::session::{Answers, Cause};
 
 pub(crate) const MS: u64 = 1_000_000;
 pub(crate) const BEGIN_NS: u64 = 1000 * MS;
-/// What a connection takes up that has sent so many bytes: the same twice, as vectors grow, and the rest.
+/// Memory of a connection that has sent so many bytes: twice as many, as vectors grow, and the rest.
 const BESIDE_BYTES: usize = 16 * 1024;
 
 pub(crate) fn run(data: &[u8]) {
@@ -40,7 +40,7 @@ fn frames(mut stream: &[u8]) {
     }
 }
 
-/// Takes no notice.
+/// Ignores all events.
 pub(crate) struct Deaf;
 
 impl Answers for Deaf {

@@ -1,6 +1,6 @@
 //! Several things from one input.
 
-/// A line that parts two texts of one input; in a corpus, people see where.
+/// A line that separates two texts of one input, visible to readers of a corpus.
 const MARK: &str = "\n#====\n";
 
 /// The text before and the text after the mark; without one, all is before it.
@@ -9,7 +9,7 @@ pub(crate) fn texts(data: &[u8]) -> Option<(&str, &str)> {
     Some(text.split_once(MARK).unwrap_or((text, "")))
 }
 
-/// Bytes taken one thing after the other; past the end all are zero.
+/// Takes bytes in order; past the end all are zero.
 pub(crate) struct Bytes<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Bytes<'a> {

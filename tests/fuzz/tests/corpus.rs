@@ -1,4 +1,4 @@
-//! Every input of the corpus once: what was fixed stays fixed. And a target that fails is noticed.
+//! Every input of the corpus once: fixed mistakes stay fixed. And a failing target is noticed.
 
 use rohrpost_fuzz::{PLANTED, TARGETS, Target};
 use std::fs;
@@ -18,7 +18,7 @@ fn corpus(target: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Runs an input on a thread of its own, with the stack that threads have; what it panicked with, or that it did not end.
+/// Runs an input on a thread of its own, with the usual stack. Returns its panic, or that it did not end.
 fn run(target: Target, input: Vec<u8>) -> Result<(), String> {
     let (done, ended) = mpsc::channel();
     std::thread::spawn(move || {

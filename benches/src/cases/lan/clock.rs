@@ -1,7 +1,8 @@
 //! How far a slave's system time is off the master's, while both processors work and the network is full.
 //!
-//! The clock services are those of routers. The clocks that they read are this computer's, the slave's made wrong by a known offset,
-//! 30 ppm, and half a ppm that comes and goes; so the true error of each reading is known, and its own bound must contain it.
+//! The clock services are those of routers. The clocks that they read are this computer's, the slave's made wrong by a
+//! known offset, 30 ppm, and half a ppm that comes and goes; so the true error of each reading is known, and its own
+//! bound must contain it.
 
 use crate::cases::Case;
 use crate::harness::{End, Failure, sample_in_child};

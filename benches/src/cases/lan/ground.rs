@@ -1,4 +1,4 @@
-//! What the turns of a case happen on: a network of its own, and two nodes with their routers.
+//! What the turns of a case share: a network of its own, and two nodes with their routers.
 
 use crate::harness::Failure;
 use crate::lan::Wire;
@@ -6,16 +6,16 @@ use crate::lan::nodes::{Network, Nodes};
 use crate::settings::Settings;
 use std::cell::Cell as Counter;
 
-/// As large as a datagram can be, so that none is parted.
+/// The largest possible datagram, so that nothing is fragmented.
 pub(super) const WHOLE: u16 = u16::MAX;
-/// What a network of today has.
+/// Of a current Ethernet.
 pub(super) const ETHERNET: u16 = 1_500;
 
-/// What all turns of a case happen on.
+/// What all turns of a case share.
 pub(super) struct LanSegment {
-    /// None where there may be no namespaces.
+    /// None if the system allows no namespaces.
     wire: Result<Wire, Failure>,
-    /// None where there is no command, or it does not start: then ours has no figure, and the floors still have.
+    /// None without the command, or if it does not start: then only the floors have figures.
     nodes: Result<Nodes, Failure>,
     turns: Counter<u8>,
 }
@@ -26,7 +26,7 @@ impl LanSegment {
         Self::on(settings, network, Wire::new(network.mtu))
     }
 
-    /// The same on a network that is there.
+    /// As [`Self::new`], on an existing network.
     pub(super) fn on(settings: &Settings, network: &Network, wire: Result<Wire, Failure>) -> Self {
         let nodes =
             wire.as_ref().map_err(Clone::clone).and_then(|wire| Nodes::start(wire, network, settings.command()));
@@ -37,7 +37,7 @@ impl LanSegment {
         self.wire.as_ref().map_err(Clone::clone)
     }
 
-    /// For a turn of ours: the nodes, and its number.
+    /// For one of our turns: the nodes, and its number.
     pub(super) fn turn(&self) -> Result<(&Nodes, u8), Failure> {
         let turn = self.turns.get();
         self.turns.set(turn.wrapping_add(1));

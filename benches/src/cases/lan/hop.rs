@@ -1,4 +1,5 @@
-//! How long a package takes from a module on one node to a module on another, one at a time; everybody sleeps who waits.
+//! How long a package takes from a module on one node to a module on another, one at a time; every waiting process
+//! sleeps.
 
 use super::ground::{ETHERNET, LanSegment, WHOLE};
 use crate::cases::Case;
@@ -12,10 +13,10 @@ use crate::settings::Settings;
 use std::time::Duration;
 
 const MESSAGES_PACED: usize = 1_000;
-/// A package each so often, as robots send.
+/// Period of packages, as robots send.
 const PACE: Duration = Duration::from_micros(500);
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let whole = |bytes| LanHop { name: "hop", bytes, mtu: WHOLE, pace: None, judged: true };
     let mut cases = [64, 1024, 16_384, 62_000].map(whole).to_vec();
@@ -30,7 +31,7 @@ struct LanHop {
     bytes: usize,
     mtu: u16,
     pace: Option<Duration>,
-    /// Whether the targets hold.
+    /// Whether the targets apply.
     judged: bool,
 }
 

@@ -1,13 +1,14 @@
-//! A package now and then from node to node, while somebody sends 500 000 datagrams a second to each port of the far one: how much later it comes than
-//! without them.
+//! A package now and then from node to node, while 500 000 foreign datagrams a second arrive at each port of the far
+//! node: how much later the package arrives than without them.
 //!
 //! ```text
 //!  processor 0                                processor 1
 //!  ping ─▶ router ═══════════════════════════▶ router ─▶ pong
 //!  junk ══════════════════════════════════════▶ both of its ports
 //! ```
-//! `junk`: from an address that no node has; `junk of a peer`: from that of the near node, as an attacker may write it on what it sends. The floor of each: a
-//! bare hop by UDP under the same junk, to ports that nobody reads. It tells what the junk costs the computer that carries it, whoever is its target.
+//! `junk`: from an address that no node has; `junk of a peer`: from the address of the near node, as an attacker may
+//! forge it. The floor of each: a bare hop by UDP under the same junk, to ports that nobody reads. It shows what the
+//! junk costs the computer that carries it.
 
 use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;
@@ -27,20 +28,20 @@ use std::time::Duration;
 const BYTES: usize = 64;
 const MESSAGES: usize = 2_000;
 const PACE: Duration = Duration::from_micros(500);
-/// Of packages and of time, as configurations have them that say nothing; and two that nobody reads.
+/// Default ports of packages and of time; and two that nobody reads.
 const PORTS: [u16; 2] = [21_117, 21_118];
 const UNREAD: [u16; 2] = [21_217, 21_218];
 
-/// Whose address stands on it.
+/// The source address of junk.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum JunkSource {
-    /// That of a third computer, which is no node.
+    /// A third computer, which is no node.
     Stranger,
-    /// That of the near end: a node that the far one takes datagrams of.
+    /// The near end: a node from which the far one accepts datagrams.
     Peer,
 }
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let case = |name, from| Box::new(LanJunk { name, from }) as Box<dyn Case>;
     vec![case("junk", JunkSource::Stranger), case("junk of a peer", JunkSource::Peer)]

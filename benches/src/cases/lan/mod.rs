@@ -1,4 +1,5 @@
-//! Two nodes on a network of their own: how long a package takes over two routers, how many go, what is urgent past a flood.
+//! Two nodes on a network of their own: how long a package takes over two routers, how many go, what is urgent past a
+//! flood.
 
 mod clock;
 mod ground;

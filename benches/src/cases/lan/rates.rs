@@ -1,15 +1,16 @@
 //! How many packages go from node to node in a second, beside raw datagrams, and what is lost of them.
 //!
-//! `rate`: the largest datagram is chosen so that one package fits and no second one. `packing`: as many as fit. Ours has a window of
-//! packages on their way, as senders that want an answer have one: more would only be lost in its own node's router.
+//! `rate`: the largest datagram holds exactly one package. `packing`: it holds as many as fit. Ours has a window of
+//! packages in flight, as senders that await an answer have: more would only be lost in the router of the sending node.
 //!
 //! ```text
 //!  processor 0                  processor 1
 //!  raw sender ═══════════════▶ raw receiver
-//!  sending router ═══════════▶ receiving router ─▶ receiving module;  sending module, which hands over a window at a time
+//!  sending router ═══════════▶ receiving router ─▶ receiving module;  sending module, a window at a time
 //! ```
-//! Two nodes share two processors here, so the sending router has one for itself, as the raw sender has. With the sending module on
-//! that one, too, and below its router as launch schedules it, each package costs two changes of process: that is told beside.
+//! Two nodes share two processors here. So the sending router has a processor for itself, as the raw sender has. With
+//! the sending module on that processor, too, and below its router as launch schedules it, each package costs two
+//! process switches: a row of its own shows that.
 
 use super::ground::{LanSegment, WHOLE};
 use crate::cases::Case;
@@ -28,19 +29,19 @@ use std::time::Duration;
 
 /// Long enough for some ten thousand packages, short enough that the kernel's fair server stays out.
 const TURN: Duration = Duration::from_millis(500);
-/// Below the slots of a router's mailbox.
+/// Less than the slots of a router's mailbox.
 const WINDOW: u64 = 60;
-/// Above the routers' threads: a sender on the other processor hands over what it has before they go on.
+/// Above the routers' threads: a sender on the other processor hands over its whole window before they run.
 const SENDER_FIFO: u8 = 80;
 const BESIDE_ROUTER: &str = "beside its router";
-/// IPv4 and UDP, and the head of a router's frame, before the packages.
+/// Headers of IPv4, UDP and a router's frame, before the packages.
 const BEFORE_PACKAGES: usize = 28 + frame::HEAD_BYTES;
-/// Least that a network's largest packet may be.
+/// Minimum of a network's MTU.
 const MTU_MIN: usize = 576;
-/// Of messages a second that seed 001 (CBWare, 2006, table 1) reached on a network of 1 Gbit/s, at most 3 MB/s.
+/// Messages a second that seed 001 (CBWare, 2006, table 1) reached on a network of 1 Gbit/s, at most 3 MB/s.
 const CBWARE: [(usize, f64); 4] = [(2112, 1200.0), (5860, 475.0), (15_236, 195.0), (36_084, 84.0)];
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let rate = |bytes| Rate { name: "rate", bytes, packs: false, bound: 0.9 };
     let packing = Rate { name: "packing", bytes: 64, packs: true, bound: 3.0 };
@@ -53,7 +54,7 @@ struct Rate {
     bytes: usize,
     /// Whether many packages may share a datagram.
     packs: bool,
-    /// Of the raw datagrams' rate.
+    /// Share of the raw datagrams' rate.
     bound: f64,
 }
 
@@ -118,7 +119,7 @@ fn messages(settings: &Settings) -> u64 {
     if settings.quick { settings.count(usize::MAX) as u64 } else { u64::MAX }
 }
 
-/// What each contender lost in each turn, of 100.
+/// Loss of each contender in each turn, percent.
 #[derive(Default)]
 struct Losses(RefCell<Vec<(&'static str, f64)>>);
 
@@ -132,16 +133,16 @@ impl Losses {
         Contender { name, turn: Box::new(turn) }
     }
 
-    /// One for each who had a turn: the median over rounds, and the worst.
+    /// One for each contender that had a turn: the median over rounds, and the worst.
     fn rows(&self, subject: &Subject) -> Vec<Row> {
         let losses = self.0.borrow();
-        let of = |who| losses.iter().filter(move |(name, _)| *name == who).map(|(_, percent)| *percent);
-        let row = |who| {
-            let summary = Summary { max: of(who).reduce(f64::max), ..Summary::single(median(of(who))?) };
+        let of = |contender| losses.iter().filter(move |(name, _)| *name == contender).map(|(_, percent)| *percent);
+        let row = |contender| {
+            let summary = Summary { max: of(contender).reduce(f64::max), ..Summary::single(median(of(contender))?) };
             Some(Row {
                 case: format!("{}, lost", subject.case),
                 bytes: subject.bytes,
-                who,
+                contender,
                 unit: "%",
                 result: Ok(summary),
                 versus: None,

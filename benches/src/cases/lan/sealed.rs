@@ -1,4 +1,4 @@
-//! What it costs that datagrams are sealed: the hop with keys beside the same without, turn by turn.
+//! The cost of sealed datagrams: the hop with keys beside the same hop without, turn by turn.
 
 use super::ground::{ETHERNET, LanSegment};
 use crate::cases::Case;
@@ -8,7 +8,7 @@ use crate::lan::nodes::{Network, UNPACED};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     [64, 1024].map(|bytes| Box::new(Sealed { bytes }) as Box<dyn Case>).into()
 }

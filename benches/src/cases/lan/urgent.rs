@@ -1,4 +1,4 @@
-//! Something urgent each millisecond, there and back over two routers, while a lower class sends as much as it can.
+//! An urgent package each millisecond, there and back over two routers, while a lower class sends as much as it can.
 //!
 //! ```text
 //!  processor 0                                      processor 1
@@ -6,15 +6,18 @@
 //!                            ├▶ router ═▶ router┤
 //!  flooder (processor 1) ────┘      ◀═          └─▶ swamp (processor 0): takes what comes of the flood
 //! ```
-//! `urgent`: the routers send as fast as an Ethernet of 100 Mbit/s, which two processors carry. `urgent-saturated`: as fast as they do
-//! by default, which they do not: what carries the flood then is what has no processor left, and not what carries the urgent ones.
+//! `urgent`: the routers send at the rate of an Ethernet of 100 Mbit/s, which two processors sustain.
+//! `urgent-saturated`: at the default rate, which they do not sustain: then the path of the flood lacks processor time,
+//! not that of the urgent packages.
 //!
-//! The flooder gives more than may leave: the router's mailbox is full of its packages, and so is
-//! its quota of the queue; what is too much is refused, or lost there. Of the urgent ones none may be. Flooder and swamp have
-//! FIFO 10, before other programs and after all that is timed, and each is where the router of its node is not. The flooder pauses
-//! for 2 ms in 20, so that the kernel's fair server stays out; what waits in the queue lasts longer.
+//! The flooder offers more than may leave: the router's mailbox is full of its packages, and so is
+//! its quota of the queue; the excess is refused or lost there. No urgent package may be. Flooder and swamp run at
+//! FIFO 10, above other programs and below all that is timed, each on the processor that the router of its node does
+//! not use. The flooder pauses for 2 ms in 20, so that the kernel's fair server stays out; the queue outlasts the
+//! pause.
 //!
-//! The floor, `udp`: sockets in the modules themselves, the flood from one of its own to one of its own, as fast as the routers may send.
+//! The floor, `udp`: sockets in the modules themselves, with a separate socket pair for the flood, at the rate of the
+//! routers.
 
 use super::ground::LanSegment;
 use crate::cases::Case;
@@ -35,7 +38,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 const BYTES: usize = 64;
-/// With the heads it fills a packet of 1500 B.
+/// With the headers it fills a packet of 1500 B.
 const FLOOD_BYTES: usize = 1_400;
 const FLOOD_FIFO: u8 = 10;
 const FLOOD: Duration = Duration::from_millis(18);
@@ -44,20 +47,20 @@ const MESSAGES: usize = 1_000;
 const WARM_UP: usize = 50;
 const PACE: Duration = Duration::from_millis(1);
 const CAP: Duration = Duration::from_secs(3);
-/// What an urgent package takes at most; one that takes longer is lost.
+/// Timeout of an urgent package; a later one counts as lost.
 const LOST_AFTER: Duration = Duration::from_secs(1);
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 const CARRIED: Network = Network { mtu: 1_500, rate: "10 MiB", quota: "256 KiB", sealed: false };
-/// As a user gets it who says nothing.
+/// The default of users.
 const USUAL: Network = Network { rate: "100 MiB", ..CARRIED };
-/// Of the bare flood.
+/// Port of the bare flood.
 const FLOOD_PORT: u16 = 20_217;
-/// The bare swamp looks so often whether it is over.
+/// The bare swamp checks this often whether the turn is over.
 const LOOK: Duration = Duration::from_millis(100);
-/// Heads of a datagram on an Ethernet, with its gap.
+/// Headers of a datagram on an Ethernet, with its gap.
 const WIRE_BYTES: u64 = 66;
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let urgent = |name, network, mib_s: u64| Box::new(Urgent { name, network, bytes_s: mib_s << 20 }) as Box<dyn Case>;
     vec![urgent("urgent", CARRIED, 10), urgent("urgent-saturated", USUAL, 100)]
@@ -120,16 +123,16 @@ impl Case for Urgent {
     }
 }
 
-/// Half of each round trip, µs. A package that is lost fails it.
+/// Half of each round trip, µs. A lost package fails the turn.
 fn urgent(nodes: &Nodes, turn: u8, cell: &Cell) -> Result<Vec<f64>, Failure> {
     time_two_processes(cell, |end, meetings| {
         let module = Module::open(nodes, end, turn, BYTES, meetings)?;
-        // The far end waits for the first one while the near one still sleeps.
+        // The far end waits for the first package while the near end still sleeps.
         Ok(if end == End::Ping { module.with_patience(LOST_AFTER) } else { module })
     })
 }
 
-/// Packages a second that the flooder sent, and that came.
+/// Packages a second that the flooder sent, and that arrived.
 #[derive(Clone, Copy)]
 struct Flooded {
     sent: f64,
@@ -138,9 +141,9 @@ struct Flooded {
 
 #[repr(C)]
 struct UrgentCounts {
-    /// There is a mailbox to flood.
+    /// The mailbox to flood exists.
     swamp: Gate,
-    /// It is being flooded.
+    /// The flood has begun.
     flooding: Gate,
     over: AtomicU64,
     sent: AtomicU64,
@@ -150,7 +153,7 @@ struct UrgentCounts {
 // SAFETY: atomics only.
 unsafe impl Zeroable for UrgentCounts {}
 
-/// A flooder and who takes what it sends, until it is ended or dropped.
+/// A flooder and the receiver of its flood, until they are ended or dropped.
 struct Flooder {
     counts: Shared<UrgentCounts>,
     children: [Child; 2],
@@ -158,7 +161,7 @@ struct Flooder {
 }
 
 impl Flooder {
-    /// From a module of the near node to one of the far one.
+    /// From a module of the near node to a module of the far node.
     fn over(nodes: &Nodes, turn: u8) -> Result<Self, Failure> {
         let [from, to] = [End::Ping, End::Pong].map(|end| nodes::flood(end, turn));
         let sink = || LanSink::open(&nodes.directory(End::Pong), to, FLOOD_BYTES);
@@ -169,7 +172,7 @@ impl Flooder {
         Self::start(sink, source)
     }
 
-    /// From socket to socket, no faster than this.
+    /// From socket to socket, at most at this rate.
     fn bare(wire: &Wire, bytes_s: u64) -> Result<Self, Failure> {
         let open = |end| Datagrams::between(wire, end, [FLOOD_PORT; 2]);
         let source = || {
@@ -177,7 +180,7 @@ impl Flooder {
             let (began, mut sent_bytes) = (Instant::now(), 0);
             Ok(move |message: &[u8]| {
                 let may_bytes = (began.elapsed().as_secs_f64() * bytes_s as f64) as u64;
-                // A lull is made up for, as a router's queue lasts longer; more is not.
+                // A short lull is made up for, since a router's queue outlasts one; a longer one is not.
                 sent_bytes = may_bytes.saturating_sub((LULL.as_secs_f64() * bytes_s as f64) as u64).max(sent_bytes);
                 let may = sent_bytes <= may_bytes;
                 if may {
@@ -190,7 +193,7 @@ impl Flooder {
         Self::start(|| open(End::Pong)?.with_patience(LOOK), source)
     }
 
-    /// `sink`: opens where it goes. `source`: opens what it comes from, and says of each whether it was taken.
+    /// `sink` opens the receiving side. `source` opens the sending side and reports whether each package was accepted.
     fn start<O: Outlet, S: FnMut(&[u8]) -> Result<bool, Failure>>(
         sink: impl FnOnce() -> Result<O, Failure>,
         source: impl FnOnce() -> Result<S, Failure>,
@@ -230,7 +233,7 @@ impl Flooder {
         Ok(Self { counts, children: [flooder, swamp], began: Instant::now() })
     }
 
-    /// Ends both, and tells how much it was.
+    /// Ends both, and reports the rates.
     fn end(self) -> Result<Flooded, Failure> {
         let seconds = self.began.elapsed().as_secs_f64();
         self.counts.over.store(1, Ordering::Release);
@@ -245,7 +248,7 @@ impl Flooder {
     }
 }
 
-/// Before other programs, and after all that is timed.
+/// Above other programs, and below all that is timed.
 fn settle_low(end: End) -> Result<(), Failure> {
     settle(end, Placement::TwoCores, Scheduling::Normal)?;
     // Refused, the environment says so.
@@ -255,10 +258,10 @@ fn settle_low(end: End) -> Result<(), Failure> {
 
 fn flood_rows(case: &str, [sent, arrived]: [&'static str; 2], floods: &[Flooded]) -> Vec<Row> {
     // What the router's mailbox took, and what arrived.
-    let row = |who, rate: fn(&Flooded) -> f64| {
+    let row = |contender, rate: fn(&Flooded) -> f64| {
         let median = crate::statistics::median(floods.iter().map(rate))?;
         let subject = Subject { case: case.into(), bytes: Some(FLOOD_BYTES), unit: "packages/s" };
-        Some(Row::alone(subject, who, Ok(Summary::single(median))))
+        Some(Row::alone(subject, contender, Ok(Summary::single(median))))
     };
     [row(sent, |flood| flood.sent), row(arrived, |flood| flood.received)].into_iter().flatten().collect()
 }

@@ -1,5 +1,5 @@
-//! A thousand clients at once: how many packages go, and how late they come; whether one that reads nothing, or a hostile program, is felt by the
-//! others.
+//! A thousand clients at once: throughput and delay; and whether a client that reads nothing, or a hostile program,
+//! affects the others.
 
 use crate::cases::Case;
 use crate::harness::{Failure, Machine};
@@ -16,31 +16,31 @@ const GUESTS: u16 = 1_000;
 /// In a quick run.
 const GUESTS_QUICK: u16 = 40;
 const BYTES: usize = 64;
-/// What a thousand clients send, a second: what must go.
+/// Packages a second that a thousand clients send: the rate that must be reached.
 const PER_S: u64 = 50_000;
-/// What they send where it is asked whether they feel somebody, or TLS: both processors have rests, so that what is felt is not that they are
-/// full.
+/// Packages a second where a case asks whether clients feel a disturbance or TLS: both processors have reserves, so
+/// that the figures do not show a full processor.
 const PER_S_BESIDE: u64 = 20_000;
 const PER_S_QUICK: u64 = 1_000;
-/// The router has some rest, so that the kernel's fair server stays out.
+/// The router has reserves, so that the kernel's fair server stays out.
 const COUNTED: Duration = Duration::from_secs(4);
 const WARM_UP: Duration = Duration::from_secs(1);
-/// Longer than a computer stands still.
+/// Longer than a computer stalls.
 const QUICK: Duration = Duration::from_secs(1);
 /// The thread of the TCP router.
 const THREAD: &str = "tcp-router";
 
 const OURS: &str = "rohrpost";
 const BOUND: (&str, f64) = ("5 ms", 5_000.0);
-/// Of all that was sent.
+/// Share of all that was sent.
 const RATE: (&str, f64) = ("of what is sent", 0.995);
 const BESIDE: f64 = 1.2;
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let habits =
         Habits { guests: GUESTS, per_s: PER_S, bytes: BYTES, one_stalls: false, warm_up: WARM_UP, counted: COUNTED };
-    let plain = ClientTurn { who: OURS, habits, security: Security::None, is_hostile: false };
+    let plain = ClientTurn { contender: OURS, habits, security: Security::None, is_hostile: false };
     let beside = ClientTurn { habits: Habits { per_s: PER_S_BESIDE, ..habits }, ..plain };
     let sealed = ClientTurn { security: Security::Tls, ..beside };
     let stalled = ClientTurn { habits: Habits { one_stalls: true, ..beside.habits }, ..beside };
@@ -51,17 +51,17 @@ pub(super) fn cases() -> Vec<Box<dyn Case>> {
         Clients { name: "clients", turns: vec![plain], versus: vec![bound] },
         Clients {
             name: "clients, sealed",
-            turns: vec![sealed, ClientTurn { who: "not sealed", ..beside }],
+            turns: vec![sealed, ClientTurn { contender: "not sealed", ..beside }],
             versus: vec![bound, other("not sealed", None)],
         },
         Clients {
             name: "clients, one stalled",
-            turns: vec![stalled, ClientTurn { who: "none stalled", ..beside }],
+            turns: vec![stalled, ClientTurn { contender: "none stalled", ..beside }],
             versus: vec![other("none stalled", felt)],
         },
         Clients {
             name: "clients, hostile beside",
-            turns: vec![ClientTurn { is_hostile: true, ..beside }, ClientTurn { who: "nobody beside", ..beside }],
+            turns: vec![ClientTurn { is_hostile: true, ..beside }, ClientTurn { contender: "nobody beside", ..beside }],
             versus: vec![other("nobody beside", felt)],
         },
     ]
@@ -78,15 +78,15 @@ struct Clients {
 
 #[derive(Clone, Copy)]
 struct ClientTurn {
-    who: &'static str,
+    contender: &'static str,
     habits: Habits,
     security: Security,
     is_hostile: bool,
 }
 
-/// What was seen in a turn besides how late packages came.
+/// What a turn shows besides delays.
 struct ClientFigures {
-    who: &'static str,
+    contender: &'static str,
     sent_s: f64,
     came_s: f64,
     lost_percent: f64,
@@ -104,7 +104,7 @@ impl Case for Clients {
         let seen = RefCell::new(Vec::new());
         let mut contenders: Vec<Contender<'_>> = Vec::new();
         for turn in &self.turns {
-            contenders.push(Contender::sampled(turn.who, || {
+            contenders.push(Contender::sampled(turn.contender, || {
                 let (latencies, one) = turn.take(settings)?;
                 seen.borrow_mut().push(one);
                 Ok(latencies)
@@ -116,11 +116,11 @@ impl Case for Clients {
         let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
         let mut rows = compare(settings, &subject, &contenders, &self.versus);
         drop(contenders);
-        // Where it is no bound, it is nobody.
-        rows.retain(|row| row.who != bound || self.versus.iter().any(|versus| versus.name == bound));
+        // Without a bound this contender has no row.
+        rows.retain(|row| row.contender != bound || self.versus.iter().any(|versus| versus.name == bound));
         for turn in &self.turns {
             let seen = seen.borrow();
-            let own: Vec<&ClientFigures> = seen.iter().filter(|one| one.who == turn.who).collect();
+            let own: Vec<&ClientFigures> = seen.iter().filter(|one| one.contender == turn.contender).collect();
             rows.extend(turn.rows(self.name, &own));
         }
         Ok(rows)
@@ -143,7 +143,7 @@ impl ClientTurn {
         let seconds = habits.counted.as_secs_f64();
         let (sent, came) = (tally.sent.get(), tally.came.get());
         let seen = ClientFigures {
-            who: self.who,
+            contender: self.contender,
             sent_s: sent as f64 / seconds,
             came_s: tally.meanwhile.get() as f64 / seconds,
             lost_percent: (sent - came) as f64 * 100.0 / sent.max(1) as f64,
@@ -162,12 +162,12 @@ impl ClientTurn {
         Habits { guests: GUESTS_QUICK, per_s: PER_S_QUICK, warm_up: QUICK, counted: QUICK, ..full }
     }
 
-    /// Rate, losses and what the computer did meanwhile; none if there was no turn.
+    /// Rate, losses and the computer's load meanwhile; none without a turn.
     fn rows(&self, case: &str, seen: &[&ClientFigures]) -> Vec<Row> {
         let subject = |what: &str, unit| Subject { case: format!("{case}, {what}"), bytes: Some(BYTES), unit };
         let figure = |what: &str, unit, of: fn(&ClientFigures) -> Option<f64>| {
             let middle = median(seen.iter().filter_map(|one| of(one)))?;
-            Some(Row::alone(subject(what, unit), self.who, Ok(Summary::single(middle))))
+            Some(Row::alone(subject(what, unit), self.contender, Ok(Summary::single(middle))))
         };
         let rate = figure("rate", "packages/s", |one| Some(one.came_s)).map(|row| {
             let rounds = seen.iter().map(|one| one.came_s / one.sent_s);

@@ -1,4 +1,5 @@
-//! How long a package takes from a module through the TCP router to a module of another system, one at a time; everybody sleeps who waits.
+//! How long a package takes from a module through the TCP router to a module of another system, one at a time; every
+//! waiting process sleeps.
 
 use crate::cases::Case;
 use crate::harness::{Cell, End, Failure, time_two_processes};
@@ -11,14 +12,14 @@ use crate::tcp::zenoh::time_zenoh;
 use std::cell::Cell as Counter;
 use std::time::Duration;
 
-/// What waits for longer than 1.5 s is given up on its way.
+/// A package in flight for longer than 1.5 s counts as lost.
 const LOST: Duration = Duration::from_secs(5);
-/// Of what it costs at least.
+/// Ratio to the least possible cost.
 const OF_RELAYS: f64 = 1.3;
-/// Of what it costs without a seal.
+/// Ratio to the cost without TLS.
 const OF_OPEN: f64 = 1.3;
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     let hop = |is_sealed| move |bytes| Box::new(TcpHop { bytes, is_sealed }) as Box<dyn Case>;
     let plain = [64, 1024, 16_384, 62_000].map(hop(false));
@@ -65,9 +66,9 @@ impl Case for TcpHop {
     }
 }
 
-/// What all turns of a case happen on.
+/// What all turns of a case share.
 struct TcpSegment {
-    /// None where there is no command, or it does not start: then the others still have figures.
+    /// None without the command, or if it does not start: then the others still have figures.
     systems: Result<Systems, Failure>,
     turns: Counter<u8>,
 }

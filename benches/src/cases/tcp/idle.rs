@@ -1,4 +1,4 @@
-//! Memory of the TCP router that a client takes up which does nothing but say that it is there.
+//! Memory of the TCP router for a client that only sends keep-alives.
 
 use crate::cases::Case;
 use crate::harness::{Failure, rest};
@@ -12,11 +12,11 @@ use std::time::Duration;
 
 const GUESTS: u16 = 1_000;
 const GUESTS_QUICK: u16 = 40;
-/// Longer than what a handshake needs is kept, and than it takes to say how one is.
+/// Longer than the handshake's memory is kept, and than a status takes.
 const SETTLES: Duration = Duration::from_secs(3);
 const BOUND: (&str, f64) = ("64 KiB", 64.0);
 
-/// All of them.
+/// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
     [("idle client", Security::None), ("idle client, sealed", Security::Tls)]
         .map(|(name, security)| Box::new(Idle { name, security }) as Box<dyn Case>)
@@ -63,7 +63,7 @@ impl Idle {
     }
 }
 
-/// Memory of a process that is really there.
+/// Resident memory of a process.
 fn resident_kib(pid: i32) -> Result<f64, Failure> {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.split_whitespace().next());

@@ -1,4 +1,4 @@
-//! The TCP router: how long a package takes through it, how many go and beside whom, and what a client costs.
+//! The TCP router: how long a package takes through it, its throughput beside other load, and what a client costs.
 
 mod clients;
 mod hop;

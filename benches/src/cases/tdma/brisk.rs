@@ -29,8 +29,8 @@ impl Case for Brisk {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, loaded| WatchedContender {
-            who,
+        let watched = |contender, loaded| WatchedContender {
+            contender,
             plan: BRISK,
             way: RunConditions { rights: Rights::RealTime, loaded, junk: false },
         };

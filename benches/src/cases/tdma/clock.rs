@@ -1,8 +1,8 @@
-//! How far a slave's system time is off the master's in time slots, while everything else is busy; and how far a second after the last
+//! How far a slave's system time is off the master's in time slots, under load; and how far a second after the last
 //! master fell silent.
 //!
-//! The routers are threads of one process, with clocks that are wrong by a known offset, 30 ppm, and half a ppm that comes and goes; so the
-//! true error of each reading is known, and its own bound must contain it.
+//! The routers are threads of one process. Their clocks are wrong by a known offset, 30 ppm, and a varying half ppm; so
+//! the true error of each reading is known, and the reading's own bound must contain it.
 
 use super::goals::{Goal, figure};
 use super::plans::LOADED;
@@ -27,13 +27,13 @@ const SAMPLES: usize = 5_000;
 const SYNCHRONISATIONS: usize = 1_000;
 const MTU: u16 = 1_500;
 const PATIENCE: Duration = Duration::from_secs(180);
-/// The masters of the plan, all of which fall silent.
+/// The masters of the plan, which all fall silent.
 const MASTERS: std::ops::Range<u8> = 0..2;
-/// Who follows them.
+/// The slaves.
 const SLAVE: u8 = 2;
 const SILENT_FOR: Duration = Duration::from_secs(1);
 const SILENCES: usize = 5;
-/// So long clocks measure before: what they know of their pace is of that time.
+/// Clocks measure for so long before; this is what they know of their rate.
 const MEASURES: Duration = Duration::from_secs(10);
 const MEASURES_QUICK: Duration = Duration::from_millis(500);
 
@@ -74,7 +74,7 @@ impl Case for SlotClockCase {
         ];
         let versus =
             |name, p50: f64, p99: f64| Versus { name, p50: Some(Target::AtMost(p50)), p99: Some(Target::AtMost(p99)) };
-        // Five times better, and twenty times in the middle and thirty at the end.
+        // Five times better; twenty times in the middle and thirty at the end.
         let (better, much_better) = (versus(RTNET, 0.2, 0.2), versus(RTNET, 0.05, 0.033));
         let all = [better, much_better, versus(MUST.0, 1.0, 1.0), versus(HOPED.0, 1.0, 1.0)];
         let mut rows = compare(settings, &subject("clock"), &contenders, &all);
@@ -113,7 +113,7 @@ fn measures(settings: &Settings) -> Duration {
     if settings.quick { MEASURES_QUICK } else { MEASURES }
 }
 
-/// How far off the slaves were at any moment.
+/// Errors of the slaves' time.
 fn errors_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
     let _load = stage.load()?;
@@ -123,7 +123,7 @@ fn errors_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
         std::thread::sleep(measures(settings));
         for _ in 0..settings.count(SAMPLES) {
             std::thread::sleep(EACH);
-            // By another master's time only those are right who have measured it.
+            // After a change of the master only slaves that have measured the new one are right.
             if shells.master() != Some(master) {
                 master = shells.await_settled()?;
             }
@@ -135,7 +135,7 @@ fn errors_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
     })
 }
 
-/// How far off a slave was a second after all masters had fallen silent, several times.
+/// Error of a slave's time a second after all masters fell silent, several times.
 fn off_after_silence_us(stage: &Stage, settings: &Settings) -> Result<Vec<f64>, Failure> {
     let silences = if settings.quick { 1 } else { SILENCES };
     let scratches = (0..silences).map(|_| Scratch::new()).collect::<Result<Vec<_>, Failure>>()?;

@@ -1,4 +1,4 @@
-//! Contenders that differ in their table or in how routers run, watched in turn; and the rows that come of it.
+//! Contenders that differ in their slot table or in the scheduling of routers, observed in turn; and their rows.
 
 use super::goals::{Goal, figure};
 use super::observed::{Observed, RunConditions, watched};
@@ -11,31 +11,31 @@ use crate::tdma::plan::Plan;
 use crate::tdma::stage::Stage;
 use std::cell::RefCell;
 
-/// Somebody who is watched.
+/// One observed contender.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WatchedContender {
-    /// As the table calls it.
-    pub who: &'static str,
+    /// Name in the table.
+    pub contender: &'static str,
     /// Its slots.
     pub plan: Plan,
     /// How its routers run.
     pub way: RunConditions,
 }
 
-/// Something else that was seen in a turn, besides how far off slots began.
+/// Another figure of a turn, besides how far off slots began.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Figure {
-    /// Follows the name of the case.
+    /// Suffix of the case's name.
     pub what: &'static str,
-    /// Of the figure.
+    /// Unit of the figure.
     pub unit: &'static str,
-    /// What it is.
+    /// The figure.
     pub of: fn(&Observed) -> f64,
-    /// For those who are judged.
+    /// Goals of contenders that have any.
     pub goals: &'static [Goal],
 }
 
-/// What belongs to each case: whether nodes met on the wire, and what the computer did meanwhile.
+/// Figures of each case: whether nodes met on the wire, and the computer's load meanwhile.
 pub(super) const ALWAYS: [Figure; 4] = [
     Figure {
         what: "outside its own",
@@ -53,16 +53,17 @@ pub(super) const ALWAYS: [Figure; 4] = [
     Figure { what: "run delay", unit: "ms/s", of: |seen| seen.waited_ms_s, goals: &[] },
 ];
 
-/// The floor: threads that wake up for the slots of the first contender, beside the same load, and send nothing.
+/// The floor: threads that wake up for the slots of the first contender, under the same load, and send nothing.
 pub(super) const BARE: &str = "bare threads";
 const OMITTED: &str = "omitted";
-/// Who leaves out more than threads that do nothing else is to blame for it. Few slots are left out in a round, so the two differ by chance.
+/// A router that omits more slots than threads that do nothing else has an error. A round omits few slots, so the two
+/// differ by chance.
 const OF_BARE: [Goal; 1] = [Goal { name: "hoped 1.5", most: 1.5 }];
 
 /// What was seen of a contender, round after round.
 pub(super) type ObservedRounds = Vec<Observed>;
 
-/// What became of a contest.
+/// The result of a contest.
 pub(super) struct Held {
     pub rows: Vec<Row>,
     /// Of each contender.
@@ -77,18 +78,18 @@ pub(super) struct Contest {
     pub case: &'static str,
     /// Those watched.
     pub watched: Vec<WatchedContender>,
-    /// Goals are for the first so many.
+    /// Goals apply to the first so many.
     pub judged: usize,
-    /// What slots are held against that has a name and figures.
+    /// The goals of slots: a name and figures.
     pub bounds: Vec<(&'static str, Summary)>,
-    /// Whom the first is compared with.
+    /// Compared with the first one.
     pub versus: Vec<Versus>,
-    /// What else is told.
+    /// Other figures.
     pub figures: Vec<Figure>,
 }
 
 impl Contest {
-    /// Watches all, round after round.
+    /// Observes all, round after round.
     pub(super) fn hold(&self, settings: &Settings) -> Held {
         let stage = Stage::new();
         let all: Vec<RefCell<ObservedRounds>> = self.watched.iter().map(|_| RefCell::default()).collect();
@@ -101,7 +102,7 @@ impl Contest {
         };
         let turn = &turn;
         let contender = |(at, watched): (usize, &WatchedContender)| Contender {
-            name: watched.who,
+            name: watched.contender,
             turn: Box::new(move || turn(at)),
         };
         let fixed = |(name, bounds): &(&'static str, Summary)| {
@@ -129,23 +130,23 @@ impl Contest {
         Held { rows, seen, bare }
     }
 
-    /// Slots that bare threads would have left out, and how many times as many the first contender has.
+    /// Slots that bare threads would omit, and how many times as many the first contender omits.
     fn beside_bare(&self, seen: &ObservedRounds, bare: &[BareThreads]) -> Vec<Row> {
         let omitted: Vec<f64> = bare.iter().map(BareThreads::omitted_percent).collect();
         let mut rows = figure(&self.subject("%", Some(OMITTED)), BARE, &omitted, &[]);
-        // A round in which nobody was late says nothing about their ratio.
+        // A round without a late wake-up says nothing about their ratio.
         let both = seen.iter().map(Observed::omitted_percent).zip(omitted).filter(|(_, bare)| *bare > 0.0);
         let ratios: Vec<f64> = both.map(|(ours, bare)| ours / bare).collect();
-        rows.extend(figure(&self.subject("of bare", Some(OMITTED)), self.watched[0].who, &ratios, &OF_BARE));
+        rows.extend(figure(&self.subject("of bare", Some(OMITTED)), self.watched[0].contender, &ratios, &OF_BARE));
         rows
     }
 
-    /// The rows of a figure: of those who are judged beside its goals, of the others alone.
+    /// The rows of a figure: contenders with goals beside these, others alone.
     fn told(&self, told: &Figure, seen: &[ObservedRounds]) -> Vec<Row> {
         let subject = self.subject(told.unit, Some(told.what));
         let rows = self.watched.iter().zip(seen).enumerate().map(|(at, (watched, seen))| {
             let rounds: Vec<f64> = seen.iter().map(told.of).collect();
-            figure(&subject, watched.who, &rounds, if at < self.judged { told.goals } else { &[] })
+            figure(&subject, watched.contender, &rounds, if at < self.judged { told.goals } else { &[] })
         });
         rows.flatten().collect()
     }

@@ -1,5 +1,5 @@
-//! Declared flows, while every node floods with a lower class: how late their packages are, beside the bounds that `rohrpost check` computes
-//! for this very configuration.
+//! Declared flows, while every node floods with a lower class: how late their packages are, beside the bounds that
+//! `rohrpost check` computes for this very configuration.
 
 use super::contest::BARE;
 use super::goals::{Goal, NONE, figure, spread};
@@ -21,7 +21,7 @@ use crate::tdma::talkers::{Talked, Talkers};
 use crate::tdma::traffic::Traffic;
 use std::time::{Duration, Instant};
 
-/// Parts of a turn in which it is looked whether the hypervisor took time away.
+/// Parts of a turn, each checked for time that the hypervisor took.
 const WINDOW: Duration = Duration::from_secs(1);
 const WITHIN: [Goal; 1] = [Goal { name: "must bound", most: 1.0 }];
 const WITHIN_ALONE: [Goal; 1] = [Goal { name: "hoped bound", most: 1.0 }];
@@ -80,7 +80,7 @@ fn watch(stage: &Stage, settings: &Settings) -> Result<FlowTurns, Failure> {
     Ok(FlowTurns { arrivals, counts, talked, windows, waited_ms_s, bare })
 }
 
-/// Sleeps for so long; what the hypervisor took in each window of it, percent.
+/// Sleeps for so long. Returns what the hypervisor took in each window, percent.
 fn steal_in_windows(all: Duration) -> Result<Vec<f64>, Failure> {
     let over = Instant::now() + all;
     let mut windows = Vec::new();
@@ -92,7 +92,7 @@ fn steal_in_windows(all: Duration) -> Result<Vec<f64>, Failure> {
     Ok(windows)
 }
 
-/// A flow of each node: their bounds are the same, since their slots are.
+/// A flow of each node. Their bounds are the same, since their slots are.
 struct Measured {
     name: &'static str,
     bound_us: f64,
@@ -137,7 +137,7 @@ fn rows(turns: &[FlowTurns]) -> Result<Vec<Row>, Failure> {
             rows.extend(figure(&subject(&format!("{case}, p99.9"), unit), "measured", &[p999_us / most_us], goals));
         }
         rows.extend(figure(&subject(&format!("{case}, beyond bound"), "%"), "measured", &[beyond_percent], &[]));
-        // Of those whose slots were left out, all take longer; they would make any bound look close.
+        // Packages take longer when a slot was omitted; with these, any bound would look close.
         let mut within_us: Vec<f64> =
             latencies_us.iter().copied().filter(|latency_us| *latency_us <= bound_us).collect();
         let vacuous =
@@ -157,7 +157,7 @@ fn rows(turns: &[FlowTurns]) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// Slots that threads which only wake up would have left out, beside nothing else, of each turn.
+/// Slots of each turn that threads which only wake up would omit.
 fn bare_percent(turns: &[FlowTurns]) -> Vec<f64> {
     turns.iter().map(|turn| turn.bare.omitted_percent()).collect()
 }

@@ -15,21 +15,21 @@ pub(super) struct Goal {
 /// Where nothing at all is allowed.
 pub(super) const NONE: [Goal; 1] = [Goal { name: "must none", most: 0.0 }];
 
-/// A figure that is there once in a round, beside each of its goals, which its worst round must meet; without goals, alone. None without
-/// any round.
-pub(super) fn figure(subject: &Subject, who: &'static str, rounds: &[f64], goals: &[Goal]) -> Vec<Row> {
+/// A figure that is there once in a round, beside each of its goals, which its worst round must meet; without goals,
+/// alone. None without any round.
+pub(super) fn figure(subject: &Subject, contender: &'static str, rounds: &[f64], goals: &[Goal]) -> Vec<Row> {
     let Some(middle) = median(rounds.iter().copied()) else { return Vec::new() };
     let row = |goal: Option<&Goal>| {
         let ratio = goal.and_then(|goal| Ratio::of(rounds.iter().map(|value| value / base(goal))));
         let versus = goal.map(|goal| Versus { name: goal.name, p50: Some(target(goal)), p99: None });
-        Row { versus, ratio_p50: ratio, ..Row::alone(subject.clone(), who, Ok(Summary::single(middle))) }
+        Row { versus, ratio_p50: ratio, ..Row::alone(subject.clone(), contender, Ok(Summary::single(middle))) }
     };
     if goals.is_empty() { vec![row(None)] } else { goals.iter().map(Some).map(row).collect() }
 }
 
 /// Many figures of all rounds, for information. None without any.
-pub(super) fn spread(subject: &Subject, who: &'static str, mut samples: Vec<f64>) -> Option<Row> {
-    Some(Row::alone(subject.clone(), who, Ok(Summary::of(&mut samples)?)))
+pub(super) fn spread(subject: &Subject, contender: &'static str, mut samples: Vec<f64>) -> Option<Row> {
+    Some(Row::alone(subject.clone(), contender, Ok(Summary::of(&mut samples)?)))
 }
 
 /// What the ratio is taken to: where nothing at all is allowed, one.

@@ -1,7 +1,8 @@
-//! Slots that are left out while somebody sends 500 000 datagrams a second to each port of a node, from an address that no node has; and without.
+//! Slots that are omitted while 500 000 foreign datagrams a second arrive at each port of a node, from an address that
+//! no node has; and without.
 //!
-//! The junk goes to the node that is no master, in place of the load of the other cases. Who sends it has a processor with what else runs there. The floor: bare
-//! threads that wake up for the same slots beside the same junk.
+//! The junk goes to the node that is no master, in place of the load of the other cases. Its sender shares a processor
+//! with other processes. The floor: bare threads that wake up for the same slots beside the same junk.
 
 use super::contest::BARE;
 use super::goals::{Goal, figure};
@@ -15,7 +16,7 @@ use crate::tdma::bare::BareThreads;
 use crate::tdma::rights::Rights;
 use crate::tdma::stage::Stage;
 
-/// A turn lasts long.
+/// A turn is long.
 const ROUNDS_MAX: usize = 3;
 const OF_NO_JUNK: [Goal; 1] = [Goal { name: "must 1.2", most: 1.2 }];
 
@@ -50,7 +51,7 @@ impl Case for SlotJunk {
         let [junk, quiet] = seen.each_ref().map(|all| all.iter().map(Observed::omitted_percent).collect::<Vec<_>>());
         let sent: Vec<f64> = seen[0].iter().filter_map(|seen| seen.junk_s).collect();
         let subject = |unit, what| Subject { case: format!("{}, {what}", self.name()), bytes: None, unit };
-        // A round in which nothing was left out without junk says nothing about the ratio.
+        // A round without omitted slots and without junk says nothing about the ratio.
         let both = junk.iter().zip(&quiet).filter(|(_, quiet)| **quiet > 0.0);
         let ratios: Vec<f64> = both.map(|(junk, quiet)| junk / quiet).collect();
         Ok([

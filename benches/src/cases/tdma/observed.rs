@@ -14,10 +14,10 @@ use crate::tdma::stage::{NODES, Stage};
 use crate::tdma::traffic::Traffic;
 use std::time::Duration;
 
-/// So long a turn is watched.
+/// Length of a turn.
 const WATCHED: Duration = Duration::from_secs(30);
 const WATCHED_QUICK: Duration = Duration::from_secs(1);
-/// Until routers know how long their datagrams take to the wire, and everybody what the load is.
+/// Until routers know the delay of their datagrams to the wire, and the load is steady.
 const SETTLES: Duration = Duration::from_secs(1);
 
 /// Of packages and of time.
@@ -31,9 +31,9 @@ pub(super) const ALL: [u8; NODES as usize] = [0, 1, 2];
 pub(super) struct RunConditions {
     /// How they may be scheduled.
     pub rights: Rights,
-    /// Whether everything else is busy, too.
+    /// Whether there is load on all processors and the network.
     pub loaded: bool,
-    /// Whether somebody sends junk to the ports of a node.
+    /// Whether junk arrives at the ports of a node.
     pub junk: bool,
 }
 
@@ -46,13 +46,13 @@ pub(super) struct Observed {
     pub counts: Counts,
     /// Of the processors' time, the hypervisor's, percent.
     pub steal_percent: f64,
-    /// Threads of slots waited so long for a processor, all together, ms for each second.
+    /// Wait of the slots' threads for a processor, in total, ms for each second.
     pub waited_ms_s: f64,
-    /// Junk that was sent to each port, datagrams a second; none without any.
+    /// Junk sent to each port, datagrams a second; none without junk.
     pub junk_s: Option<f64>,
 }
 
-/// How long a turn is watched.
+/// Length of a turn.
 pub(super) fn watched(settings: &Settings) -> Duration {
     if settings.quick { WATCHED_QUICK } else { WATCHED }
 }
@@ -61,7 +61,7 @@ impl Observed {
     /// One turn, with routers of its own.
     ///
     /// # Errors
-    /// When a part of it fails, or routers are not scheduled as they should be.
+    /// When a part of it fails, or routers do not have the scheduling that they should.
     pub(super) fn turn(stage: &Stage, plan: &Plan, way: RunConditions, settings: &Settings) -> Result<Self, Failure> {
         let routers = Routers::start(stage, plan, way.rights, settings)?;
         let mut capture = Capture::start(stage)?;
@@ -101,17 +101,17 @@ impl Observed {
         Summary::of(&mut self.kept.off_us.clone()).ok_or_else(|| Failure::Failed("no slot was used".into()))
     }
 
-    /// Slots that were left out, percent.
+    /// Omitted slots, percent.
     pub(super) fn omitted_percent(&self) -> f64 {
         self.counts.omitted_percent()
     }
 
-    /// Slots whose first frame was further off than this, percent of those that were used.
+    /// Slots with a first frame further off than this, percent of the used slots.
     pub(super) fn further_off_percent(&self, than_us: f64) -> f64 {
         self.kept.further_off(than_us) as f64 * 100.0 / self.kept.off_us.len().max(1) as f64
     }
 
-    /// Frames in no window of their sender, percent.
+    /// Frames outside any window of their sender, percent.
     pub(super) fn outside_percent(&self) -> f64 {
         self.kept.outside as f64 * 100.0 / self.kept.frames.max(1) as f64
     }

@@ -1,5 +1,6 @@
-//! How short a slot for 1400 B can be, and how much of its end must be kept free: tables by the shortest slots that `check` lets pass, and
-//! how far into the guard the latest frame began. A table that was not kept is none that can be had.
+//! How short a slot for 1400 B can be, and how much of its end must be kept free: tables by the shortest slots that
+//! `check` lets pass, and how far into the guard the latest frame began. A table that was not kept is none that can be
+//! had.
 
 use super::contest::{ALWAYS, Contest, Figure, Held, WatchedContender};
 use super::goals::{Goal, NONE, figure};
@@ -32,8 +33,8 @@ impl Case for Pitch {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, plan| WatchedContender {
-            who,
+        let watched = |contender, plan| WatchedContender {
+            contender,
             plan,
             way: RunConditions { rights: Rights::RealTime, loaded: true, junk: false },
         };
@@ -44,21 +45,21 @@ impl Case for Pitch {
         ];
         let contest = Contest {
             case: "pitch",
-            watched: tables.map(|(who, plan)| watched(who, plan)).into(),
+            watched: tables.map(|(contender, plan)| watched(contender, plan)).into(),
             judged: tables.len(),
             bounds: Vec::new(),
             versus: Vec::new(),
             figures: [&[INTO_GUARD, OMITTED][..], &ALWAYS[..]].concat(),
         };
         let Held { mut rows, seen, .. } = contest.hold(settings);
-        for ((who, plan), seen) in tables.into_iter().zip(seen) {
+        for ((contender, plan), seen) in tables.into_iter().zip(seen) {
             let not_kept: Vec<f64> = seen.iter().map(|seen| if is_kept(&plan, seen) { 0.0 } else { 100.0 }).collect();
-            rows.extend(figure(&contest.subject("%", Some("not kept")), who, &not_kept, &NONE));
+            rows.extend(figure(&contest.subject("%", Some("not kept")), contender, &not_kept, &NONE));
             // A round that failed has a row of its own.
             if not_kept.len() == settings.rounds.max(1) && not_kept.iter().all(|percent| *percent == 0.0) {
                 let Plan { pitch_us, guard_us, .. } = plan;
-                rows.extend(figure(&contest.subject("us", Some("slot")), who, &[pitch_us as f64], &PITCH));
-                rows.extend(figure(&contest.subject("us", Some("guard")), who, &[guard_us as f64], &GUARD));
+                rows.extend(figure(&contest.subject("us", Some("slot")), contender, &[pitch_us as f64], &PITCH));
+                rows.extend(figure(&contest.subject("us", Some("guard")), contender, &[guard_us as f64], &GUARD));
             }
         }
         Ok(rows)

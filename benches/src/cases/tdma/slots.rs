@@ -1,4 +1,5 @@
-//! How far off their nominal beginning slots begin, with everything else at work, without, and with routers that the kernel denies real time.
+//! How far off their nominal begin slots start, under load, without load, and with routers without real-time
+//! scheduling.
 
 use super::contest::{ALWAYS, BARE, Contest, Figure, Held, ObservedRounds, WatchedContender};
 use super::goals::{Goal, figure};
@@ -20,15 +21,15 @@ const MUST: (&str, Summary) = ("20, 50, 150 us", bounds(20.0, 50.0, 150.0));
 const HOPED: (&str, Summary) = ("5, 25, 60 us", bounds(5.0, 25.0, 60.0));
 pub(super) const UNLOADED: &str = "unloaded";
 const ORDINARY: &str = "ordinary";
-/// Off by more, a slot would meet the next one also with a wide guard.
+/// Further off than this, a slot would meet the next one even with a wide guard.
 const FAR_US: f64 = 250.0;
 
-/// How far off the last of 1000 is, µs.
+/// 99.9 % quantile of how far off, µs.
 fn p999_us(seen: &Observed) -> f64 {
     seen.summary().ok().and_then(|summary| summary.p999).unwrap_or_default()
 }
 
-/// More left out, and slots are not kept.
+/// With more omitted slots, slots are not kept.
 pub(super) const OMITTED_MUST: Goal = Goal { name: "must 0.5 %", most: 0.5 };
 
 /// Of the routers' own counts.
@@ -55,7 +56,7 @@ const FIGURES: [Figure; 3] = [
     },
 ];
 
-/// What the same code must do to that without real time.
+/// What the same code must do to this without real-time scheduling.
 const FEWER: [Goal; 2] =
     [Goal { name: "must 1/50", most: 1.0 / 50.0 }, Goal { name: "hoped 1/100", most: 1.0 / 100.0 }];
 
@@ -71,8 +72,8 @@ impl Case for Slots {
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
-        let watched = |who, rights, loaded| WatchedContender {
-            who,
+        let watched = |contender, rights, loaded| WatchedContender {
+            contender,
             plan: LOADED,
             way: RunConditions { rights, loaded, junk: false },
         };
@@ -113,28 +114,30 @@ impl Case for Slots {
     }
 }
 
-/// Slots that were not what they should be, of how many.
+/// Slots that were not kept, of how many.
 type Far = fn(&Observed) -> (u64, u64);
 
 const NOT_KEPT: &str = "left out or over 250 us off";
 
-/// What bare threads would have left out, by what is not kept without real time: no router is better.
+/// Slots that bare threads would omit, divided by slots that are not kept without real-time scheduling: no router is
+/// better.
 fn floor(bare: &BareThreads, ordinary: &Observed) -> f64 {
     let (some, all) = not_kept(ordinary);
     bare.omitted_percent() / 100.0 * all.max(1) as f64 / some.max(1) as f64
 }
 
-/// Of those that were used.
+/// Of used slots.
 fn far_off(seen: &Observed) -> (u64, u64) {
     (seen.kept.further_off(FAR_US) as u64, seen.kept.off_us.len() as u64)
 }
 
-/// Of all. What wakes up too late does not send, so without real time most slots are left out, and few are begun late.
+/// Of all slots. A late wake-up does not send. So without real-time scheduling most slots are omitted, and few begin
+/// late.
 fn not_kept(seen: &Observed) -> (u64, u64) {
     (far_off(seen).0 + seen.counts.omitted(), seen.counts.all())
 }
 
-/// Share of ours by that of the other, in each round. Who had none is taken to have had one.
+/// Our share divided by the other's, in each round. None counts as one.
 fn ratios(ours: &ObservedRounds, others: &ObservedRounds, far: Far) -> Vec<f64> {
     let share = |seen| {
         let (some, all) = far(seen);

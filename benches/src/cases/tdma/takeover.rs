@@ -1,4 +1,5 @@
-//! The master is killed, again and again, while all nodes send; and then it is left alone for long, and must remain it.
+//! The master is killed again and again while all nodes send; then the master runs undisturbed for long, and must stay
+//! the master.
 
 use super::contest::BARE;
 use super::goals::{Goal, figure, spread};
@@ -27,15 +28,17 @@ const KILLS_MAX: usize = 14;
 /// In each round: 100 000 cycles in five.
 const QUIET: Duration = Duration::from_secs(100);
 const QUIET_QUICK: Duration = Duration::from_secs(1);
-/// The pace at which the moment of killing goes through the cycle.
+/// The step at which the moment of killing moves through the cycle.
 const GOLDEN: f64 = 0.618_034;
 
-/// Who dies. Each time the other takes its place and keeps it, so they die in turns. Only a later one in the order of masters stands in for
-/// a silent master in the same cycle: its window lies behind. An earlier one does so in the next.
+/// The killed master. Each time the other takes its place and keeps it, so they alternate. Only a later one in the
+/// order of masters stands in for a silent master in the same cycle, since its window comes later. An earlier one does
+/// so in the next cycle.
 const DEAD: [&str; 2] = ["the first dies", "the second dies"];
 
 const REPLACED: [Goal; 2] = [Goal { name: "must 2 cycles", most: 2.0 }, Goal { name: "hoped 1, and 1 ms", most: 1.2 }];
-const REIGNS: [Goal; 2] = [Goal { name: "must 4 cycles", most: 4.0 }, Goal { name: "hoped 3, and 1 ms", most: 3.2 }];
+const NEW_MASTER: [Goal; 2] =
+    [Goal { name: "must 4 cycles", most: 4.0 }, Goal { name: "hoped 3, and 1 ms", most: 3.2 }];
 const LOST: [Goal; 1] = [Goal { name: "hoped none", most: 0.0 }];
 const STEP: [Goal; 1] = [Goal { name: "hoped 5 us", most: 5.0 }];
 const FALSE: [Goal; 2] = [Goal { name: "must 1", most: 1.0 }, Goal { name: "hoped none", most: 0.0 }];
@@ -53,9 +56,9 @@ struct Found {
     killed: Vec<TakenOver>,
     quiet_cycles: f64,
     false_changes: usize,
-    /// Of bare threads, each of which might have been the master, beside as many cycles.
+    /// Of bare threads, each of which could be the master, in as many cycles.
     standstills: Vec<f64>,
-    /// Of the quiet cycles of each round, those in which the capture saw no Sync, percent.
+    /// Cycles without a captured Sync in the undisturbed part of each round, percent.
     without_sync: Vec<f64>,
 }
 
@@ -84,7 +87,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
     let traffic = Traffic::start(&routers)?;
     routers.await_packages(&ALL, &mut capture)?;
     let mut found_here = Vec::new();
-    // In few kills the same one may die each time, where masters change by themselves.
+    // With few kills the same master may die each time, when masters change by themselves.
     let both_died = |killed: &[TakenOver]| (0..).zip(DEAD).all(|(dead, _)| killed.iter().any(|kill| kill.dead == dead));
     for kill in 0..KILLS_MAX {
         if kill >= kills && both_died(&found_here) {
@@ -92,7 +95,7 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
         }
         let taken_over = kill_master(&mut routers, &mut capture, &LOADED, (kill as f64 * GOLDEN).fract())?;
         routers.start_again(taken_over.dead)?;
-        // One that comes back listens, follows, and sends again.
+        // A returning node listens, follows, and sends again.
         routers.await_packages(&ALL, &mut capture)?;
         found_here.push(taken_over);
     }
@@ -111,38 +114,44 @@ fn watch(stage: &Stage, settings: &Settings, found: &mut Found) -> Result<(), Fa
 }
 
 impl Found {
-    /// What became of it when this node was the master.
-    fn killed(&self, who: &'static str, dead: u8) -> Vec<Row> {
+    /// The results for this node as the killed master.
+    fn killed(&self, contender: &'static str, dead: u8) -> Vec<Row> {
         let kills: Vec<&TakenOver> = self.killed.iter().filter(|kill| kill.dead == dead).collect();
         if kills.is_empty() {
             let never = Failure::Failed("it was never the master when one was killed".into());
-            return vec![Row::alone(subject("takeover, replacement", "cycles"), who, Err(never))];
+            return vec![Row::alone(subject("takeover, replacement", "cycles"), contender, Err(never))];
         }
         let mut rows = Vec::new();
         let mut told = |what: &str, unit, goals: &[Goal], of: fn(&TakenOver) -> f64| {
             let all: Vec<f64> = kills.iter().map(|kill| of(kill)).collect();
             let worst = all.iter().copied().reduce(f64::max);
-            rows.extend(spread(&subject(&format!("takeover, {what}"), unit), who, all));
-            rows.extend(figure(&subject(&format!("takeover, {what}, worst"), unit), who, worst.as_slice(), goals));
+            rows.extend(spread(&subject(&format!("takeover, {what}"), unit), contender, all));
+            rows.extend(figure(
+                &subject(&format!("takeover, {what}, worst"), unit),
+                contender,
+                worst.as_slice(),
+                goals,
+            ));
         };
         told("replacement", "cycles", &REPLACED, |kill| kill.replaced_cycles);
-        told("new master", "cycles", &REIGNS, |kill| kill.reigns_cycles);
+        told("new master", "cycles", &NEW_MASTER, |kill| kill.new_master_cycles);
         told("slots lost", "slots", &LOST, |kill| kill.slots_lost as f64);
         told("time step", "us", &STEP, |kill| kill.step_us);
         rows
     }
 
     fn rows(&self) -> Vec<Row> {
-        let mut rows: Vec<Row> = DEAD.iter().zip(0..).flat_map(|(who, dead)| self.killed(who, dead)).collect();
+        let mut rows: Vec<Row> =
+            DEAD.iter().zip(0..).flat_map(|(contender, dead)| self.killed(contender, dead)).collect();
         let cycles = self.quiet_cycles;
         let seen = subject("takeover, cycles without Sync", "%");
         rows.extend(figure(&seen, "quiet", &self.without_sync, &WITHOUT_SYNC));
-        // Who sees no master sees no change of it.
+        // A node that sees no master sees no change of the master.
         if self.without_sync.iter().all(|percent| *percent <= WITHOUT_SYNC[0].most) {
             let changes = self.false_changes as f64 * 1e5 / cycles;
             rows.extend(figure(&subject(FALSE_CHANGES, PER_CYCLES), "quiet", &[changes], &FALSE));
         }
-        // Each of them would be taken for dead.
+        // Others would take each of them for dead.
         let rounds = self.standstills.len();
         let mean = (rounds > 0).then(|| self.standstills.iter().sum::<f64>() / rounds as f64);
         rows.extend(figure(&subject(FALSE_CHANGES, PER_CYCLES), BARE, mean.as_slice(), &FALSE));
@@ -162,13 +171,13 @@ mod tests {
 
     #[test]
     fn what_nobody_saw_is_no_good_figure() {
-        let kill = |dead| TakenOver { dead, replaced_cycles: 1.0, reigns_cycles: 3.0, slots_lost: 0, step_us: 1.0 };
+        let kill = |dead| TakenOver { dead, replaced_cycles: 1.0, new_master_cycles: 3.0, slots_lost: 0, step_us: 1.0 };
         let cases = |killed: &[u8], without_sync| {
             let killed = killed.iter().map(|dead| kill(*dead)).collect();
             let rows =
                 Found { killed, quiet_cycles: 200.0, without_sync: vec![0.0, without_sync], ..Found::default() }.rows();
             let has = |case: &str| rows.iter().any(|row| row.case == case);
-            let failed = rows.iter().filter(|row| row.result.is_err()).map(|row| row.who).collect::<Vec<_>>();
+            let failed = rows.iter().filter(|row| row.result.is_err()).map(|row| row.contender).collect::<Vec<_>>();
             let missed = rows.iter().any(|row| row.case == "takeover, cycles without Sync" && row.met() == Some(false));
             (has("takeover, false changes"), missed, failed)
         };
