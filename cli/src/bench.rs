@@ -1,4 +1,4 @@
-//! `rohrpost bench local`: how this computer hands packages over, beside what it could do at best.
+//! `rohrpost bench local`: how fast this computer passes packages between processes, next to its hardware floor.
 
 use crate::terminal::{Failure, complain, say};
 use rohrpost_bench::environment::Environment;
@@ -11,20 +11,20 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Rounds of the self-test, which takes some five seconds.
+/// Rounds of the self-test; it takes about five seconds.
 const ROUNDS: usize = 3;
 
-/// Ours may take so much longer than the floor, by the median, before something is strange; the target is 1.1.
+/// Our median may exceed the floor by this factor; beyond it something is strange. The target is 1.1.
 const STRANGE_BLOCKING: f64 = 1.5;
 
-/// Spinning pays if it is so much quicker than sleeping; mostly it is ten times and more. How it stands to bare spinning tells
-/// more of the way between two processors than of the computer as a whole.
+/// Spinning pays if it is faster than sleeping by this factor; mostly it is ten times faster or more. The ratio to bare spinning
+/// says more about the path between two processors than about the computer as a whole.
 const SPINNING_PAYS: f64 = 2.0;
 
-/// One of a hundred of the futex floor that takes longer tells of a computer that does not wake threads in time, µs.
+/// If the p99 of the futex floor is longer than this, the computer does not wake threads in time, µs.
 const LATE_US: f64 = 100.0;
 
-/// Where to read on.
+/// The page with more explanation.
 const TUNING: &str = "docs/src/tuning.md";
 
 #[derive(clap::Args)]
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Mailboxes between two processes, beside bare shared memory: takes 5 seconds.
+    /// Mailboxes between two processes, next to bare shared memory; takes 5 seconds.
     #[command(
         after_help = "Example: rohrpost bench local\nIt keeps two processors busy meanwhile, so not while a robot works. Where a node is launched it\nmeasures with the default scheduler, so that it is in nobody's way."
     )]
@@ -76,9 +76,9 @@ fn launched() -> Vec<PathBuf> {
     paths.filter(|path| Node::open(path).is_ok_and(|node| node.launcher().is_some())).collect()
 }
 
-/// What is known to make a computer late.
+/// Known causes of latency on this computer.
 struct Hints {
-    /// Of the first processor; none where it is not to be chosen.
+    /// Governor of the first processor; none where it cannot be chosen.
     governor: Option<String>,
     is_virtual: bool,
     /// This program was compiled for development.
@@ -98,12 +98,12 @@ impl Hints {
     }
 }
 
-/// The row of ours beside a floor, for small messages.
+/// Our row next to a floor, for small messages.
 fn small<'a>(rows: &'a [Row], floor: &str) -> Option<&'a Row> {
     rows.iter().find(|row| row.bytes == Some(64) && row.versus.is_some_and(|versus| versus.name == floor))
 }
 
-/// What the figures say, and where to look if they are not good.
+/// What the figures mean, and where to look if they are bad.
 fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
     let (Some(blocking), Some(spinning)) = (small(&report.rows, "futex"), small(&report.rows, "spin")) else {
         return "NOTHING TO SAY: no figures.".into();
@@ -130,7 +130,7 @@ fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
     format!("LOOK: {said}{}. What to look at: {advice}. See {TUNING}.", late.unwrap_or_default())
 }
 
-/// What is known to be in the way here.
+/// Known causes of latency here, as text.
 fn look_at(environment: &Environment, scheduling: Scheduling, hints: &Hints) -> Vec<String> {
     let refused = (!environment.refusals.is_empty()).then(|| {
         format!("the kernel refuses real time ({}), give the user the right", environment.refusals.join("; "))

@@ -1,4 +1,4 @@
-//! `rohrpost bw`: how many bytes go in and out of a module, read from the counters of those who send.
+//! `rohrpost bw`: bytes per second into and out of a module, read from the senders' counters.
 
 use super::published::{WatchedModule, data_of};
 use super::target::Target;
@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         let module = watched.module;
         let flows = survey.flows.into_iter().filter(|flow| !flow.is_publication());
-        // All that comes in is counted on the module's node: what comes from another one, by the router that delivers it.
+        // All input is counted on the module's node: packages from another node are counted by the router that delivers them.
         let (installation, node) = (&watched.running.installation, survey.node.as_str());
         let counts = |flow: &FlowInfo| {
             flow.to.module() == module || flow.from.module() == module && !is_hop(installation, node, flow)
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// One line; false when nobody reads any more.
+/// Prints one line; false when nobody reads any more.
 fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &FlowSum) -> bool {
     if !arguments.pace.json {
         return say(sum.text(name));
@@ -90,7 +90,7 @@ fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &FlowSum) -
     }))
 }
 
-/// Several flows together.
+/// Totals of several flows.
 #[derive(Default)]
 struct FlowSum {
     packages: u64,
@@ -104,7 +104,7 @@ struct FlowSum {
     lively: bool,
 }
 
-/// Each flow's rate is by its own first and last package, and so is their sum.
+/// Each flow's rate comes from its own first and last package; the total is their sum.
 fn sum<'a>(flows: impl Iterator<Item = (&'a FlowInfo, FlowFigures)>) -> FlowSum {
     let mut sum = FlowSum::default();
     for (_, figures) in flows {

@@ -1,4 +1,4 @@
-//! `rohrpost delay`: how long packages wait to be taken, and how old data are when they are published.
+//! `rohrpost delay`: how long packages wait in mailboxes, and how old data are when they are published.
 
 use super::published::{WatchedModule, data_of};
 use super::summary::class_name;
@@ -38,7 +38,7 @@ struct Wait {
     latency: Latency,
 }
 
-/// What the tool looks at.
+/// One observation.
 struct Looked {
     waits: Window<Vec<Wait>>,
     module: WatchedModule,
@@ -48,7 +48,7 @@ struct Looked {
 struct WaitLine {
     mailbox: String,
     purpose: &'static str,
-    /// Somebody else's, to which this module sends data.
+    /// A mailbox of another module, to which this module sends data.
     subscriber: bool,
     class: String,
     received: u64,
@@ -98,14 +98,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Whether mailboxes were made anew, and count from 0: as when their node was launched again.
+/// Whether mailboxes were created anew and count from 0, for example after their node was launched again.
 fn begins_anew(before: &[Wait], now: &[Wait]) -> bool {
     let known = |wait: &Wait| before.iter().find(|known| (known.mailbox, known.class) == (wait.mailbox, wait.class));
     now.iter().any(|wait| known(wait).is_some_and(|known| wait.latency.count() < known.latency.count()))
 }
 
-/// Waits in the module's mailboxes, and in those that it sends data to, on whichever nodes they are. What is on a node that does not
-/// answer is left out.
+/// Waits in the module's mailboxes and in the mailboxes that it sends data to, on any node. Nodes that do not answer
+/// are left out.
 fn waits(running: &Running, module: Name, survey: &Survey) -> Result<Vec<Wait>, Failure> {
     let is_sent = |flow: &&FlowInfo| matches!(flow.kind.kind(), Kind::Data(_)) && !flow.is_publication();
     let sent: Vec<Name> =

@@ -34,7 +34,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// After the end of a log, so long for the last packages to be mapped and drawn.
+/// After the end of a log, wait this long until the last packages are mapped and drawn.
 const SETTLE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(if well { code } else { ExitCode::FAILURE })
 }
 
-/// Until the time is over, the log is over, or it is told to stop.
+/// Runs until the time is over, the log is over, or a stop is requested.
 fn watch(arguments: &Arguments, long: Option<Duration>, launch: &mut Launch, speech: &Speech) -> Result<(), Failure> {
     let mut deadline = long.map(|long| Instant::now() + long);
     let mut view = TerminalView::new(arguments.quiet, speech);
@@ -94,13 +94,13 @@ fn progress(launch: &mut Launch) -> Option<Progress> {
     ask(launch, player, PlayerInterface::hash())
 }
 
-/// The first function of a module's own, without arguments.
+/// The first function of a module's own interface that takes no arguments.
 fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interface: u32) -> Option<T> {
     let read = |bytes: &[u8]| rohrpost::macro_support::from_bytes::<T>(bytes);
     launch.tool().call(module, FIRST_FUNCTION, interface, |_| Ok(()), read).ok()
 }
 
-/// What there is to say at the end: packages, losses and latencies by class, and what came of them; and
+/// The summary: packages, losses and latencies by class, and their result; and
 /// whether all is well.
 fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
     let survey = launch.survey()?;

@@ -1,4 +1,4 @@
-//! Declared flows as a table: how late each may be at most, and how late it was. Of `net`, and of the demo's summary.
+//! Declared flows as a table: the allowed latency and the measured latency. Used by `net` and by the demo's summary.
 
 use super::table::table;
 use super::units::fine;
@@ -8,7 +8,7 @@ use rohrpost::interfaces::{FlowState, FlowStates, Links};
 use rohrpost::schema::Description;
 use rohrpost_config::{Contents, Installation};
 
-/// What the columns say that their heads do not.
+/// Explains the columns.
 pub(super) const LEGEND: &str = "\
 at worst: the bound that `check` computes, for slots that are kept; kept: the slowest package since whose publishing none was missed or cut
 short; slowest: of all, as the router that sends measured it, up to the arrival at the other computer; beyond: packages slower than the bound,
@@ -16,7 +16,7 @@ of kept: those among them whose slots were kept; late: slower than the deadline,
 when they came to its mailbox, by their stamp. A package between two modules is put to the flow that carries it (`carries`), else, declared
 or not, to one that does not say what it carries";
 
-/// A row for each flow that leaves one of these nodes; empty without any. `ask` asks a module for its interface.
+/// A row for each flow that starts at one of these nodes; empty if there is none. `ask` asks a module for its interface.
 pub(super) fn measured<'a>(
     installation: &Installation,
     nodes: impl IntoIterator<Item = &'a FlowStates>,
@@ -50,7 +50,7 @@ pub(super) fn measured<'a>(
     table(heads, rows)
 }
 
-/// What a flow carries, by the name in the interface where that is known; none if the file does not say.
+/// A flow's content, by its name in the interface if that is known; none if the file does not list it.
 fn carried(
     installation: &Installation,
     flow: &FlowState,
@@ -87,7 +87,7 @@ fn row(installation: &Installation, flow: &FlowState, carried: Option<String>, l
     ]
 }
 
-/// Of the receiver's class, on its node. Commands and replies have no stamp.
+/// Packages of the receiver's class, on its node. Commands and replies have no stamp.
 fn oldest_ns(installation: &Installation, flow: &FlowState, links: &[&Links]) -> Option<u64> {
     let to = installation.classes.parse_module(&flow.to).ok()?;
     let node = installation.node_of(to)?;
@@ -152,7 +152,7 @@ mod tests {
     fn what_a_flow_carries_has_the_name_that_the_interface_gives_it() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-nodes.toml");
         let text = std::fs::read_to_string(&file).unwrap();
-        // One whose interface has to be asked for, and one that does not tell it.
+        // One interface must be asked for; the other module does not answer.
         let program = |name: &str| format!("[[module]]\nname = \"{name}\"\nnode = \"base\"\nprogram = \"./laser\"\n");
         let text = text + &program("laser.1") + &program("laser.2");
         let installation = Installation::parse(&text, &file).unwrap();

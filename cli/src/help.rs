@@ -1,8 +1,8 @@
-//! `rohrpost --help`: its subcommands, those of every day first.
+//! `rohrpost --help`: groups the subcommands, the most used ones first.
 
 use clap::Command;
 
-/// Headings and their subcommands, in the order of a newcomer's days.
+/// Headings and their subcommands, in the order in which a newcomer needs them.
 const GROUPS: [(&str, &[&str]); 7] = [
     ("To begin", &["demo", "new", "check", "launch"]),
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),

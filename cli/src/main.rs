@@ -1,7 +1,7 @@
-//! The `rohrpost` command: one file or folder a subcommand.
+//! The `rohrpost` command: one file or folder for each subcommand.
 
 #![forbid(unsafe_code)]
-// What is printed goes through `say` and `complain`, and so nothing in it that a terminal would obey.
+// All output goes through `say` and `complain`, which escape what a terminal would obey.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
@@ -67,9 +67,9 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Explain what a configuration will run, or what is wrong with it.
+    /// Explain what a configuration will run, or its mistakes.
     Check(check::Arguments),
-    /// Start the modules of a node and watch over them.
+    /// Start the modules of a node and supervise them.
     Launch(launch::Arguments),
     /// Run a simulated robot that drives and maps, or play a robot's log.
     Demo(demo::Arguments),
@@ -99,7 +99,7 @@ enum Command {
     Bw(bw::Arguments),
     /// Measure how long packages wait; disturbs nobody.
     Delay(delay::Arguments),
-    /// Show or draw who sends what to whom; disturbs nobody.
+    /// Show or draw which module sends what to which; disturbs nobody.
     Graph(graph::Arguments),
     /// Measure how long a module takes to answer.
     Ping(ping::Arguments),
@@ -113,7 +113,7 @@ enum Command {
     Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
-    /// SnapshotRequest whether this computer lets a robot run in time.
+    /// Check whether this computer lets a robot run in time.
     Doctor(doctor::Arguments),
     /// Measure how this computer hands packages over.
     Bench(bench::Arguments),

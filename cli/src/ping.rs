@@ -28,16 +28,16 @@ pub(super) struct Arguments {
     name: String,
     #[command(flatten)]
     target: Target,
-    /// End after so many calls; without it, at Ctrl-C.
+    /// End after this many calls; without it, at Ctrl-C.
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
-    /// From one to the next.
+    /// Time from one call to the next.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     interval: f64,
-    /// Wait so long for each answer.
+    /// Timeout for each answer.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     timeout: f64,
-    /// One JSON object a line: each answer, then all.
+    /// One JSON object a line: each answer, then the totals.
     #[arg(long)]
     json: bool,
 }
@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut tool = running.join(timeout)?;
     let mut rounds = PingRounds::default();
     loop {
-        // The round encloses the ways: whoever holds this process up in between makes neither longer than the round.
+        // The round trip encloses both one-way times: a delay of this process in between makes neither longer than the round trip.
         let (began, before) = (Instant::now(), TimeReport::of(&tool.clock));
         let answer = tool.time(module);
         let (after, took) = (TimeReport::of(&tool.clock), began.elapsed());
@@ -113,7 +113,7 @@ fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64
     say(format_args!("{}: none {number}: {why}", arguments.name))
 }
 
-/// What shared memory tells of a module that does not answer, and what to do.
+/// What shared memory shows of a module that does not answer, and what to do.
 fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
     let name = running.text(module);
     let survey = running.look(running.node_of(module), Scope::Module(module.raw()))?;
@@ -130,7 +130,7 @@ fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
     })
 }
 
-/// All rounds so far, in as much memory for a million as for one.
+/// Statistics of all rounds, in constant memory.
 #[derive(Default)]
 struct PingRounds {
     sent: u64,
@@ -156,10 +156,10 @@ impl PingRounds {
         self.sent - self.answered
     }
 
-    /// Min, mean, p50, p99, max; none when nothing was answered.
+    /// Min, mean, p50, p99, max; none without an answer.
     fn times(&self) -> Option<[Duration; 5]> {
         let (min, mean) = (self.min?, self.took.sum.div_f64(self.answered as f64));
-        // A bucket may begin before the shortest time in it.
+        // A bucket may begin below the shortest time in it.
         let at = |share| self.took.quantile(share).map_or(min, |found| found.max(min));
         Some([min, mean, at(0.5), at(0.99), self.took.max])
     }

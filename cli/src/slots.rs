@@ -1,10 +1,10 @@
-//! How nodes keep their time slots, as a table: of `net`, and of the demo's summary.
+//! How nodes keep their time slots, as a table: used by `net` and by the demo's summary.
 
 use super::table::table;
 use super::units::{bytes, fine};
 use rohrpost::interfaces::{SlotState, TunnelState};
 
-/// A row for each node, and why those are silent that are; empty without any.
+/// A row for each node, and the reason for each silent node; empty if there are no slots.
 pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String {
     let slots: Vec<&SlotState> = slots.into_iter().collect();
     if slots.is_empty() {
@@ -54,13 +54,13 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
     table(heads, rows) + &silent.collect::<String>() + &hellos.collect::<String>() + &tunnels.collect::<String>()
 }
 
-/// What was said at a moment that nobody vouches for.
+/// Hellos that were sent at an unverified time.
 fn unproven(slots: &SlotState) -> String {
     let hellos = if slots.unproven == 1 { "1 hello".into() } else { format!("{} hellos", slots.unproven) };
     format!("node {}: {hellos} left by the time of who had not shown that it lives\n", slots.node)
 }
 
-/// What ordinary traffic did; what went wrong is told if it did.
+/// Ordinary traffic in the slots; errors appear if there were any.
 fn tunnelled(node: &str, tunnel: &TunnelState) -> String {
     let TunnelState { sent, dropped, stray, received, refused } = *tunnel;
     let wrong =

@@ -1,4 +1,4 @@
-//! `rohrpost version`: of this program, of what it shares with others, and of the nodes that are here.
+//! `rohrpost version`: versions of this program, of its shared formats, and of the nodes here.
 
 use crate::terminal::{Failure, say};
 use rohrpost::common;
@@ -16,7 +16,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// What `--version` says after the program's name.
+/// The text of `--version` after the program's name.
 pub(super) fn text() -> &'static str {
     static TEXT: OnceLock<String> = OnceLock::new();
     TEXT.get_or_init(|| {

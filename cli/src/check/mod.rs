@@ -1,4 +1,4 @@
-//! `rohrpost check`, and the reading of a configuration with all that can be known of it before anything runs.
+//! `rohrpost check`, and reading a configuration with every check that is possible before anything runs.
 
 mod json;
 
@@ -17,7 +17,7 @@ use std::process::ExitCode;
 pub(super) struct Arguments {
     /// The configuration.
     file: PathBuf,
-    /// Explain this node only.
+    /// Explain only this node.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
     /// Print mistakes, or what the file means, as JSON.
@@ -25,7 +25,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Reads a configuration, and asks the built-in modules whether they could work with it.
+/// Reads a configuration, and asks the built-in modules whether they can work with it.
 ///
 /// # Errors
 /// Everything that is wrong, by line.
@@ -33,7 +33,7 @@ pub(super) fn load(file: &Path) -> Result<Installation, Errors> {
     validate(Installation::load(file)?)
 }
 
-/// Asks the built-in modules of an installation whether they could work with it.
+/// Asks the built-in modules of an installation whether they can work with it.
 ///
 /// # Errors
 /// Everything that they would refuse, by line.
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Time daemons that run on this computer, where a common time is told.
+/// Time daemons that run on this computer, if the installation has a common time.
 fn daemons_here(installation: &Installation, processes: &Path) -> Vec<String> {
     if !matches!(installation.time, TimeSource::Master { .. }) {
         return Vec::new();
@@ -87,7 +87,7 @@ fn daemons_here(installation: &Installation, processes: &Path) -> Vec<String> {
     told.collect()
 }
 
-/// Flows between the same modules of two nodes of which the file does not say what they carry: routers go by the size of each package.
+/// Flows between the same two modules of two nodes, if the file does not list their content: routers go by the size of each package.
 fn told_apart_by_size(installation: &Installation) -> Vec<String> {
     let name = |name| installation.classes.format(name);
     let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
@@ -108,7 +108,7 @@ fn told_apart_by_size(installation: &Installation) -> Vec<String> {
     notes.collect()
 }
 
-/// On which computer this runs is not said; a missing program is an error only where its node will be launched.
+/// The file does not say on which computer this runs; a missing program is an error only where its node is launched.
 fn missing_programs(installation: &Installation, only: Option<&str>) -> Result<Vec<MissingProgram>, Failure> {
     let beside = std::env::current_exe()?.parent().map(PathBuf::from).unwrap_or_default();
     let nodes = installation.nodes.iter().filter(|node| only.is_none_or(|name| name == node.name));

@@ -1,4 +1,4 @@
-//! What went between the nodes of the demo, and whether nothing was forgotten.
+//! The traffic between the nodes of the demo, and whether every package is accounted for.
 
 use crate::summary::class_name;
 use crate::table::{counted, table, time};
@@ -9,26 +9,26 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;
 
-/// Whether all that routers were given is accounted for, once nothing is on its way any more.
+/// Whether every package that routers were given is accounted for, once nothing is under way.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Balance {
     taken: u64,
     delivered: u64,
     /// Lost in routers, for any cause.
     lost: u64,
-    /// Sent by one router and not come to the other.
+    /// Sent by one router and not received by the other.
     on_wire: u64,
-    /// Datagrams that went missing with them.
+    /// Datagrams that were lost with them.
     datagrams: u64,
-    /// Nodes whose routers died: what those had counted is gone with them.
+    /// Nodes with a router that died: its counters are lost.
     died: Vec<String>,
-    /// What does not add up.
+    /// Counters that do not add up.
     wrong: Vec<String>,
 }
 
 impl Balance {
-    /// The snapshots are of different moments: what goes on meanwhile, calls of tools (class `tool`), is compared within each node only.
-    /// Routers of the nodes that have `died` count from their last start, so that between nodes only the others are compared, and as a whole.
+    /// The snapshots are not simultaneous: traffic that continues meanwhile, calls of tools (class `tool`), is compared only within each node.
+    /// Routers of the nodes that have `died` count from their last start, so between nodes only the others are compared, and as a whole.
     pub(super) fn of(links: &[Links], tool: u8, died: &[&str]) -> Self {
         let mut balance = Self { died: died.iter().map(ToString::to_string).collect(), ..Self::default() };
         links.iter().for_each(|node| balance.within(node));
@@ -44,7 +44,7 @@ impl Balance {
         balance
     }
 
-    /// What a router has got must be what it knows of.
+    /// A router's input must equal the sum of its outcomes.
     fn within(&mut self, node: &Links) {
         let waiting: u64 = node.waiting.iter().map(|level| level.packages).sum();
         let (mut into, mut out) = (0, waiting);
@@ -61,7 +61,7 @@ impl Balance {
         }
     }
 
-    /// What was sent must have come, class by class.
+    /// Every sent package must arrive, class by class.
     fn by_class(&mut self, links: &[Links], tool: u8) {
         let mut ways: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
         for class in links.iter().flat_map(|node| &node.classes) {
@@ -73,7 +73,7 @@ impl Balance {
         }
     }
 
-    /// The same from each node to each other, as far as the routers of both have lived throughout.
+    /// The same for each pair of nodes, if both routers lived throughout.
     fn by_way(&mut self, links: &[Links]) {
         let survivors: Vec<&Links> = links.iter().filter(|links| !self.died.contains(&links.node)).collect();
         let towards = |of: &Links, to: &Links| of.peers.iter().position(|peer| peer.node == to.node);
@@ -126,7 +126,7 @@ fn lost_of(class: &ClassCarried) -> u64 {
     class.lost.iter().map(|lost| lost.packages).sum()
 }
 
-/// Datagrams from a peer that did not come whole.
+/// Datagrams from a peer that did not arrive intact.
 fn gone(peer: &PeerLink) -> u64 {
     peer.counters.lost + peer.counters.damaged
 }
@@ -153,7 +153,7 @@ pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
     )
 }
 
-/// A row for each pair of nodes and direction, as the one that receives sees it.
+/// A row for each pair of nodes and direction, as counted by the receiver.
 pub(super) fn by_link(links: &[Links]) -> String {
     let pairs = links.iter().flat_map(|to| to.peers.iter().map(move |from| (from, to)));
     let rows = pairs.map(|(from, to)| {

@@ -1,4 +1,4 @@
-//! What went through the TCP router in the demo, as its clients have counted; and what it cost that it died.
+//! Traffic through the TCP router in the demo, as its clients count it; and the losses when it died.
 
 use crate::summary::class_name;
 use crate::table::{table, time};
@@ -10,7 +10,7 @@ use rohrpost::{CallError, Class, ToolLink};
 use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 
-/// What the clients of all nodes say; nobody without a TCP router.
+/// The reports of all nodes' clients; empty without a TCP router.
 pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<BeyondLink>, Failure> {
     let mut links = Vec::new();
     for node in &installation.nodes {
@@ -24,22 +24,22 @@ pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Result<Ve
     Ok(links)
 }
 
-/// What a class did, at all ends together.
+/// A class's counters, summed over all clients.
 #[derive(Default)]
 struct ClassSum {
-    /// Meant to go to the TCP router.
+    /// Addressed to the TCP router.
     meant: u64,
     left: u64,
-    /// By newer ones, at the clients' ends.
+    /// Replaced by newer ones, at the clients.
     replaced: u64,
     came: u64,
     delivered: u64,
-    /// By cause.
+    /// Losses by cause.
     lost: BTreeMap<String, u64>,
 }
 
 impl ClassSum {
-    /// Handed to a connection, and never come out of another.
+    /// Written to a connection, and never received from another.
     fn on_way(&self) -> u64 {
         self.left.saturating_sub(self.came)
     }
@@ -109,7 +109,7 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     text + "\n" + &table(["node", ">connected anew", ">outages", ">the last took"], rows)
 }
 
-/// Whether all take part in the end.
+/// Whether all clients are connected at the end.
 pub(super) fn is_well(links: &[BeyondLink]) -> bool {
     links.iter().all(|link| link.state == BeyondState::Up)
 }

@@ -1,12 +1,12 @@
-//! The kernel and the processor: what may keep a thread waiting.
+//! The kernel and the processor: what may delay a thread.
 
 use super::finding::{Finding, Grade};
 use super::machine::Machine;
 use crate::daemons::{self, Daemon};
 
-/// Open-file-description locks came with it.
+/// The first version with open-file-description locks.
 const KERNEL_LEAST: (u32, u32) = (3, 15);
-/// A core that has to be woken out of a state for longer than this is late by as much, µs.
+/// Idle states with a longer exit latency delay a wake-up noticeably, µs.
 const IDLE_LATENCY_US: u64 = 50;
 const CPUS: &str = "/sys/devices/system/cpu";
 
@@ -18,7 +18,7 @@ pub(super) fn findings(machine: &Machine) -> Vec<Finding> {
     found.chain(time_daemons(machine)).collect()
 }
 
-/// Where nodes have a common time, nobody else may slew their clocks.
+/// If nodes have a common time, no other program may slew their clocks.
 fn time_daemons(machine: &Machine) -> Vec<Finding> {
     let finding = |daemon: Daemon| {
         let (what, is) = ("time daemon", format!("{} runs", daemon.name));
@@ -52,7 +52,7 @@ fn preemption(machine: &Machine) -> Option<Finding> {
     if machine.number("/sys/kernel/realtime") == Some(1) || built.contains("PREEMPT_RT") {
         return Some(Finding::ok("preemption", "PREEMPT_RT", why));
     }
-    // `none voluntary (full) lazy`: the one in brackets. Mostly only root may read it.
+    // `none voluntary (full) lazy`: the mode in brackets is active. Mostly only root may read the file.
     let chosen = machine.read("/sys/kernel/debug/sched/preempt");
     let chosen = chosen.as_deref().and_then(|text| text.split(['(', ')']).nth(1));
     let model = match chosen {
@@ -83,7 +83,7 @@ fn throttling(machine: &Machine) -> Option<Finding> {
     })
 }
 
-/// Since 6.12 the kernel serves ordinary threads in time of their own; the share above counts no more then.
+/// Since 6.12 the kernel reserves time for ordinary threads by a deadline server; the share above no longer matters.
 fn fair_server(machine: &Machine) -> Option<Finding> {
     let runtime = machine.number("/sys/kernel/debug/sched/fair_server/cpu0/runtime")?;
     let period = machine.number("/sys/kernel/debug/sched/fair_server/cpu0/period")?;
@@ -162,7 +162,7 @@ fn cores(machine: &Machine) -> Finding {
     Finding::ok(what, is, why)
 }
 
-/// `0-3,8`: five.
+/// Counts the processors of a list: `0-3,8` is five.
 fn count_of_list(list: &str) -> u32 {
     let range = |part: &str| {
         let (first, last) = part.split_once('-').unwrap_or((part, part));

@@ -1,4 +1,4 @@
-//! What this user and this process may.
+//! The rights of this user and this process.
 
 use super::finding::{Finding, Grade};
 use super::machine::{Limit, Machine, Needs};
@@ -6,7 +6,7 @@ use rohrpost_config::FIFO_MAX;
 
 /// Bit of CAP_SYS_NICE.
 const SYS_NICE: u32 = 23;
-/// A process of a node keeps a few files for each mailbox that it has or sends to.
+/// A process of a node keeps a few files open for each mailbox that it owns or sends to.
 const FILES_LEAST: u64 = 1024;
 
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
@@ -45,7 +45,7 @@ fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
 }
 
 fn nice(machine: &Machine) -> Option<Finding> {
-    // The limit is counted from the other end: 20 less the lowest nice value.
+    // The limit counts from the other end: 20 minus the lowest nice value.
     let is = match machine.limit("Max nice priority")? {
         Limit::Of(..=20) => "from 0 on".into(),
         Limit::Of(limit) => format!("from -{} on", limit.min(40) - 20),
@@ -77,7 +77,7 @@ fn swap(machine: &Machine) -> Option<Finding> {
         return Some(Finding::ok(what, "none", why));
     }
     let is = areas.join(", ");
-    // Who locks its memory is not paged out.
+    // Locked memory is not paged out.
     if machine.limit("Max locked memory") == Some(Limit::None) {
         return Some(Finding::ok(what, format!("{is}; real-time modules lock their memory"), why));
     }

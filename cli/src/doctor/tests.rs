@@ -1,4 +1,4 @@
-//! What `doctor` says of computers that were written down, and of networks.
+//! Output of `doctor` for recorded computers and networks.
 
 use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use super::machine::{AskedOfKernel, Bridge, NodeDirectory, NodeFound};
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// Unpacks a computer that was written down: lines `== PATH`, each followed by what the file holds.
+/// Unpacks a recorded computer: lines `== PATH`, each followed by that file's content.
 fn unpack(text: &str, to: &Path) {
     for file in text.split("\n== ").skip(1) {
         let (path, content) = file.split_once('\n').unwrap_or((file, ""));
@@ -30,7 +30,7 @@ fn said(name: &str, computer: (AskedOfKernel, Needs)) -> String {
     page(&examined(name, computer)) + "\n"
 }
 
-/// `UPDATE_GOLDEN=1 cargo test --bin rohrpost doctor` writes the texts anew; read the difference before you commit.
+/// `UPDATE_GOLDEN=1 cargo test --bin rohrpost doctor` rewrites the texts; read the diff before you commit.
 fn compare(name: &str, said: &str) {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../tests/doctor/{name}.txt"));
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
@@ -125,7 +125,7 @@ fn bad() -> (AskedOfKernel, Needs) {
     (asked, Needs { priority: 34, memory: 40 << 20, gui: true, bridge: None, processes: 6, from })
 }
 
-/// As the unit for systemd has it, in /run: what holds there is told of /run, not of /dev/shm.
+/// As in the systemd unit, in /run: the text must name /run, not /dev/shm.
 fn too_little_room_in_run() -> (AskedOfKernel, Needs) {
     let asked = AskedOfKernel {
         base: "/run/rohrpost/main".into(),
@@ -168,7 +168,7 @@ fn a_computer_made_for_a_robot() {
 
 #[test]
 fn a_computer_on_which_all_is_wrong() {
-    // The version of the layout goes its own way.
+    // The layout version changes independently.
     compare("bad", &said("bad", bad()).replace(&format!("this program {LAYOUT_VERSION}"), "this program …"));
 }
 
@@ -184,7 +184,7 @@ fn a_node_whose_address_is_elsewhere() {
     compare("elsewhere", &format!("warn  network security{network}"));
 }
 
-/// What a kernel does not tell is not guessed at.
+/// A fact that the kernel does not report is not guessed.
 #[test]
 fn a_computer_that_tells_nothing() {
     let said = said("silent", (nothing_told(), Needs::default()));
@@ -192,7 +192,7 @@ fn a_computer_that_tells_nothing() {
     compare("silent", &said);
 }
 
-/// With or without a configuration, a node cannot be made in no room.
+/// With or without a configuration, a node needs free space.
 #[test]
 fn full_shared_memory_is_bad() {
     for (free, state) in [(64 << 10, Grade::Bad), (8 << 20, Grade::Warn), (64 << 20, Grade::Ok)] {
@@ -210,12 +210,12 @@ fn waking_up_late_is_told() {
     assert_ne!(validate(90).is, validate(6000).is);
 }
 
-/// A line that says the same of each computer tells nothing, or lies.
+/// A line that is the same for every computer says nothing, or is wrong.
 #[test]
 fn each_line_is_tested_with_the_opposite_state() {
-    // Nothing of it is wrong: each says how it is, in one way here and in another there.
+    // None of these is a problem: each describes a state, which differs between the computers.
     const NEVER_WRONG: [&str; 6] = ["fair server", "nice", "user", "container", "isolated cores", "systemd"];
-    // There only when something is wrong.
+    // These appear only for a problem.
     const NEVER_RIGHT: [&str; 2] = ["CPU quota", "real-time quota"];
     let computers = [
         ("good", good()),

@@ -1,4 +1,4 @@
-//! `rohrpost keys`: what the nodes of an installation know or show, and nobody else.
+//! `rohrpost keys`: the secret keys and certificates of an installation's nodes.
 
 pub(super) mod certificates;
 
@@ -30,37 +30,37 @@ pub(super) struct Arguments {
 
 #[derive(Subcommand)]
 enum Step {
-    /// Make what is missing, and certificates that do not hold.
+    /// Make missing keys and certificates, and replace certificates that are not valid.
     New(Place),
-    /// Add a key, and renew certificates; the key before stays valid until `finish`.
+    /// Add a key, and renew certificates; the previous key stays valid until `finish`.
     Rotate {
         #[command(flatten)]
         place: Place,
-        /// With a new authority: all certificates that the old one has signed count no more, so all are changed at once.
+        /// Make a new authority: certificates that the old one signed are no longer valid, so all nodes change at once.
         #[arg(long)]
         authority: bool,
     },
     /// Drop the older key, when all nodes have the newer one.
     Finish(Place),
-    /// Show what there is: keys by fingerprints that say nothing of them, how old they are, and how long certificates hold.
+    /// Show keys as fingerprints, which do not reveal them, their age, and how long certificates are valid.
     Show(Place),
 }
 
 #[derive(Args)]
 struct Place {
-    /// The configuration, for all that it needs; or a folder, for the keys of datagrams alone.
+    /// The configuration, for everything that it requires; or a folder, for the keys of datagrams alone.
     #[arg(value_name = "FILE", default_value = "keys")]
     path: PathBuf,
-    /// New certificates hold for so many days.
+    /// New certificates are valid for this many days.
     #[arg(long, default_value_t = 730, value_parser = clap::value_parser!(u32).range(1..=3650))]
     days: u32,
 }
 
-/// What keys are wanted for.
+/// The files that keys are made for.
 struct Wanted {
-    /// The file of those that seal datagrams, if there are to be any.
+    /// The file of the keys that seal datagrams, if there are to be any.
     datagrams: Option<PathBuf>,
-    /// For its certificates.
+    /// The installation, for its certificates.
     installation: Option<Installation>,
 }
 
@@ -85,7 +85,7 @@ impl Wanted {
         Ok(Self { datagrams, installation: Some(installation) })
     }
 
-    /// Makes certificates, and says which.
+    /// Makes certificates, and prints the new files.
     fn certify(&self, which: Which, days: u32) -> Result<Vec<String>, Failure> {
         let Some(installation) = &self.installation else { return Ok(Vec::new()) };
         let made = certificates::make(installation, which, days)?;
@@ -107,7 +107,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn new(wanted: &Wanted, days: u32) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
     if let Some(file) = &wanted.datagrams {
-        // Those of another system of the installation may be the same.
+        // Several systems of an installation may share a folder.
         if wanted.installation.is_none() || !file.exists() {
             let keys = Keys::first(security::random()?);
             keys.create(file)?;
@@ -127,7 +127,7 @@ fn new(wanted: &Wanted, days: u32) -> Result<Vec<String>, Failure> {
 fn rotate(wanted: &Wanted, authority: bool, days: u32) -> Result<Vec<String>, Failure> {
     let rotated = |file: &PathBuf| Ok::<_, Failure>((file.clone(), Keys::load(file)?.rotated(security::random()?)?));
     let keys = wanted.datagrams.as_ref().map(rotated).transpose()?;
-    // First: certificates may be made again after what fails behind this, and a key must not be changed twice.
+    // This comes first: if a later step fails, certificates can be made again, but a key must not change twice.
     let made = wanted.certify(if authority { Which::WithAuthority } else { Which::All }, days)?;
     let mut lines = Vec::new();
     if let Some((file, keys)) = keys {
@@ -157,7 +157,7 @@ fn show(wanted: &Wanted) -> Result<Vec<String>, Failure> {
     Ok(lines)
 }
 
-/// How long ago the file was written, which is when its keys were made or changed, or copied here.
+/// Age of the file: the time since its keys were made, changed, or copied here.
 fn age(file: &Path) -> Option<String> {
     let days = |since: Duration| since.as_secs() / certificates::DAY.as_secs();
     let ago = match file.metadata().ok()?.modified().ok()?.elapsed().map(days) {

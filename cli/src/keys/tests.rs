@@ -1,4 +1,4 @@
-//! Keys and certificates of a robot, made, changed and shown in a folder.
+//! Keys and certificates of a robot are made, changed and shown in a folder.
 
 use super::*;
 
@@ -39,7 +39,7 @@ fn keys_are_made_changed_and_shown_but_never_said() {
     assert_eq!(Keys::load(&file).unwrap(), Keys { older: None, ..both });
 }
 
-/// A robot of two computers and a laptop, of an installation of this name.
+/// A robot of two computers and a laptop; the installation has this name.
 fn robot(place: &Path, installation: &str) -> PathBuf {
     let text = include_str!("../../../config/demo-tcp.toml")
         .replace("installation = \"demo-tcp\"", &format!("installation = \"{installation}\""))
@@ -51,7 +51,7 @@ fn robot(place: &Path, installation: &str) -> PathBuf {
     file
 }
 
-/// All that is in the folder of certificates.
+/// All files in the folder of certificates.
 fn shown(place: &Path) -> std::collections::BTreeMap<String, String> {
     let read = |entry: std::io::Result<std::fs::DirEntry>| {
         let path = entry.unwrap().path();
@@ -60,7 +60,7 @@ fn shown(place: &Path) -> std::collections::BTreeMap<String, String> {
     std::fs::read_dir(place.join("shown")).unwrap().map(read).collect()
 }
 
-/// Whether the certificates of base and TCP router are by the authority that is there.
+/// Whether the existing authority signed the certificates of base and TCP router.
 fn fit(file: &Path) -> bool {
     use rohrpost_routers::tcp::{Authority, Holder};
     let installation = load(file).unwrap();
@@ -108,7 +108,7 @@ fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
     let first = shown(place.path());
-    // Renamed, it signs under the name that it has.
+    // A renamed installation still signs under the authority's name.
     robot(place.path(), "another");
     std::fs::remove_file(place.path().join("shown/desk.system-1.pem")).unwrap();
     step(Step::New, &file).unwrap();
@@ -118,12 +118,12 @@ fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
     std::fs::remove_file(place.path().join("shown/ca.pem")).unwrap();
     step(Step::New, &file).unwrap();
     assert!(shown(place.path())["ca.key"] == first["ca.key"] && fit(&file), "old certificates hold");
-    // Under another name, what was signed under the old one counts no more.
+    // Under another name, old signatures are no longer valid.
     robot(place.path(), "another");
     std::fs::remove_file(place.path().join("shown/ca.pem")).unwrap();
     step(Step::New, &file).unwrap();
     assert!(shown(place.path())["ca.key"] == first["ca.key"] && fit(&file), "all are signed anew");
-    // Its key cannot.
+    // Its key cannot be made anew.
     std::fs::remove_file(place.path().join("shown/ca.key")).unwrap();
     let sealing = Keys::file(&place.path().join("keys"));
     let key = Keys::load(&sealing).unwrap();
@@ -133,7 +133,7 @@ fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
     step(begin_anew, &file).unwrap();
     assert!(fit(&file) && shown(place.path()).contains_key("ca.pem.old"));
     step(Step::Finish, &file).unwrap();
-    // Halves of two.
+    // Key and certificate belong to different authorities.
     let now = shown(place.path());
     std::fs::write(place.path().join("shown/ca.key"), &first["ca.key"]).unwrap();
     for halves in [step(rotate, &file), step(Step::New, &file)] {
@@ -154,7 +154,7 @@ fn no_new_authority_begins_over_certificates_of_another() {
         let before = shown(place.path());
         let said = step(Step::New, &file);
         match name {
-            // Moved off the robots.
+            // The authority's key is kept off the robots.
             "ca.key" => assert!(said.is_ok(), "{said:?}"),
             _ => assert!(said.as_ref().is_err_and(|said| said.contains("keys rotate --authority")), "{said:?}"),
         }
@@ -171,7 +171,7 @@ fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
     let first = shown(place.path());
     assert!(!says().contains("keys new"), "{}", says());
     let put = |name: &str, text: &str| std::fs::write(place.path().join("shown").join(name), text).unwrap();
-    // As a crash between the two leaves it.
+    // The state after a crash between the two writes.
     put("base.system-1.key", &first["desk.system-1.key"]);
     assert!(says().contains("base.system-1.pem: certificate and key do not fit; `rohrpost keys new`"), "{}", says());
     step(Step::New, &file).unwrap();
@@ -206,7 +206,7 @@ fn what_cannot_be_written_leaves_all_as_it_was() {
     }
     std::fs::remove_dir(&in_the_way).unwrap();
     assert_eq!(shown(place.path()), first);
-    // Each authority that was there is kept, also when one begins anew once more.
+    // Each earlier authority is kept, even after another new start.
     step(begin_anew, &file).unwrap();
     let second = shown(place.path());
     step(Step::Finish, &file).unwrap();
@@ -263,12 +263,12 @@ fn how_long_certificates_hold_is_shown_and_the_age_of_keys() {
     assert!(says("udp.keys: written").ends_with("written 3 days ago"));
 }
 
-/// Python 3.13 asks for no less by itself.
+/// Python 3.13 checks this strictly by default.
 #[test]
 fn strict_verifiers_take_the_certificates() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
-    // Those of a first authority, and of one that was read from its files.
+    // Certificates of a first authority, and of one that was read from its files.
     for made in [Step::New, rotate as fn(Place) -> Step] {
         step(made, &file).unwrap();
         let mut python = std::process::Command::new("python3");

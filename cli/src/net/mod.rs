@@ -1,4 +1,4 @@
-//! `rohrpost net`: how the routers of all nodes are: who hears whom, what waits, what was lost and why, and whose time is how good.
+//! `rohrpost net`: the state of all nodes' routers: links, queues, losses with their causes, and the quality of each clock.
 
 mod beyond;
 mod node_report;
@@ -12,7 +12,7 @@ use rohrpost::interfaces::{RouterInterface, TcpInterface};
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Between the two looks that a rate is made of: routers tell how they are twice a second.
+/// Time between the two observations of a rate: routers publish their state twice a second.
 const LOOK_AGAIN: Duration = Duration::from_millis(600);
 
 #[derive(clap::Args)]
@@ -59,7 +59,7 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
     Ok(if well || (stopped && rounds.watch) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Asks the routers of all nodes that are meant.
+/// Asks the routers of all selected nodes.
 fn look(round: &mut Round) -> Vec<NodeReport> {
     round.nodes().into_iter().map(|node| ask(round, node)).collect()
 }
@@ -86,7 +86,7 @@ fn ask(round: &mut Round, node: String) -> NodeReport {
 
 fn ask_router(round: &mut Round, node: String) -> NodeReport {
     let links = round.newest(&node, RouterInterface::LINKS);
-    // A router that has no clock publishes none, and none slots that has none.
+    // A router without a clock publishes none, and one without slots publishes none.
     let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
     let in_slots = links.is_ok() && round.running.installation.tdma.is_some();
     let slots = in_slots.then(|| round.newest(&node, RouterInterface::SLOTS).ok()).flatten();

@@ -1,20 +1,20 @@
-//! Names that a module's project can have: it is a class, a crate and a program at once.
+//! Valid names of a module's project: each is a class, a crate and a program at once.
 
 use rohrpost_config::is_class_name;
 use std::str::FromStr;
 
-/// Words of Rust's own; a crate of such a name could not be spoken of.
+/// Rust's keywords; a crate of such a name cannot be used.
 const KEYWORDS: &str = "abstract as async await become box break const continue crate do dyn else enum extern false final fn \
                         for gen if impl in let loop macro match mod move mut override priv pub ref return self static \
                         struct super trait true try type typeof union unsafe unsized use virtual where while yield";
-/// Crates that every project has, ours, and folders that Cargo keeps beside programs.
+/// Crates that every project uses, our own crates, and folders that Cargo creates beside programs.
 const CRATES: &str = "alloc build core deps examples incremental module proc-macro rohrpost std test tests";
 
-/// A name that is right.
+/// A valid name.
 #[derive(Debug)]
 pub(super) struct ModuleName(String);
 
-/// Why a name is not right for a module's project.
+/// Why a name is not valid for a module's project.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub(super) enum NameError {
     #[error("`{0}` is no class name; use lower-case letters, digits and `-`, a letter first{1}")]
@@ -61,7 +61,7 @@ impl FromStr for ModuleName {
     }
 }
 
-/// What was likely meant: `WindVane`, `wind_vane` and `Wind Vane` as `wind-vane`.
+/// The likely intention: `WindVane`, `wind_vane` and `Wind Vane` as `wind-vane`.
 fn likely(text: &str) -> String {
     let mut word = String::new();
     for c in text.chars() {

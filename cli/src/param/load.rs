@@ -46,7 +46,7 @@ pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> 
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// Sets what the file says of one module, all of it or nothing; a line for each parameter.
+/// Sets the file's values for one module, all or none; one line for each parameter.
 fn load(session: &mut Session, saved: &Saved, module: Name, dry_run: bool) -> Result<Vec<String>, Failure> {
     let values = saved.values::<Value>(&session.running.installation, module)?;
     let parameters = session.parameters(module)?;

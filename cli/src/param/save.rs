@@ -17,7 +17,7 @@ pub(super) fn run(session: &mut Session, names: &[String], output: Option<&Path>
     let modules = if names.is_empty() { session.modules()? } else { named? };
     let (mut saved, mut failures) = (Vec::new(), Vec::new());
     for module in modules {
-        // A process has one set of parameters, whichever of its names it is asked by.
+        // A process has one set of parameters, under each of its names.
         let owner = session.running.installation.module(module).map_or(module, |owner| owner.name);
         let name = session.running.text(owner);
         match session.parameters(owner) {

@@ -1,33 +1,33 @@
-//! The ways there and back of a round, by system time. Pure.
+//! The one-way times of a round trip, by system time. Pure.
 //!
-//! Two nodes have one time as far as both have the master's, in the same epoch, and each knows how far off it is at most; a difference
-//! of their times is off by the sum of both bounds. A figure that is smaller than its bound says nothing, and is not told.
+//! Two nodes share a time if both follow the master's clock in the same epoch, and each knows its error bound; the error of
+//! a difference of their times is at most the sum of both bounds. A figure below its bound means nothing, and is not shown.
 
 use super::super::units::short;
 use rohrpost::common::TimeReport;
 use serde_json::{Value, json};
 
-/// What the name of the source of time is where nodes share one.
+/// The name of the source of time, where nodes share one.
 const MASTER: &str = "master";
 
-/// System time when the command was sent, when it was run, and when the answer was here.
+/// System time when the command was sent, when it was run, and when the answer arrived.
 pub(super) struct Moments<'a> {
     pub(super) before: &'a TimeReport,
     pub(super) there: &'a TimeReport,
     pub(super) after: &'a TimeReport,
 }
 
-/// How long the command took, and its answer.
+/// The one-way times of the command and of its answer.
 #[derive(Debug, PartialEq)]
 pub(super) struct RoundTrip {
     pub(super) there_s: f64,
     pub(super) back_s: f64,
-    /// Each is off by at most so much; what one is too long, the other is too short.
+    /// Bound of each one's error; if one is too long, the other is too short by the same amount.
     pub(super) error_s: f64,
 }
 
 impl RoundTrip {
-    /// Between modules of one node there is one clock; `pace` is how fast that goes.
+    /// Modules of one node share its clock; `pace` is that clock's rate.
     pub(super) fn new(moments: &Moments<'_>, one_clock: bool, pace: f64) -> Result<Self, String> {
         let Moments { before, there, after } = moments;
         if !one_clock {
@@ -67,7 +67,7 @@ impl RoundTrip {
     }
 }
 
-/// One way of all rounds.
+/// One direction of all rounds.
 #[derive(Default)]
 pub(super) struct WaySum {
     count: u64,
@@ -90,7 +90,7 @@ impl WaySum {
         (self.count > 0).then(|| self.sum_s / self.count as f64)
     }
 
-    /// None when no way is known.
+    /// None if no one-way time is known.
     pub(super) fn text(&self) -> Option<String> {
         let mean_s = self.mean_s()?;
         let error = if self.error_s > 0.0 { format!("  each ± {}", short(self.error_s)) } else { String::new() };

@@ -1,4 +1,4 @@
-//! `rohrpost tcp-router` and `rohrpost tcp-client`: what carries packages beyond the LAN. Launch starts them where `[tcp]` says so.
+//! `rohrpost tcp-router` and `rohrpost tcp-client`: carry packages beyond the LAN. Launch starts them as `[tcp]` requires.
 
 mod client;
 mod ends;
@@ -15,7 +15,7 @@ use std::process::ExitCode;
 Launch starts both by itself, the client on every node; by hand they are of use where modules are started by hand."
 )]
 pub(super) struct Arguments {
-    /// What every module takes: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the clients of the nodes.
+    /// The arguments of every module: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the clients of the nodes.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
 }

@@ -1,5 +1,5 @@
-//! What `top` asks for: to switch modules on and off, what was said, why a module is in error. Nothing here waits:
-//! calls are begun, and looked after each time round, so that a module that hangs freezes no screen.
+//! The calls of `top`: to switch modules on and off, for output lines, for the causes of errors. Nothing here blocks:
+//! calls are begun, and polled in each round, so that a module that hangs freezes no screen.
 
 use super::super::observer::{Silence, silence};
 use super::super::target::Running;
@@ -12,7 +12,7 @@ use rohrpost::survey::{Distant, Scope, Snapshot, Survey};
 use rohrpost::{Name, ToolLink};
 use std::time::Duration;
 
-/// An answer comes within this time, or it does not come.
+/// Timeout for an answer.
 pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A call that is under way.
@@ -22,7 +22,7 @@ struct Call {
     wants: Wants,
 }
 
-/// What its answer is for.
+/// The purpose of its answer.
 enum Wants {
     Switch(bool),
     Lines,
@@ -30,21 +30,21 @@ enum Wants {
     Restart(Name),
 }
 
-/// What came of a call.
+/// The result of a call.
 pub(super) enum Answer {
     Switched(Name, bool, Result<(), String>),
     Lines(Result<Page, String>),
     Why(Name, String),
     Restarted(Name, Result<(), String>),
-    /// What another node shows, or why it does not.
+    /// Another node's report, or why it does not answer.
     Snapshot(String, Result<Survey, Silence>),
 }
 
-/// Top's place among those that call.
+/// The place of `top` among the callers.
 pub(super) struct Calls {
     tool: ToolLink,
     under_way: Vec<Call>,
-    /// Looks at other nodes.
+    /// Observes other nodes.
     looks: Vec<(String, Distant)>,
 }
 
@@ -54,7 +54,7 @@ impl Calls {
         Ok(Self { tool: running.join(PATIENCE)?, under_way: Vec::new(), looks: Vec::new() })
     }
 
-    /// Gives the place back.
+    /// Releases the place.
     pub(super) fn close(self) {
         self.tool.close();
     }
@@ -75,14 +75,14 @@ impl Calls {
         self.begun(running, collector, Wants::Lines, begun)
     }
 
-    /// Has launch restart a module.
+    /// Asks launch to restart a module.
     pub(super) fn restart(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let launcher = running.launcher_of(module).unwrap_or(self.tool.launcher());
         let begun = self.tool.begin_restart(launcher, &running.text(module));
         self.begun(running, launcher, Wants::Restart(module), begun)
     }
 
-    /// Begins to look at other nodes, but for those that are being looked at.
+    /// Begins to observe other nodes, except those with an unfinished request.
     pub(super) fn look(&mut self, running: &Running, nodes: &[&str]) {
         for node in nodes {
             let launcher = launcher_of(&running.installation, node);
@@ -94,13 +94,13 @@ impl Calls {
         }
     }
 
-    /// Asks a module in error why.
+    /// Asks a module in error for the cause.
     pub(super) fn why(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let begun = self.tool.begin(module, common::STATUS, common::HASH, |_| Ok(()));
         self.begun(running, module, Wants::Why, begun)
     }
 
-    /// Keeps a call that was begun; one that could not be is answered by that.
+    /// Records a call that was begun; a call that could not begin gets its error as the answer.
     fn begun(&mut self, running: &Running, to: Name, wants: Wants, begun: Result<u32, CallError>) -> Option<Answer> {
         match begun {
             Ok(sequence) => {
@@ -111,12 +111,12 @@ impl Calls {
         }
     }
 
-    /// Whether answers are awaited.
+    /// Whether any answer is outstanding.
     pub(super) fn waits(&self) -> bool {
         !self.under_way.is_empty() || !self.looks.is_empty()
     }
 
-    /// The answers that have come, and the calls whose time is over.
+    /// The answers that arrived, and the calls that timed out.
     pub(super) fn poll(&mut self, running: &Running) -> Vec<Answer> {
         self.tool.link.collect();
         let mut answers = Vec::new();
@@ -134,7 +134,7 @@ impl Calls {
             match look.poll(&mut self.tool.link) {
                 None => self.looks.push((node, look)),
                 Some(Ok(Snapshot::Survey(survey))) => answers.push(Answer::Snapshot(node, Ok(*survey))),
-                // It was not asked for one.
+                // This call requested no data.
                 Some(Ok(Snapshot::Mailbox(_))) => {}
                 Some(Err(failure)) => {
                     let silence = silence(&running.installation, &node, &failure);
@@ -162,7 +162,7 @@ impl Calls {
     }
 }
 
-/// What a call that failed comes to. What is asked again at the next look is told only when it was asked by a key.
+/// The result of a failed call. Periodic queries report nothing; a failure is shown only for a call that a key started.
 fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Option<Answer> {
     let who = match wants {
         Wants::Restart(_) => "launch".into(),

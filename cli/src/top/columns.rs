@@ -1,4 +1,4 @@
-//! Columns of the table: what they say, by what they sort, and which go first when the terminal is narrow.
+//! The table's columns: their text, their sort order, and which ones a narrow terminal drops first.
 
 use super::super::units;
 use super::model::Row;
@@ -28,9 +28,9 @@ pub(super) enum Column {
     Why,
 }
 
-/// Room between columns.
+/// Space between columns.
 const GAP: u16 = 1;
-/// A name is not cut below this, nor is it given more than that.
+/// Narrowest and widest column of names.
 const NAME_MIN: u16 = 12;
 const NAME_MAX: u16 = 34;
 
@@ -56,7 +56,7 @@ impl Column {
         Self::Why,
     ];
 
-    /// As they are given room, the first always.
+    /// In order of importance; the first is always shown.
     const BY_IMPORTANCE: [Self; 17] = [
         Self::Module,
         Self::State,
@@ -99,7 +99,7 @@ impl Column {
         }
     }
 
-    /// What it means, for the help.
+    /// Its meaning, for the help.
     pub(super) const fn text(self) -> &'static str {
         match self {
             Self::Module => "name, and with + the number of its further names",
@@ -124,7 +124,7 @@ impl Column {
         }
     }
 
-    /// Columns that hold it. Fixed, so that nothing jumps as numbers change.
+    /// Its width. Fixed, so that nothing moves as numbers change.
     const fn width(self) -> u16 {
         match self {
             Self::Module => NAME_MIN,
@@ -140,12 +140,12 @@ impl Column {
         }
     }
 
-    /// Numbers stand to the right.
+    /// Numbers are aligned to the right.
     pub(super) const fn is_number(self) -> bool {
         !matches!(self, Self::Module | Self::Node | Self::State | Self::Class | Self::Scheduling | Self::Why)
     }
 
-    /// What it says of a module.
+    /// Its text for a module.
     pub(super) fn cell(self, row: &Row) -> String {
         let number = |number: Option<f64>| number.map_or("-".into(), short);
         let waited = |seconds: Option<f64>| seconds.map_or("-".into(), units::short);
@@ -170,7 +170,7 @@ impl Column {
         }
     }
 
-    /// How two modules stand to each other in this column: what deserves a look comes first.
+    /// The order of two modules by this column: what needs attention comes first.
     pub(super) fn compare(self, a: &Row, b: &Row) -> Ordering {
         let state = |row: &Row| row.line.account.state;
         let number = |of: fn(&Row) -> Option<f64>| of(b).unwrap_or(-1.0).total_cmp(&of(a).unwrap_or(-1.0));
@@ -192,7 +192,7 @@ impl Column {
     }
 }
 
-/// Why it does not work; else how its packages were lost, or what went wrong before. Those that a newer one replaced are nobody's loss.
+/// Why it does not work; else the causes of its losses, or the last error. Replaced packages are no loss.
 fn why(row: &Row) -> String {
     let account = &row.line.account;
     let losses = row.line.losses.lost_by_cause.iter().map(|(cause, lost)| format!("{lost} {cause}"));
@@ -226,7 +226,7 @@ pub(super) fn memory(bytes: u64) -> String {
     }
 }
 
-/// The columns that have room in so many, with their widths, from left to right. `names` is what the longest name needs;
+/// The columns that fit into this width, with their widths, from left to right. `names` is the length of the longest name;
 /// `nodes`: whether there are several.
 pub(super) fn fit(room: u16, names: u16, nodes: bool) -> Vec<(Column, u16)> {
     let names = names.clamp(NAME_MIN, NAME_MAX);
@@ -234,7 +234,7 @@ pub(super) fn fit(room: u16, names: u16, nodes: bool) -> Vec<(Column, u16)> {
     let mut used = 0;
     for column in Column::BY_IMPORTANCE.into_iter().filter(|column| nodes || *column != Column::Node) {
         let width = column.width() + if chosen.is_empty() { 0 } else { GAP };
-        // The first that finds no room ends it: a less important one is not shown in the place of a more important one.
+        // The first column that does not fit ends the list: a less important one never replaces a more important one.
         if used + width > room && !chosen.is_empty() {
             break;
         }

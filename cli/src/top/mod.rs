@@ -6,7 +6,7 @@
 //! keys ──▶ App ──▶ ScreenAction ──▶ Calls ──answers──▶ Live ──────┴──▶ ScreenModel ──▶ screen
 //! ```
 //!
-//! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` touch the world.
+//! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` do the input and output.
 
 mod app;
 mod calls;
@@ -42,7 +42,7 @@ Counters are read from shared memory, of other nodes by way of their launches: l
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
-    /// SnapshotRequest so often, seconds; rates are those of this time.
+    /// Refresh period, seconds; rates are those of this time.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     interval: f64,
     /// Print the table once, after one interval.
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     no_color: bool,
 }
 
-/// Shorter intervals count too little to make a rate of; longer ones show nothing.
+/// Shorter periods count too few packages for a rate; longer ones show nothing.
 const INTERVAL_S: std::ops::RangeInclusive<f64> = 0.1..=3600.0;
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -76,7 +76,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What there is to show after one interval. Whoever is in error, and no launch knows why, is asked.
+/// The state after one period. A module in error is asked for the cause if no launch knows it.
 fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
     let look = || running.look_at(&running.shown(), Scope::All);
     let earlier = sample::put_together(running, look()?, None, &Said::default());

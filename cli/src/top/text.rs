@@ -12,10 +12,10 @@ pub(super) fn date(time_ns: u64) -> String {
     format!("{} UTC", text.split('.').next().unwrap_or_default())
 }
 
-/// A line in pieces of at most so many characters, broken at blanks where there are any; what follows the first is indented
-/// as the line itself is, and a little more.
+/// A line in pieces of at most this many characters, broken at blanks where possible; the later pieces are indented
+/// like the line itself, and a little more.
 pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
-    // A module may say anything; on the screen a line is a line.
+    // A module may print anything; on the screen a line stays one line.
     let text = plain::line(text);
     let indent = (text.chars().take_while(|letter| *letter == ' ').count() + 2).min(width / 3);
     let mut pieces = Vec::new();
@@ -24,7 +24,7 @@ pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
     while rest.len() + before > width && width > before {
         let room = width - before;
         let blank = rest[..=room.min(rest.len() - 1)].iter().rposition(|letter| *letter == ' ');
-        // A blank in the indentation, or too far to the left, is none to break at.
+        // A blank in the indentation, or too far to the left, is no place to break.
         let at = blank.filter(|at| *at > room / 2).unwrap_or(room);
         let piece: String = rest.drain(..at).collect();
         pieces.push(" ".repeat(before) + piece.trim_end());
@@ -38,7 +38,7 @@ pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
     pieces
 }
 
-/// Everything as plain text, for `--once`.
+/// The whole output as plain text, for `--once`.
 pub(super) fn table(model: &Model) -> String {
     let several = model.nodes.len() > 1;
     let columns = || Column::ALL.into_iter().filter(|column| several || *column != Column::Node);

@@ -8,9 +8,9 @@ use super::finding::{Finding, Grade};
 use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use super::machine::{Machine, Needs};
 
-/// What a router asks the kernel for, to hold what comes while nobody reads.
+/// The receive buffer that a router requests, for datagrams that arrive while it does not read.
 const RECEIVE_BYTES: u64 = 8 << 20;
-/// Below it, a burst of one large package from each of a few nodes is lost.
+/// With a smaller buffer, a burst of one large package from each of a few nodes is lost.
 const RECEIVE_BYTES_LEAST: u64 = 1 << 20;
 
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {

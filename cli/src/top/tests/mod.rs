@@ -1,6 +1,6 @@
-//! The screen as a person sees it, word for word, and what keys do.
+//! The screen as a user sees it, word for word, and the effects of keys.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --bin rohrpost top` writes the expected screens anew; read the difference before you commit.
+//! `UPDATE_GOLDEN=1 cargo test --bin rohrpost top` rewrites the expected screens; read the diff before you commit.
 
 mod robot;
 
