@@ -38,7 +38,7 @@ pub(super) struct Arguments {
 enum What {
     /// Mailboxes between two processes, next to bare shared memory; takes 5 seconds.
     #[command(
-        after_help = "Example: rohrpost bench local\nIt keeps two processors busy meanwhile, so not while a robot works. Where a node is launched it\nmeasures with the default scheduler, so that it is in nobody's way."
+        after_help = "Example: rohrpost bench local\nIt keeps two processors busy: do not run it while a robot works. If a node is launched, it\nmeasures with the default scheduler and delays no module."
     )]
     Local(Local),
 }
@@ -110,7 +110,7 @@ fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
     };
     let figures = (&blocking.result, blocking.ratio_p50, &spinning.result, spinning.ratio_p50);
     let (Ok(asleep), Some(ratio_asleep), Ok(awake), Some(ratio_awake)) = figures else {
-        return "NO ANSWER: a contender did not run; the notes under the tables say why.".into();
+        return "NO ANSWER: a part of the test did not run; the notes under the tables say why.".into();
     };
     let said = format!(
         "a package of 64 B takes {:.1} µs to a module that sleeps, {:.1} times what the computer takes to wake any process, \
@@ -124,9 +124,9 @@ fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
         return format!("GOOD: {said}.");
     }
     let look = look_at(&report.environment, scheduling, hints);
-    let advice = if look.is_empty() { "other programs that are busy".to_string() } else { look.join("; ") };
+    let advice = if look.is_empty() { "other busy programs".to_string() } else { look.join("; ") };
     let late =
-        floor.filter(|_| is_late).map(|p99| format!("; bare waking is late by {p99:.0} µs once in a hundred times"));
+        floor.filter(|_| is_late).map(|p99| format!("; a bare wake-up is late by {p99:.0} µs once in a hundred times"));
     format!("LOOK: {said}{}. What to look at: {advice}. See {TUNING}.", late.unwrap_or_default())
 }
 
@@ -138,9 +138,9 @@ fn look_at(environment: &Environment, scheduling: Scheduling, hints: &Hints) -> 
     let robot = (scheduling == Scheduling::Normal).then(|| "a node is launched: measure again without it".to_string());
     let slow = hints.governor.as_ref().filter(|governor| *governor != "performance");
     let governor = slow.map(|name| format!("the CPU governor is `{name}`, `performance` wakes sooner"));
-    let host = hints.is_virtual.then(|| "this is a virtual machine, whose host decides when it runs".to_string());
+    let host = hints.is_virtual.then(|| "this is a virtual machine: its host decides when it runs".to_string());
     let build =
-        hints.is_slow_build.then(|| "this `rohrpost` is a development build, `--release` is quicker".to_string());
+        hints.is_slow_build.then(|| "this `rohrpost` is a development build, `--release` is faster".to_string());
     [refused, robot, governor, host, build].into_iter().flatten().collect()
 }
 

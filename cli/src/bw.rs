@@ -12,11 +12,11 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost bw mapper.0                what goes in and out, two lines a second; Ctrl-C ends it
-  rohrpost bw laser.0 scan            the values that it publishes, each counted once whoever subscribes
+  rohrpost bw mapper.0                input and output, two lines a second; Ctrl-C ends it
+  rohrpost bw laser.0 scan            the values that it publishes, each counted once, however many subscribe
   rohrpost bw mapper.0 --seconds 5 --json
-Bytes are those of bodies: a package has 16 bytes of head besides. It reads counters in shared memory, on another node by \
-way of that node's launch: nothing is subscribed to, and the module is sent nothing. Smallest and largest are those of the whole seconds that the window touches.")]
+Bytes are those of package bodies, without the 16 bytes of each head. The tool reads counters in shared memory, on another node \
+through that node's launch: it does not subscribe, and sends nothing to the module. Smallest and largest are those of the whole seconds that overlap the window.")]
 pub(super) struct Arguments {
     /// Module or alias, such as mapper.0.
     name: String,

@@ -36,10 +36,10 @@ pub(super) struct Arguments {
 
 /// Functions that every module has, in addition to those of its interface.
 pub(super) const COMMON: [(&str, &str); 5] = [
-    ("on", "Begins to work"),
+    ("on", "Starts its work"),
     ("off", "Goes to its safe state"),
-    ("status", "Says how it is"),
-    ("get", "Asks for its newest data of a kind"),
+    ("status", "Reports its state"),
+    ("get", "Returns the newest data of one kind"),
     ("output-level", "Sets which lines it sends"),
 ];
 

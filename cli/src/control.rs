@@ -19,7 +19,7 @@ const MARGIN: Duration = Duration::from_secs(7);
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: rohrpost restart pilot.0\nExits with 1 when launch refuses, or it did not come to that."
+    after_help = "Example: rohrpost restart pilot.0\nExit code 1: launch refused, or the module did not reach the state."
 )]
 pub(super) struct Arguments {
     /// Module, such as pilot.0.
@@ -88,18 +88,18 @@ struct ModuleOrder<'a> {
 impl ModuleOrder<'_> {
     /// The message after success.
     fn carry_out(&mut self, order: Order, wait: bool) -> Result<String, Failure> {
-        let before = self.child()?.pid.map_or(String::new(), |pid| format!("; before it was process {pid}"));
+        let before = self.child()?.pid.map_or(String::new(), |pid| format!("; previously process {pid}"));
         let text = self.text.clone();
         let life = match order {
             Order::Restart => self.tool.restart(self.launcher, &text),
             Order::Start => self.tool.start(self.launcher, &text),
             Order::Stop => {
                 self.tool.stop(self.launcher, &text).map_err(|error| self.told(&error))?;
-                return if wait { self.wait_stopped() } else { Ok(format!("{text} is told to end")) };
+                return if wait { self.wait_stopped() } else { Ok(format!("{text} is being stopped")) };
             }
         };
         let life = life.map_err(|error| self.told(&error))?;
-        if wait { self.wait_running(life, &before) } else { Ok(format!("{text} is to be started")) }
+        if wait { self.wait_running(life, &before) } else { Ok(format!("{text} is being started")) }
     }
 
     fn wait_running(&mut self, life: u32, before: &str) -> Result<String, Failure> {
@@ -108,7 +108,7 @@ impl ModuleOrder<'_> {
             let text = &self.text;
             match child.phase {
                 Phase::Running if child.lives == life => return self.at_work(&child, before),
-                Phase::Stopped => return Err(format!("somebody has stopped {text} meanwhile").into()),
+                Phase::Stopped => return Err(format!("another user has stopped {text} meanwhile").into()),
                 // It ran and ended, or could not even be started.
                 _ if child.lives > life || child.lives == life && child.phase == Phase::Waiting => {
                     return Err(format!("{text} was started, and ended by itself: {}", child.last_end).into());
@@ -142,7 +142,7 @@ impl ModuleOrder<'_> {
                     let (text, how) = (&self.text, child.last_end.lines().next().unwrap_or("it never ran"));
                     return Ok(format!("{text} is stopped ({how}); `rohrpost start {text}` starts it"));
                 }
-                _ => return Err(format!("somebody has started {} again meanwhile", self.text).into()),
+                _ => return Err(format!("another user has started {} again meanwhile", self.text).into()),
             }
         }
     }

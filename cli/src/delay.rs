@@ -17,10 +17,10 @@ use std::process::ExitCode;
 #[command(after_help = "Examples:
   rohrpost delay mapper.0             by mailbox and class, once a second; Ctrl-C ends it
   rohrpost delay mapper.0 --count 1 --window 5
-  rohrpost delay laser.0 --json       also how long its data wait for those that subscribed
-A package waits from being published to being taken. The mean is exact; p50 and p99 come from a histogram and are \
-right to a quarter or so; the longest is that of the mailbox's whole life. It reads counters, on other nodes by way of their \
-launches: the modules are sent nothing.")]
+  rohrpost delay laser.0 --json       also how long its data wait at the subscribers
+The waiting time runs from publishing a package to taking it. The mean is exact; p50 and p99 come from a histogram and are \
+accurate to about 25 %; the longest is that since the mailbox was created. The tool reads counters, on other nodes through their \
+launches: it sends nothing to the modules.")]
 pub(super) struct Arguments {
     /// Module or alias, such as mapper.0.
     name: String,

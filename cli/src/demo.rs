@@ -43,10 +43,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return nodes::run(arguments, count, long);
     }
     if arguments.gui == Joined::Tcp {
-        return Err("one node alone has its GUI beside it; say --nodes 3".into());
+        return Err("with one node there is no other way to join the GUI; use --nodes 3".into());
     }
     if arguments.kill_master {
-        return Err("one node alone has no master to be killed; say --nodes 3".into());
+        return Err("one node alone has no master to kill; use --nodes 3".into());
     }
     let folder = Folder::new()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
@@ -114,7 +114,7 @@ fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
         let Progress { scans, odometries, discarded, malformed, .. } = played;
         if played.finished && scans + odometries == 0 {
             well = false;
-            text.push_str("the log holds no record that is known: is it a CARMEN log?\n");
+            text.push_str("the log contains no known record: is it a CARMEN log?\n");
         }
         text.push_str(&format!(
             "log: {scans} scans and {odometries} odometry lines played, {discarded} discarded for their stamps, \

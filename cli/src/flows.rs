@@ -10,11 +10,11 @@ use rohrpost_config::{Contents, Installation};
 
 /// Explains the columns.
 pub(super) const LEGEND: &str = "\
-at worst: the bound that `check` computes, for slots that are kept; kept: the slowest package since whose publishing none was missed or cut
-short; slowest: of all, as the router that sends measured it, up to the arrival at the other computer; beyond: packages slower than the bound,
-of kept: those among them whose slots were kept; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's class
-when they came to its mailbox, by their stamp. A package between two modules is put to the flow that carries it (`carries`), else, declared
-or not, to one that does not say what it carries";
+at worst: the bound that `check` computes, if all slots are kept; kept: the slowest package with no slot missed or cut between its publishing
+and its arrival; slowest: of all, measured by the sending router, up to the arrival at the other computer; beyond: packages slower than the bound,
+of kept: those of them with all slots kept; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's class
+at their arrival in its mailbox, by their stamp. A package between two modules belongs to the flow that carries it (`carries`), else, declared
+or not, to a flow without `carries`";
 
 /// A row for each flow that starts at one of these nodes; empty if there is none. `ask` asks a module for its interface.
 pub(super) fn measured<'a>(

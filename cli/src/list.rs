@@ -16,7 +16,7 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: rohrpost list --mailboxes\nOf several nodes all are listed; --node lists one. Reading the counters disturbs nobody."
+    after_help = "Example: rohrpost list --mailboxes\nLists all nodes; --node lists one. Reading the counters disturbs nobody."
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -131,7 +131,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     if listing.beyond_more > 0 {
         say(format_args!(
-            "(the TCP router knows {} further ranges of names, of this system or others, and does not tell them)",
+            "(the TCP router knows {} more ranges of names, of this system or others, than fit into its report)",
             listing.beyond_more
         ));
     }

@@ -282,7 +282,7 @@ impl SlotLine {
             let how = if victim.replaced { "replaces" } else { "displaced" };
             format!("{how} a package of {} ({})", victim.class, victim.priority)
         });
-        let redelivered = self.redelivered.then(|| "an earlier receiver died with it in hand".to_owned());
+        let redelivered = self.redelivered.then(|| "an earlier receiver died while reading it".to_owned());
         [by, victim, redelivered].into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 }
@@ -290,9 +290,9 @@ impl SlotLine {
 fn print(installation: &Installation, detail: &MailboxDetail, seen: &MailboxView) -> String {
     let shape = &detail.info.shape;
     let when_full = match shape.full {
-        OverflowPolicy::Displace => "displace: the least important gives way to what is more important",
-        OverflowPolicy::Latest => "latest: what is of the same state gives way to the newer",
-        OverflowPolicy::Reject => "reject: what comes then is refused",
+        OverflowPolicy::Displace => "displace: a more important package replaces the least important one",
+        OverflowPolicy::Latest => "latest: a newer package replaces an older one of the same state",
+        OverflowPolicy::Reject => "reject: further packages are refused",
     };
     let receiver = match &seen.receiver {
         None => "nobody yet".into(),

@@ -45,7 +45,7 @@ impl Manager {
 
     /// The modules are being started.
     pub(super) fn starting(&mut self, node: &str) {
-        self.say(format!("STATUS=starts the modules of node {node}"));
+        self.say(format!("STATUS=starting the modules of node {node}"));
     }
 
     /// All modules are on.
@@ -83,7 +83,7 @@ impl Manager {
 
     /// All modules are being stopped. The watchdog is off from here on: `TimeoutStopSec` bounds their time.
     pub(super) fn stopping(&mut self) {
-        self.say("STOPPING=1\nSTATUS=stops the modules, the last first\nWATCHDOG_USEC=0".into());
+        self.say("STOPPING=1\nSTATUS=stopping the modules, the last first\nWATCHDOG_USEC=0".into());
     }
 
     fn say(&mut self, words: String) {

@@ -19,10 +19,10 @@ use std::time::{Duration, Instant};
 #[command(after_help = "Examples:
   rohrpost ping motor.0               once a second; Ctrl-C ends it
   rohrpost ping motor.0 -c 100 --interval 0.01
-It asks for system time. The time is that of the whole round: a module answers between its own work, and so what it does just \
-then is in it, as is being waited for behind more important classes. The ways there and back are by system time, with how far \
-off they may be; between nodes that do not have the master's time, or where that is too unsure, it says so instead. p50 and p99 \
-come from a histogram and are right to a quarter or so; the others are exact. The exit code is 1 if nothing was answered.")]
+Each call asks for system time. The measured time is the whole round trip: a module answers between its own work, so the time includes its \
+current work, and the wait behind more important classes. The one-way times use system time, and are shown with their error \
+bounds; if the nodes do not follow the master's clock, or the bounds are too large, the output says so instead. p50 and p99 \
+come from a histogram and are accurate to about 25 %; the others are exact. Exit code 1: no call was answered.")]
 pub(super) struct Arguments {
     /// Module or alias, such as motor.0.
     name: String,
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             // It has answered, if only that it does not know this function.
             Err(CallError::Fault(_, Fault::Unknown(_))) => {
                 rounds.answered(took, None);
-                let why = "the module was built with a Rohrpost that tells no time; build it anew".into();
+                let why = "the module was built with a Rohrpost that returns no time; rebuild it".into();
                 tell_answer(arguments, rounds.sent, took, &Err(why))
             }
             Err(error) => tell_loss(arguments, &running, module, rounds.sent, &error),
@@ -97,7 +97,7 @@ fn tell_answer(arguments: &Arguments, number: u64, took: Duration, ways: &Result
     }
     let ways = match ways {
         Ok(ways) => ways.text(),
-        Err(why) => format!("ways unknown: {why}"),
+        Err(why) => format!("one-way times unknown: {why}"),
     };
     say(format_args!("{name}: answer {number} after {} ({ways})", time(took)))
 }

@@ -72,7 +72,7 @@ impl Round {
         let write = |body: &mut Vec<u8>| append(body, &(port.number,));
         let newest = self.tool.call(module, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
         newest.map_err(|error| match error {
-            CallError::Fault(_, Fault::NothingYet) => "it has just begun; ask again".into(),
+            CallError::Fault(_, Fault::NothingYet) => "it has just started; ask again".into(),
             error => self.running.told(module, &error).to_string(),
         })
     }

@@ -19,8 +19,8 @@ const LOOK: Duration = Duration::from_millis(50);
 #[command(after_help = "Examples:
   rohrpost send motor.0 drive 0.3 0.5                 ten times a second, until Ctrl-C
   rohrpost send motor.0 drive 0.3 0.5 --rate 20 --count 40
-Each error is told once, then counted. A command that waits longer than --timeout is not run any more. Commands that \
-come due while earlier ones keep this program from sending are left out, not sent in a heap.")]
+Each error is printed once, then counted. A command that waits longer than --timeout is not run. Commands that \
+come due while this program is blocked are skipped, not sent in a burst.")]
 pub(super) struct Arguments {
     /// Module or alias, such as motor.0.
     name: String,
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn no_function(arguments: &Arguments, description: &Description) -> String {
     let (name, function) = (&arguments.name, &arguments.function);
     if COMMON.iter().any(|(common, _)| common == function) {
-        return format!("`{function}` is not for send, but for once: `rohrpost call {name} {function}`");
+        return format!("`{function}` needs no repetition: `rohrpost call {name} {function}`");
     }
     match &names(description)[..] {
         [] => format!("no function `{function}`; {name} has none to send"),

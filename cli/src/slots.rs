@@ -57,7 +57,7 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
 /// Hellos that were sent at an unverified time.
 fn unproven(slots: &SlotState) -> String {
     let hellos = if slots.unproven == 1 { "1 hello".into() } else { format!("{} hellos", slots.unproven) };
-    format!("node {}: {hellos} left by the time of who had not shown that it lives\n", slots.node)
+    format!("node {}: {hellos} were sent by the time of an unverified node\n", slots.node)
 }
 
 /// Ordinary traffic in the slots; errors appear if there were any.
@@ -77,7 +77,7 @@ mod tests {
     fn what_nobody_vouches_for_is_told_if_there_was_any() {
         let slots = |unproven| SlotState { node: "arm".into(), unproven, ..SlotState::default() };
         assert!(!kept([&slots(0)]).contains("hello"));
-        let line = "node arm: 3 hellos left by the time of who had not shown that it lives";
+        let line = "node arm: 3 hellos were sent by the time of an unverified node";
         assert!(kept([&slots(3)]).lines().any(|told| told == line));
         assert!(kept([&slots(1)]).contains("arm: 1 hello left"));
     }

@@ -117,7 +117,7 @@ impl Shared {
             drop(queue);
             let text = match next {
                 Next::Text(text) => text,
-                Next::Lost(count) => marked(mark, &format!("… lost here: {count}, since nobody read this")),
+                Next::Lost(count) => marked(mark, &format!("… {count} lines lost here, since nobody read this stream")),
             };
             // The reader may be gone; that does not stop a robot.
             let _ = stream.write_all(text.as_bytes()).and_then(|()| stream.flush());

@@ -173,7 +173,7 @@ impl Running {
                 format!("{name} does not run; `rohrpost start {name}` starts it, or says why it cannot")
             }
             Some(_) => {
-                format!("{name} does not run, and no launch watches over it; start it as you started the others")
+                format!("{name} does not run, and no launch supervises it; start it as you started the others")
             }
             None if self.is_beyond(module) && module.system() != self.installation.system.id => {
                 format!("{name} does not run; start it in system {}, where it belongs", module.system())

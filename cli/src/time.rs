@@ -49,7 +49,7 @@ struct NodeTimes {
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let alone = "this installation has one node, whose time is its own; `rohrpost top` shows it";
+    let alone = "this installation has one node, and its own clock is the time; `rohrpost top` shows it";
     let mut round = rounds.begin(alone, |installation| installation.nodes.len() > 1)?;
     let clock = SystemClock::open(&round.running.node);
     let agree = loop {

@@ -35,7 +35,7 @@ impl Pace {
         if self.window > 0.0 {
             seconds(self.window)
         } else {
-            Err(format!("a window of {} s holds nothing; try --window 1", self.window).into())
+            Err(format!("a window of {} s is empty; try --window 1", self.window).into())
         }
     }
 

@@ -111,7 +111,7 @@ impl fmt::Display for Balance {
         if !died.is_empty() {
             writeln!(
                 f,
-                "what the router of {} had counted before it died is gone with it: between nodes, packages are compared of the others alone",
+                "the counters of the router of {} from before its death are lost: between nodes, only packages of the others are compared",
                 died.join(", of ")
             )?;
         }

@@ -94,10 +94,10 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     let mut text = String::from("\nThrough the TCP router, by class, as the clients of all nodes have counted:\n\n");
     text += &table(heads, rows);
     if has_died {
-        text += "(lost on the way: with connections that broke, or waiting in a TCP router that died, less its own answers to what it could not hand on)\n";
+        text += "(lost on the way: with broken connections, or waiting in a TCP router that died, minus its own error answers)\n";
     }
     if is_any_on_way {
-        text += "(what newer ones replaced at the TCP router itself counts as lost on the way here; `rohrpost net` tells it apart)\n";
+        text += "(packages that newer ones replaced at the TCP router itself count as lost on the way here; `rohrpost net` lists them separately)\n";
     }
     let rows = links.iter().map(|link| {
         let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_never_took_part_is_not_well() {
+    fn a_client_that_never_took_part_is_not_well() {
         let link = |state| BeyondLink {
             node: "desk".into(),
             server: "192.168.7.1:7400".into(),

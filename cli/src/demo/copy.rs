@@ -27,7 +27,7 @@ const DAYS: u32 = 1;
 /// The configuration that runs. A copy is written into `temporary`.
 pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<Installation, Failure> {
     if arguments.tdma && arguments.nodes == Some(1) {
-        return Err("one node alone has no time slots; say --nodes 3".into());
+        return Err("one node alone has no time slots; use --nodes 3".into());
     }
     let (name, text) = match (&arguments.log, arguments.nodes) {
         (Some(_), _) => ("demo-log.toml", LOG),

@@ -106,7 +106,7 @@ mod tests {
         let masters = masters(&told);
         let seen: Vec<_> = masters.since(0).map(|term| (term.node, term.replacement, term.cycles())).collect();
         assert_eq!(seen, [(0, false, 2), (1, true, 2), (1, false, 1), (1, false, 1)]);
-        assert_eq!(masters.master_at(4000).map(|term| term.node), Some(0), "who stands in is no master");
+        assert_eq!(masters.master_at(4000).map(|term| term.node), Some(0), "a backup is no master");
         assert_eq!(masters.master_at(5000).map(|term| term.node), Some(1));
         assert_eq!(masters.master_at(999), None);
         assert_eq!(masters.last_of(0, 9000).map(|term| term.last_cycle), Some(2));

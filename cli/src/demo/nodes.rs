@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let nodes = installation.nodes.len();
     if nodes != usize::from(count) {
-        return Err(format!("{} has {nodes} nodes; say --nodes {nodes}", installation.shown.display()).into());
+        return Err(format!("{} has {nodes} nodes; use --nodes {nodes}", installation.shown.display()).into());
     }
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
     // Must run before the first thread; the speech has two.
@@ -184,7 +184,7 @@ fn in_error(installation: &Installation, tool: &mut ToolLink) -> Vec<String> {
         let name = installation.classes.format(module.name);
         match tool.status(module.name) {
             Ok(status) if status.state == State::Error => Some(format!("{name} is in error: {}", status.error)),
-            Err(error) if !module.optional => Some(format!("{name} does not say how it is: {error}")),
+            Err(error) if !module.optional => Some(format!("{name} does not report its state: {error}")),
             _ => None,
         }
     };
@@ -216,7 +216,7 @@ fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
         };
     }
     if !holds {
-        text += "a clock is further off than it says\n";
+        text += "a clock's error exceeds its own bound\n";
     }
     (text, holds)
 }

@@ -189,9 +189,9 @@ impl TakeoverRecord {
         let mut next = self.masters.since(last.last_ns).peekable();
         let mut text = String::from("  It was the master.");
         while let Some(term) = next.next_if(|term| term.replacement) {
-            let (who, many) = (self.name(term), term.cycles());
+            let (backup, many) = (self.name(term), term.cycles());
             let syncs = if many == 1 { "synchronisation" } else { "synchronisations" };
-            text += &format!(" {who} stood in with {many} {syncs}, the first {}.", after(term));
+            text += &format!(" {backup} stood in with {many} {syncs}, the first {}.", after(term));
         }
         text += &match next.peek() {
             None => " No other took over.\n".into(),

@@ -11,7 +11,7 @@ const WAKES: u32 = 1000;
 const LATE: Duration = Duration::from_millis(5);
 
 const WHAT: &str = "wake-up";
-const WHY: &str = "so late is a module that waits for its time, when this computer does what it does now";
+const WHY: &str = "a module that sleeps until a time wakes up this late, under the present load";
 
 /// Measures with the scheduling that the most urgent module would get.
 pub(super) fn wake_up(priority: u8) -> Finding {
@@ -28,7 +28,7 @@ pub(super) fn validate(latenesses: &[Duration], fifo: Option<u8>) -> Finding {
     let wakes = latenesses.len();
     let is = format!("half by {}, 99 % by {}, all by {} late, of {wakes} under {how}", at(0.5), at(0.99), at(1.0));
     if latenesses.last().is_some_and(|most| *most > LATE) {
-        let fix = "see what warns above; then look for what else runs (`top -H`)";
+        let fix = "fix the warnings above; then look for other busy threads (`top -H`)";
         return Finding::not(Grade::Warn, WHAT, is, WHY, fix);
     }
     Finding::ok(WHAT, is, WHY)

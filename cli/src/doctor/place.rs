@@ -73,14 +73,14 @@ fn file_system(machine: &Machine) -> Option<Finding> {
 }
 
 fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
-    let (what, why) = ("shared memory", "a mailbox takes its memory when it is made; then it must be there");
+    let (what, why) = ("shared memory", "a mailbox takes all of its memory when it is created");
     let mount = mount(machine);
     let Some(room) = machine.asked.room else {
         let fix = match &mount {
             Some(mount) if mount.is_memory() => format!("df {}", mount.quoted()),
             _ => "mount -t tmpfs tmpfs /dev/shm".to_owned(),
         };
-        return Some(Finding::not(Grade::Warn, what, "its size is not told", why, fix));
+        return Some(Finding::not(Grade::Warn, what, "its size is unknown", why, fix));
     };
     let needed = match &needs.from {
         Some(file) => format!("; {} needs {} for its mailboxes", file.display(), size(needs.memory)),
@@ -109,14 +109,14 @@ fn more_room(mount: Option<&Mount>, mib: u64) -> String {
 }
 
 fn container(machine: &Machine) -> Option<Finding> {
-    let why = "in a container its host decides on rights, shared memory and cores";
+    let why = "a container's host decides on rights, shared memory and cores";
     let marks = [
         ("/.dockerenv", "Docker"),
         ("/run/.containerenv", "Podman"),
         ("/run/systemd/container", "systemd-nspawn or LXC"),
     ];
     let kind = marks.iter().find(|(mark, _)| machine.exists(mark)).map(|(_, kind)| *kind);
-    Some(Finding::ok("container", kind.unwrap_or("none that is known"), why))
+    Some(Finding::ok("container", kind.unwrap_or("none known"), why))
 }
 
 /// Limits of this process's control group and of its ancestors.
@@ -129,7 +129,7 @@ fn groups_of_control(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 }
 
 fn share_of_time(machine: &Machine) -> Option<Finding> {
-    let why = "a control group that has used up its share stands still, however urgent its threads are";
+    let why = "a control group that has used up its share is stopped, however urgent its threads are";
     let (value, path) = tightest(machine, "cpu", "cpu.max", |text| {
         let (quota, period) = text.split_once(' ')?;
         Some(quota.parse::<f64>().ok()? / period.parse::<f64>().ok()?)
@@ -143,12 +143,12 @@ fn share_of_real_time(machine: &Machine) -> Option<Finding> {
     let least = tightest(machine, "cpu", "cpu.rt_runtime_us", |text| text.parse::<f64>().ok());
     let (_, path) = least.filter(|(value, _)| *value <= 0.0)?;
     let fix = format!("echo 950000 | sudo tee {path}, in the groups around it first");
-    let why = "SCHED_FIFO is refused in such a group";
+    let why = "without this share, the group may not use SCHED_FIFO";
     Some(Finding::not(Grade::Warn, "real-time quota", format!("0 µs ({path})"), why, fix))
 }
 
 fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding> {
-    let (what, why) = ("memory limit", "who goes beyond is killed; shared memory counts");
+    let (what, why) = ("memory limit", "a process beyond it is killed; shared memory counts");
     let (limit, path) = tightest(machine, "memory", file, whole)?;
     let (limit, is) = (limit as u64, format!("{} ({path})", size(limit as u64)));
     if limit >= needs.memory + SPARE {
@@ -214,7 +214,7 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
             NodeDirectory::Launched(pid) => Finding::ok(what, format!("{path}: launched by process {pid}"), why),
             NodeDirectory::InUse => Finding::ok(what, format!("{path}: in use, without a launch"), why),
             NodeDirectory::Dead => {
-                Finding::not(Grade::Warn, what, format!("{path}: nothing lives there"), why, "rohrpost clean")
+                Finding::not(Grade::Warn, what, format!("{path}: no process uses it"), why, "rohrpost clean")
             }
             NodeDirectory::OtherVersion(version) => Finding::not(
                 Grade::Warn,
@@ -224,7 +224,7 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
                     rohrpost_mailbox::LAYOUT_VERSION
                 ),
                 why,
-                format!("stop what runs there (with the program that launched it), then rm -r {path}"),
+                format!("stop the node (with the program that launched it), then rm -r {path}"),
             ),
             NodeDirectory::Unreadable(error) => {
                 Finding::not(Grade::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
@@ -237,10 +237,10 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
 fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     // Without a GUI the bridge is not needed.
     let missing = |what, why, fix: &str| match &needs.from {
-        Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} shows nothing", file.display()), why),
+        Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} has no GUI", file.display()), why),
         _ => Finding::not(Grade::Warn, what, "not found", why, fix),
     };
-    let (what, why) = ("GUI bridge", "draws what modules publish; the module `gui.0` of the demo is it");
+    let (what, why) = ("GUI bridge", "draws the modules' data; the demo's module `gui.0` uses it");
     let bridge = match &machine.asked.bridge {
         Some(Bridge { path, pid: Some(pid) }) => Finding::ok(what, format!("{}, process {pid}", path.display()), why),
         Some(Bridge { path, pid: None }) => Finding::ok(what, path.display().to_string(), why),
@@ -248,7 +248,7 @@ fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
             missing(what, why, "cargo build -p rohrpost-gui-bridge --profile bridge, then PATH=target/bridge:$PATH")
         }
     };
-    let (what, why) = ("viewer", "shows live what the bridge draws, and opens drawings");
+    let (what, why) = ("viewer", "shows drawings, live or from a file");
     let viewer = match &machine.asked.viewer {
         Some(path) => Finding::ok(what, path.display().to_string(), why),
         None => missing(what, why, "pip install rerun-sdk==0.36.3"),
@@ -258,5 +258,5 @@ fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 
 fn systemd(machine: &Machine) -> Finding {
     let is = if machine.exists("/run/systemd/system") { "runs" } else { "does not run here" };
-    Finding::ok("systemd", is, "can start a node at boot, and again when it ended")
+    Finding::ok("systemd", is, "can start a node at boot, and restart it")
 }

@@ -17,7 +17,7 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
     let (what, why) = (
         "real time",
-        "without the right, modules of classes from 128 up run under the normal scheduler, and wait for others",
+        "without the right, modules of classes from 128 up run under the normal scheduler, and other threads delay them",
     );
     let wanted = match (&needs.from, needs.priority) {
         (Some(file), 0) => return Some(Finding::ok(what, format!("{} asks for none", file.display()), why)),
@@ -57,7 +57,7 @@ fn nice(machine: &Machine) -> Option<Finding> {
 fn memory_lock(machine: &Machine) -> Option<Finding> {
     let (what, why) = (
         "locked memory",
-        "modules in real time lock their memory only if they may lock all of it; else a page that is fetched makes them late",
+        "real-time modules lock their memory only if the limit allows all of it; else page faults delay them",
     );
     Some(match machine.limit("Max locked memory")? {
         Limit::None => Finding::ok(what, "no limit", why),
@@ -70,7 +70,7 @@ fn memory_lock(machine: &Machine) -> Option<Finding> {
 }
 
 fn swap(machine: &Machine) -> Option<Finding> {
-    let (what, why) = ("swap", "memory that was paged out takes milliseconds to come back");
+    let (what, why) = ("swap", "swapped-out memory takes milliseconds to come back");
     let text = machine.read("/proc/swaps")?;
     let areas: Vec<&str> = text.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
     if areas.is_empty() {
@@ -85,7 +85,7 @@ fn swap(machine: &Machine) -> Option<Finding> {
 }
 
 fn files(machine: &Machine) -> Option<Finding> {
-    let (what, why) = ("open files", "a process opens each mailbox that it has or sends to");
+    let (what, why) = ("open files", "a process opens each mailbox that it owns or sends to");
     Some(match machine.limit("Max open files")? {
         Limit::Of(limit) if limit < FILES_LEAST => {
             let fix =

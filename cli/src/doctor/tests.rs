@@ -178,7 +178,7 @@ fn a_computer_with_too_little_room_in_run() {
 }
 
 #[test]
-fn a_node_whose_address_is_elsewhere() {
+fn an_address_of_another_computer_is_reported() {
     let said = said("silent", elsewhere());
     let network = said.split_once("warn  network security").unwrap().1;
     compare("elsewhere", &format!("warn  network security{network}"));
@@ -229,11 +229,11 @@ fn each_line_is_tested_with_the_opposite_state() {
         let same = || found.iter().filter(|finding| finding.what == what);
         let (fine, wrong): (Vec<_>, Vec<_>) = same().partition(|finding| finding.state == Grade::Ok);
         if NEVER_RIGHT.contains(&what) {
-            assert!(fine.is_empty(), "{what} is said although nothing is wrong");
+            assert!(fine.is_empty(), "{what} appears although nothing is wrong");
             continue;
         }
         assert_eq!(wrong.is_empty(), NEVER_WRONG.contains(&what), "{what}: {wrong:?}");
-        assert!(!fine.is_empty(), "{what} is never seen to be right");
-        assert!(same().any(|other| other.is != fine[0].is), "{what} says of each computer: {}", fine[0].is);
+        assert!(!fine.is_empty(), "{what} never appears with the grade ok");
+        assert!(same().any(|other| other.is != fine[0].is), "{what} is the same for each computer: {}", fine[0].is);
     }
 }

@@ -21,12 +21,12 @@ use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost graph                             a table: who, to whom, what, how often
+  rohrpost graph                             a table: sender, receiver, content, rate
   rohrpost graph --svg -o graph.svg          a drawing
   rohrpost graph --dot | dot -Tpdf > graph.pdf
-Rates are of the time that it looks. Of several nodes all are shown; --node shows one. A drawing leaves out replies and the calls that every module has (such as the \
-renewing of subscriptions); --all draws them too. It reads counters in shared memory, on other nodes by way \
-of their launches: modules are sent nothing.")]
+Rates are those of the observed time. All nodes are shown; --node shows one. A drawing leaves out replies and the calls that every module has (such as the \
+renewal of subscriptions); --all draws them, too. The tool reads counters in shared memory, on other nodes \
+through their launches: it sends nothing to modules.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
@@ -220,7 +220,7 @@ fn in_text(graph: &Graph) -> String {
 
 fn edges_in_text(graph: &Graph) -> String {
     if graph.edges.is_empty() {
-        return format!("nobody sent anything within {:.1} s; --silent shows who did before", graph.interval_s);
+        return format!("no package was sent within {:.1} s; --silent shows earlier senders", graph.interval_s);
     }
     let rows = graph.edges.iter().map(|edge| {
         let kind = match edge.carries {

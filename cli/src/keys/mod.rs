@@ -117,7 +117,7 @@ fn new(wanted: &Wanted, days: u32) -> Result<Vec<String>, Failure> {
     lines.extend(wanted.certify(Which::Missing, days)?);
     if lines.is_empty() {
         lines.push(
-            "all of it is there already; `rohrpost keys rotate` changes it, `rohrpost keys show` tells what it is"
+            "everything exists already; `rohrpost keys rotate` changes it, `rohrpost keys show` lists it"
                 .into(),
         );
     }
@@ -140,7 +140,7 @@ fn rotate(wanted: &Wanted, authority: bool, days: u32) -> Result<Vec<String>, Fa
 
 fn finish(wanted: &Wanted) -> Result<Vec<String>, Failure> {
     let Some(file) = &wanted.datagrams else {
-        return Err("certificates need no `finish`: old ones hold until their time is over".into());
+        return Err("certificates need no `finish`: old ones are valid until they expire".into());
     };
     let keys = Keys::load(file)?.finished()?;
     keys.replace(file)?;
@@ -164,7 +164,7 @@ fn age(file: &Path) -> Option<String> {
         Ok(0) => "less than a day ago".into(),
         Ok(1) => "1 day ago".into(),
         Ok(days) => format!("{days} days ago"),
-        Err(_) => "by a clock that was ahead of the present time".into(),
+        Err(_) => "at a time in the future of this clock".into(),
     };
     Some(format!("{}: written {ago}", file.display()))
 }
@@ -174,7 +174,7 @@ fn text(file: &Path, keys: &Keys) -> String {
     let line = |key: &Key, note: &str| format!("{file}: key {}, fingerprint {}{note}", key.id, fingerprint(key));
     match &keys.older {
         None => line(&keys.newest, ""),
-        Some(older) => format!("{}\n{}", line(&keys.newest, ""), line(older, "; it goes with `rohrpost keys finish`")),
+        Some(older) => format!("{}\n{}", line(&keys.newest, ""), line(older, "; `rohrpost keys finish` removes it")),
     }
 }
 

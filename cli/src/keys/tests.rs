@@ -86,7 +86,7 @@ fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
     );
     assert!(fit(&file));
     step(Step::New, &file).unwrap();
-    assert_eq!(shown(place.path()), first, "what is there stays");
+    assert_eq!(shown(place.path()), first, "existing files stay");
     std::fs::remove_file(place.path().join("shown/brain.system-1.pem")).unwrap();
     step(Step::New, &file).unwrap();
     let fixed = shown(place.path());
@@ -97,7 +97,7 @@ fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
     assert!(rotated["ca.pem"] == first["ca.pem"] && rotated["desk.system-1.pem"] != first["desk.system-1.pem"]);
     assert_eq!(Keys::load(&Keys::file(&place.path().join("keys"))).unwrap().older, Some(key.newest));
     let refused = step(rotate, &file).unwrap_err();
-    assert!(refused.contains("keys finish") && shown(place.path()) == rotated, "nothing is done by halves: {refused}");
+    assert!(refused.contains("keys finish") && shown(place.path()) == rotated, "all or nothing: {refused}");
     step(Step::Finish, &file).unwrap();
     step(Step::Show, &file).unwrap();
 }
@@ -129,7 +129,7 @@ fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
     let key = Keys::load(&sealing).unwrap();
     let lost = step(rotate, &file).unwrap_err();
     assert!(lost.contains("keys rotate --authority"), "{lost}");
-    assert_eq!(Keys::load(&sealing).unwrap(), key, "nothing is done by halves");
+    assert_eq!(Keys::load(&sealing).unwrap(), key, "all or nothing");
     step(begin_anew, &file).unwrap();
     assert!(fit(&file) && shown(place.path()).contains_key("ca.pem.old"));
     step(Step::Finish, &file).unwrap();
@@ -173,7 +173,7 @@ fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
     let put = |name: &str, text: &str| std::fs::write(place.path().join("shown").join(name), text).unwrap();
     // The state after a crash between the two writes.
     put("base.system-1.key", &first["desk.system-1.key"]);
-    assert!(says().contains("base.system-1.pem: certificate and key do not fit; `rohrpost keys new`"), "{}", says());
+    assert!(says().contains("base.system-1.pem: certificate and key do not match; `rohrpost keys new`"), "{}", says());
     step(Step::New, &file).unwrap();
     let fixed = shown(place.path());
     assert!(!says().contains("keys new") && fixed["base.system-1.pem"] != first["base.system-1.pem"]);
@@ -245,12 +245,12 @@ fn how_long_certificates_hold_is_shown_and_the_age_of_keys() {
     let lasts = |days: u32| {
         let said = says("desk.system-1.pem");
         let is_so =
-            [days - 1, days].iter().any(|days| said.contains(&format!("is there, holds for {days} days, until ")));
+            [days - 1, days].iter().any(|days| said.contains(&format!("is there, valid for {days} days, until ")));
         assert!(is_so, "{said}");
         said.contains("`rohrpost keys rotate` makes new ones")
     };
     make(20);
-    assert!(lasts(20), "soon it holds no more");
+    assert!(lasts(20), "it expires soon");
     assert!(
         says("desk.system-1.key").ends_with("desk.system-1.key: is there"),
         "a key holds as long as its certificate"

@@ -28,7 +28,7 @@ impl Filter {
         let level = match shown[..] {
             [] => OutputLevel::Trace,
             [level] => call::level_of(level)?,
-            _ => return Err("--level says twice which lines to show; to set levels write --level NAME=LEVEL".into()),
+            _ => return Err("--level selects lines twice; to set levels write --level NAME=LEVEL".into()),
         };
         let modules = arguments.module.iter().map(|name| module(name, running)).collect::<Result<_, _>>()?;
         let classes = arguments.class.iter().map(|name| class(name, running)).collect::<Result<_, _>>()?;
@@ -53,7 +53,7 @@ pub(super) fn module(text: &str, running: &Running) -> Result<Name, Failure> {
     let module = running
         .installation
         .module(name)
-        .ok_or_else(|| format!("{text} is a program run by hand, and says nothing to the collector"))?;
+        .ok_or_else(|| format!("{text} is a program run by hand, and sends no lines to the collector"))?;
     Ok(module.name)
 }
 

@@ -67,12 +67,12 @@ impl<'a> Reader<'a> {
             let file = &self.running.installation.output.file;
             let file = file.as_ref().map(|file| format!("; {} has them", file.display())).unwrap_or_default();
             let note =
-                format!("{name} was started again; lines that it had taken since the last one above are gone{file}");
+                format!("{name} was started again; the lines since the last one above are lost{file}");
             return News { lines: Vec::new(), note: Some(note), more: true };
         }
         let skipped = page.first.saturating_sub(self.next);
         let note = match (skipped, known) {
-            (1.., Some(_)) => Some(format!("{skipped} lines are gone: {name} keeps fewer")),
+            (1.., Some(_)) => Some(format!("{skipped} lines are lost: {name} keeps fewer")),
             _ if waited => Some(format!("{name} answers again")),
             _ => None,
         };

@@ -58,7 +58,7 @@ fn outages(link: &BeyondLink) -> String {
     let Some(last) = link.outage else { return "none".into() };
     let took = match last.ended_ns {
         Some(ended_ns) => format!("the last took {}", time(last.duration(ended_ns))),
-        None => "it is away".into(),
+        None => "it is disconnected".into(),
     };
     format!("{}, {took}", link.outages)
 }

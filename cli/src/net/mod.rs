@@ -18,15 +18,15 @@ const LOOK_AGAIN: Duration = Duration::from_millis(600);
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost net                all nodes, once
-  rohrpost net --watch        again and again; Ctrl-C ends it
+  rohrpost net --watch        repeatedly; Ctrl-C ends it
   rohrpost net --node arm --json
-`lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. `refused` are \
-those that came from the peer's address and were not taken. With time slots, `late` are those that were left out because the router woke \
-up too late, `skipped` those that went by while it stood still, `silent` those in which it was not sure enough of the time; `held` are datagrams that missed the end of their slot. \
-Where datagrams are sealed, a line counts hellos of a node that went by the time of who had not shown that it lives. Packages lost in routers stand \
-below, by class and cause (at the TCP router and its clients also those that were `replaced`: of data of which only the newest counts a newer one came while they \
-waited, which is no loss), and at the end the declared flows: how late each may be, and how late it was. The \
-exit code is 1 if a router or a client of the TCP router does not answer, a peer is not alive, or a client takes no part.")]
+`lost`: datagrams from the peer that never arrived; `missed`: datagrams to the peer that it misses; both are losses on the wire. `refused`: \
+datagrams from the peer's address that were rejected. With time slots, `late`: slots that were not used because the router woke \
+up too late; `skipped`: slots that passed while it did not run; `silent`: slots in which its time was too uncertain; `held`: datagrams that missed the end of their slot. \
+Where datagrams are sealed, a line counts hellos that a node sent by the time of an unverified node. Packages lost in routers follow \
+below, by class and cause (at the TCP router and its clients also `replaced` packages: only the newest data count, and newer data came while they \
+waited, which is no loss), and at the end the declared flows: allowed and measured latency. The \
+exit code is 1 if a router or a client of the TCP router does not answer, a peer is not alive, or a client is not connected.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,

@@ -21,7 +21,7 @@ pub(super) enum NameError {
     NoClass(String, String),
     #[error("`{0}`: a `-` stands alone, between letters or digits; write for example `{1}`")]
     Dashes(String, String),
-    #[error("`{0}` is a word of Rust's own; choose another name, such as `{0}-module`")]
+    #[error("`{0}` is a keyword of Rust; choose another name, such as `{0}-module`")]
     Keyword(String),
     #[error("`{0}` would be taken for something of Cargo's or Rohrpost's own; choose another name, such as `my-{0}`")]
     Crate(String),
@@ -52,7 +52,7 @@ impl FromStr for ModuleName {
         }
         match text {
             "tool" => Err(NameError::Class(own(), "programs run by hand")),
-            "output" => Err(NameError::Class(own(), "the collector of what modules say")),
+            "output" => Err(NameError::Class(own(), "the collector of the modules' output")),
             _ => match rohrpost_modules::builtin::of_class(text) {
                 Some(builtin) => Err(NameError::BuiltIn(own(), builtin)),
                 None => Ok(Self(own())),
@@ -125,7 +125,7 @@ mod tests {
             ("grüße", format!("`grüße` is no class name; {rule}: `gre`")),
             ("arm-", "`arm-`: a `-` stands alone, between letters or digits; write for example `arm`".into()),
             ("a--b", "`a--b`: a `-` stands alone, between letters or digits; write for example `a-b`".into()),
-            ("loop", "`loop` is a word of Rust's own; choose another name, such as `loop-module`".into()),
+            ("loop", "`loop` is a keyword of Rust; choose another name, such as `loop-module`".into()),
             (
                 "tool",
                 "`tool` is the class of programs run by hand; a module of yours needs another name, such as `my-tool`"

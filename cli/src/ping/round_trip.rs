@@ -31,9 +31,9 @@ impl RoundTrip {
     pub(super) fn new(moments: &Moments<'_>, one_clock: bool, pace: f64) -> Result<Self, String> {
         let Moments { before, there, after } = moments;
         if !one_clock {
-            for (whose, time) in [("this node", before), ("its node", there)] {
+            for (place, time) in [("this node", before), ("its node", there)] {
                 if time.source != MASTER {
-                    return Err(format!("{whose} does not have the master's time, but its own ({})", time.source));
+                    return Err(format!("{place} does not have the master's time, but its own ({})", time.source));
                 }
             }
         }
@@ -54,7 +54,7 @@ impl RoundTrip {
         let (there_s, back_s) = (way(before, there), way(there, after));
         if there_s.min(back_s) < error_s || there_s.min(back_s) < 0.0 {
             return Err(format!(
-                "the clocks of both nodes may differ by {}, which is more than a way takes",
+                "the clocks of both nodes may differ by {}, which is more than the one-way time",
                 short(error_s)
             ));
         }
@@ -131,12 +131,12 @@ mod tests {
             (
                 time(100, 3, 60, MASTER),
                 false,
-                "the clocks of both nodes may differ by 62 µs, which is more than a way takes",
+                "the clocks of both nodes may differ by 62 µs, which is more than the one-way time",
             ),
             (
                 time(151, 3, 0, MASTER),
                 false,
-                "the clocks of both nodes may differ by 2 µs, which is more than a way takes",
+                "the clocks of both nodes may differ by 2 µs, which is more than the one-way time",
             ),
         ] {
             assert_eq!(told(ways(there, one_clock)), words);

@@ -65,7 +65,7 @@ impl Module for RouterModule {
             }
         }
         if let Some(impair) = impair {
-            tracing::warn!("makes the network worse, as {} says: {impair}", impair::ENVIRONMENT);
+            tracing::warn!("adds network faults, as {} requests: {impair}", impair::ENVIRONMENT);
         }
         let faults = Arc::new(faults::Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();

@@ -164,13 +164,13 @@ impl Calls {
 
 /// The result of a failed call. Periodic queries report nothing; a failure is shown only for a call that a key started.
 fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Option<Answer> {
-    let who = match wants {
+    let asked = match wants {
         Wants::Restart(_) => "launch".into(),
         _ => running.text(to),
     };
     let told = match error {
-        CallError::Timeout(..) => format!("{who}: no answer within {} s", PATIENCE.as_secs()),
-        error => error.to_string().replace(&to.to_string(), &who),
+        CallError::Timeout(..) => format!("{asked}: no answer within {} s", PATIENCE.as_secs()),
+        error => error.to_string().replace(&to.to_string(), &asked),
     };
     match wants {
         Wants::Switch(on) => Some(Answer::Switched(to, on, Err(told))),

@@ -105,22 +105,22 @@ impl Column {
             Self::Module => "name, and with + the number of its further names",
             Self::Node => "where it runs; shown when there are several nodes",
             Self::State => {
-                "starting, on, off, stopped; error; busy: its code does not come back; restarting; failed: given up; unreachable"
+                "starting, on, off, stopped; error; busy: its code does not return; restarting; failed: given up; unreachable"
             }
-            Self::Class => "class: who is of it, is as important",
+            Self::Class => "its class, which gives its importance",
             Self::Priority => "class id = priority of its commands, 255 most urgent",
-            Self::Scheduling => "what the kernel says: fifo 1..99, or nice",
+            Self::Scheduling => "as the kernel has it: fifo 1..99, or nice",
             Self::In => "packages received a second",
             Self::Out => "packages sent a second",
             Self::Waiting => "packages that wait in its mailboxes now",
             Self::Lost => "packages lost in its mailboxes so far",
-            Self::P50 => "half of the packages of the interval waited so long at most",
-            Self::P99 => "99 of 100 waited so long at most",
-            Self::Restarts => "times that launch has started it again",
+            Self::P50 => "half of the packages of the interval waited at most this long",
+            Self::P99 => "99 of 100 waited at most this long",
+            Self::Restarts => "how often launch has restarted it",
             Self::Cpu => "of one processor",
             Self::Memory => "resident, mailboxes included",
             Self::Pid => "process",
-            Self::Why => "what went wrong last, or how packages were lost",
+            Self::Why => "the last error, or the causes of losses",
         }
     }
 

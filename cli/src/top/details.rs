@@ -23,7 +23,7 @@ pub(super) fn page(
     mut describe: impl FnMut(Name) -> Option<Description>,
 ) -> Vec<String> {
     let Some(row) = model.row(name) else {
-        return vec![format!("{} is not here any more", installation.classes.format(name))];
+        return vec![format!("{} no longer exists", installation.classes.format(name))];
     };
     let mut lines = vec![format!("{}: {}", row.line.module, row.line.account.state)];
     lines.extend(indented(&about(installation, sample, row)));

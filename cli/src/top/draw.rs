@@ -101,7 +101,7 @@ impl ScreenModel<'_> {
         });
         line(to, head, "", cells);
         if rows.is_empty() {
-            put(to, body, "  no module is called so; Esc shows all", Style::new());
+            put(to, body, "  no module matches; Esc shows all", Style::new());
         }
         let selected = self.app.selected_at(rows);
         let first = (selected + 1).saturating_sub(body.height.into());
@@ -120,11 +120,11 @@ impl ScreenModel<'_> {
     fn output(&self, area: Rect, to: &mut Buffer) {
         let [title, body] = Layout::vertical([Constraint::Length(1), Constraint::Min(0)]).areas(area);
         let filter = self.app.lines;
-        let whose = filter.module.map_or("all modules".into(), |module| {
+        let source = filter.module.map_or("all modules".into(), |module| {
             self.model.row(module).map_or(module.to_string(), |row| row.line.module.clone())
         });
         let text = match self.silence {
-            None => format!("── output: {} and above, {whose} ", filter.level.name()),
+            None => format!("── output: {} and above, {source} ", filter.level.name()),
             Some(why) => format!("── no output: {why} "),
         };
         let rest = usize::from(title.width).saturating_sub(text.chars().count());
@@ -166,7 +166,7 @@ impl ScreenModel<'_> {
         };
         let (text, style) = match (&self.app.prompt, &self.app.message) {
             (Prompt::Filter(_), _) => {
-                (format!("/{}_   Enter keeps it, Esc takes it back", self.app.filter), Style::new())
+                (format!("/{}_   Enter keeps it, Esc restores the old one", self.app.filter), Style::new())
             }
             (Prompt::Restart(name), _) => {
                 let text = self.model.row(*name).map_or(name.to_string(), |row| row.line.module.clone());

@@ -48,7 +48,7 @@ fn others(running: &Running) -> impl Iterator<Item = &str> {
 }
 
 fn not_seen_yet(running: &Running) -> NodeSurveys {
-    others(running).map(|node| Err(Silence::new(node, "it was not heard yet"))).collect()
+    others(running).map(|node| Err(Silence::new(node, "no report yet"))).collect()
 }
 
 /// The reports of all selected nodes, in the order of the configuration.
@@ -133,7 +133,7 @@ impl Live {
                 Ok(event) if self.event(&event) => return Ok(()),
                 Ok(_) => changed = true,
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Err("the terminal says nothing more".into()),
+                Err(RecvTimeoutError::Disconnected) => return Err("the terminal was closed".into()),
             }
             if Instant::now() >= next && !self.app.paused {
                 next = Instant::now() + self.interval;
@@ -241,7 +241,7 @@ impl Live {
                 self.peek();
             }
             Answer::Restarted(name, outcome) => {
-                let done = format!("{} is told to end, and starts again", self.running.text(name));
+                let done = format!("{} is being restarted", self.running.text(name));
                 self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
                 self.peek();
             }

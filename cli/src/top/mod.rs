@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     if !arguments.once && !arguments.json {
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
-            return Err("`top` draws on a terminal; into a file or pipe, say `top --once` or `top --json`".into());
+            return Err("`top` draws on a terminal; for a file or pipe, use `top --once` or `top --json`".into());
         }
         return live::run(running, interval, palette::Palette::new(arguments.no_color));
     }

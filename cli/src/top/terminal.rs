@@ -21,7 +21,7 @@ impl Opened {
         }));
         Self::draw().map_err(|error| {
             give_back();
-            format!("this terminal cannot be drawn on: {error}; say `top --once`").into()
+            format!("cannot draw on this terminal: {error}; use `top --once`").into()
         })
     }
 

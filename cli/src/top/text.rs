@@ -83,18 +83,18 @@ const KEYS: [(&str, &str); 12] = [
     ("Enter", "details of the module; Esc goes back"),
     ("o", "switch it on"),
     ("f", "switch it off: its safe state"),
-    ("r", "restart it, once you have said y"),
+    ("r", "restart it, after y"),
     ("s", "sort by the next column, S the other way round"),
-    ("/", "only modules whose name holds what you type; Esc: all"),
-    ("l", "output of the selected module alone, or of all"),
-    ("L", "which output: info, debug, trace, error, warn and above"),
+    ("/", "only modules with the typed text in their name; Esc: all"),
+    ("l", "output of the selected module only, or of all"),
+    ("L", "lowest level of output: info, debug, trace, error, warn"),
     ("p", "pause: the screen stays as it is; p goes on"),
     ("?", "this help"),
     ("q, Ctrl-C", "end"),
 ];
 
 const WHAT: &str = "  Rates and waiting times are those of the last interval. They are read from shared memory, which \
-    disturbs nobody; launches of other nodes show theirs. For its new lines the collector of output is asked once an interval.";
+    disturbs nobody; launches of other nodes report theirs. The collector of output is asked for new lines once an interval.";
 
 /// All keys and all columns.
 pub(super) fn help() -> Vec<String> {
@@ -102,7 +102,7 @@ pub(super) fn help() -> Vec<String> {
     lines.extend(KEYS.iter().map(|(key, text)| format!("  {key:<12} {text}")));
     lines.extend(["".into(), "columns; narrow terminals have fewer".into()]);
     lines.extend(Column::ALL.iter().map(|column| format!("  {:<12} {}", column.head(), column.text())));
-    lines.extend(["".into(), "what is shown".into(), WHAT.into()]);
+    lines.extend(["".into(), "contents".into(), WHAT.into()]);
     lines
 }
 

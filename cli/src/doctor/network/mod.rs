@@ -28,7 +28,7 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 }
 
 fn address(lan: &LanView, from: &str) -> Finding {
-    let (what, why) = ("node address", "other nodes send to it, and take nothing from any other");
+    let (what, why) = ("node address", "other nodes send to it, and accept datagrams only from it");
     if lan.is_here {
         let device = lan.addresses.iter().find(|(_, address)| *address == lan.address);
         let device = device.map_or(String::new(), |(device, _)| format!(", device {device}"));
@@ -74,7 +74,7 @@ fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
             what,
             format!("UDP {number}, not tried"),
             why,
-            "first the node's address, then this again",
+            "fix the node's address first, then check again",
         ),
         PortState::Refused(error) => Finding::not(
             Grade::Bad,
@@ -89,10 +89,10 @@ fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
 fn buffers(machine: &Machine) -> Option<Finding> {
     let (what, why) = (
         "socket buffers",
-        "they hold what comes in while the router's thread waits for a core; what finds no room is lost",
+        "they hold datagrams that arrive while the router's thread waits for a core; without room, datagrams are lost",
     );
     let limit = machine.number("/proc/sys/net/core/rmem_max")?;
-    let is = format!("at most {} KiB for who is not root", limit >> 10);
+    let is = format!("at most {} KiB without root rights", limit >> 10);
     Some(if limit >= RECEIVE_BYTES_LEAST {
         Finding::ok(what, is, why)
     } else {
@@ -103,7 +103,7 @@ fn buffers(machine: &Machine) -> Option<Finding> {
 fn stamps(lan: &LanView) -> Option<Finding> {
     let (what, why) = (
         "time stamps",
-        "clocks of nodes are compared by when the kernel sent and received; else by when a thread came to run",
+        "the kernel's time stamps of sending and reception compare the nodes' clocks; else a thread's less exact ones",
     );
     let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and software-receive";
     Some(match &lan.stamps {
@@ -143,7 +143,7 @@ fn reach(peer: &PeerNode, lan: &LanView) -> Finding {
 }
 
 fn mtu(peer: &PeerNode, lan: &LanView, from: &str) -> Option<Finding> {
-    let (what, why) = ("packet size", "a datagram that does not fit on the way is lost, or refused by the kernel");
+    let (what, why) = ("packet size", "a datagram larger than the path's MTU is lost, or refused by the kernel");
     let way = peer.mtu?;
     Some(if way >= lan.mtu.into() {
         Finding::ok(what, format!("{} B of the {way} B that go to {}", lan.mtu, peer.name), why)

@@ -23,7 +23,7 @@ pub(in crate::keys) fn show(installation: &Installation) -> Vec<String> {
         Ok(_) => format!("{}: is there{}", certificate.display(), lasts(&certificate, "keys rotate --authority")),
     }];
     lines.push(match &known {
-        _ if !secret.exists() => format!("{}: is not here; whoever makes certificates needs it", secret.display()),
+        _ if !secret.exists() => format!("{}: is not here; it is needed to make certificates", secret.display()),
         Ok(_) if !is_pair(&certificate, &secret) => {
             format!("{}: is not the key of {}", secret.display(), certificate.display())
         }
@@ -68,7 +68,7 @@ fn line(file: &Path, state: HolderState) -> String {
             format!("{}: is there without the other file; {MAKES}", file.display())
         }
         HolderState::Missing => format!("{}: is missing; {MAKES}", file.display()),
-        HolderState::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
+        HolderState::NoPair => format!("{}: certificate and key do not match; {MAKES} anew", file.display()),
         HolderState::Unsigned => {
             format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
         }
@@ -85,9 +85,9 @@ fn lasts(file: &Path, renews: &str) -> String {
 fn text(until_s: u64, days: u64, renews: &str) -> String {
     let until = date_time_ymd(1970, 1, 1) + Duration::from_secs(until_s);
     let left = if days == 1 { "1 day".into() } else { format!("{days} days") };
-    let warning = format!("; soon it does not: `rohrpost {renews}` makes new ones");
+    let warning = format!("; renew it soon: `rohrpost {renews}` makes new ones");
     let warning = if days < SOON_DAYS { warning } else { String::new() };
-    format!(", holds for {left}, until {}{warning}", until.date())
+    format!(", valid for {left}, until {}{warning}", until.date())
 }
 
 #[cfg(test)]
@@ -97,10 +97,10 @@ mod tests {
     #[test]
     fn what_ends_within_thirty_days_is_warned_of() {
         const UNTIL_S: u64 = 1_795_252_380;
-        assert_eq!(text(UNTIL_S, 30, "keys rotate"), ", holds for 30 days, until 2026-11-21");
+        assert_eq!(text(UNTIL_S, 30, "keys rotate"), ", valid for 30 days, until 2026-11-21");
         assert_eq!(
             text(UNTIL_S, 1, "keys rotate"),
-            ", holds for 1 day, until 2026-11-21; soon it does not: `rohrpost keys rotate` makes new ones"
+            ", valid for 1 day, until 2026-11-21; renew it soon: `rohrpost keys rotate` makes new ones"
         );
     }
 }
