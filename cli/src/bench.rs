@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sentence_tells_good_from_what_is_to_be_looked_at() {
+    fn the_verdict_names_the_causes_of_bad_figures() {
         let good = said(1.1, 20.0, &[], Scheduling::Fifo);
         assert!(good.starts_with("GOOD: a package of 64 B takes 8.0 µs") && !good.contains("powersave"), "{good}");
         for (text, part) in [
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn without_figures_it_does_not_guess() {
+    fn missing_figures_give_no_verdict() {
         let mut report = Report { environment: environment(&[]), rows: Vec::new() };
         let hints = Hints { governor: None, is_virtual: false, is_slow_build: true };
         assert!(meaning(&report, Scheduling::Fifo, &hints).starts_with("NOTHING"));

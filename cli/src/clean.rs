@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: rohrpost clean\nWhat a launch or a living process uses is left alone.")]
+#[command(after_help = "Example: rohrpost clean\nDirectories that a launch or a live process uses stay.")]
 pub(super) struct Arguments {
     /// Print one JSON object.
     #[arg(long)]

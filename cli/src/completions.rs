@@ -31,7 +31,7 @@ const PATIENCE: Duration = Duration::from_millis(300);
   source <(rohrpost completions bash)        in ~/.bashrc
   source <(rohrpost completions zsh)         in ~/.zshrc, after compinit
   rohrpost completions fish | source         in ~/.config/fish/config.fish
-Names of modules, functions and data are those of the node that runs.")]
+Names of modules, functions and data come from the running node.")]
 pub(super) struct Arguments {
     /// The shell.
     shell: Shell,

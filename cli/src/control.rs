@@ -90,7 +90,7 @@ impl ModuleOrder<'_> {
     fn carry_out(&mut self, order: Order, wait: bool) -> Result<String, Failure> {
         let before = self.child()?.pid.map_or(String::new(), |pid| format!("; previously process {pid}"));
         let text = self.text.clone();
-        let life = match order {
+        let incarnation = match order {
             Order::Restart => self.tool.restart(self.launcher, &text),
             Order::Start => self.tool.start(self.launcher, &text),
             Order::Stop => {
@@ -98,19 +98,19 @@ impl ModuleOrder<'_> {
                 return if wait { self.wait_stopped() } else { Ok(format!("{text} is being stopped")) };
             }
         };
-        let life = life.map_err(|error| self.told(&error))?;
-        if wait { self.wait_running(life, &before) } else { Ok(format!("{text} is being started")) }
+        let incarnation = incarnation.map_err(|error| self.told(&error))?;
+        if wait { self.wait_running(incarnation, &before) } else { Ok(format!("{text} is being started")) }
     }
 
-    fn wait_running(&mut self, life: u32, before: &str) -> Result<String, Failure> {
+    fn wait_running(&mut self, incarnation: u32, before: &str) -> Result<String, Failure> {
         loop {
             let child = self.child()?;
             let text = &self.text;
             match child.phase {
-                Phase::Running if child.lives == life => return self.at_work(&child, before),
+                Phase::Running if child.lives == incarnation => return self.at_work(&child, before),
                 Phase::Stopped => return Err(format!("another user has stopped {text} meanwhile").into()),
                 // It ran and ended, or could not even be started.
-                _ if child.lives > life || child.lives == life && child.phase == Phase::Waiting => {
+                _ if child.lives > incarnation || child.lives == incarnation && child.phase == Phase::Waiting => {
                     return Err(format!("{text} was started, and ended by itself: {}", child.last_end).into());
                 }
                 Phase::Failed | Phase::Ended => return Err(format!("{text} does not run: {}", child.last_end).into()),

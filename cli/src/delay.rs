@@ -39,7 +39,7 @@ struct Wait {
 }
 
 /// One observation.
-struct Looked {
+struct Observation {
     waits: Window<Vec<Wait>>,
     module: WatchedModule,
 }
@@ -77,9 +77,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut module = WatchedModule::new(&arguments.target, &arguments.name, long)?;
     module.require_present()?;
     let mut names = data_of(&module.running, module.module, None).unwrap_or_default();
-    let mut looked = Looked { waits: Window::new(long), module };
-    let look = |looked: &mut Looked| {
-        let Looked { waits: window, module } = looked;
+    let mut observed = Observation { waits: Window::new(long), module };
+    let look = |observed: &mut Observation| {
+        let Observation { waits: window, module } = observed;
         let Some(survey) = module.look()? else { return Ok(()) };
         let waits = waits(&module.running, module.module, &survey)?;
         if window.ends().is_some_and(|(_, before)| begins_anew(before, &waits)) {
@@ -89,12 +89,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         module.take_published(survey);
         Ok(())
     };
-    let tell = |looked: &mut Looked| {
-        looked.module.renew(&mut names, None);
-        let delays = delays(&arguments.name, looked, &names);
+    let tell = |observed: &mut Observation| {
+        observed.module.renew(&mut names, None);
+        let delays = delays(&arguments.name, observed, &names);
         Ok(say(if arguments.pace.json { serde_json::to_string(&delays)? } else { in_text(&delays) }))
     };
-    arguments.pace.watch(&mut looked, look, tell)?;
+    arguments.pace.watch(&mut observed, look, tell)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -125,16 +125,16 @@ fn waits(running: &Running, module: Name, survey: &Survey) -> Result<Vec<Wait>, 
     Ok(mailboxes.into_iter().flat_map(|mailbox| mailbox.classes.iter().map(wait(mailbox.name))).collect())
 }
 
-fn delays<'a>(name: &'a str, looked: &Looked, names: &[(u16, String)]) -> Delays<'a> {
-    let installation = &looked.module.running.installation;
-    let (earlier, now) = looked.waits.ends().map_or((&[][..], &[][..]), |(a, b)| (&a[..], &b[..]));
+fn delays<'a>(name: &'a str, observed: &Observation, names: &[(u16, String)]) -> Delays<'a> {
+    let installation = &observed.module.running.installation;
+    let (earlier, now) = observed.waits.ends().map_or((&[][..], &[][..]), |(a, b)| (&a[..], &b[..]));
     let line = |wait: &Wait| {
         let before = earlier.iter().find(|known| (known.mailbox, known.class) == (wait.mailbox, wait.class));
         let latency = before.map_or(wait.latency.clone(), |before| wait.latency.since(&before.latency));
         WaitLine {
             mailbox: installation.classes.format_full(wait.mailbox),
             purpose: purpose(wait.mailbox.local()),
-            subscriber: wait.mailbox.module() != looked.module.module,
+            subscriber: wait.mailbox.module() != observed.module.module,
             class: class_name(installation, wait.class),
             received: latency.count(),
             waited_mean_s: latency.mean().map(|mean| mean.as_secs_f64()),
@@ -144,7 +144,7 @@ fn delays<'a>(name: &'a str, looked: &Looked, names: &[(u16, String)]) -> Delays
         }
     };
     let age = |(number, name): &(u16, String)| {
-        let figures = looked.module.figures(*number).unwrap_or_default();
+        let figures = observed.module.figures(*number).unwrap_or_default();
         AgeLine { data: name.clone(), values: figures.packages, age_mean_s: figures.age_mean_s }
     };
     Delays { module: name, waits: now.iter().map(line).collect(), published: names.iter().map(age).collect() }

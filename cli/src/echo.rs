@@ -87,7 +87,7 @@ fn follow(
     let incarnation = tool.link.incarnation();
     let patience = super::units::seconds(arguments.timeout)?;
     let (mut renew_at, mut count) = (Instant::now(), 0);
-    let mut heard = Instant::now();
+    let mut last_at = Instant::now();
     let stop = rohrpost::launch::events()?;
     loop {
         if Instant::now() >= renew_at {
@@ -98,7 +98,7 @@ fn follow(
         if let Ok(rohrpost::launch::Event::Stop) = stop.try_recv() {
             return Ok(());
         }
-        if !patience.is_zero() && heard.elapsed() > patience {
+        if !patience.is_zero() && last_at.elapsed() > patience {
             return Err(format!("no data within {patience:?}").into());
         }
         let Some(package) = tool.data()?.receive_timeout(Duration::from_millis(50)) else { continue };
@@ -108,7 +108,7 @@ fn follow(
         if (number, from, id, head.incarnation) != (item.number, module, wish.id, incarnation) {
             continue;
         }
-        heard = Instant::now();
+        last_at = Instant::now();
         let value = decode(&item.field.ty, value)?;
         let line = if arguments.json {
             let stamped = serde_json::json!({

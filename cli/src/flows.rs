@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_seen_and_what_is_not_known_is_left_open() {
+    fn unmeasured_and_unknown_figures_are_blank() {
         let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tdma.toml");
         let installation = Installation::load(&demo).unwrap();
         let words = |flow: FlowState| {
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_flow_carries_has_the_name_that_the_interface_gives_it() {
+    fn a_flow_content_has_its_name_from_the_interface() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-nodes.toml");
         let text = std::fs::read_to_string(&file).unwrap();
         // One interface must be asked for; the other module does not answer.

@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn help_shows_what_is_done_first_and_keeps_within_eighty_columns() {
+    fn help_lists_common_commands_first_in_eighty_columns() {
         let help = grouped(Arguments::command()).render_help().to_string();
         let at = |text: &str| help.find(text).unwrap_or_else(|| panic!("{text}: {help}"));
         assert!(

@@ -20,10 +20,10 @@ const BAR: f64 = 40.0;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost mailbox laser.0           where the commands of laser.0 wait
+  rohrpost mailbox laser.0           the mailbox for commands to laser.0
   rohrpost mailbox laser.0.2         another of its mailboxes, by its local id
   watch -n1 rohrpost mailbox laser.0
-`rohrpost list --mailboxes` lists all. Looking disturbs nobody.")]
+`rohrpost list --mailboxes` lists all. Reading them disturbs nobody.")]
 pub(super) struct Arguments {
     /// Mailbox to show, such as laser.0 or laser.0.2.
     name: String,

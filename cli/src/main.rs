@@ -57,7 +57,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::complain;
 
-/// Prioritised mailboxes for robots: configure, launch, look, call.
+/// Prioritised mailboxes for robots: configure, launch, inspect, call.
 #[derive(Parser)]
 #[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
 struct Arguments {

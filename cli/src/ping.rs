@@ -59,9 +59,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             Ok(there) => {
                 let pace = tool.clock.record().map_or(1.0, |record| record.pace_ppb as f64 / 1e9);
                 let moments = Moments { before: &before, there: &there, after: &after };
-                let ways = RoundTrip::new(&moments, running.is_own(module), pace);
-                rounds.answered(took, ways.as_ref().ok());
-                tell_answer(arguments, rounds.sent, took, &ways)
+                let one_way = RoundTrip::new(&moments, running.is_own(module), pace);
+                rounds.answered(took, one_way.as_ref().ok());
+                tell_answer(arguments, rounds.sent, took, &one_way)
             }
             // It has answered, if only that it does not know this function.
             Err(CallError::Fault(_, Fault::Unknown(_))) => {
@@ -86,20 +86,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn tell_answer(arguments: &Arguments, number: u64, took: Duration, ways: &Result<RoundTrip, String>) -> bool {
+fn tell_answer(arguments: &Arguments, number: u64, took: Duration, one_way: &Result<RoundTrip, String>) -> bool {
     let name = &arguments.name;
     if arguments.json {
-        let (ways, why) = (ways.as_ref().ok(), ways.as_ref().err());
+        let (one_way, why) = (one_way.as_ref().ok(), one_way.as_ref().err());
         return say(json!({
-            "module": name, "number": number, "round_trip_s": took.as_secs_f64(), "there_s": ways.map(|ways| ways.there_s),
-            "back_s": ways.map(|ways| ways.back_s), "ways_error_s": ways.map(|ways| ways.error_s), "ways_unknown": why,
+            "module": name, "number": number, "round_trip_s": took.as_secs_f64(), "there_s": one_way.map(|one_way| one_way.there_s),
+            "back_s": one_way.map(|one_way| one_way.back_s), "ways_error_s": one_way.map(|one_way| one_way.error_s), "ways_unknown": why,
         }));
     }
-    let ways = match ways {
-        Ok(ways) => ways.text(),
+    let one_way = match one_way {
+        Ok(one_way) => one_way.text(),
         Err(why) => format!("one-way times unknown: {why}"),
     };
-    say(format_args!("{name}: answer {number} after {} ({ways})", time(took)))
+    say(format_args!("{name}: answer {number} after {} ({one_way})", time(took)))
 }
 
 fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64, error: &CallError) -> bool {
@@ -142,11 +142,11 @@ struct PingRounds {
 }
 
 impl PingRounds {
-    fn answered(&mut self, took: Duration, ways: Option<&RoundTrip>) {
+    fn answered(&mut self, took: Duration, one_way: Option<&RoundTrip>) {
         self.answered += 1;
-        if let Some(ways) = ways {
-            self.there.add(ways.there_s, ways.error_s);
-            self.back.add(ways.back_s, ways.error_s);
+        if let Some(one_way) = one_way {
+            self.there.add(one_way.there_s, one_way.error_s);
+            self.back.add(one_way.back_s, one_way.error_s);
         }
         self.min = Some(self.min.map_or(took, |min| min.min(took)));
         self.took.count_one(took);
@@ -168,9 +168,9 @@ impl PingRounds {
         let count = format!("\n{name}: {} sent, {} answered, {} lost", self.sent, self.answered, self.lost());
         let Some(times) = self.times() else { return count };
         let [min, mean, p50, p99, max] = times.map(time);
-        let ways = [("there", &self.there), ("back", &self.back)];
-        let ways = ways.map(|(name, way)| way.text().map_or(String::new(), |text| format!("\n{name:5} {text}")));
-        format!("{count}\nround min {min}  mean {mean}  p50 {p50}  p99 {p99}  max {max}{}", ways.concat())
+        let one_way = [("there", &self.there), ("back", &self.back)];
+        let one_way = one_way.map(|(name, way)| way.text().map_or(String::new(), |text| format!("\n{name:5} {text}")));
+        format!("{count}\nround min {min}  mean {mean}  p50 {p50}  p99 {p99}  max {max}{}", one_way.concat())
     }
 
     fn json(&self, module: &str) -> String {
@@ -192,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rounds_are_told_exactly_but_for_the_quantiles() {
+    fn statistics_of_rounds_are_exact_except_quantiles() {
         let ms = Duration::from_millis;
         let mut rounds = PingRounds { sent: 101, ..PingRounds::default() };
         assert!(rounds.times().is_none());

@@ -43,7 +43,7 @@ pub(super) struct WatchedModule {
     /// Whether the node was launched again, or answers again, so that the module's data must be looked up anew.
     changed: bool,
     /// Whether the module's node answered before and does not answer now.
-    heard: bool,
+    has_answered: bool,
     silent: bool,
 }
 
@@ -68,7 +68,7 @@ impl WatchedModule {
             tracks: Tracks::new(window),
             launched,
             changed: false,
-            heard: false,
+            has_answered: false,
             silent: false,
         })
     }
@@ -86,12 +86,12 @@ impl WatchedModule {
                     complain(format_args!("node {node} answers again"));
                     self.changed = true;
                 }
-                self.heard = true;
+                self.has_answered = true;
                 Ok(Some(survey))
             }
             // A node that has ended loses its directory; there is nothing to see until the next launch.
             Err(_) if own && !self.launched => Ok(None),
-            Err(error) if own || !self.heard => Err(error),
+            Err(error) if own || !self.has_answered => Err(error),
             Err(error) => {
                 if !std::mem::replace(&mut self.silent, true) {
                     complain(format_args!("{error}; waiting for it (Ctrl-C ends this)"));

@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_nobody_vouches_for_is_told_if_there_was_any() {
+    fn unverified_hellos_are_reported_if_there_were_any() {
         let slots = |unproven| SlotState { node: "arm".into(), unproven, ..SlotState::default() };
         assert!(!kept([&slots(0)]).contains("hello"));
         let line = "node arm: 3 hellos were sent by the time of an unverified node";
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tunnel_says_what_went_wrong_only_if_it_did() {
+    fn a_tunnel_reports_errors_only_if_there_were_any() {
         let well = TunnelState { sent: 7, received: 5, ..TunnelState::default() };
         assert_eq!(tunnelled("arm", &well), "tunnel of arm: 7 packets sent, 5 received\n");
         let badly = TunnelState { dropped: 3, stray: 2, refused: 1, ..well };

@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_finds_no_room_is_counted_where_it_is_missing() {
+    fn dropped_lines_are_counted_at_their_place() {
         let mut queue = Queue::default();
         let text = |n: usize| Next::Text(n.to_string());
         for n in 0..WAITING_MAX + 3 {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn each_line_in_the_journal_begins_with_its_urgency() {
+    fn each_line_in_the_journal_begins_with_its_severity() {
         assert_eq!(marked("<5>", "probe.0 ended\n    why"), "<5>probe.0 ended\n<5>    why\n");
         assert_eq!(marked("", "a\nb"), "a\nb\n");
     }

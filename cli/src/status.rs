@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: rohrpost status mapper.0\nExits with 1 when a module does not answer or is in error.")]
+#[command(after_help = "Example: rohrpost status mapper.0\nExit code 1: a module does not answer or is in error.")]
 pub(super) struct Arguments {
     /// Module to ask; all, if none is named.
     name: Option<String>,

@@ -13,11 +13,11 @@ use std::time::Duration;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost time              all nodes, once
-  rohrpost time --watch      again and again; Ctrl-C ends it
-`bound`: the node's time is not further off the master's. `off`: what it found itself off by at its last exchange with the master. \
-`way`: the shortest way there and back of late; a bound cannot be much less than half of it. `ago`: when the node said so. Two nodes \
-of the same term and epoch differ by at most the sum of their bounds. The exit code is 1 if a node does not answer or does not know the \
-time, or if there are two masters.")]
+  rohrpost time --watch      repeatedly; Ctrl-C ends it
+`bound`: largest possible error against the master's time. `off`: error measured at the last exchange with the master. \
+`way`: shortest recent round trip; a bound cannot be much less than half of it. `ago`: age of the report. Two nodes \
+of the same term and epoch differ by at most the sum of their bounds. Exit code 1: a node does not answer or does not know the \
+time, or there are two masters.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,

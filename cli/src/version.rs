@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_book_shows_these_versions() {
+    fn the_book_shows_the_present_versions() {
         let (page, said) = (include_str!("../../docs/src/tools.md"), format!("\nrohrpost {}\n", super::text()));
         assert!(page.contains(&said), "docs/src/tools.md does not show{said}");
     }

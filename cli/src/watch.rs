@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_on_has_the_rate_from_package_to_package() {
+    fn an_active_flow_has_the_rate_from_package_to_package() {
         assert_eq!(rate(200, [99.99, 100.0, 109.99, 110.0]), (Some(20.0), false));
         // One interval may be late; a slow flow has long intervals.
         assert_eq!(rate(200, [99.99, 100.0, 109.99, 110.08]), (Some(20.0), false));
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_stopped_is_slower_with_each_look() {
+    fn a_stopped_flow_gets_slower_with_each_observation() {
         assert_eq!(rate(90, [100.0, 100.0, 104.0, 109.0]), (Some(10.0), true));
         // A burst of 0.1 s, and nothing for 0.9 s.
         assert_eq!(rate(100, [100.0, 100.0, 100.1, 101.0]), (Some(100.0), true));
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_on_after_a_long_silence_is_counted_from_the_first_look() {
+    fn a_flow_after_a_long_silence_counts_from_the_first_observation() {
         assert_eq!(rate(200, [5.0, 100.0, 110.0, 110.01]), (Some(20.0), false));
         assert_eq!(rate(2, [5.0, 100.0, 100.5, 104.0]), (Some(0.5), true));
     }

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost check config/demo.toml
-  rohrpost check robot.toml --json         mistakes with file and line, or what the file means, for programs")]
+  rohrpost check robot.toml --json         mistakes with file and line, or the resolved file, for programs")]
 pub(super) struct Arguments {
     /// The configuration.
     file: PathBuf,
@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         rohrpost::launch::choose_node(&installation, only)?;
     }
     let missing = missing_programs(&installation, only)?;
-    let mut notes = told_apart_by_size(&installation);
+    let mut notes = separated_by_size(&installation);
     notes.extend(daemons_here(&installation, Path::new("/proc")));
     if arguments.json {
         say(json::installation(&installation, only, &missing, &notes));
@@ -88,7 +88,7 @@ fn daemons_here(installation: &Installation, processes: &Path) -> Vec<String> {
 }
 
 /// Flows between the same two modules of two nodes, if the file does not list their content: routers go by the size of each package.
-fn told_apart_by_size(installation: &Installation) -> Vec<String> {
+fn separated_by_size(installation: &Installation) -> Vec<String> {
     let name = |name| installation.classes.format(name);
     let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
     let unsaid: Vec<&Flow> = installation.flows.iter().filter(|flow| flow.carries.is_none()).filter(crosses).collect();
@@ -120,10 +120,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flows_that_size_alone_tells_apart_are_noted() {
+    fn flows_separated_only_by_size_get_a_note() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tdma.toml");
         let text = std::fs::read_to_string(&file).unwrap();
-        let notes = |text: &str| told_apart_by_size(&Installation::parse(text, &file).unwrap());
+        let notes = |text: &str| separated_by_size(&Installation::parse(text, &file).unwrap());
         assert_eq!(notes(&text), [""; 0], "each says what it carries");
         let line = |from: &str| 1 + text[..text.find(from).unwrap()].matches('\n').count();
         let lines = [line("[[flow]] # 181 beams"), line("[[flow]] # and answered")];

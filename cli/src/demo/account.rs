@@ -34,8 +34,8 @@ impl Balance {
         links.iter().for_each(|node| balance.within(node));
         let survived = |node: &str| !died.contains(&node);
         let to_survivors = links.iter().filter(|links| survived(&links.node));
-        let ways = to_survivors.flat_map(|to| to.peers.iter().filter(|from| survived(&from.node)));
-        balance.datagrams = ways.map(gone).sum();
+        let peers = to_survivors.flat_map(|to| to.peers.iter().filter(|from| survived(&from.node)));
+        balance.datagrams = peers.map(gone).sum();
         if died.is_empty() {
             balance.by_class(links, tool)
         } else {
@@ -63,12 +63,12 @@ impl Balance {
 
     /// Every sent package must arrive, class by class.
     fn by_class(&mut self, links: &[Links], tool: u8) {
-        let mut ways: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
+        let mut totals: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
         for class in links.iter().flat_map(|node| &node.classes) {
-            let way = ways.entry(class.class).or_default();
-            *way = [way[0] + class.sent, way[1] + class.came];
+            let total = totals.entry(class.class).or_default();
+            *total = [total[0] + class.sent, total[1] + class.came];
         }
-        for (class, sent_and_came) in ways.into_iter().filter(|(class, _)| *class != tool) {
+        for (class, sent_and_came) in totals.into_iter().filter(|(class, _)| *class != tool) {
             self.compare(&format!("of class {class}"), sent_and_came);
         }
     }
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn accounts_balance_if_every_package_is_known_of() {
+    fn accounts_balance_if_every_package_is_accounted_for() {
         let sent = || class(150, [10, 9, 0, 0], 1);
         assert_eq!(wrong(sent(), class(150, [0, 0, 9, 7], 2), 0), [""; 0]);
         assert_eq!(wrong(sent(), class(150, [0, 0, 8, 8], 0), 1), [""; 0], "one was in a datagram that is missing");
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_death_the_others_are_compared_and_each_life_for_itself() {
+    fn after_a_death_only_the_other_routers_are_compared() {
         let survivors = |came: u64| {
             let base = with_peers("base", vec![class(150, [3, 3, 0, 0], 0)], vec![peer("brain", [3, 9], 5)]);
             let brain = with_peers(
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn calls_of_tools_go_on_between_two_snapshots() {
+    fn calls_of_tools_may_continue_between_two_snapshots() {
         assert_eq!(wrong(class(TOOL, [10, 10, 0, 0], 0), class(TOOL, [0, 0, 9, 9], 0), 0), [""; 0]);
         assert_eq!(wrong(class(TOOL, [10, 9, 0, 0], 0), class(TOOL, [0, 0, 9, 9], 0), 0).len(), 1, "not within a node");
     }

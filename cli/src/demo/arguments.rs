@@ -13,7 +13,7 @@ use std::path::PathBuf;
   rohrpost demo --nodes 3 --gui tcp --secure --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
-Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) of the present folder if there is one, else its own copy.")]
+Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) of the present folder if it exists, else its own copy.")]
 pub(crate) struct Arguments {
     /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]

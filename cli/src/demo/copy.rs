@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_stay_where_they_are() {
+    fn lines_keep_their_numbers() {
         // The GUI stands in the middle, with its own table.
         let (head, gui) = SIMULATION.split_once("[[module]]\nname = \"gui.0\"").unwrap();
         let (gui, _show) = gui.split_once("[gui]").unwrap();
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_start_from_the_folder_of_the_file() {
+    fn paths_are_relative_to_the_folder_of_the_file() {
         let program = "builtin = \"pilot\"";
         let text = SIMULATION.replace(program, "program = [\"../bin/pilot\", \"--fast\"]");
         let installation = copied(&text, &["--no-gui"]);

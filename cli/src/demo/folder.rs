@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_killed_demo_left_is_found_and_what_runs_is_not() {
+    fn only_folders_of_killed_demos_are_abandoned() {
         let temp = tempfile::tempdir().unwrap();
         fs::create_dir(temp.path().join("rohrpost-demo-begun")).unwrap();
         fs::create_dir(temp.path().join("another")).unwrap();

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reign_ends_with_another_node_another_role_or_a_cycle_that_nobody_told() {
+    fn a_term_ends_with_another_node_another_role_or_a_missing_cycle() {
         let told =
             [(0, 1, false), (0, 1, false), (0, 2, false), (1, 3, true), (1, 4, true), (1, 5, false), (1, 7, false)];
         let masters = masters(&told);

@@ -143,7 +143,7 @@ impl TakeoverRecord {
     pub(super) fn text(&self) -> String {
         let mut text: String = self.incarnations.deaths.iter().map(|death| self.event(death)).collect();
         for death in &self.beyond.deaths {
-            text += &format!("The TCP router {}.\n", self.life(death));
+            text += &format!("The TCP router {}.\n", self.death_text(death));
         }
         if self.in_vain > 0 {
             text += "no router was killed, as there was none: no master, if [time] of the configuration is without `source = \"master\"`, or no \
@@ -161,12 +161,12 @@ impl TakeoverRecord {
     }
 
     fn event(&self, death: &Death) -> String {
-        let what = format!("The router of {} {}.\n", self.installation.nodes[death.node].name, self.life(death));
+        let what = format!("The router of {} {}.\n", self.installation.nodes[death.node].name, self.death_text(death));
         what + &self.takeover(death).unwrap_or_else(|| "  It was not the master.\n".into())
     }
 
     /// When it died, and when it was back.
-    fn life(&self, death: &Death) -> String {
+    fn death_text(&self, death: &Death) -> String {
         let after = |from_ns: u64, to_ns: u64| time(Duration::from_nanos(to_ns.saturating_sub(from_ns)));
         let why = if self.on_purpose.contains(&death.pid) { "killed on purpose" } else { "not by this command" };
         let again = match death.again {

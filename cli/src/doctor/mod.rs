@@ -21,10 +21,10 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost doctor                            what this computer allows
-  rohrpost doctor --config robot.toml        and whether that suffices for this configuration
-  rohrpost doctor --measure                  and how late a thread wakes up, in one second
-Ends with 1 if something is bad. Changes nothing.")]
+  rohrpost doctor                            the state of this computer
+  rohrpost doctor --config robot.toml        also whether it suffices for this configuration
+  rohrpost doctor --measure                  also how late a thread wakes up, in one second
+Exit code 1: something is bad. Changes nothing.")]
 pub(super) struct Arguments {
     /// Configuration that will run here.
     #[arg(long, value_name = "FILE")]

@@ -160,14 +160,14 @@ fn nothing_told() -> AskedOfKernel {
 }
 
 #[test]
-fn a_computer_made_for_a_robot() {
+fn a_well_configured_computer_has_no_warnings() {
     let said = said("good", good());
     assert!(!said.contains("\nwarn ") && !said.contains("\nbad "), "{said}");
     compare("good", &said);
 }
 
 #[test]
-fn a_computer_on_which_all_is_wrong() {
+fn a_badly_configured_computer_fails_every_check() {
     // The layout version changes independently.
     compare("bad", &said("bad", bad()).replace(&format!("this program {LAYOUT_VERSION}"), "this program …"));
 }
@@ -186,7 +186,7 @@ fn an_address_of_another_computer_is_reported() {
 
 /// A fact that the kernel does not report is not guessed.
 #[test]
-fn a_computer_that_tells_nothing() {
+fn unknown_facts_are_left_out() {
     let said = said("silent", (nothing_told(), Needs::default()));
     assert!(!said.contains("\nbad "), "{said}");
     compare("silent", &said);
@@ -204,7 +204,7 @@ fn full_shared_memory_is_bad() {
 }
 
 #[test]
-fn waking_up_late_is_told() {
+fn late_wake_ups_are_reported() {
     let validate = |most| measure::validate(&[Duration::from_micros(60), Duration::from_micros(most)], Some(34));
     assert_eq!((validate(90).state, validate(6000).state), (Grade::Ok, Grade::Warn));
     assert_ne!(validate(90).is, validate(6000).is);

@@ -14,15 +14,15 @@ use std::time::Duration;
 
 #[derive(Args)]
 #[command(after_help = "Examples:
-  rohrpost keys new robot.toml       all that the file needs, as far as it is not there
+  rohrpost keys new robot.toml       all missing keys and certificates of the file
   rohrpost keys rotate robot.toml    another key, and new certificates; the older key stays valid until `finish`
   rohrpost keys finish robot.toml
-What seals datagrams (`security = \"keys\"` in [network]) is one file, `udp.keys`, the same on every node. What sessions with the TCP router show \
-(`security = \"tls\"` in [tcp]) is a certificate and its key for each node, and for the TCP router; each needs `ca.pem` and its own two files. \
-Copy them as safely as passwords, and keep `ca.key`, which can make more, off the robots. For another system of the installation let its file name \
-the same folders, or put `ca.pem` and `ca.key` into its own first. To change keys: `rotate`, copy and restart, one node after the other; then `finish`, \
-and the same again. New certificates are taken at the next start of the TCP router and of its clients; old ones hold until their time is over. After \
-`rotate --authority` they do not: copy to all nodes and restart the TCP router and its clients all at once; nothing goes through it meanwhile.")]
+Datagrams (`security = \"keys\"` in [network]) are sealed with one file, `udp.keys`, the same on every node. Sessions with the TCP router \
+(`security = \"tls\"` in [tcp]) need a certificate and its key for each node, and for the TCP router; each needs `ca.pem` and its own two files. \
+Copy them as safely as passwords, and keep `ca.key`, which signs new ones, off the robots. For another system of the installation, name in its file \
+the same folders, or copy `ca.pem` and `ca.key` into its own folder first. To change keys: `rotate`, copy and restart, one node after the other; then `finish`, \
+copy and restart again. The TCP router and its clients read new certificates at their next start; old ones are valid until they expire. After \
+`rotate --authority` old ones are invalid: copy to all nodes and restart the TCP router and its clients all at once; meanwhile no package goes through it.")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     step: Step,

@@ -18,7 +18,7 @@ fn begin_anew(place: Place) -> Step {
 }
 
 #[test]
-fn keys_are_made_changed_and_shown_but_never_said() {
+fn keys_are_made_changed_and_shown_only_as_fingerprints() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("keys");
     let file = Keys::file(&folder);
@@ -71,7 +71,7 @@ fn fit(file: &Path) -> bool {
 }
 
 #[test]
-fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
+fn one_command_makes_all_files_and_one_renews_them() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
@@ -103,7 +103,7 @@ fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
 }
 
 #[test]
-fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
+fn a_damaged_or_renamed_authority_is_fixed_or_reported() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
@@ -145,7 +145,7 @@ fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
 }
 
 #[test]
-fn no_new_authority_begins_over_certificates_of_another() {
+fn a_new_authority_never_replaces_certificates_of_another() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
@@ -163,7 +163,7 @@ fn no_new_authority_begins_over_certificates_of_another() {
 }
 
 #[test]
-fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
+fn invalid_certificates_are_listed_and_replaced_and_valid_ones_stay() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     let says = || super::show(&Wanted::by(&file).unwrap()).unwrap().join("\n");
@@ -191,7 +191,7 @@ fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
 }
 
 #[test]
-fn what_cannot_be_written_leaves_all_as_it_was() {
+fn a_failed_write_changes_nothing() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
@@ -217,7 +217,7 @@ fn what_cannot_be_written_leaves_all_as_it_was() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_no_folder_of_keys() {
+fn a_missing_file_is_no_folder_of_keys() {
     let place = tempfile::tempdir().unwrap();
     let mistyped = place.path().join("robto.toml");
     let said = step(Step::New, &mistyped).unwrap_err();
@@ -225,14 +225,14 @@ fn a_file_that_is_not_there_is_no_folder_of_keys() {
 }
 
 #[test]
-fn what_seals_nothing_needs_no_keys() {
+fn a_configuration_without_security_needs_no_keys() {
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo.toml");
     let said = step(Step::New, &demo).unwrap_err();
     assert!(said.contains("nothing here is sealed"), "{said}");
 }
 
 #[test]
-fn how_long_certificates_hold_is_shown_and_the_age_of_keys() {
+fn validity_of_certificates_and_age_of_keys_are_shown() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     let says = |of: &str| {
@@ -265,7 +265,7 @@ fn how_long_certificates_hold_is_shown_and_the_age_of_keys() {
 
 /// Python 3.13 checks this strictly by default.
 #[test]
-fn strict_verifiers_take_the_certificates() {
+fn strict_verifiers_accept_the_certificates() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     // Certificates of a first authority, and of one that was read from its files.

@@ -4,13 +4,13 @@ use crate::target::Target;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost log                           what was said so far
-  rohrpost log --follow                  and what is said from now on
+  rohrpost log                           the output so far
+  rohrpost log --follow                  also new output, as it comes
   rohrpost log --level warn              only warnings and errors
   rohrpost log --module pilot.0 --text wall --since '5 min'
-  rohrpost log --level pilot.0=debug     makes pilot.0 say more; with --follow, and shows it
-  rohrpost log --level laser=error       makes all lasers say errors only
-  rohrpost log --levels                  from which level on each module speaks")]
+  rohrpost log --level pilot.0=debug     makes pilot.0 more verbose; with --follow, also shows it
+  rohrpost log --level laser=error       limits all lasers to errors
+  rohrpost log --levels                  the level of each module")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub(super) target: Target,

@@ -19,7 +19,7 @@ pub(super) struct Reader<'a> {
     /// Whether launch ran at the start; if so, the node ends with it.
     launched: bool,
     /// The collector's incarnation that `next` belongs to.
-    life: Option<u32>,
+    incarnation: Option<u32>,
     next: u64,
     /// Whether the reader waits for a collector.
     waiting: bool,
@@ -38,14 +38,14 @@ impl<'a> Reader<'a> {
     pub(super) fn new(running: &'a Running, collector: Name) -> Self {
         // For a collector on another node this is unknown: the reader waits for it.
         let launched = running.is_own(collector) && running.node.launcher().is_some();
-        Self { running, collector, launched, life: None, next: 0, waiting: false }
+        Self { running, collector, launched, incarnation: None, next: 0, waiting: false }
     }
 
     /// The next page. A follower waits for a collector that has answered once.
     pub(super) fn read(&mut self, tool: &mut ToolLink, follow: bool) -> Result<News, Failure> {
         match self.page(tool) {
             Ok(page) => Ok(self.take(page)),
-            Err(error) if follow && self.life.is_some() => self.missed(&error),
+            Err(error) if follow && self.incarnation.is_some() => self.missed(&error),
             Err(error) => Err(told(self.running, self.collector, &error).into()),
         }
     }
@@ -60,8 +60,8 @@ impl<'a> Reader<'a> {
     fn take(&mut self, page: Page) -> News {
         let name = self.running.text(self.collector);
         let waited = std::mem::take(&mut self.waiting);
-        let known = self.life.replace(page.life);
-        if known.is_some_and(|life| life != page.life) {
+        let known = self.incarnation.replace(page.life);
+        if known.is_some_and(|incarnation| incarnation != page.life) {
             // This page's numbers belong to the new incarnation; it may begin in the middle.
             self.next = 0;
             let file = &self.running.installation.output.file;

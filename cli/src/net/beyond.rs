@@ -99,7 +99,7 @@ fn clients(servers: &[&BeyondClients]) -> String {
             );
         }
         if server.overtaken > 0 {
-            text += &format!("({} registrations were overtaken by later ones of the same client)\n", server.overtaken);
+            text += &format!("({} registrations were replaced by later ones of the same client)\n", server.overtaken);
         }
         if !server.refusal.is_empty() {
             text += &format!("the last that was refused: {}\n", plain::line(&server.refusal));

@@ -25,8 +25,8 @@ datagrams from the peer's address that were rejected. With time slots, `late`: s
 up too late; `skipped`: slots that passed while it did not run; `silent`: slots in which its time was too uncertain; `held`: datagrams that missed the end of their slot. \
 Where datagrams are sealed, a line counts hellos that a node sent by the time of an unverified node. Packages lost in routers follow \
 below, by class and cause (at the TCP router and its clients also `replaced` packages: only the newest data count, and newer data came while they \
-waited, which is no loss), and at the end the declared flows: allowed and measured latency. The \
-exit code is 1 if a router or a client of the TCP router does not answer, a peer is not alive, or a client is not connected.")]
+waited, which is no loss), and at the end the declared flows: allowed and measured latency. \
+Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, or a client is not connected.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,

@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_is_left_to_fill_in_and_the_configuration_is_right() {
+    fn the_template_has_no_placeholders_left_and_a_valid_configuration() {
         let name: ModuleName = "wind-vane".parse().unwrap();
         for (file, template) in FILES {
             let text = fill(template, &name, "/opt/rohrpost");

@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_made_into_what_rust_needs() {
+    fn names_become_valid_rust_names() {
         for (text, krate, ty) in [
             ("arm", "arm", "Arm"),
             ("wind-vane", "wind_vane", "WindVane"),
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_names_say_what_would_be_right() {
+    fn errors_of_names_suggest_valid_names() {
         let rule = "use lower-case letters, digits and `-`, a letter first";
         for (text, message) in [
             ("WindVane", format!("`WindVane` is no class name; {rule}: `wind-vane`")),

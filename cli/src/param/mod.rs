@@ -16,10 +16,10 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost param list                          the parameters of all modules
-  rohrpost param get pilot.0                   those of one
-  rohrpost param set pilot.0 cruise-m-s 0.4    another value, from now on
-  rohrpost param save                          into the file that the configuration names
-  rohrpost param load tuned.toml --dry-run     what a file would change")]
+  rohrpost param get pilot.0                   the parameters of one module
+  rohrpost param set pilot.0 cruise-m-s 0.4    sets a value at once
+  rohrpost param save                          saves to the file that the configuration names
+  rohrpost param load tuned.toml --dry-run     shows what a file would change")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     action: ParamCommand,

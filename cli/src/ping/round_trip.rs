@@ -115,14 +115,14 @@ mod tests {
         TimeReport { ns: 1_000_000_000 + us * 1000, epoch, error_ns: error_us * 1000, source: source.into() }
     }
 
-    fn ways(there: TimeReport, one_clock: bool) -> Result<RoundTrip, String> {
+    fn round_trip(there: TimeReport, one_clock: bool) -> Result<RoundTrip, String> {
         let (before, after) = (time(0, 3, 2, MASTER), time(150, 3, 2, MASTER));
         RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, one_clock, 1.0)
     }
 
     #[test]
-    fn a_way_is_told_only_where_it_is_known() {
-        let told = |ways: Result<RoundTrip, String>| ways.map_or_else(|why| why, |ways| ways.text());
+    fn a_one_way_time_appears_only_where_it_is_known() {
+        let told = |round_trip: Result<RoundTrip, String>| round_trip.map_or_else(|why| why, |round_trip| round_trip.text());
         for (there, one_clock, words) in [
             (time(100, 3, 5, MASTER), false, "there 100 µs, back 50 µs, each ± 7 µs"),
             (time(100, 3, 5, "local"), true, "there 100 µs, back 50 µs"),
@@ -139,14 +139,14 @@ mod tests {
                 "the clocks of both nodes may differ by 2 µs, which is more than the one-way time",
             ),
         ] {
-            assert_eq!(told(ways(there, one_clock)), words);
+            assert_eq!(told(round_trip(there, one_clock)), words);
         }
     }
 
     #[test]
-    fn a_simulation_that_runs_faster_is_told_in_real_time() {
+    fn times_of_a_faster_simulation_are_in_real_time() {
         let (before, there, after) = (time(0, 1, 0, "local"), time(100, 1, 0, "local"), time(300, 1, 0, "local"));
-        let ways = RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, true, 2.0).unwrap();
-        assert_eq!((ways.there_s, ways.back_s), (50e-6, 100e-6));
+        let round_trip = RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, true, 2.0).unwrap();
+        assert_eq!((round_trip.there_s, round_trip.back_s), (50e-6, 100e-6));
     }
 }

@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn every_cause_of_which_a_caller_should_know_has_a_fault_that_names_a_remedy() {
+    fn each_reported_cause_has_a_fault_with_a_remedy() {
         let call = CallEnvelope { interface: 1, incarnation: 7, sequence: 9, valid_for_us: 1, age_us: 0 }.to_bytes();
         let mismatch = Some(Mismatch { reason: Reason::Digest, version: 1, digest: Some(0xabc) });
         for (cause, words) in [

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(
     after_help = "Example, on the node that `server` of [tcp] names: rohrpost tcp-router --config robot.toml --name tcp.255
-Launch starts both by itself, the client on every node; by hand they are of use where modules are started by hand."
+Launch starts both, the client on every node; start them by hand only if you start modules by hand."
 )]
 pub(super) struct Arguments {
     /// The arguments of every module: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the clients of the nodes.

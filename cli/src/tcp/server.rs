@@ -47,7 +47,7 @@ impl Module for ServerModule {
             own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
             life: realtime_ns().max(1),
             clients_max: tcp.clients,
-            greetings_max: tcp.clients.max(GREETINGS_MIN),
+            greetings_max: tcp.clients.max(HANDSHAKES_MIN),
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
         };
@@ -90,7 +90,7 @@ impl Module for ServerModule {
 }
 
 /// Lower bound of connections that have not completed the handshake.
-const GREETINGS_MIN: u16 = 64;
+const HANDSHAKES_MIN: u16 = 64;
 
 /// Ranges per report: with the names of their clients they fit in a package.
 const HOSTS_MAX: usize = 512;
@@ -132,7 +132,7 @@ mod tests {
 
     /// A report with more entries would not fit, and nothing would be shown.
     #[test]
-    fn as_many_clients_as_are_told_fit_into_a_package() {
+    fn the_largest_report_of_clients_fits_into_a_package() {
         let most = u64::from(u32::MAX);
         let client = BeyondClient {
             name: "x".repeat(NAME_BYTES_MAX),

@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn narrow_terminals_keep_what_matters() {
+    fn narrow_terminals_keep_the_important_columns() {
         for room in 0..200 {
             let columns = fit(room, 20, true);
             let used: u16 = columns.iter().map(|(_, width)| width + GAP).sum::<u16>() - GAP;

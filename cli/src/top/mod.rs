@@ -38,7 +38,7 @@ use std::time::Duration;
   rohrpost top                  ? shows the keys, q ends it
   rohrpost top --once           one plain table
   rohrpost top --json           one object with everything, for programs
-Counters are read from shared memory, of other nodes by way of their launches: looking disturbs nobody.")]
+Counters are read from shared memory, on other nodes through their launches: this disturbs nobody.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,

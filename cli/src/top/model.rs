@@ -178,8 +178,8 @@ impl Model {
 
 /// A restarted process counts its output from 0.
 fn sent_per_s(now: &ModuleSurvey, before: &ModuleSurvey, interval: Duration) -> Option<f64> {
-    let life = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.incarnation);
-    (now.process.is_some() && life(now) == life(before)).then(|| per_s(now.sent, before.sent, interval))
+    let incarnation = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.incarnation);
+    (now.process.is_some() && incarnation(now) == incarnation(before)).then(|| per_s(now.sent, before.sent, interval))
 }
 
 /// The sender: the module, or the name that a tool's answers go to.

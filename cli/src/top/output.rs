@@ -20,7 +20,7 @@ pub(super) struct Output {
     collector: Option<Name>,
     lines: VecDeque<OutputLine>,
     /// The collector's incarnation that `next` belongs to; none before its first answer.
-    life: Option<u32>,
+    incarnation: Option<u32>,
     /// Number of the next line.
     next: u64,
     /// Why there are no lines.
@@ -34,7 +34,7 @@ impl Output {
         let name = class.map(|class| Name::new(installation.system.id, class.0, 0, 0));
         let collector = name.filter(|name| installation.module(*name).is_some());
         let silence = collector.is_none().then(|| "the configuration has no module `output.0`".into());
-        Self { collector, lines: VecDeque::new(), life: None, next: u64::MAX, silence }
+        Self { collector, lines: VecDeque::new(), incarnation: None, next: u64::MAX, silence }
     }
 
     /// The collector to ask, and the first line to ask for.
@@ -53,8 +53,8 @@ impl Output {
             }
         };
         self.silence = None;
-        if self.life != Some(page.life) {
-            (self.life, self.next) = (Some(page.life), page.next.saturating_sub(BACKLOG));
+        if self.incarnation != Some(page.life) {
+            (self.incarnation, self.next) = (Some(page.life), page.next.saturating_sub(BACKLOG));
             return page.next > 0;
         }
         let more = !page.lines.is_empty();

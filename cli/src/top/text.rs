@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_lines_are_broken_at_blanks_and_nothing_is_lost() {
+    fn long_lines_are_broken_at_blanks_without_loss() {
         assert_eq!(wrap("one two three", 8), ["one two", "  three"]);
         assert_eq!(wrap("  one two three", 10), ["  one two", "   three"]);
         assert_eq!(wrap("abcdefghij", 4), ["abcd", " efg", " hij"]);

@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_ends_within_thirty_days_is_warned_of() {
+    fn expiry_within_thirty_days_gives_a_warning() {
         const UNTIL_S: u64 = 1_795_252_380;
         assert_eq!(text(UNTIL_S, 30, "keys rotate"), ", valid for 30 days, until 2026-11-21");
         assert_eq!(
