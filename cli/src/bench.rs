@@ -17,8 +17,8 @@ const ROUNDS: usize = 3;
 /// Our median may exceed the floor by this factor; beyond it something is strange. The target is 1.1.
 const STRANGE_BLOCKING: f64 = 1.5;
 
-/// Spinning pays if it is faster than sleeping by this factor; mostly it is ten times faster or more. The ratio to bare spinning
-/// says more about the path between two processors than about the computer as a whole.
+/// Spinning pays if it is faster than sleeping by this factor; mostly it is ten times faster or more. The ratio to bare
+/// spinning says more about the path between two processors than about the computer as a whole.
 const SPINNING_PAYS: f64 = 2.0;
 
 /// If the p99 of the futex floor is longer than this, the computer does not wake threads in time, µs.
@@ -38,7 +38,8 @@ pub(super) struct Arguments {
 enum What {
     /// Mailboxes between two processes, next to bare shared memory; takes 5 seconds.
     #[command(
-        after_help = "Example: rohrpost bench local\nIt keeps two processors busy: do not run it while a robot works. If a node is launched, it\nmeasures with the default scheduler and delays no module."
+        after_help = "Example: rohrpost bench local\nIt keeps two processors busy: do not run it while a robot works. \
+            If a node is launched, it\nmeasures with the default scheduler and delays no module."
     )]
     Local(Local),
 }
@@ -56,8 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let scheduling = if launched.is_empty() { Scheduling::Fifo } else { Scheduling::Normal };
     for node in &launched {
         complain(format_args!(
-            "warning: {} is launched on this computer, and this takes two processors for some seconds: measuring with the \
-             default scheduler, so that real-time modules keep theirs; the figures are worse for it",
+            "warning: {} is launched on this computer, and this takes two processors for some seconds: measuring with \
+             the default scheduler, so that real-time modules keep theirs; the figures are worse for it",
             node.display()
         ));
     }
@@ -113,8 +114,8 @@ fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
         return "NO ANSWER: a part of the test did not run; the notes under the tables say why.".into();
     };
     let said = format!(
-        "a package of 64 B takes {:.1} µs to a module that sleeps, {:.1} times what the computer takes to wake any process, \
-         and {:.2} µs to one that spins, {:.1} times bare shared memory",
+        "a package of 64 B takes {:.1} µs to a module that sleeps, {:.1} times what the computer takes to wake any \
+         process, and {:.2} µs to one that spins, {:.1} times bare shared memory",
         asleep.p50, ratio_asleep.median, awake.p50, ratio_awake.median
     );
     let floor = report.rows.iter().find(|row| row.who == "futex").and_then(|row| row.result.as_ref().ok()?.p99);

@@ -15,8 +15,9 @@ use std::process::ExitCode;
   rohrpost bw mapper.0                input and output, two lines a second; Ctrl-C ends it
   rohrpost bw laser.0 scan            the values that it publishes, each counted once, however many subscribe
   rohrpost bw mapper.0 --seconds 5 --json
-Bytes are those of package bodies, without the 16 bytes of each head. The tool reads counters in shared memory, on another node \
-through that node's launch: it does not subscribe, and sends nothing to the module. Smallest and largest are those of the whole seconds that overlap the window.")]
+Bytes are those of package bodies, without the 16 bytes of each head. The tool reads counters in shared memory, on \
+    another node through that node's launch: it does not subscribe, and sends nothing to the module. Smallest and \
+    largest are those of the whole seconds that overlap the window.")]
 pub(super) struct Arguments {
     /// Module or alias, such as mapper.0.
     name: String,
@@ -44,7 +45,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         let module = watched.module;
         let flows = survey.flows.into_iter().filter(|flow| !flow.is_publication());
-        // All input is counted on the module's node: packages from another node are counted by the router that delivers them.
+        // All input is counted on the module's node: packages from another node are counted by the router that delivers
+        // them.
         let (installation, node) = (&watched.running.installation, survey.node.as_str());
         let counts = |flow: &FlowInfo| {
             flow.to.module() == module || flow.from.module() == module && !is_hop(installation, node, flow)

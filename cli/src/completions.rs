@@ -1,8 +1,8 @@
 //! `rohrpost completions`, and the completions themselves, for shells where the script is installed.
 //!
-//! A shell runs this command at each press of Tab, with the words typed so far. Names of modules and nodes come from the
-//! configuration that launch recorded; functions and data come from the descriptions that modules store beside their mailboxes.
-//! A module is asked only for its parameters, when one of them is to be completed.
+//! A shell runs this command at each press of Tab, with the words typed so far. Names of modules and nodes come from
+//! the configuration that launch recorded; functions and data come from the descriptions that modules store beside
+//! their mailboxes. A module is asked only for its parameters, when one of them is to be completed.
 
 use super::call::COMMON;
 use super::target::{Running, Target};

@@ -19,7 +19,8 @@ const MARGIN: Duration = Duration::from_secs(7);
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: rohrpost restart pilot.0\nExit code 1: launch refused, or the module did not reach the state."
+    after_help = "Example: rohrpost restart pilot.0\nExit code 1: launch refused, or the module did not reach the \
+        state."
 )]
 pub(super) struct Arguments {
     /// Module, such as pilot.0.
@@ -53,8 +54,8 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
     let launcher = running.launcher_of(module.name).ok_or_else(|| format!("no node `{node}`"))?;
     if running.is_own(module.name) && running.node.launcher().is_none() {
         return Err(format!(
-            "no launch watches over {text}: node {} runs by hand. End the module's process and start it yourself, or launch \
-             the node: `rohrpost launch {}`",
+            "no launch watches over {text}: node {} runs by hand. End the module's process and start it yourself, or \
+             launch the node: `rohrpost launch {}`",
             running.node_name,
             running.installation.path.display()
         )

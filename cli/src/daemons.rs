@@ -1,4 +1,5 @@
-//! Daemons that slew a computer's clock, found by their names. The bounds of the nodes' common time hold only without them.
+//! Daemons that slew a computer's clock, found by their names. The bounds of the nodes' common time hold only without
+//! them.
 
 use std::path::Path;
 
@@ -34,8 +35,8 @@ pub(super) fn running(processes: &Path) -> Vec<Daemon> {
 }
 
 /// The problem in one sentence.
-pub(super) const WHY: &str = "it slews the clock by more than the nodes' common time allows for: whenever it does, nothing is known of the time, and the \
-                              node sends nothing in its time slots";
+pub(super) const WHY: &str = "it slews the clock by more than the nodes' common time allows for: whenever it does, \
+    nothing is known of the time, and the node sends nothing in its time slots";
 
 #[cfg(test)]
 mod tests {

@@ -18,9 +18,9 @@ use std::process::ExitCode;
   rohrpost delay mapper.0             by mailbox and class, once a second; Ctrl-C ends it
   rohrpost delay mapper.0 --count 1 --window 5
   rohrpost delay laser.0 --json       also how long its data wait at the subscribers
-The waiting time runs from publishing a package to taking it. The mean is exact; p50 and p99 come from a histogram and are \
-accurate to about 25 %; the longest is that since the mailbox was created. The tool reads counters, on other nodes through their \
-launches: it sends nothing to the modules.")]
+The waiting time runs from publishing a package to taking it. The mean is exact; p50 and p99 come from a histogram \
+    and are accurate to about 25 %; the longest is that since the mailbox was created. The tool reads counters, on \
+    other nodes through their launches: it sends nothing to the modules.")]
 pub(super) struct Arguments {
     /// Module or alias, such as mapper.0.
     name: String,

@@ -10,13 +10,18 @@ use rohrpost_config::{Contents, Installation};
 
 /// Explains the columns.
 pub(super) const LEGEND: &str = "\
-at worst: the bound that `check` computes, if all slots are kept; kept: the slowest package with no slot missed or cut between its publishing
-and its arrival; slowest: of all, measured by the sending router, up to the arrival at the other computer; beyond: packages slower than the bound,
-of kept: those of them with all slots kept; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's class
-at their arrival in its mailbox, by their stamp. A package between two modules belongs to the flow that carries it (`carries`), else, declared
+at worst: the bound that `check` computes, if all slots are kept; kept: the slowest package with no slot missed or \
+    cut between its publishing
+and its arrival; slowest: of all, measured by the sending router, up to the arrival at the other computer; beyond: \
+    packages slower than the bound,
+of kept: those of them with all slots kept; late: slower than the deadline, `within`; lost: in that router's queue; \
+    oldest: data of the receiver's class
+at their arrival in its mailbox, by their stamp. A package between two modules belongs to the flow that carries it \
+    (`carries`), else, declared
 or not, to a flow without `carries`";
 
-/// A row for each flow that starts at one of these nodes; empty if there is none. `ask` asks a module for its interface.
+/// A row for each flow that starts at one of these nodes; empty if there is none. `ask` asks a module for its
+/// interface.
 pub(super) fn measured<'a>(
     installation: &Installation,
     nodes: impl IntoIterator<Item = &'a FlowStates>,

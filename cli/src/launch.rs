@@ -37,8 +37,8 @@ pub(super) struct Arguments {
     /// Launch all nodes on this computer, each in its own network namespace.
     #[arg(long, conflicts_with = "node")]
     all: bool,
-    /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that are reached only by TCP,
-    /// a loss becomes a delay of that package and of all packages behind it.
+    /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
+    /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.
     #[arg(long, value_name = "TEXT", requires = "all")]
     impair: Option<impair::Settings>,
     /// No live table, only events.
@@ -60,7 +60,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
-/// Reads an installation that can run here: mistakes that a router would find only at its start are reported at once. A node without a router needs no keys.
+/// Reads an installation that can run here: mistakes that a router would find only at its start are reported at once. A
+/// node without a router needs no keys.
 fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
     let installation = super::check::load(&arguments.file)?;
     let node = arguments.node.as_deref();
@@ -179,8 +180,8 @@ impl<'a> TerminalView<'a> {
         let excess = self.notes.len().saturating_sub(NOTES_MAX);
         self.notes.drain(..excess);
         let head = format!("{installation}, {} s. Ctrl-C stops it.", self.begun.elapsed().as_secs());
-        // Home, then clear each line to its end, then everything below: no flicker. Long lines are cut, not wrapped, so that
-        // the table keeps its shape.
+        // Home, then clear each line to its end, then everything below: no flicker. Long lines are cut, not wrapped, so
+        // that the table keeps its shape.
         let text = format!("{head}\n\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
         let text = Lines(text).to_string().replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };

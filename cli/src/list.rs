@@ -15,9 +15,8 @@ use serde::Serialize;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(
-    after_help = "Example: rohrpost list --mailboxes\nLists all nodes; --node lists one. Reading the counters disturbs nobody."
-)]
+#[command(after_help = "Example: rohrpost list --mailboxes\nLists all nodes; --node lists one. Reading the counters \
+        disturbs nobody.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,

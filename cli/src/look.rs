@@ -1,5 +1,5 @@
-//! How tools observe nodes and their modules: their own node in its shared memory, others through their launches. No call waits
-//! longer than [`PATIENCE`]; a node that does not answer is silent, and the tool reports that.
+//! How tools observe nodes and their modules: their own node in its shared memory, others through their launches. No
+//! call waits longer than [`PATIENCE`]; a node that does not answer is silent, and the tool reports that.
 
 use crate::observer::{PATIENCE, Silence, silence};
 use crate::target::Running;
@@ -16,7 +16,8 @@ use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
 use rohrpost_mailbox::{InspectError, Name};
 
 impl Running {
-    /// Observes these nodes, all at the same time. Returns, in their order, what each reports, or why it does not answer.
+    /// Observes these nodes, all at the same time. Returns, in their order, what each reports, or why it does not
+    /// answer.
     pub(super) fn look_at(&self, nodes: &[&str], scope: Scope) -> Result<Vec<Result<Survey, Silence>>, Failure> {
         let others: Vec<&str> = nodes.iter().copied().filter(|node| *node != self.node_name).collect();
         let launchers: Vec<Name> = others.iter().filter_map(|node| launcher_of(&self.installation, node)).collect();
@@ -157,8 +158,8 @@ impl Running {
         described.map_err(|error| self.told(module, &error))
     }
 
-    /// The module, alias or manually started program that a user names: one of the configuration, with mailboxes here, of another system,
-    /// or of this one and registered at the TCP router.
+    /// The module, alias or manually started program that a user names: one of the configuration, with mailboxes here,
+    /// of another system, or of this one and registered at the TCP router.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
         let module = self.installation.classes.parse_name(text)?.module();
         let is_other = self.is_beyond(module) && module.system() != self.installation.system.id;

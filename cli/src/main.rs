@@ -59,7 +59,8 @@ use terminal::complain;
 
 /// Prioritised mailboxes for robots: configure, launch, inspect, call.
 #[derive(Parser)]
-#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
+#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal \
+    `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

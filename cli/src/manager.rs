@@ -1,7 +1,7 @@
 //! What launch reports to the service manager that started it (systemd). Without a manager, it reports nothing.
 //!
-//! The protocol is sd_notify(3): lines in a datagram. The existing crate blocks when the manager does not read, and knows no
-//! abstract sockets; launch must never block, and containers use such sockets.
+//! The protocol is sd_notify(3): lines in a datagram. The existing crate blocks when the manager does not read, and
+//! knows no abstract sockets; launch must never block, and containers use such sockets.
 
 use rohrpost::launch::Launch;
 use rohrpost::launcher::Phase;

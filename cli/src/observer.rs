@@ -81,7 +81,9 @@ pub(super) fn silence(installation: &Installation, node: &str, failure: &LookFai
             "no datagrams come from it; is it on, does its router run, and is its address reachable? (`rohrpost net`)"
                 .into()
         }
-        LookFailure::Call(CallError::Fault(_, Fault::NoMailbox)) => "no launch runs there; is the node launched?".into(),
+        LookFailure::Call(CallError::Fault(_, Fault::NoMailbox)) => {
+            "no launch runs there; is the node launched?".into()
+        }
         LookFailure::Call(CallError::Fault(_, fault)) => fault.to_string(),
         LookFailure::Call(CallError::NotSent(SendError::NoMailbox(_) | SendError::NoRouter { .. })) => {
             "the router of this node does not run (`rohrpost list`)".into()

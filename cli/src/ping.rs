@@ -19,10 +19,11 @@ use std::time::{Duration, Instant};
 #[command(after_help = "Examples:
   rohrpost ping motor.0               once a second; Ctrl-C ends it
   rohrpost ping motor.0 -c 100 --interval 0.01
-Each call asks for system time. The measured time is the whole round trip: a module answers between its own work, so the time includes its \
-current work, and the wait behind more important classes. The one-way times use system time, and are shown with their error \
-bounds; if the nodes do not follow the master's clock, or the bounds are too large, the output says so instead. p50 and p99 \
-come from a histogram and are accurate to about 25 %; the others are exact. Exit code 1: no call was answered.")]
+Each call asks for system time. The measured time is the whole round trip: a module answers between its own work, so \
+    the time includes its current work, and the wait behind more important classes. The one-way times use system \
+    time, and are shown with their error bounds; if the nodes do not follow the master's clock, or the bounds are too \
+    large, the output says so instead. p50 and p99 come from a histogram and are accurate to about 25 %; the others \
+    are exact. Exit code 1: no call was answered.")]
 pub(super) struct Arguments {
     /// Module or alias, such as motor.0.
     name: String,
@@ -50,7 +51,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut tool = running.join(timeout)?;
     let mut rounds = PingRounds::default();
     loop {
-        // The round trip encloses both one-way times: a delay of this process in between makes neither longer than the round trip.
+        // The round trip encloses both one-way times: a delay of this process in between makes neither longer than the
+        // round trip.
         let (began, before) = (Instant::now(), TimeReport::of(&tool.clock));
         let answer = tool.time(module);
         let (after, took) = (TimeReport::of(&tool.clock), began.elapsed());
@@ -91,8 +93,10 @@ fn tell_answer(arguments: &Arguments, number: u64, took: Duration, one_way: &Res
     if arguments.json {
         let (one_way, why) = (one_way.as_ref().ok(), one_way.as_ref().err());
         return say(json!({
-            "module": name, "number": number, "round_trip_s": took.as_secs_f64(), "there_s": one_way.map(|one_way| one_way.there_s),
-            "back_s": one_way.map(|one_way| one_way.back_s), "ways_error_s": one_way.map(|one_way| one_way.error_s), "ways_unknown": why,
+            "module": name, "number": number, "round_trip_s": took.as_secs_f64(),
+            "there_s": one_way.map(|one_way| one_way.there_s),
+            "back_s": one_way.map(|one_way| one_way.back_s),
+            "ways_error_s": one_way.map(|one_way| one_way.error_s), "ways_unknown": why,
         }));
     }
     let one_way = match one_way {
@@ -120,8 +124,9 @@ fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
     let found = survey.module(module);
     Ok(match found.and_then(|found| found.process.as_ref().map(|process| (found, process))) {
         Some((found, process)) => format!(
-            "{name} answered nothing: its process {} is there, its state is {}, and {} packages wait for it; it hangs, was \
-             stopped (kill -CONT {0} goes on), or works longer than that: see `rohrpost log --module {name}`",
+            "{name} answered nothing: its process {} is there, its state is {}, and {} packages wait for it; it \
+             hangs, was stopped (kill -CONT {0} goes on), or works longer than that: see `rohrpost log --module \
+             {name}`",
             process.pid,
             process.state.map_or("unknown", ModuleState::name),
             found.depth

@@ -54,8 +54,8 @@ impl WatchedModule {
         let module = running.module(text)?;
         if running.is_beyond(module) {
             return Err(format!(
-                "{text} is beyond this system's nodes, and what it counts stands in its own node's memory; run this in system {}, or \
-                 take `rohrpost echo {text}`, which subscribes",
+                "{text} is beyond this system's nodes, and what it counts stands in its own node's memory; run this \
+                 in system {}, or take `rohrpost echo {text}`, which subscribes",
                 module.system()
             )
             .into());

@@ -62,7 +62,8 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
         let bound = bounds.iter().find(|bound| bound.flow == index);
         json!({
             "from": text(flow.from), "to": text(flow.to), "carries": flow.carries.map(|carries| carries.to_string()),
-            "size": flow.size, "period_ms": ms(flow.period), "deadline_ms": ms(flow.deadline), "at_worst": bound.map(at_worst),
+            "size": flow.size, "period_ms": ms(flow.period), "deadline_ms": ms(flow.deadline),
+            "at_worst": bound.map(at_worst),
         })
     });
     let access = installation.access.iter().map(|rule| {
@@ -111,7 +112,8 @@ fn module(installation: &Installation, module: &Module) -> Value {
         "line": module.line,
         "priority": module.name.class().0,
         "scheduling": scheduling(installation.scheduling(module.name.class())),
-        "aliases": module.aliases.iter().map(|alias| json!({ "name": text(alias), "number": alias.raw() })).collect::<Vec<_>>(),
+        "aliases": module.aliases.iter()
+            .map(|alias| json!({ "name": text(alias), "number": alias.raw() })).collect::<Vec<_>>(),
         "runs": runs,
         "optional": module.optional,
         "required": module.required,

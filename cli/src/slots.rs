@@ -57,7 +57,7 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
 /// Hellos that were sent at an unverified time.
 fn unproven(slots: &SlotState) -> String {
     let hellos = if slots.unproven == 1 { "1 hello".into() } else { format!("{} hellos", slots.unproven) };
-    format!("node {}: {hellos} were sent by the time of an unverified node\n", slots.node)
+    format!("node {}: {hellos} sent by the time of an unverified node\n", slots.node)
 }
 
 /// Ordinary traffic in the slots; errors appear if there were any.
@@ -77,9 +77,9 @@ mod tests {
     fn unverified_hellos_are_reported_if_there_were_any() {
         let slots = |unproven| SlotState { node: "arm".into(), unproven, ..SlotState::default() };
         assert!(!kept([&slots(0)]).contains("hello"));
-        let line = "node arm: 3 hellos were sent by the time of an unverified node";
+        let line = "node arm: 3 hellos sent by the time of an unverified node";
         assert!(kept([&slots(3)]).lines().any(|told| told == line));
-        assert!(kept([&slots(1)]).contains("arm: 1 hello left"));
+        assert!(kept([&slots(1)]).contains("arm: 1 hello sent"));
     }
 
     #[test]
@@ -89,7 +89,8 @@ mod tests {
         let badly = TunnelState { dropped: 3, stray: 2, refused: 1, ..well };
         assert_eq!(
             tunnelled("arm", &badly),
-            "tunnel of arm: 7 packets sent, 5 received, 3 dropped, since too many waited, 2 for nobody, 1 not taken by the kernel\n"
+            "tunnel of arm: 7 packets sent, 5 received, 3 dropped, since too many waited, 2 for nobody, 1 not taken \
+            by the kernel\n"
         );
     }
 }

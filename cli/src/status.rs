@@ -97,7 +97,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(if lines.iter().all(well) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// A module's state: from launch, from its node's table, and from the module itself, unless it is known that it cannot answer.
+/// A module's state: from launch, from its node's table, and from the module itself, unless it is known that it cannot
+/// answer.
 fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silence], name: Name) -> StatusRow {
     let (text, node) = (running.text(name), running.node_of(name).to_owned());
     let account = survey.module(name).map(|module| Account::of(module, &running.installation));

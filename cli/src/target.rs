@@ -14,8 +14,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Selects a node. Without options, a tool takes the installation that runs here; if several of its nodes run here, the first of
-/// the configuration. Its router reaches modules of the other nodes, so for most tools the choice makes no difference.
+/// Selects a node. Without options, a tool takes the installation that runs here; if several of its nodes run here, the
+/// first of the configuration. Its router reaches modules of the other nodes, so for most tools the choice makes no
+/// difference.
 #[derive(Args)]
 pub(super) struct Target {
     /// Configuration of the nodes; without it, the one that runs here.
@@ -141,7 +142,8 @@ impl Running {
         self.node_of(module) == self.node_name && !self.is_beyond(module)
     }
 
-    /// Whether it is reached only through the TCP router: a module of another system, or a program of this system outside the configuration.
+    /// Whether it is reached only through the TCP router: a module of another system, or a program of this system
+    /// outside the configuration.
     pub(super) fn is_beyond(&self, module: Name) -> bool {
         if self.installation.tcp.is_none() || module.system() != self.installation.system.id {
             return self.installation.tcp.is_some();
@@ -206,8 +208,8 @@ impl Running {
         text.contains(&transit).then(|| {
             let (router, node) = (self.text(router), &self.node_name);
             format!(
-                "the router of this node, {router}, does not run, and without it nothing goes from {node} to other nodes; \
-                 `rohrpost start {router}` starts it, or says why it cannot"
+                "the router of this node, {router}, does not run, and without it nothing goes from {node} to other \
+                 nodes; `rohrpost start {router}` starts it, or says why it cannot"
             )
             .into()
         })

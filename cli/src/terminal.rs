@@ -6,7 +6,8 @@ use std::io::Write;
 /// An error message for the user.
 pub(crate) type Failure = Box<dyn std::error::Error>;
 
-/// Prints a line, or several; false when nobody reads any more (a closed pipe). All output of the command goes through here and
+/// Prints a line, or several; false when nobody reads any more (a closed pipe). All output of the command goes through
+/// here and
 /// [`complain`], which escape what a terminal would obey: names, texts and faults come from other programs.
 pub(crate) fn say(line: impl std::fmt::Display) -> bool {
     writeln!(std::io::stdout(), "{}", Lines(line)).is_ok()

@@ -14,10 +14,10 @@ use std::time::Duration;
 #[command(after_help = "Examples:
   rohrpost time              all nodes, once
   rohrpost time --watch      repeatedly; Ctrl-C ends it
-`bound`: largest possible error against the master's time. `off`: error measured at the last exchange with the master. \
-`way`: shortest recent round trip; a bound cannot be much less than half of it. `ago`: age of the report. Two nodes \
-of the same term and epoch differ by at most the sum of their bounds. Exit code 1: a node does not answer or does not know the \
-time, or there are two masters.")]
+`bound`: largest possible error against the master's time. `off`: error measured at the last exchange with the \
+    master. `way`: shortest recent round trip; a bound cannot be much less than half of it. `ago`: age of the report. \
+    Two nodes of the same term and epoch differ by at most the sum of their bounds. Exit code 1: a node does not \
+    answer or does not know the time, or there are two masters.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,

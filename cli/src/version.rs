@@ -8,7 +8,8 @@ use std::sync::OnceLock;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: rohrpost version\nPrograms of one node must have the same layout and the same common functions."
+    after_help = "Example: rohrpost version\nPrograms of one node must have the same layout and the same common \
+        functions."
 )]
 pub(super) struct Arguments {
     /// Print one JSON object.

@@ -1,4 +1,5 @@
-//! Names of package types: commands and replies by their functions, data by their item, as the modules' interfaces declare them.
+//! Names of package types: commands and replies by their functions, data by their item, as the modules' interfaces
+//! declare them.
 
 use rohrpost::Name;
 use rohrpost::common as c;

@@ -1,4 +1,5 @@
-//! Counters observed over time: shared by `hz`, `bw` and `delay`. Observing subscribes to nothing, and sends nothing to modules.
+//! Counters observed over time: shared by `hz`, `bw` and `delay`. Observing subscribes to nothing, and sends nothing to
+//! modules.
 
 use super::units::{Stop, seconds};
 use crate::terminal::Failure;

@@ -87,7 +87,8 @@ fn daemons_here(installation: &Installation, processes: &Path) -> Vec<String> {
     told.collect()
 }
 
-/// Flows between the same two modules of two nodes, if the file does not list their content: routers go by the size of each package.
+/// Flows between the same two modules of two nodes, if the file does not list their content: routers go by the size of
+/// each package.
 fn separated_by_size(installation: &Installation) -> Vec<String> {
     let name = |name| installation.classes.format(name);
     let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
@@ -98,8 +99,8 @@ fn separated_by_size(installation: &Installation) -> Vec<String> {
     }
     let notes = lines.into_iter().filter(|(_, lines)| lines.len() > 1).map(|((from, to), lines)| {
         format!(
-            "the [[flow]]s from {} to {} in lines {} are told apart by the size of packages alone; say what each carries, such as \
-             `carries = \"data 1\"`",
+            "the [[flow]]s from {} to {} in lines {} are told apart by the size of packages alone; say what each \
+             carries, such as `carries = \"data 1\"`",
             name(from),
             name(to),
             lines.join(", ")

@@ -27,8 +27,9 @@ pub(super) struct Balance {
 }
 
 impl Balance {
-    /// The snapshots are not simultaneous: traffic that continues meanwhile, calls of tools (class `tool`), is compared only within each node.
-    /// Routers of the nodes that have `died` count from their last start, so between nodes only the others are compared, and as a whole.
+    /// The snapshots are not simultaneous: traffic that continues meanwhile, calls of tools (class `tool`), is compared
+    /// only within each node. Routers of the nodes that have `died` count from their last start, so between nodes only
+    /// the others are compared, and as a whole.
     pub(super) fn of(links: &[Links], tool: u8, died: &[&str]) -> Self {
         let mut balance = Self { died: died.iter().map(ToString::to_string).collect(), ..Self::default() };
         links.iter().for_each(|node| balance.within(node));
@@ -111,7 +112,8 @@ impl fmt::Display for Balance {
         if !died.is_empty() {
             writeln!(
                 f,
-                "the counters of the router of {} from before its death are lost: between nodes, only packages of the others are compared",
+                "the counters of the router of {} from before its death are lost: between nodes, only packages of the \
+                 others are compared",
                 died.join(", of ")
             )?;
         }
@@ -241,7 +243,7 @@ mod tests {
             Balance::of(&[base, brain, desk], TOOL, &["base"])
         };
         let balance = survivors(4);
-        assert!(balance.holds() && balance.to_string().contains("the router of base had counted"), "{balance}");
+        assert!(balance.holds() && balance.to_string().contains("the counters of the router of base"), "{balance}");
         assert_eq!(survivors(3).wrong, ["from brain to desk, packages that did not come: 1; no datagram was lost"]);
         assert_eq!(survivors(5).wrong, ["from brain to desk, 4 packages were sent and 5 came"]);
     }

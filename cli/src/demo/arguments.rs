@@ -13,7 +13,8 @@ use std::path::PathBuf;
   rohrpost demo --nodes 3 --gui tcp --secure --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
-Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) of the present folder if it exists, else its own copy.")]
+Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) \
+    of the present folder if it exists, else its own copy.")]
 pub(crate) struct Arguments {
     /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]
@@ -30,8 +31,8 @@ pub(crate) struct Arguments {
     /// The nodes send in time slots, each in its own.
     #[arg(long, requires = "nodes", conflicts_with = "config")]
     pub(super) tdma: bool,
-    /// How the node with the GUI is connected to the robot: by the LAN, or only through the TCP router. With `tcp` and --seconds the TCP router
-    /// is killed in the middle of the run (SIGKILL); launch restarts it.
+    /// How the node with the GUI is connected to the robot: by the LAN, or only through the TCP router. With `tcp` and
+    /// --seconds the TCP router is killed in the middle of the run (SIGKILL); launch restarts it.
     #[arg(long, value_enum, default_value = "lan", requires = "nodes", conflicts_with = "tdma")]
     pub(super) gui: Joined,
     /// Seal the traffic between the nodes, with keys and certificates that are made for this run.
@@ -40,8 +41,8 @@ pub(crate) struct Arguments {
     /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch restarts it.
     #[arg(long, requires_all = ["nodes", "seconds"])]
     pub(super) kill_master: bool,
-    /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that are reached only by TCP,
-    /// a loss becomes a delay of that package and of all packages behind it.
+    /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
+    /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.
     #[arg(long, value_name = "TEXT", requires = "nodes")]
     pub(super) impair: Option<impair::Settings>,
     /// Another configuration.

@@ -94,10 +94,12 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     let mut text = String::from("\nThrough the TCP router, by class, as the clients of all nodes have counted:\n\n");
     text += &table(heads, rows);
     if has_died {
-        text += "(lost on the way: with broken connections, or waiting in a TCP router that died, minus its own error answers)\n";
+        text += "(lost on the way: with broken connections, or waiting in a TCP router that died, minus its own error \
+            answers)\n";
     }
     if is_any_on_way {
-        text += "(packages that newer ones replaced at the TCP router itself count as lost on the way here; `rohrpost net` lists them separately)\n";
+        text += "(packages that newer ones replaced at the TCP router itself count as lost on the way here; `rohrpost \
+            net` lists them separately)\n";
     }
     let rows = links.iter().map(|link| {
         let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {

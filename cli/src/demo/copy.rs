@@ -1,5 +1,5 @@
-//! The configuration of a demo: the folder's own, or a copy with the command line's options added. A copy keeps each line
-//! at its place, and messages name the original file.
+//! The configuration of a demo: the folder's own, or a copy with the command line's options added. A copy keeps each
+//! line at its place, and messages name the original file.
 
 use super::arguments::{Arguments, Joined};
 use super::drawing::GUI;

@@ -29,7 +29,8 @@ impl Folder {
 
     fn new_in(temp: &Path) -> io::Result<Self> {
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(temp)?;
-        // The final name appears only with the lock: without a lock, another demo would take the folder for an abandoned one.
+        // The final name appears only with the lock: without a lock, another demo would take the folder for an
+        // abandoned one.
         let in_use = File::create(folder.path().join(NOT_LOCKED))?;
         in_use.lock()?;
         fs::rename(folder.path().join(NOT_LOCKED), folder.path().join(IN_USE))?;
@@ -41,7 +42,8 @@ impl Folder {
     }
 }
 
-/// Removes the folders of this user's demos that no longer run; returns their paths. Another process may have removed one meanwhile.
+/// Removes the folders of this user's demos that no longer run; returns their paths. Another process may have removed
+/// one meanwhile.
 pub(crate) fn remove_abandoned(temp: &Path) -> Vec<PathBuf> {
     let mut folders = abandoned(temp);
     folders.retain(|folder| fs::remove_dir_all(folder).is_ok());

@@ -20,8 +20,8 @@ pub(super) struct ExchangeLosses {
 }
 
 impl ExchangeLosses {
-    /// Asks both ends of each declared flow. A module that does not answer is reported elsewhere. A call that timed out a moment ago may
-    /// still get its answer: wait a little for it.
+    /// Asks both ends of each declared flow. A module that does not answer is reported elsewhere. A call that timed out
+    /// a moment ago may still get its answer: wait a little for it.
     pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Self {
         let until = Instant::now() + OVERDUE;
         loop {

@@ -58,7 +58,8 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     Ok(if well { code } else { ExitCode::FAILURE })
 }
 
-/// Runs until the time is over, counted from when all modules are on, or a stop is requested; returns the observed routers, or none if not all modules ran.
+/// Runs until the time is over, counted from when all modules are on, or a stop is requested; returns the observed
+/// routers, or none if not all modules ran.
 fn watch(
     nodes: &mut LaunchedNodes<'_>,
     installation: &Arc<Installation>,
@@ -191,8 +192,8 @@ fn in_error(installation: &Installation, tool: &mut ToolLink) -> Vec<String> {
     installation.modules.iter().filter_map(told).collect()
 }
 
-/// The differences between the nodes' clocks. All run on one computer, so the true difference is known: their pages are read at
-/// one moment of the one monotonic clock. False if a node claims a better bound than is true.
+/// The differences between the nodes' clocks. All run on one computer, so the true difference is known: their pages are
+/// read at one moment of the one monotonic clock. False if a node claims a better bound than is true.
 fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
     let clocks: Vec<SystemClock> = nodes.iter().map(|node| SystemClock::open(node)).collect();
     let moment = monotonic_ns();

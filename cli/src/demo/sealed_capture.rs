@@ -1,4 +1,5 @@
-//! Decodes sealed time datagrams from the bridge: the demo has the keys, and reads them like a node that has not authenticated its peers.
+//! Decodes sealed time datagrams from the bridge: the demo has the keys, and reads them like a node that has not
+//! authenticated its peers.
 
 use crate::router::keys;
 use crate::terminal::Failure;

@@ -146,8 +146,8 @@ impl TakeoverRecord {
             text += &format!("The TCP router {}.\n", self.death_text(death));
         }
         if self.in_vain > 0 {
-            text += "no router was killed, as there was none: no master, if [time] of the configuration is without `source = \"master\"`, or no \
-                     TCP router\n";
+            text += "no router was killed, as there was none: no master, if [time] of the configuration is without \
+                `source = \"master\"`, or no TCP router\n";
         }
         if !self.incarnations.deaths.is_empty() {
             let master = self.masters.master_at(u64::MAX).map(|term| self.name(term));

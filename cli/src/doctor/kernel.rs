@@ -94,7 +94,11 @@ fn fair_server(machine: &Machine) -> Option<Finding> {
 
 fn clock_source(machine: &Machine) -> Option<Finding> {
     let folder = "/sys/devices/system/clocksource/clocksource0";
-    let (what, why) = ("clock source", "every package and deadline reads the clock; some clock sources need a system call");
+    let (what, why) = (
+        "clock source",
+        "every package and deadline reads the clock; some clock sources need a system \
+        call",
+    );
     let source = machine.read(&format!("{folder}/current_clocksource"))?;
     let slow = ["hpet", "acpi_pm", "jiffies", "refined-jiffies", "pit"];
     if !slow.contains(&source.as_str()) {

@@ -187,7 +187,8 @@ pub(super) enum Limit {
     Of(u64),
 }
 
-/// Tries it for a moment in a separate thread: only the kernel knows the sum of limits, capabilities and control groups.
+/// Tries it for a moment in a separate thread: only the kernel knows the sum of limits, capabilities and control
+/// groups.
 fn try_fifo(priority: u8) -> Result<(), String> {
     if priority == 0 {
         return Ok(());

@@ -17,7 +17,8 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
     let (what, why) = (
         "real time",
-        "without the right, modules of classes from 128 up run under the normal scheduler, and other threads delay them",
+        "without the right, modules of classes from 128 up run under the normal scheduler, and other threads delay \
+         them",
     );
     let wanted = match (&needs.from, needs.priority) {
         (Some(file), 0) => return Some(Finding::ok(what, format!("{} asks for none", file.display()), why)),
@@ -36,8 +37,8 @@ fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
         Ok(()) => Some(Finding::ok(what, format!("granted ({right}); {wanted}"), why)),
         Err(error) => {
             let fix = format!(
-                "echo \"$USER - rtprio {FIFO_MAX}\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in anew; \
-                 in a container: `--ulimit rtprio={FIFO_MAX} --cap-add=SYS_NICE`"
+                "echo \"$USER - rtprio {FIFO_MAX}\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
+                 anew; in a container: `--ulimit rtprio={FIFO_MAX} --cap-add=SYS_NICE`"
             );
             Some(Finding::not(Grade::Warn, what, format!("refused ({right}): {error}; {wanted}"), why, fix))
         }
@@ -62,8 +63,8 @@ fn memory_lock(machine: &Machine) -> Option<Finding> {
     Some(match machine.limit("Max locked memory")? {
         Limit::None => Finding::ok(what, "no limit", why),
         Limit::Of(bytes) => {
-            let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
-                        anew; in a container: `--ulimit memlock=-1`";
+            let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log \
+                in anew; in a container: `--ulimit memlock=-1`";
             Finding::not(Grade::Warn, what, format!("at most {}", super::place::size(bytes)), why, fix)
         }
     })

@@ -20,8 +20,8 @@ fn lan(protection: &LanProtection, from: &str) -> Finding {
             format!("none, as {from} says"),
             why,
             format!(
-                "use a separate network for the robot, without access from others; or write `security = \"keys\"` into [network] of {from}, \
-                 and run `rohrpost keys new {from}`"
+                "use a separate network for the robot, without access from others; or write `security = \"keys\"` \
+                 into [network] of {from}, and run `rohrpost keys new {from}`"
             ),
         ),
         LanProtection::Keys { file, ids: Ok(ids) } => {
@@ -34,7 +34,8 @@ fn lan(protection: &LanProtection, from: &str) -> Finding {
             what,
             format!("{from} requires keys, and there are none: {error}"),
             why,
-            "copy the keys from the first computer of the installation; only if none has any, `rohrpost keys new` makes them",
+            "copy the keys from the first computer of the installation; only if none has any, `rohrpost keys new` \
+            makes them",
         ),
     }
 }
@@ -49,8 +50,8 @@ fn tcp(protection: &Tcp, from: &str) -> Finding {
             format!("none, as {from} says"),
             why,
             format!(
-                "use a network without access from others; or write `security = \"tls\"` and `certificates = \"certificates\"` into [tcp] of \
-                 {from}, and run `rohrpost keys new {from}`"
+                "use a network without access from others; or write `security = \"tls\"` and `certificates \
+                 = \"certificates\"` into [tcp] of {from}, and run `rohrpost keys new {from}`"
             ),
         ),
         Tcp::Tls { folder, lacking } if lacking.is_empty() => {

@@ -24,9 +24,9 @@ use std::time::{Duration, Instant};
   rohrpost graph                             a table: sender, receiver, content, rate
   rohrpost graph --svg -o graph.svg          a drawing
   rohrpost graph --dot | dot -Tpdf > graph.pdf
-Rates are those of the observed time. All nodes are shown; --node shows one. A drawing leaves out replies and the calls that every module has (such as the \
-renewal of subscriptions); --all draws them, too. The tool reads counters in shared memory, on other nodes \
-through their launches: it sends nothing to modules.")]
+Rates are those of the observed time. All nodes are shown; --node shows one. A drawing leaves out replies and the \
+    calls that every module has (such as the renewal of subscriptions); --all draws them, too. The tool reads \
+    counters in shared memory, on other nodes through their launches: it sends nothing to modules.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
@@ -188,7 +188,8 @@ impl Names<'_> {
         self.running.text(name)
     }
 
-    /// Whether this is a mailbox for output lines. In any other module a mailbox of that local id has the module's own data.
+    /// Whether this is a mailbox for output lines. In any other module a mailbox of that local id has the module's own
+    /// data.
     fn is_collector(&self, mailbox: Name) -> bool {
         let class = self.running.installation.classes.id(rohrpost::output::CLASS);
         class == Some(mailbox.class()) && mailbox.local() == rohrpost::output::LINES

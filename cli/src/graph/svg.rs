@@ -111,7 +111,8 @@ impl Drawing {
             let weight = if n == 0 { " font-weight=\"bold\"" } else { "" };
             let _ = writeln!(
                 self.texts,
-                "<text x=\"{:.1}\" y=\"{y:.1}\" font-size=\"{}\" text-anchor=\"middle\" fill=\"#1c2128\"{weight}>{}</text>",
+                "<text x=\"{:.1}\" y=\"{y:.1}\" font-size=\"{}\" text-anchor=\"middle\" \
+                fill=\"#1c2128\"{weight}>{}</text>",
                 at.x,
                 look.font_size,
                 escaped(line)
@@ -154,8 +155,8 @@ impl Drawing {
         };
         let tips: String = [DATA, COMMAND, OUTPUT, REPLY].into_iter().map(tip).collect();
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide:.0}\" height=\"{high:.0}\" \
-             viewBox=\"{x:.1} {y:.1} {wide:.1} {high:.1}\" font-family=\"sans-serif\">\n<title>{}</title>\n<defs>\n{tips}</defs>\n\
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide:.0}\" height=\"{high:.0}\" viewBox=\"{x:.1} \
+             {y:.1} {wide:.1} {high:.1}\" font-family=\"sans-serif\">\n<title>{}</title>\n<defs>\n{tips}</defs>\n\
              <rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{wide:.1}\" height=\"{high:.1}\" fill=\"white\"/>\n{}{}{}</svg>",
             escaped(title),
             self.arrows,
@@ -233,8 +234,8 @@ impl RenderBackend for Drawing {
     }
 }
 
-/// The middle of a line made of Bézier curves, by its length. The first pair of points is the start and its control point,
-/// each other pair is an incoming control point and an end; the outgoing control point mirrors the incoming one.
+/// The middle of a line made of Bézier curves, by its length. The first pair of points is the start and its control
+/// point, each other pair is an incoming control point and an end; the outgoing control point mirrors the incoming one.
 fn middle(path: &[(Point, Point)]) -> Point {
     let mut points = Vec::new();
     let (mut from, mut leaving) = path[0];

@@ -170,7 +170,8 @@ fn signed_by_itself(folder: &Path, installation: &Installation, key: KeyPair) ->
     Ok(Signing { authority, issuer: Some(Issuer::new(params, key)), made })
 }
 
-/// Links the authority's files under a second, unused name: the old authority is still needed if the new one is rejected.
+/// Links the authority's files under a second, unused name: the old authority is still needed if the new one is
+/// rejected.
 fn keep_aside(folder: &Path) -> Result<(), CertificateError> {
     let files = files(folder, AUTHORITY);
     let aside = |number: u32| {
@@ -210,8 +211,8 @@ fn issue(
         Holder::Router => ExtendedKeyUsagePurpose::ServerAuth,
         Holder::Node { .. } => ExtendedKeyUsagePurpose::ClientAuth,
     }];
-    // RFC 5280 requires all of these, and strict verifiers check them: that it is no authority, the purpose of its key, and
-    // the key that signed it.
+    // RFC 5280 requires all of these, and strict verifiers check them: that it is no authority, the purpose of its key,
+    // and the key that signed it.
     params.is_ca = IsCa::ExplicitNoCa;
     params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
     params.use_authority_key_identifier_extension = true;

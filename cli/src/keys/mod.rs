@@ -17,12 +17,14 @@ use std::time::Duration;
   rohrpost keys new robot.toml       all missing keys and certificates of the file
   rohrpost keys rotate robot.toml    another key, and new certificates; the older key stays valid until `finish`
   rohrpost keys finish robot.toml
-Datagrams (`security = \"keys\"` in [network]) are sealed with one file, `udp.keys`, the same on every node. Sessions with the TCP router \
-(`security = \"tls\"` in [tcp]) need a certificate and its key for each node, and for the TCP router; each needs `ca.pem` and its own two files. \
-Copy them as safely as passwords, and keep `ca.key`, which signs new ones, off the robots. For another system of the installation, name in its file \
-the same folders, or copy `ca.pem` and `ca.key` into its own folder first. To change keys: `rotate`, copy and restart, one node after the other; then `finish`, \
-copy and restart again. The TCP router and its clients read new certificates at their next start; old ones are valid until they expire. After \
-`rotate --authority` old ones are invalid: copy to all nodes and restart the TCP router and its clients all at once; meanwhile no package goes through it.")]
+Datagrams (`security = \"keys\"` in [network]) are sealed with one file, `udp.keys`, the same on every node. Sessions \
+    with the TCP router (`security = \"tls\"` in [tcp]) need a certificate and its key for each node, and for the TCP \
+    router; each needs `ca.pem` and its own two files. Copy them as safely as passwords, and keep `ca.key`, which \
+    signs new ones, off the robots. For another system of the installation, name in its file the same folders, or \
+    copy `ca.pem` and `ca.key` into its own folder first. To change keys: `rotate`, copy and restart, one node after \
+    the other; then `finish`, copy and restart again. The TCP router and its clients read new certificates at their \
+    next start; old ones are valid until they expire. After `rotate --authority` old ones are invalid: copy to all \
+    nodes and restart the TCP router and its clients all at once; meanwhile no package goes through it.")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     step: Step,
@@ -76,8 +78,8 @@ impl Wanted {
         let datagrams = installation.keys.as_deref().map(Keys::file);
         if datagrams.is_none() && certificates::folder(&installation).is_none() {
             return Err(format!(
-                "{}: nothing here is sealed; write `security = \"keys\"` in [network], for several nodes on a LAN, or `security = \"tls\"` and \
-                 `certificates = \"certificates\"` in [tcp]",
+                "{}: nothing here is sealed; write `security = \"keys\"` in [network], for several nodes on a LAN, or \
+                 `security = \"tls\"` and `certificates = \"certificates\"` in [tcp]",
                 path.display()
             )
             .into());
@@ -116,10 +118,8 @@ fn new(wanted: &Wanted, days: u32) -> Result<Vec<String>, Failure> {
     }
     lines.extend(wanted.certify(Which::Missing, days)?);
     if lines.is_empty() {
-        lines.push(
-            "everything exists already; `rohrpost keys rotate` changes it, `rohrpost keys show` lists it"
-                .into(),
-        );
+        lines
+            .push("everything exists already; `rohrpost keys rotate` changes it, `rohrpost keys show` lists it".into());
     }
     Ok(lines)
 }

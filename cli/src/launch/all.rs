@@ -6,8 +6,9 @@
 //!                └─ rohrpost launch FILE --node desk ─── router.1 …    namespace of desk ──┘
 //! ```
 //!
-//! The nodes start together, like computers that are switched on together, and stop one after the other, the last first. If this
-//! command dies, the kernel tells each launch to stop; when the last process of a node has ended, its namespace is gone.
+//! The nodes start together, like computers that are switched on together, and stop one after the other, the last
+//! first. If this command dies, the kernel tells each launch to stop; when the last process of a node has ended, its
+//! namespace is gone.
 
 use crate::speech::Speech;
 use crate::terminal::Failure;
@@ -118,7 +119,8 @@ pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
 }
 
 impl<'a> LaunchedNodes<'a> {
-    /// Starts the launch of each node. The calling thread must live as long as the nodes: the kernel takes its end for this command's end.
+    /// Starts the launch of each node. The calling thread must live as long as the nodes: the kernel takes its end for
+    /// this command's end.
     ///
     /// # Errors
     /// When one cannot be started; then all are stopped.
@@ -174,8 +176,8 @@ impl<'a> LaunchedNodes<'a> {
         Ok(self.lab.capture()?)
     }
 
-    /// Handles events for at most `period`, or until something happens; false when it is time to stop: a stop was requested, a node did not start,
-    /// or no node runs any more.
+    /// Handles events for at most `period`, or until something happens; false when it is time to stop: a stop was
+    /// requested, a node did not start, or no node runs any more.
     pub(crate) fn watch(&mut self, period: Duration) -> bool {
         match self.happenings.recv_timeout(period) {
             Ok(happening) => self.note(happening),

@@ -1,4 +1,5 @@
-//! Launch owns the sockets of a node's router: while a dead router is restarted, datagrams of peers wait in the kernel for the next one.
+//! Launch owns the sockets of a node's router: while a dead router is restarted, datagrams of peers wait in the kernel
+//! for the next one.
 
 use rohrpost_config::{Installation, Module};
 use std::os::fd::OwnedFd;

@@ -1,8 +1,8 @@
 //! Reads the collector's lines page by page, across its restarts.
 //!
 //! Polling pages costs less than a subscription: a quiet collector answers one short command five times a second, at
-//! the lowest priority, instead of sending a package for each line; nothing must be renewed; and a slow or stopped reader
-//! misses nothing that the collector still keeps, and notices what it missed.
+//! the lowest priority, instead of sending a package for each line; nothing must be renewed; and a slow or stopped
+//! reader misses nothing that the collector still keeps, and notices what it missed.
 
 use super::super::target::Running;
 use crate::terminal::Failure;
@@ -66,8 +66,7 @@ impl<'a> Reader<'a> {
             self.next = 0;
             let file = &self.running.installation.output.file;
             let file = file.as_ref().map(|file| format!("; {} has them", file.display())).unwrap_or_default();
-            let note =
-                format!("{name} was started again; the lines since the last one above are lost{file}");
+            let note = format!("{name} was started again; the lines since the last one above are lost{file}");
             return News { lines: Vec::new(), note: Some(note), more: true };
         }
         let skipped = page.first.saturating_sub(self.next);
@@ -102,7 +101,8 @@ fn told(running: &Running, collector: Name, error: &CallError) -> String {
         }
         CallError::Timeout(..) => {
             format!(
-                "{said} It hangs or is stopped: `rohrpost list` shows its process; if you end that, launch starts another"
+                "{said} It hangs or is stopped: `rohrpost list` shows its process; if you end that, launch starts \
+                 another"
             )
         }
         CallError::NotSent(_) => format!("{said} It collects what modules say; `rohrpost list` shows what runs"),

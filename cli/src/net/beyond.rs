@@ -1,4 +1,5 @@
-//! The TCP router's part of `rohrpost net`: the clients of all nodes as they report themselves, and the server's own view.
+//! The TCP router's part of `rohrpost net`: the clients of all nodes as they report themselves, and the server's own
+//! view.
 
 use super::node_report::NodeReport;
 use crate::table::{table, time};
@@ -9,7 +10,8 @@ use rohrpost::interfaces::{BeyondClients, BeyondCrowded, BeyondLink, BeyondState
 use rohrpost::output::plain;
 use std::time::Duration;
 
-/// Tables of clients, of the server's connections and of lost or replaced packages, and why a client is not connected; empty without a TCP router.
+/// Tables of clients, of the server's connections and of lost or replaced packages, and why a client is not connected;
+/// empty without a TCP router.
 pub(super) fn text(running: &Running, all: &[NodeReport]) -> [String; 4] {
     let links: Vec<&BeyondLink> = all.iter().filter_map(|told| told.beyond.as_ref()).collect();
     let servers: Vec<&BeyondClients> = all.iter().filter_map(|told| told.clients.as_ref()).collect();
@@ -94,8 +96,8 @@ fn clients(servers: &[&BeyondClients]) -> String {
         let BeyondCrowded { greetings, clients, ranges, packages } = server.crowded;
         if greetings + clients + ranges + packages > 0 {
             text += &format!(
-                "(beyond the part of one certificate or address: {packages} packages lost, {clients} clients and {greetings} connections \
-                 before their hello gave way, {ranges} registrations of too many ranges)\n"
+                "(beyond the part of one certificate or address: {packages} packages lost, {clients} clients and \
+                 {greetings} connections before their hello gave way, {ranges} registrations of too many ranges)\n"
             );
         }
         if server.overtaken > 0 {

@@ -1,4 +1,5 @@
-//! `rohrpost net`: the state of all nodes' routers: links, queues, losses with their causes, and the quality of each clock.
+//! `rohrpost net`: the state of all nodes' routers: links, queues, losses with their causes, and the quality of each
+//! clock.
 
 mod beyond;
 mod node_report;
@@ -20,13 +21,15 @@ const LOOK_AGAIN: Duration = Duration::from_millis(600);
   rohrpost net                all nodes, once
   rohrpost net --watch        repeatedly; Ctrl-C ends it
   rohrpost net --node arm --json
-`lost`: datagrams from the peer that never arrived; `missed`: datagrams to the peer that it misses; both are losses on the wire. `refused`: \
-datagrams from the peer's address that were rejected. With time slots, `late`: slots that were not used because the router woke \
-up too late; `skipped`: slots that passed while it did not run; `silent`: slots in which its time was too uncertain; `held`: datagrams that missed the end of their slot. \
-Where datagrams are sealed, a line counts hellos that a node sent by the time of an unverified node. Packages lost in routers follow \
-below, by class and cause (at the TCP router and its clients also `replaced` packages: only the newest data count, and newer data came while they \
-waited, which is no loss), and at the end the declared flows: allowed and measured latency. \
-Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, or a client is not connected.")]
+`lost`: datagrams from the peer that never arrived; `missed`: datagrams to the peer that it misses; both are losses \
+    on the wire. `refused`: datagrams from the peer's address that were rejected. With time slots, `late`: slots that \
+    were not used because the router woke up too late; `skipped`: slots that passed while it did not run; `silent`: \
+    slots in which its time was too uncertain; `held`: datagrams that missed the end of their slot. Where datagrams \
+    are sealed, a line counts hellos that a node sent by the time of an unverified node. Packages lost in routers \
+    follow below, by class and cause (at the TCP router and its clients also `replaced` packages: only the newest \
+    data count, and newer data came while they waited, which is no loss), and at the end the declared flows: allowed \
+    and measured latency. Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, \
+    or a client is not connected.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,

@@ -90,8 +90,9 @@ fn strangers(all: &[NodeReport]) -> String {
     for links in all.iter().filter_map(|told| told.links.as_ref()) {
         for peer in links.peers.iter().filter(|peer| peer.counters.refused > 0) {
             text += &format!(
-                "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or version (launch all \
-                 nodes from the same file; `rohrpost version`), or of a router of it that is over\n",
+                "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or \
+                 version (launch all nodes from the same file; `rohrpost version`), or of a router of it that is \
+                 over\n",
                 links.node,
                 datagrams(peer.counters.refused),
                 peer.address,
@@ -100,8 +101,9 @@ fn strangers(all: &[NodeReport]) -> String {
         }
         if links.foreign > 0 {
             text += &format!(
-                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's, or found the router's socket full: if \
-                 another installation uses this network, give one of them another `port` in [network]\n",
+                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's, or found the \
+                 router's socket full: if another installation uses this network, give one of them another `port` in \
+                 [network]\n",
                 links.node,
                 datagrams(links.foreign)
             );

@@ -55,7 +55,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let shown = folder.display();
     say(format_args!(
-        "made {shown}: a module that counts, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost launch robot.toml\n\n\
+        "made {shown}: a module that counts, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost \
+        launch robot.toml\n\n\
          README.md there says how to go on."
     ));
     Ok(ExitCode::SUCCESS)

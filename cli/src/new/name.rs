@@ -4,9 +4,9 @@ use rohrpost_config::is_class_name;
 use std::str::FromStr;
 
 /// Rust's keywords; a crate of such a name cannot be used.
-const KEYWORDS: &str = "abstract as async await become box break const continue crate do dyn else enum extern false final fn \
-                        for gen if impl in let loop macro match mod move mut override priv pub ref return self static \
-                        struct super trait true try type typeof union unsafe unsized use virtual where while yield";
+const KEYWORDS: &str = "abstract as async await become box break const continue crate do dyn else enum extern false \
+    final fn for gen if impl in let loop macro match mod move mut override priv pub ref return self static struct \
+    super trait true try type typeof union unsafe unsized use virtual where while yield";
 /// Crates that every project uses, our own crates, and folders that Cargo creates beside programs.
 const CRATES: &str = "alloc build core deps examples incremental module proc-macro rohrpost std test tests";
 

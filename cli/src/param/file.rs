@@ -67,8 +67,10 @@ impl Contents {
 
     fn text(&self, installation: &Installation) -> String {
         let mut text = format!(
-            "# Parameters of `{}`, written by `rohrpost param save`. When a module starts they go before the settings of the\n\
-             # same names, if this is the file that the configuration names as `parameters`. `rohrpost param load` sets them\n\
+            "# Parameters of `{}`, written by `rohrpost param save`. When a module starts they go before the settings \
+            of the\n\
+             # same names, if this is the file that the configuration names as `parameters`. `rohrpost param load` \
+             sets them\n\
              # while it runs.\n",
             installation.name
         );

@@ -1,7 +1,8 @@
 //! The one-way times of a round trip, by system time. Pure.
 //!
-//! Two nodes share a time if both follow the master's clock in the same epoch, and each knows its error bound; the error of
-//! a difference of their times is at most the sum of both bounds. A figure below its bound means nothing, and is not shown.
+//! Two nodes share a time if both follow the master's clock in the same epoch, and each knows its error bound; the
+//! error of a difference of their times is at most the sum of both bounds. A figure below its bound means nothing, and
+//! is not shown.
 
 use super::super::units::short;
 use rohrpost::common::TimeReport;
@@ -100,7 +101,8 @@ impl WaySum {
     pub(super) fn json(&self) -> Value {
         match self.mean_s() {
             Some(mean_s) => json!({
-                "known": self.count, "min_s": self.least_s, "mean_s": mean_s, "max_s": self.most_s, "error_s": self.error_s,
+                "known": self.count, "min_s": self.least_s, "mean_s": mean_s, "max_s": self.most_s,
+                "error_s": self.error_s,
             }),
             None => Value::Null,
         }
@@ -122,7 +124,8 @@ mod tests {
 
     #[test]
     fn a_one_way_time_appears_only_where_it_is_known() {
-        let told = |round_trip: Result<RoundTrip, String>| round_trip.map_or_else(|why| why, |round_trip| round_trip.text());
+        let told =
+            |round_trip: Result<RoundTrip, String>| round_trip.map_or_else(|why| why, |round_trip| round_trip.text());
         for (there, one_clock, words) in [
             (time(100, 3, 5, MASTER), false, "there 100 µs, back 50 µs, each ± 7 µs"),
             (time(100, 3, 5, "local"), true, "there 100 µs, back 50 µs"),

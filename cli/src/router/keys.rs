@@ -15,7 +15,8 @@ pub(crate) fn of(installation: &Installation) -> Result<Option<KeyRing>, KeysErr
     Ok(Some(KeyRing::new(key(&newest), older.as_ref().map(key))))
 }
 
-/// The random id of this incarnation of a router. Two sealed incarnations with one id would use a key twice in one direction: so the id cannot be guessed.
+/// The random id of this incarnation of a router. Two sealed incarnations with one id would use a key twice in one
+/// direction: so the id cannot be guessed.
 ///
 /// # Errors
 /// [`NoRandom`]

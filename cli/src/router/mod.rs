@@ -27,7 +27,8 @@ const PERIOD: Duration = Duration::from_millis(500);
 #[command(after_help = "Example, on the first node of robot.toml: rohrpost router --config robot.toml --name router.0
 Launch starts it on each node of a system with several nodes; start it by hand only if you start modules by hand.")]
 pub(super) struct Arguments {
-    /// The arguments of every module: --config FILE --name router.I [--off]; I is the place of its node in the configuration, from 0.
+    /// The arguments of every module: --config FILE --name router.I [--off]; I is the place of its node in the
+    /// configuration, from 0.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
 }

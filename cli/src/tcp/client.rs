@@ -50,7 +50,10 @@ impl Module for ClientModule {
         // Between nodes on the LAN, the faults apply to the LAN.
         let impair = if is_beyond { impairment()? } else { None };
         if let Some(impair) = impair {
-            tracing::warn!("adds faults to the connection with the TCP router, as {} requests: {impair}", impair::ENVIRONMENT);
+            tracing::warn!(
+                "adds faults to the connection with the TCP router, as {} requests: {impair}",
+                impair::ENVIRONMENT
+            );
         }
         let node = context.link().borrow().participant().node().clone();
         let shell = ClientShell::start(ClientParts {

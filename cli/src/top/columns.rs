@@ -105,7 +105,8 @@ impl Column {
             Self::Module => "name, and with + the number of its further names",
             Self::Node => "where it runs; shown when there are several nodes",
             Self::State => {
-                "starting, on, off, stopped; error; busy: its code does not return; restarting; failed: given up; unreachable"
+                "starting, on, off, stopped; error; busy: its code does not return; restarting; failed: given up; \
+                 unreachable"
             }
             Self::Class => "its class, which gives its importance",
             Self::Priority => "class id = priority of its commands, 255 most urgent",
@@ -226,8 +227,8 @@ pub(super) fn memory(bytes: u64) -> String {
     }
 }
 
-/// The columns that fit into this width, with their widths, from left to right. `names` is the length of the longest name;
-/// `nodes`: whether there are several.
+/// The columns that fit into this width, with their widths, from left to right. `names` is the length of the longest
+/// name; `nodes`: whether there are several.
 pub(super) fn fit(room: u16, names: u16, nodes: bool) -> Vec<(Column, u16)> {
     let names = names.clamp(NAME_MIN, NAME_MAX);
     let mut chosen = Vec::new();

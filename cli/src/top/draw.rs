@@ -179,7 +179,8 @@ impl ScreenModel<'_> {
     }
 }
 
-/// Text in the first line of an area, cut to its width, with control characters escaped. On a small terminal an area may be empty.
+/// Text in the first line of an area, cut to its width, with control characters escaped. On a small terminal an area
+/// may be empty.
 fn put(to: &mut Buffer, place: Rect, text: &str, style: Style) {
     if !place.is_empty() {
         to.set_stringn(place.x, place.y, plain::line(text), place.width.into(), style);

@@ -225,7 +225,8 @@ fn between(earlier_ns: u64, now_ns: u64) -> Duration {
     Duration::from_nanos(now_ns.saturating_sub(earlier_ns))
 }
 
-/// The module at an earlier observation, and the time since, on its own node's clock; none if the node did not report again.
+/// The module at an earlier observation, and the time since, on its own node's clock; none if the node did not report
+/// again.
 fn since<'a>(module: &ModuleSurvey, earlier: &'a Sample) -> Option<(&'a ModuleSurvey, Duration)> {
     let before = earlier.survey.module(module.name)?;
     let interval = between(before.at_ns?, module.at_ns?);

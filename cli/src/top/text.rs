@@ -94,7 +94,8 @@ const KEYS: [(&str, &str); 12] = [
 ];
 
 const WHAT: &str = "  Rates and waiting times are those of the last interval. They are read from shared memory, which \
-    disturbs nobody; launches of other nodes report theirs. The collector of output is asked for new lines once an interval.";
+    disturbs nobody; launches of other nodes report theirs. The collector of output is asked for new lines once an \
+    interval.";
 
 /// All keys and all columns.
 pub(super) fn help() -> Vec<String> {

@@ -149,7 +149,8 @@ fn refused(error: &std::io::Error) -> Reach {
     }
 }
 
-/// Whether the neighbour table has a MAC for the address: then the computer answered ARP, whatever its firewall does above.
+/// Whether the neighbour table has a MAC for the address: then the computer answered ARP, whatever its firewall does
+/// above.
 fn is_neighbour(address: IpAddr) -> bool {
     let text = std::fs::read_to_string("/proc/self/net/arp").unwrap_or_default();
     let complete = |line: &str| {

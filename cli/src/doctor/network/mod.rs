@@ -42,8 +42,8 @@ fn address(lan: &LanView, from: &str) -> Finding {
         format!("{} is not one of this computer, which has {others}", lan.address),
         why,
         format!(
-            "run it on node {}'s own computer, or `--node` with the name of this one; or correct `address` in {from}; or give this \
-             computer the address: sudo ip address add {}/24 dev DEVICE",
+            "run it on node {}'s own computer, or `--node` with the name of this one; or correct `address` in {from}; \
+             or give this computer the address: sudo ip address add {}/24 dev DEVICE",
             lan.node, lan.address
         ),
     )
@@ -66,7 +66,8 @@ fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
             format!("UDP {number}, another program has it"),
             why,
             format!(
-                "`ss -ulpn sport = {number}` names the program: stop it, or write another `port` into [network] of {from}, the same on all nodes"
+                "`ss -ulpn sport = {number}` names the program: stop it, or write another `port` into [network] of \
+                 {from}, the same on all nodes"
             ),
         ),
         PortState::Unknown => Finding::not(
@@ -105,7 +106,8 @@ fn stamps(lan: &LanView) -> Option<Finding> {
         "time stamps",
         "the kernel's time stamps of sending and reception compare the nodes' clocks; else a thread's less exact ones",
     );
-    let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and software-receive";
+    let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and \
+        software-receive";
     Some(match &lan.stamps {
         Stamps::Both => Finding::ok(what, "sending and receiving", why),
         Stamps::NoSent => Finding::not(Grade::Warn, what, "receiving only", why, fix),

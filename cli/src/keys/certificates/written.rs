@@ -35,7 +35,8 @@ impl Written {
     }
 }
 
-/// Moves the files into the folder in this order, after `before`; they replace older ones. If they cannot be written, nothing changes.
+/// Moves the files into the folder in this order, after `before`; they replace older ones. If they cannot be written,
+/// nothing changes.
 pub(super) fn put(
     folder: &Path,
     files: &[Written],
