@@ -19,7 +19,7 @@ use super::speech::Speech;
 use super::summary::print_classes;
 use crate::terminal::{Failure, say};
 pub(super) use arguments::Arguments;
-use arguments::Joined;
+use arguments::GuiConnection;
 use asked::{FIRST_FUNCTION, map_line, running};
 use drawing::{drawing, drawn};
 use folder::Folder;
@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
         return nodes::run(arguments, count, long);
     }
-    if arguments.gui == Joined::Tcp {
+    if arguments.gui == GuiConnection::Tcp {
         return Err("with one node there is no other way to join the GUI; use --nodes 3".into());
     }
     if arguments.kill_master {

@@ -313,7 +313,7 @@ fn print(installation: &Installation, detail: &MailboxDetail, seen: &MailboxView
         ("adoptions", seen.adoptions.to_string()),
     ];
     if seen.retired {
-        facts.push(("retired", "nobody sends here any more; the next receiver makes it anew".into()));
+        facts.push(("retired", "nobody sends here any more; the next receiver creates it again".into()));
     }
     let facts: String = facts.iter().map(|(what, text)| format!("  {what:10}  {text}\n")).collect();
     let mut text =

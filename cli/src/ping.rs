@@ -10,7 +10,7 @@ use rohrpost::common::TimeReport;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_mailbox::{Latency, ModuleState};
-use round_trip::{Moments, RoundTrip, WaySum};
+use round_trip::{DirectionSum, Moments, RoundTrip};
 use serde_json::json;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -142,8 +142,8 @@ struct PingRounds {
     answered: u64,
     min: Option<Duration>,
     took: Latency,
-    there: WaySum,
-    back: WaySum,
+    there: DirectionSum,
+    back: DirectionSum,
 }
 
 impl PingRounds {

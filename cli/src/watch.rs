@@ -222,13 +222,13 @@ fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond
     let age_ns = now.age_sum_ns.saturating_sub(before(|flow| flow.age_sum_ns));
     // There is no silence before the first package.
     let began_ns = sent.map_or(from_ns, |_| *began_ns);
-    let lively = Lively { intervals, from_ns, began_ns, last_ns: now.last_ns, at_ns: *at_ns };
+    let times = FlowTimes { intervals, from_ns, began_ns, last_ns: now.last_ns, at_ns: *at_ns };
     let since_last_s = at_ns.saturating_sub(now.last_ns) as f64 / 1e9;
     FlowFigures {
         packages,
         bytes: now.bytes.saturating_sub(before(|flow| flow.bytes)),
         refused,
-        rate_hz: interval_mean_s.and_then(|_| lively.rate_hz()),
+        rate_hz: interval_mean_s.and_then(|_| times.rate_hz()),
         interval_mean_s,
         interval_std_s,
         interval_s: interval_ns.map(|(min, max)| (min as f64 / 1e9, max as f64 / 1e9)),
@@ -237,12 +237,12 @@ fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond
         from_ns,
         last_ns: now.last_ns,
         since_last_s,
-        silent_s: lively.is_silent().then_some(since_last_s),
+        silent_s: times.is_silent().then_some(since_last_s),
     }
 }
 
 /// Times of a flow's packages and observations, on the monotonic clock.
-struct Lively {
+struct FlowTimes {
     intervals: u64,
     /// The package before the first that counts, the first observation, the last package, the last observation.
     from_ns: u64,
@@ -251,7 +251,7 @@ struct Lively {
     at_ns: u64,
 }
 
-impl Lively {
+impl FlowTimes {
     /// Whether this gap is silence, for a flow with this many packages in that time.
     fn is_silence(&self, gap_ns: u64, within_ns: u64) -> bool {
         let mean_ns = within_ns as f64 / self.intervals as f64;
@@ -292,8 +292,8 @@ mod tests {
 
     fn rate(intervals: u64, [from, began, last, at]: [f64; 4]) -> (Option<f64>, bool) {
         let ns = |seconds: f64| (seconds * S as f64) as u64;
-        let lively = Lively { intervals, from_ns: ns(from), began_ns: ns(began), last_ns: ns(last), at_ns: ns(at) };
-        (lively.rate_hz(), lively.is_silent())
+        let times = FlowTimes { intervals, from_ns: ns(from), began_ns: ns(began), last_ns: ns(last), at_ns: ns(at) };
+        (times.rate_hz(), times.is_silent())
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub(crate) struct Arguments {
     /// How the node with the GUI is connected to the robot: by the LAN, or only through the TCP router. With `tcp` and
     /// --seconds the TCP router is killed in the middle of the run (SIGKILL); launch restarts it.
     #[arg(long, value_enum, default_value = "lan", requires = "nodes", conflicts_with = "tdma")]
-    pub(super) gui: Joined,
+    pub(super) gui: GuiConnection,
     /// Seal the traffic between the nodes, with keys and certificates that are made for this run.
     #[arg(long, requires = "nodes")]
     pub(super) secure: bool,
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
 
 /// How a node is connected to the others.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum Joined {
+pub(super) enum GuiConnection {
     Lan,
     Tcp,
 }

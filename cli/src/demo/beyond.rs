@@ -108,7 +108,7 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
         });
         [link.node.clone(), link.reconnects.to_string(), link.outages.to_string(), outage]
     });
-    text + "\n" + &table(["node", ">connected anew", ">outages", ">the last took"], rows)
+    text + "\n" + &table(["node", ">reconnected", ">outages", ">the last took"], rows)
 }
 
 /// Whether all clients are connected at the end.

@@ -1,10 +1,10 @@
 //! The configuration of a demo: the folder's own, or a copy with the command line's options added. A copy keeps each
 //! line at its place, and messages name the original file.
 
-use super::arguments::{Arguments, Joined};
+use super::arguments::{Arguments, GuiConnection};
 use super::drawing::GUI;
 use crate::check;
-use crate::keys::certificates::{self, Which};
+use crate::keys::certificates::{self, Renewal};
 use crate::terminal::Failure;
 use rohrpost_config::{Installation, Keys, Program};
 use rohrpost_routers::security::random;
@@ -32,7 +32,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     let (name, text) = match (&arguments.log, arguments.nodes) {
         (Some(_), _) => ("demo-log.toml", LOG),
         (None, Some(2..)) if arguments.tdma => ("demo-tdma.toml", TDMA),
-        (None, Some(2..)) if arguments.gui == Joined::Tcp => ("demo-tcp.toml", TCP),
+        (None, Some(2..)) if arguments.gui == GuiConnection::Tcp => ("demo-tcp.toml", TCP),
         (None, Some(2..)) => ("demo-nodes.toml", NODES),
         (None, _) => ("demo.toml", SIMULATION),
     };
@@ -59,7 +59,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     };
     let mut installation = check::load(&copy).map_err(named)?;
     if arguments.secure && installation.tcp.is_some() {
-        certificates::make(&installation, Which::Missing, DAYS)?;
+        certificates::make(&installation, Renewal::Missing, DAYS)?;
     }
     installation.shown = shown;
     Ok(installation)

@@ -1,7 +1,7 @@
 //! `rohrpost demo --nodes 3`: the robot over several nodes, each in its own network namespace of this computer.
 
 use super::account::{self, Balance};
-use super::arguments::{Arguments, Joined};
+use super::arguments::{Arguments, GuiConnection};
 use super::asked::{FIRST_FUNCTION, map_line, running};
 use super::drawing::{drawing, drawn};
 use super::losses::ExchangeLosses;
@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
     let mut nodes = LaunchedNodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
-    let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == Joined::Tcp)];
+    let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == GuiConnection::Tcp)];
     let victims = victims.into_iter().filter(|(_, is_one)| *is_one).map(|(victim, _)| victim).collect();
     let summary =
         watch(&mut nodes, &installation, long, victims).map(|seen| summary(&installation, &seen?, arguments.verbose));

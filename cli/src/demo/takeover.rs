@@ -195,7 +195,7 @@ impl TakeoverRecord {
         }
         text += &match next.peek() {
             None => " No other took over.\n".into(),
-            Some(term) if term.node == last.node => format!(" It told the time again {}.\n", after(term)),
+            Some(term) if term.node == last.node => format!(" It was master again {}.\n", after(term)),
             Some(term) => format!(" {} was master from the sync on that came {}.\n", self.name(term), after(term)),
         };
         Some(text)

@@ -155,7 +155,7 @@ fn cores(machine: &Machine) -> Finding {
     let allowed = machine.field("/proc/self/status", "Cpus_allowed_list");
     let count = allowed.as_deref().map_or(0, count_of_list);
     let is = match (count, allowed) {
-        (0, _) => "not told".into(),
+        (0, _) => "unknown".into(),
         (1, Some(list)) => format!("1 (number {list})"),
         (count, list) => format!("{count} (numbers {})", list.unwrap_or_default()),
     };

@@ -64,11 +64,11 @@ fn beside() -> PathBuf {
 /// A computer.
 pub(super) struct Machine {
     root: PathBuf,
-    pub(super) asked: AskedOfKernel,
+    pub(super) asked: KernelFacts,
 }
 
 /// Facts that no file holds.
-pub(super) struct AskedOfKernel {
+pub(super) struct KernelFacts {
     /// Whether a thread got the required scheduling, or why not.
     pub(super) fifo: Result<(), String>,
     /// The directory of all nodes.
@@ -117,7 +117,7 @@ impl Machine {
         let program = |name| find_program(name, Path::new("."), &beside());
         // The first launch creates the directory; until then its future place counts.
         let there = base.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
-        let asked = AskedOfKernel {
+        let asked = KernelFacts {
             fifo: try_fifo(needs.priority),
             room: sys::room(there).ok(),
             nodes: nodes(&base),
@@ -132,7 +132,7 @@ impl Machine {
 
     /// A recorded computer.
     #[cfg(test)]
-    pub(super) fn at(root: &Path, asked: AskedOfKernel) -> Self {
+    pub(super) fn at(root: &Path, asked: KernelFacts) -> Self {
         Self { root: root.into(), asked }
     }
 

@@ -1,7 +1,7 @@
 //! Output of `doctor` for recorded computers and networks.
 
 use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
-use super::machine::{AskedOfKernel, Bridge, NodeDirectory, NodeFound};
+use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound};
 use super::protection::{LanProtection, Tcp};
 use super::*;
 use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
@@ -19,14 +19,14 @@ fn unpack(text: &str, to: &Path) {
     }
 }
 
-fn examined(name: &str, (asked, needs): (AskedOfKernel, Needs)) -> Vec<Finding> {
+fn examined(name: &str, (asked, needs): (KernelFacts, Needs)) -> Vec<Finding> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/doctor");
     let root = tempfile::tempdir().unwrap();
     unpack(&fs::read_to_string(folder.join(format!("{name}.machine"))).unwrap(), root.path());
     examine(&Machine::at(root.path(), asked), &needs)
 }
 
-fn said(name: &str, computer: (AskedOfKernel, Needs)) -> String {
+fn said(name: &str, computer: (KernelFacts, Needs)) -> String {
     page(&examined(name, computer)) + "\n"
 }
 
@@ -89,8 +89,8 @@ fn open() -> Protection {
     Protection { lan: Some(LanProtection::Open), tcp: Some(Tcp::Open) }
 }
 
-fn good() -> (AskedOfKernel, Needs) {
-    let asked = AskedOfKernel {
+fn good() -> (KernelFacts, Needs) {
+    let asked = KernelFacts {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-1000".into(),
         room: Some(Room { bytes: 8 << 30, free: 7 << 30 }),
@@ -104,8 +104,8 @@ fn good() -> (AskedOfKernel, Needs) {
     (asked, Needs { priority: 34, memory: 4 << 20, gui: true, bridge: None, processes: 6, from })
 }
 
-fn bad() -> (AskedOfKernel, Needs) {
-    let asked = AskedOfKernel {
+fn bad() -> (KernelFacts, Needs) {
+    let asked = KernelFacts {
         fifo: Err("Operation not permitted (os error 1)".into()),
         base: "/home/robot/nodes".into(),
         room: Some(Room { bytes: 64 << 20, free: 1 << 20 }),
@@ -126,8 +126,8 @@ fn bad() -> (AskedOfKernel, Needs) {
 }
 
 /// As in the systemd unit, in /run: the text must name /run, not /dev/shm.
-fn too_little_room_in_run() -> (AskedOfKernel, Needs) {
-    let asked = AskedOfKernel {
+fn too_little_room_in_run() -> (KernelFacts, Needs) {
+    let asked = KernelFacts {
         base: "/run/rohrpost/main".into(),
         room: Some(Room { bytes: 64 << 20, free: 60 << 20 }),
         bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: None }),
@@ -136,18 +136,18 @@ fn too_little_room_in_run() -> (AskedOfKernel, Needs) {
     (asked, Needs { memory: 70 << 20, from: Some("robot.toml".into()), ..Needs::default() })
 }
 
-fn elsewhere() -> (AskedOfKernel, Needs) {
+fn elsewhere() -> (KernelFacts, Needs) {
     let lan = LanView {
         addresses: Vec::new(),
         stamps: Stamps::None("Protocol not available".into()),
         ..LanView { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &[]) }
     };
-    let asked = AskedOfKernel { lan: Some(lan), protection: open(), ..nothing_told() };
+    let asked = KernelFacts { lan: Some(lan), protection: open(), ..nothing_told() };
     (asked, Needs { from: Some("robot.toml".into()), ..Needs::default() })
 }
 
-fn nothing_told() -> AskedOfKernel {
-    AskedOfKernel {
+fn nothing_told() -> KernelFacts {
+    KernelFacts {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-0".into(),
         room: None,
@@ -196,7 +196,7 @@ fn unknown_facts_are_left_out() {
 #[test]
 fn full_shared_memory_is_bad() {
     for (free, state) in [(64 << 10, Grade::Bad), (8 << 20, Grade::Warn), (64 << 20, Grade::Ok)] {
-        let asked = AskedOfKernel { room: Some(Room { bytes: 1 << 30, free }), ..nothing_told() };
+        let asked = KernelFacts { room: Some(Room { bytes: 1 << 30, free }), ..nothing_told() };
         let found = examined("run", (asked, Needs::default()));
         let found = found.iter().find(|finding| finding.what == "shared memory").unwrap();
         assert_eq!(found.state, state, "{found:?}");

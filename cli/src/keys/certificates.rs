@@ -28,7 +28,7 @@ const BEFORE: Duration = DAY;
 
 /// What to make.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Which {
+pub(crate) enum Renewal {
     /// Certificates that are missing or not valid.
     Missing,
     /// New certificates for all holders, signed by the existing authority.
@@ -87,21 +87,21 @@ fn is_pair(certificate: &Path, secret: &Path) -> bool {
 /// Makes the certificates, valid for this many days; returns the new files. None if the file requires no certificates.
 ///
 /// Everything is made in memory before the first file is written.
-pub(crate) fn make(installation: &Installation, which: Which, days: u32) -> Result<Vec<PathBuf>, CertificateError> {
+pub(crate) fn make(installation: &Installation, which: Renewal, days: u32) -> Result<Vec<PathBuf>, CertificateError> {
     let Some(folder) = folder(installation) else { return Ok(Vec::new()) };
     let Signing { authority, issuer, mut made } = match which {
-        Which::WithAuthority => begin(&folder, installation)?,
-        Which::Missing | Which::All => signing(&folder, installation)?,
+        Renewal::WithAuthority => begin(&folder, installation)?,
+        Renewal::Missing | Renewal::All => signing(&folder, installation)?,
     };
     for holder in holders(installation) {
-        if which != Which::Missing || state(&folder, Some(&authority), &holder) != HolderState::Holds {
+        if which != Renewal::Missing || state(&folder, Some(&authority), &holder) != HolderState::Holds {
             let [certificate, secret] = files(&folder, AUTHORITY);
             let issuer = issuer.as_ref();
             let issuer = issuer.ok_or_else(|| CertificateError::NoKey(certificate, secret, installation.shown.clone()));
             made.extend(issue(&folder, issuer?, &holder, days)?);
         }
     }
-    written::put(&folder, &made, || if which == Which::WithAuthority { keep_aside(&folder) } else { Ok(()) })?;
+    written::put(&folder, &made, || if which == Renewal::WithAuthority { keep_aside(&folder) } else { Ok(()) })?;
     Ok(made.into_iter().map(|made| made.path).collect())
 }
 

@@ -4,7 +4,7 @@ pub(super) mod certificates;
 
 use super::check::load;
 use crate::terminal::{Failure, say};
-use certificates::Which;
+use certificates::Renewal;
 use clap::{Args, Subcommand};
 use rohrpost_config::{Installation, Key, Keys};
 use rohrpost_routers::security::{self, InstallationKey, KeyId};
@@ -59,14 +59,14 @@ struct Place {
 }
 
 /// The files that keys are made for.
-struct Wanted {
+struct KeyFiles {
     /// The file of the keys that seal datagrams, if there are to be any.
     datagrams: Option<PathBuf>,
     /// The installation, for its certificates.
     installation: Option<Installation>,
 }
 
-impl Wanted {
+impl KeyFiles {
     fn by(path: &Path) -> Result<Self, Failure> {
         if !path.exists() && path.extension().is_some_and(|end| end == "toml") {
             return Err(format!("{}: no such file", path.display()).into());
@@ -88,7 +88,7 @@ impl Wanted {
     }
 
     /// Makes certificates, and prints the new files.
-    fn certify(&self, which: Which, days: u32) -> Result<Vec<String>, Failure> {
+    fn certify(&self, which: Renewal, days: u32) -> Result<Vec<String>, Failure> {
         let Some(installation) = &self.installation else { return Ok(Vec::new()) };
         let made = certificates::make(installation, which, days)?;
         Ok(made.iter().map(|path| path.display().to_string()).collect())
@@ -97,16 +97,16 @@ impl Wanted {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let lines = match &arguments.step {
-        Step::New(place) => new(&Wanted::by(&place.path)?, place.days)?,
-        Step::Rotate { place, authority } => rotate(&Wanted::by(&place.path)?, *authority, place.days)?,
-        Step::Finish(place) => finish(&Wanted::by(&place.path)?)?,
-        Step::Show(place) => show(&Wanted::by(&place.path)?)?,
+        Step::New(place) => new(&KeyFiles::by(&place.path)?, place.days)?,
+        Step::Rotate { place, authority } => rotate(&KeyFiles::by(&place.path)?, *authority, place.days)?,
+        Step::Finish(place) => finish(&KeyFiles::by(&place.path)?)?,
+        Step::Show(place) => show(&KeyFiles::by(&place.path)?)?,
     };
     say(lines.join("\n"));
     Ok(ExitCode::SUCCESS)
 }
 
-fn new(wanted: &Wanted, days: u32) -> Result<Vec<String>, Failure> {
+fn new(wanted: &KeyFiles, days: u32) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
     if let Some(file) = &wanted.datagrams {
         // Several systems of an installation may share a folder.
@@ -116,7 +116,7 @@ fn new(wanted: &Wanted, days: u32) -> Result<Vec<String>, Failure> {
             lines.push(text(file, &keys));
         }
     }
-    lines.extend(wanted.certify(Which::Missing, days)?);
+    lines.extend(wanted.certify(Renewal::Missing, days)?);
     if lines.is_empty() {
         lines
             .push("everything exists already; `rohrpost keys rotate` changes it, `rohrpost keys show` lists it".into());
@@ -124,11 +124,11 @@ fn new(wanted: &Wanted, days: u32) -> Result<Vec<String>, Failure> {
     Ok(lines)
 }
 
-fn rotate(wanted: &Wanted, authority: bool, days: u32) -> Result<Vec<String>, Failure> {
+fn rotate(wanted: &KeyFiles, authority: bool, days: u32) -> Result<Vec<String>, Failure> {
     let rotated = |file: &PathBuf| Ok::<_, Failure>((file.clone(), Keys::load(file)?.rotated(security::random()?)?));
     let keys = wanted.datagrams.as_ref().map(rotated).transpose()?;
     // This comes first: if a later step fails, certificates can be made again, but a key must not change twice.
-    let made = wanted.certify(if authority { Which::WithAuthority } else { Which::All }, days)?;
+    let made = wanted.certify(if authority { Renewal::WithAuthority } else { Renewal::All }, days)?;
     let mut lines = Vec::new();
     if let Some((file, keys)) = keys {
         keys.replace(&file)?;
@@ -138,7 +138,7 @@ fn rotate(wanted: &Wanted, authority: bool, days: u32) -> Result<Vec<String>, Fa
     Ok(lines)
 }
 
-fn finish(wanted: &Wanted) -> Result<Vec<String>, Failure> {
+fn finish(wanted: &KeyFiles) -> Result<Vec<String>, Failure> {
     let Some(file) = &wanted.datagrams else {
         return Err("certificates need no `finish`: old ones are valid until they expire".into());
     };
@@ -147,7 +147,7 @@ fn finish(wanted: &Wanted) -> Result<Vec<String>, Failure> {
     Ok(vec![text(file, &keys)])
 }
 
-fn show(wanted: &Wanted) -> Result<Vec<String>, Failure> {
+fn show(wanted: &KeyFiles) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
     if let Some(file) = &wanted.datagrams {
         lines.push(text(file, &Keys::load(file)?));

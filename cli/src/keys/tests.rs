@@ -122,7 +122,7 @@ fn a_damaged_or_renamed_authority_is_fixed_or_reported() {
     robot(place.path(), "another");
     std::fs::remove_file(place.path().join("shown/ca.pem")).unwrap();
     step(Step::New, &file).unwrap();
-    assert!(shown(place.path())["ca.key"] == first["ca.key"] && fit(&file), "all are signed anew");
+    assert!(shown(place.path())["ca.key"] == first["ca.key"] && fit(&file), "all are signed again");
     // Its key cannot be made anew.
     std::fs::remove_file(place.path().join("shown/ca.key")).unwrap();
     let sealing = Keys::file(&place.path().join("keys"));
@@ -140,7 +140,7 @@ fn a_damaged_or_renamed_authority_is_fixed_or_reported() {
         let other = halves.unwrap_err();
         assert!(other.contains("of two authorities"), "{other}");
     }
-    assert!(super::show(&Wanted::by(&file).unwrap()).unwrap().join("\n").contains("ca.key: is not the key of"));
+    assert!(super::show(&KeyFiles::by(&file).unwrap()).unwrap().join("\n").contains("ca.key: is not the key of"));
     assert_eq!(shown(place.path())["desk.system-1.pem"], now["desk.system-1.pem"]);
 }
 
@@ -166,7 +166,7 @@ fn a_new_authority_never_replaces_certificates_of_another() {
 fn invalid_certificates_are_listed_and_replaced_and_valid_ones_stay() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
-    let says = || super::show(&Wanted::by(&file).unwrap()).unwrap().join("\n");
+    let says = || super::show(&KeyFiles::by(&file).unwrap()).unwrap().join("\n");
     step(Step::New, &file).unwrap();
     let first = shown(place.path());
     assert!(!says().contains("keys new"), "{}", says());
@@ -181,7 +181,7 @@ fn invalid_certificates_are_listed_and_replaced_and_valid_ones_stay() {
         assert_eq!(text, &first[name], "{name} stays");
     }
     // Expired.
-    certificates::make(&load(&file).unwrap(), Which::All, 0).unwrap();
+    certificates::make(&load(&file).unwrap(), Renewal::All, 0).unwrap();
     while fit(&file) {
         std::thread::sleep(std::time::Duration::from_millis(100));
     }
@@ -236,11 +236,11 @@ fn validity_of_certificates_and_age_of_keys_are_shown() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     let says = |of: &str| {
-        let lines = super::show(&Wanted::by(&file).unwrap()).unwrap();
+        let lines = super::show(&KeyFiles::by(&file).unwrap()).unwrap();
         lines.into_iter().find(|line| line.contains(of)).unwrap()
     };
     step(Step::New, &file).unwrap();
-    let make = |days| certificates::make(&load(&file).unwrap(), Which::All, days).unwrap();
+    let make = |days| certificates::make(&load(&file).unwrap(), Renewal::All, days).unwrap();
     // Less than a second may have passed, or more.
     let lasts = |days: u32| {
         let said = says("desk.system-1.pem");

@@ -61,7 +61,7 @@ pub(super) fn stop_with_it() -> Result<(), Failure> {
 pub(crate) struct LaunchedNodes<'a> {
     installation: Arc<Installation>,
     nodes: Vec<Node>,
-    happenings: Receiver<Happening>,
+    happenings: Receiver<NodeEvent>,
     /// Open output streams of all nodes.
     open: usize,
     speech: &'a Speech,
@@ -82,7 +82,7 @@ struct Node {
     told: usize,
 }
 
-enum Happening {
+enum NodeEvent {
     /// A node printed a line.
     Line { node: usize, text: String, complaint: bool },
     /// One of its two streams has ended.
@@ -150,7 +150,7 @@ impl<'a> LaunchedNodes<'a> {
         index: usize,
         executable: &Path,
         bad: Option<impair::Settings>,
-        sender: &SyncSender<Happening>,
+        sender: &SyncSender<NodeEvent>,
     ) -> Result<(), Failure> {
         let name = self.installation.nodes[index].name.clone();
         let mut command = Command::new(executable);
@@ -194,12 +194,12 @@ impl<'a> LaunchedNodes<'a> {
         self.nodes.iter().all(|node| node.runs)
     }
 
-    fn note(&mut self, happening: Happening) {
+    fn note(&mut self, happening: NodeEvent) {
         match happening {
-            Happening::Line { node, text, complaint } => self.line(node, &text, complaint),
-            Happening::Closed => self.open -= 1,
-            Happening::Event(Event::Stop) => self.words += 1,
-            Happening::Event(Event::Child) => self.look_for_ended(),
+            NodeEvent::Line { node, text, complaint } => self.line(node, &text, complaint),
+            NodeEvent::Closed => self.open -= 1,
+            NodeEvent::Event(Event::Stop) => self.words += 1,
+            NodeEvent::Event(Event::Child) => self.look_for_ended(),
         }
     }
 
@@ -261,11 +261,11 @@ impl Node {
 }
 
 /// Forwards signals as events.
-fn listen(sender: SyncSender<Happening>) -> Result<(), Failure> {
+fn listen(sender: SyncSender<NodeEvent>) -> Result<(), Failure> {
     let events = events()?;
     let pass = move || {
         for event in events {
-            if sender.send(Happening::Event(event)).is_err() {
+            if sender.send(NodeEvent::Event(event)).is_err() {
                 break;
             }
         }
@@ -279,17 +279,17 @@ fn read(
     node: usize,
     complaint: bool,
     pipe: Option<impl Read + Send + 'static>,
-    sender: SyncSender<Happening>,
+    sender: SyncSender<NodeEvent>,
 ) -> Result<(), Failure> {
     let Some(pipe) = pipe else { return Ok(()) };
     let pass = move || {
         for line in BufReader::new(pipe).split(b'\n').map_while(Result::ok) {
             let text = String::from_utf8_lossy(&line).into_owned();
-            if sender.send(Happening::Line { node, text, complaint }).is_err() {
+            if sender.send(NodeEvent::Line { node, text, complaint }).is_err() {
                 return;
             }
         }
-        let _ = sender.send(Happening::Closed);
+        let _ = sender.send(NodeEvent::Closed);
     };
     std::thread::Builder::new().name("lines".into()).spawn(pass)?;
     Ok(())

@@ -19,11 +19,14 @@ pub(super) struct Filter {
 }
 
 /// A parsed `NAME=LEVEL`.
-type Wish<'a> = (&'a str, &'a str);
+type LevelAssignment<'a> = (&'a str, &'a str);
 
 impl Filter {
     /// Parses the command line: levels to set, and lines to show.
-    pub(super) fn read<'a>(arguments: &'a Arguments, running: &Running) -> Result<(Vec<Wish<'a>>, Self), Failure> {
+    pub(super) fn read<'a>(
+        arguments: &'a Arguments,
+        running: &Running,
+    ) -> Result<(Vec<LevelAssignment<'a>>, Self), Failure> {
         let (settings, shown): (Vec<_>, Vec<_>) = arguments.level.iter().partition(|level| level.contains('='));
         let level = match shown[..] {
             [] => OutputLevel::Trace,

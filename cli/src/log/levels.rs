@@ -88,7 +88,7 @@ pub(super) fn set(settings: &[Setting], running: &Running, arguments: &Arguments
 }
 
 #[derive(Serialize)]
-struct Listed {
+struct LevelRow {
     module: String,
     level: Option<&'static str>,
     at_start: &'static str,
@@ -109,7 +109,7 @@ pub(super) fn list(running: &Running, json: bool, tool: &mut ToolLink) -> Result
             Ok(status) => (Some(status), None),
             Err(why) => (None, Some(why)),
         };
-        lines.push(Listed {
+        lines.push(LevelRow {
             module: names(module, running),
             level: status.as_ref().and_then(|status| status.output_level).map(OutputLevel::name),
             at_start: running.installation.output_level(module).as_str(),

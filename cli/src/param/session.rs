@@ -18,7 +18,7 @@ impl Session {
         match self.tool.parameters(module) {
             Err(CallError::Fault(_, Fault::Unknown(_))) => {
                 let name = self.running.text(module);
-                Err(format!("{name} was built with a Rohrpost that had no parameters; build it anew").into())
+                Err(format!("{name} was built with a Rohrpost that had no parameters; rebuild it").into())
             }
             other => other.map_err(|error| self.running.told(module, &error)),
         }

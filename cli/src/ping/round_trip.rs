@@ -40,7 +40,7 @@ impl RoundTrip {
         }
         if (before.epoch, before.epoch) != (there.epoch, after.epoch) {
             return Err(format!(
-                "time was set anew, or not on all nodes (epochs {}, {}, {})",
+                "time was set again, or not on all nodes (epochs {}, {}, {})",
                 before.epoch, there.epoch, after.epoch
             ));
         }
@@ -70,7 +70,7 @@ impl RoundTrip {
 
 /// One direction of all rounds.
 #[derive(Default)]
-pub(super) struct WaySum {
+pub(super) struct DirectionSum {
     count: u64,
     sum_s: f64,
     least_s: f64,
@@ -78,7 +78,7 @@ pub(super) struct WaySum {
     error_s: f64,
 }
 
-impl WaySum {
+impl DirectionSum {
     pub(super) fn add(&mut self, way_s: f64, error_s: f64) {
         self.least_s = if self.count == 0 { way_s } else { self.least_s.min(way_s) };
         self.most_s = self.most_s.max(way_s);
@@ -130,7 +130,7 @@ mod tests {
             (time(100, 3, 5, MASTER), false, "there 100 µs, back 50 µs, each ± 7 µs"),
             (time(100, 3, 5, "local"), true, "there 100 µs, back 50 µs"),
             (time(100, 3, 5, "local"), false, "its node does not have the master's time, but its own (local)"),
-            (time(100, 4, 5, MASTER), false, "time was set anew, or not on all nodes (epochs 3, 4, 3)"),
+            (time(100, 4, 5, MASTER), false, "time was set again, or not on all nodes (epochs 3, 4, 3)"),
             (
                 time(100, 3, 60, MASTER),
                 false,

@@ -19,11 +19,11 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 struct Call {
     sequence: u32,
     to: Name,
-    wants: Wants,
+    purpose: Purpose,
 }
 
 /// The purpose of its answer.
-enum Wants {
+enum Purpose {
     Switch(bool),
     Lines,
     Why,
@@ -61,25 +61,25 @@ impl Calls {
 
     pub(super) fn switch(&mut self, running: &Running, module: Name, on: bool) -> Option<Answer> {
         let begun = self.tool.begin_switch(module, on);
-        self.begun(running, module, Wants::Switch(on), begun)
+        self.begun(running, module, Purpose::Switch(on), begun)
     }
 
     /// Asks the collector for the lines from this number on.
     pub(super) fn lines(&mut self, running: &Running, collector: Name, from: u64) -> Option<Answer> {
-        if self.under_way.iter().any(|call| matches!(call.wants, Wants::Lines)) {
+        if self.under_way.iter().any(|call| matches!(call.purpose, Purpose::Lines)) {
             return None;
         }
         let write = |body: &mut Vec<u8>| append(body, &(from,));
         let function = super::super::log::LINES_FROM;
         let begun = self.tool.begin(collector, function, CollectorInterface::hash(), write);
-        self.begun(running, collector, Wants::Lines, begun)
+        self.begun(running, collector, Purpose::Lines, begun)
     }
 
     /// Asks launch to restart a module.
     pub(super) fn restart(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let launcher = running.launcher_of(module).unwrap_or(self.tool.launcher());
         let begun = self.tool.begin_restart(launcher, &running.text(module));
-        self.begun(running, launcher, Wants::Restart(module), begun)
+        self.begun(running, launcher, Purpose::Restart(module), begun)
     }
 
     /// Begins to observe other nodes, except those with an unfinished request.
@@ -97,17 +97,23 @@ impl Calls {
     /// Asks a module in error for the cause.
     pub(super) fn why(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let begun = self.tool.begin(module, common::STATUS, common::HASH, |_| Ok(()));
-        self.begun(running, module, Wants::Why, begun)
+        self.begun(running, module, Purpose::Why, begun)
     }
 
     /// Records a call that was begun; a call that could not begin gets its error as the answer.
-    fn begun(&mut self, running: &Running, to: Name, wants: Wants, begun: Result<u32, CallError>) -> Option<Answer> {
+    fn begun(
+        &mut self,
+        running: &Running,
+        to: Name,
+        purpose: Purpose,
+        begun: Result<u32, CallError>,
+    ) -> Option<Answer> {
         match begun {
             Ok(sequence) => {
-                self.under_way.push(Call { sequence, to, wants });
+                self.under_way.push(Call { sequence, to, purpose });
                 None
             }
-            Err(error) => failed(running, to, wants, &error),
+            Err(error) => failed(running, to, purpose, &error),
         }
     }
 
@@ -126,8 +132,8 @@ impl Calls {
                 continue;
             };
             answers.extend(match outcome {
-                Ok(bytes) => self.answer(running, call.to, call.wants, &bytes),
-                Err(error) => failed(running, call.to, call.wants, &error),
+                Ok(bytes) => self.answer(running, call.to, call.purpose, &bytes),
+                Err(error) => failed(running, call.to, call.purpose, &error),
             });
         }
         for (node, mut look) in std::mem::take(&mut self.looks) {
@@ -145,37 +151,37 @@ impl Calls {
         answers
     }
 
-    fn answer(&mut self, running: &Running, to: Name, wants: Wants, bytes: &[u8]) -> Option<Answer> {
+    fn answer(&mut self, running: &Running, to: Name, purpose: Purpose, bytes: &[u8]) -> Option<Answer> {
         let unread = |error: &dyn std::fmt::Display| CallError::BadReply(to, error.to_string());
-        match wants {
-            Wants::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
-            Wants::Lines => match from_bytes::<Page>(bytes) {
+        match purpose {
+            Purpose::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
+            Purpose::Lines => match from_bytes::<Page>(bytes) {
                 Ok(page) => Some(Answer::Lines(Ok(page))),
-                Err(error) => failed(running, to, wants, &unread(&error)),
+                Err(error) => failed(running, to, purpose, &unread(&error)),
             },
-            Wants::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
-            Wants::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
+            Purpose::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
+            Purpose::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
                 Ok(outcome) => Some(Answer::Restarted(module, outcome.map(|_| ()).map_err(|error| error.to_string()))),
-                Err(error) => failed(running, to, wants, &unread(&error)),
+                Err(error) => failed(running, to, purpose, &unread(&error)),
             },
         }
     }
 }
 
 /// The result of a failed call. Periodic queries report nothing; a failure is shown only for a call that a key started.
-fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Option<Answer> {
-    let asked = match wants {
-        Wants::Restart(_) => "launch".into(),
+fn failed(running: &Running, to: Name, purpose: Purpose, error: &CallError) -> Option<Answer> {
+    let asked = match purpose {
+        Purpose::Restart(_) => "launch".into(),
         _ => running.text(to),
     };
     let told = match error {
         CallError::Timeout(..) => format!("{asked}: no answer within {} s", PATIENCE.as_secs()),
         error => error.to_string().replace(&to.to_string(), &asked),
     };
-    match wants {
-        Wants::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
-        Wants::Lines => Some(Answer::Lines(Err(told))),
-        Wants::Restart(module) => Some(Answer::Restarted(module, Err(told))),
-        Wants::Why => None,
+    match purpose {
+        Purpose::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
+        Purpose::Lines => Some(Answer::Lines(Err(told))),
+        Purpose::Restart(module) => Some(Answer::Restarted(module, Err(told))),
+        Purpose::Why => None,
     }
 }

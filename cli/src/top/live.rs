@@ -9,13 +9,13 @@ use super::draw::{OutputText, ScreenModel, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
-use super::sample::{self, NodeSurveys, Said};
-use super::terminal::{Opened, keyboard};
+use super::sample::{self, ErrorCauses, NodeSurveys};
+use super::terminal::{RawTerminal, keyboard};
 use crate::terminal::Failure;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyEventKind};
 use rohrpost::Name;
-use rohrpost::launch::{Event as Told, events};
+use rohrpost::launch::{Event as LaunchEvent, events};
 use rohrpost::schema::Description;
 use rohrpost::survey::Standing;
 use std::collections::HashMap;
@@ -32,9 +32,9 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
     let told = events()?;
     let mut live = Live::new(running, interval, palette)?;
     let outcome = {
-        let mut screen = Opened::new()?;
+        let mut screen = RawTerminal::new()?;
         let typed = keyboard()?;
-        live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(Told::Stop)))
+        live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(LaunchEvent::Stop)))
     };
     if let Some(calls) = live.calls {
         calls.close();
@@ -77,14 +77,14 @@ struct Live {
     calls: Option<Calls>,
     output: Output,
     /// Why modules are in error, as they reported.
-    said: Said,
+    said: ErrorCauses,
 }
 
 impl Live {
     fn new(running: Running, interval: Duration, palette: Palette) -> Result<Self, Failure> {
         let others = not_seen_yet(&running);
         let seen = in_order(&running, sample::own(&running)?, &others);
-        let now = sample::put_together(&running, seen, None, &Said::default());
+        let now = sample::put_together(&running, seen, None, &ErrorCauses::default());
         let model = Model::new(&running.installation, &running.node_name, &running.shown(), &now, None);
         let output = Output::new(&running.installation);
         let mut live = Self {
@@ -100,7 +100,7 @@ impl Live {
             described: HashMap::new(),
             calls: None,
             output,
-            said: Said::default(),
+            said: ErrorCauses::default(),
         };
         live.join();
         Ok(live)
@@ -188,7 +188,7 @@ impl Live {
         let Ok(running) = self.running.again() else { return };
         let Ok(own) = sample::own(&running) else { return };
         let others = not_seen_yet(&running);
-        let now = sample::put_together(&running, in_order(&running, own, &others), None, &Said::default());
+        let now = sample::put_together(&running, in_order(&running, own, &others), None, &ErrorCauses::default());
         if !now.launched {
             return;
         }
@@ -199,7 +199,7 @@ impl Live {
             calls.close();
         }
         (self.running, self.now, self.earlier) = (running, now, None);
-        self.said = Said::default();
+        self.said = ErrorCauses::default();
         self.output = Output::new(&self.running.installation);
         self.join();
     }
@@ -210,7 +210,7 @@ impl Live {
         let mut answers = Vec::new();
         let others: Vec<&str> = others(&self.running).collect();
         calls.look(&self.running, &others);
-        if let Some((collector, from)) = self.output.wants() {
+        if let Some((collector, from)) = self.output.purpose() {
             answers.extend(calls.lines(&self.running, collector, from));
         }
         // A past error is dropped: the next one may be different.

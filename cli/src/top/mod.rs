@@ -28,7 +28,7 @@ use crate::terminal::{Failure, say};
 use model::Model;
 use rohrpost::Name;
 use rohrpost::survey::Scope;
-use sample::Said;
+use sample::ErrorCauses;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -79,10 +79,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// The state after one period. A module in error is asked for the cause if no launch knows it.
 fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
     let look = || running.look_at(&running.shown(), Scope::All);
-    let earlier = sample::put_together(running, look()?, None, &Said::default());
+    let earlier = sample::put_together(running, look()?, None, &ErrorCauses::default());
     std::thread::sleep(interval);
     let seen = look()?;
-    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &Said::default());
+    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &ErrorCauses::default());
     let unexplained: Vec<Name> = now.unexplained().collect();
     if !unexplained.is_empty()
         && let Ok(mut tool) = running.join(calls::PATIENCE)

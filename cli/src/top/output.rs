@@ -38,7 +38,7 @@ impl Output {
     }
 
     /// The collector to ask, and the first line to ask for.
-    pub(super) fn wants(&self) -> Option<(Name, u64)> {
+    pub(super) fn purpose(&self) -> Option<(Name, u64)> {
         // No line has the highest number: the first answer only tells the collector's position.
         Some((self.collector?, self.next))
     }

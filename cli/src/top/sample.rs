@@ -11,7 +11,7 @@ use rohrpost_mailbox::SystemClock;
 use std::collections::HashMap;
 
 /// Why modules are in error, as they reported.
-pub(super) type Said = HashMap<Name, String>;
+pub(super) type ErrorCauses = HashMap<Name, String>;
 
 /// The reports of some nodes, or why they do not answer.
 pub(super) type NodeSurveys = Vec<Result<Survey, Silence>>;
@@ -24,7 +24,12 @@ pub(super) fn own(running: &Running) -> Result<NodeSurveys, Failure> {
 }
 
 /// Merges the nodes' reports; `earlier` is the base of rates.
-pub(super) fn put_together(running: &Running, seen: NodeSurveys, earlier: Option<&Sample>, said: &Said) -> Sample {
+pub(super) fn put_together(
+    running: &Running,
+    seen: NodeSurveys,
+    earlier: Option<&Sample>,
+    said: &ErrorCauses,
+) -> Sample {
     let (mut surveys, mut silent) = (Vec::new(), Vec::new());
     for seen in seen {
         match seen {

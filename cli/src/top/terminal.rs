@@ -9,9 +9,9 @@ use ratatui::crossterm::{cursor, execute};
 use std::sync::mpsc::Receiver;
 
 /// The terminal in raw mode; restored however the program ends.
-pub(super) struct Opened(pub(super) DefaultTerminal);
+pub(super) struct RawTerminal(pub(super) DefaultTerminal);
 
-impl Opened {
+impl RawTerminal {
     pub(super) fn new() -> Result<Self, Failure> {
         let hook = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
@@ -32,7 +32,7 @@ impl Opened {
     }
 }
 
-impl Drop for Opened {
+impl Drop for RawTerminal {
     fn drop(&mut self) {
         give_back();
     }
