@@ -1,4 +1,4 @@
-//! `rohrpost bench local`: how this computer hands packages over, beside what it could do at best.
+//! `rohrpost bench local`: how fast this computer passes packages between processes, next to its hardware floor.
 
 use crate::terminal::{Failure, complain, say};
 use rohrpost_bench::environment::Environment;
@@ -11,20 +11,20 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Rounds of the self-test, which takes some five seconds.
+/// Rounds of the self-test; it takes about five seconds.
 const ROUNDS: usize = 3;
 
-/// Ours may take so much longer than the floor, by the median, before something is strange; the target is 1.1.
+/// Our median may exceed the floor by this factor; beyond it something is strange. The target is 1.1.
 const STRANGE_BLOCKING: f64 = 1.5;
 
-/// Spinning pays if it is so much quicker than sleeping; mostly it is ten times and more. How it stands to bare spinning tells
-/// more of the way between two processors than of the computer as a whole.
+/// Spinning pays if it is faster than sleeping by this factor; mostly it is ten times faster or more. The ratio to bare
+/// spinning says more about the path between two processors than about the computer as a whole.
 const SPINNING_PAYS: f64 = 2.0;
 
-/// One of a hundred of the futex floor that takes longer tells of a computer that does not wake threads in time, µs.
+/// If the p99 of the futex floor is longer than this, the computer does not wake threads in time, µs.
 const LATE_US: f64 = 100.0;
 
-/// Where to read on.
+/// The page with more explanation.
 const TUNING: &str = "docs/src/tuning.md";
 
 #[derive(clap::Args)]
@@ -36,9 +36,10 @@ pub(super) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// Mailboxes between two processes, beside bare shared memory: takes 5 seconds.
+    /// Mailboxes between two processes, next to bare shared memory; takes 5 seconds.
     #[command(
-        after_help = "Example: rohrpost bench local\nIt keeps two processors busy meanwhile, so not while a robot works. Where a node is launched it\nmeasures with the default scheduler, so that it is in nobody's way."
+        after_help = "Example: rohrpost bench local\nIt keeps two processors busy: do not run it while a robot works. \
+            If a node is launched, it\nmeasures with the default scheduler and delays no module."
     )]
     Local(Local),
 }
@@ -56,8 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let scheduling = if launched.is_empty() { Scheduling::Fifo } else { Scheduling::Normal };
     for node in &launched {
         complain(format_args!(
-            "warning: {} is launched on this computer, and this takes two processors for some seconds: measuring with the \
-             default scheduler, so that real-time modules keep theirs; the figures are worse for it",
+            "warning: {} is launched on this computer, and this takes two processors for some seconds: measuring with \
+             the default scheduler, so that real-time modules keep theirs; the figures are worse for it",
             node.display()
         ));
     }
@@ -76,9 +77,9 @@ fn launched() -> Vec<PathBuf> {
     paths.filter(|path| Node::open(path).is_ok_and(|node| node.launcher().is_some())).collect()
 }
 
-/// What is known to make a computer late.
+/// Known causes of latency on this computer.
 struct Hints {
-    /// Of the first processor; none where it is not to be chosen.
+    /// Governor of the first processor; none where it cannot be chosen.
     governor: Option<String>,
     is_virtual: bool,
     /// This program was compiled for development.
@@ -98,23 +99,23 @@ impl Hints {
     }
 }
 
-/// The row of ours beside a floor, for small messages.
+/// Our row next to a floor, for small messages.
 fn small<'a>(rows: &'a [Row], floor: &str) -> Option<&'a Row> {
     rows.iter().find(|row| row.bytes == Some(64) && row.versus.is_some_and(|versus| versus.name == floor))
 }
 
-/// What the figures say, and where to look if they are not good.
+/// What the figures mean, and where to look if they are bad.
 fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
     let (Some(blocking), Some(spinning)) = (small(&report.rows, "futex"), small(&report.rows, "spin")) else {
         return "NOTHING TO SAY: no figures.".into();
     };
     let figures = (&blocking.result, blocking.ratio_p50, &spinning.result, spinning.ratio_p50);
     let (Ok(asleep), Some(ratio_asleep), Ok(awake), Some(ratio_awake)) = figures else {
-        return "NO ANSWER: a contender did not run; the notes under the tables say why.".into();
+        return "NO ANSWER: a part of the test did not run; the notes under the tables say why.".into();
     };
     let said = format!(
-        "a package of 64 B takes {:.1} µs to a module that sleeps, {:.1} times what the computer takes to wake any process, \
-         and {:.2} µs to one that spins, {:.1} times bare shared memory",
+        "a package of 64 B takes {:.1} µs to a module that sleeps, {:.1} times what the computer takes to wake any \
+         process, and {:.2} µs to one that spins, {:.1} times bare shared memory",
         asleep.p50, ratio_asleep.median, awake.p50, ratio_awake.median
     );
     let floor = report.rows.iter().find(|row| row.contender == "futex").and_then(|row| row.result.as_ref().ok()?.p99);
@@ -124,13 +125,13 @@ fn meaning(report: &Report, scheduling: Scheduling, hints: &Hints) -> String {
         return format!("GOOD: {said}.");
     }
     let look = look_at(&report.environment, scheduling, hints);
-    let advice = if look.is_empty() { "other programs that are busy".to_string() } else { look.join("; ") };
+    let advice = if look.is_empty() { "other busy programs".to_string() } else { look.join("; ") };
     let late =
-        floor.filter(|_| is_late).map(|p99| format!("; bare waking is late by {p99:.0} µs once in a hundred times"));
+        floor.filter(|_| is_late).map(|p99| format!("; a bare wake-up is late by {p99:.0} µs once in a hundred times"));
     format!("LOOK: {said}{}. What to look at: {advice}. See {TUNING}.", late.unwrap_or_default())
 }
 
-/// What is known to be in the way here.
+/// Known causes of latency here, as text.
 fn look_at(environment: &Environment, scheduling: Scheduling, hints: &Hints) -> Vec<String> {
     let refused = (!environment.refusals.is_empty()).then(|| {
         format!("the kernel refuses real time ({}), give the user the right", environment.refusals.join("; "))
@@ -138,9 +139,9 @@ fn look_at(environment: &Environment, scheduling: Scheduling, hints: &Hints) -> 
     let robot = (scheduling == Scheduling::Normal).then(|| "a node is launched: measure again without it".to_string());
     let slow = hints.governor.as_ref().filter(|governor| *governor != "performance");
     let governor = slow.map(|name| format!("the CPU governor is `{name}`, `performance` wakes sooner"));
-    let host = hints.is_virtual.then(|| "this is a virtual machine, whose host decides when it runs".to_string());
+    let host = hints.is_virtual.then(|| "this is a virtual machine: its host decides when it runs".to_string());
     let build =
-        hints.is_slow_build.then(|| "this `rohrpost` is a development build, `--release` is quicker".to_string());
+        hints.is_slow_build.then(|| "this `rohrpost` is a development build, `--release` is faster".to_string());
     [refused, robot, governor, host, build].into_iter().flatten().collect()
 }
 
@@ -178,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sentence_tells_good_from_what_is_to_be_looked_at() {
+    fn the_verdict_names_the_causes_of_bad_figures() {
         let good = said(1.1, 20.0, &[], Scheduling::Fifo);
         assert!(good.starts_with("GOOD: a package of 64 B takes 8.0 µs") && !good.contains("powersave"), "{good}");
         for (text, part) in [
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn without_figures_it_does_not_guess() {
+    fn missing_figures_give_no_verdict() {
         let mut report = Report { environment: environment(&[]), rows: Vec::new() };
         let hints = Hints { governor: None, is_virtual: false, is_slow_build: true };
         assert!(meaning(&report, Scheduling::Fifo, &hints).starts_with("NOTHING"));

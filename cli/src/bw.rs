@@ -1,4 +1,4 @@
-//! `rohrpost bw`: how many bytes go in and out of a module, read from the counters of those who send.
+//! `rohrpost bw`: bytes per second into and out of a module, read from the senders' counters.
 
 use super::published::{WatchedModule, data_of};
 use super::target::Target;
@@ -12,11 +12,12 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost bw mapper.0                what goes in and out, two lines a second; Ctrl-C ends it
-  rohrpost bw laser.0 scan            the values that it publishes, each counted once whoever subscribes
+  rohrpost bw mapper.0                input and output, two lines a second; Ctrl-C ends it
+  rohrpost bw laser.0 scan            the values that it publishes, each counted once, however many subscribe
   rohrpost bw mapper.0 --seconds 5 --json
-Bytes are those of bodies: a package has 16 bytes of head besides. It reads counters in shared memory, on another node by \
-way of that node's launch: nothing is subscribed to, and the module is sent nothing. Smallest and largest are those of the whole seconds that the window touches.")]
+Bytes are those of package bodies, without the 16 bytes of each head. The tool reads counters in shared memory, on \
+    another node through that node's launch: it does not subscribe, and sends nothing to the module. Smallest and \
+    largest are those of the whole seconds that overlap the window.")]
 pub(super) struct Arguments {
     /// Module or alias, such as mapper.0.
     name: String,
@@ -44,7 +45,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         }
         let module = watched.module;
         let flows = survey.flows.into_iter().filter(|flow| !flow.is_publication());
-        // All that comes in is counted on the module's node: what comes from another one, by the router that delivers it.
+        // All input is counted on the module's node: packages from another node are counted by the router that delivers
+        // them.
         let (installation, node) = (&watched.running.installation, survey.node.as_str());
         let counts = |flow: &FlowInfo| {
             flow.to.module() == module || flow.from.module() == module && !is_hop(installation, node, flow)
@@ -69,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// One line; false when nobody reads any more.
+/// Prints one line; false when nobody reads any more.
 fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &FlowSum) -> bool {
     if !arguments.pace.json {
         return say(sum.text(name));
@@ -90,7 +92,7 @@ fn tell_one(arguments: &Arguments, name: &str, direction: &str, sum: &FlowSum) -
     }))
 }
 
-/// Several flows together.
+/// Totals of several flows.
 #[derive(Default)]
 struct FlowSum {
     packages: u64,
@@ -104,7 +106,7 @@ struct FlowSum {
     lively: bool,
 }
 
-/// Each flow's rate is by its own first and last package, and so is their sum.
+/// Each flow's rate comes from its own first and last package; the total is their sum.
 fn sum<'a>(flows: impl Iterator<Item = (&'a FlowInfo, FlowFigures)>) -> FlowSum {
     let mut sum = FlowSum::default();
     for (_, figures) in flows {

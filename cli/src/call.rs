@@ -1,4 +1,4 @@
-//! `rohrpost call`: a function of any module, by the module's own description.
+//! `rohrpost call`: calls a function of any module, using the module's own description.
 
 use super::target::Target;
 use super::units::seconds;
@@ -19,14 +19,14 @@ Arguments are numbers, words, or JSON.")]
 pub(super) struct Arguments {
     /// Module, such as motor.0.
     name: String,
-    /// Function; without it, what the module offers is listed.
+    /// Function; without it, list what the module offers.
     function: Option<String>,
     /// Its arguments.
     #[arg(allow_negative_numbers = true)]
     arguments: Vec<String>,
     #[command(flatten)]
     target: Target,
-    /// Wait so long for the answer, seconds.
+    /// Timeout for the answer, seconds.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     timeout: f64,
     /// Print the result as JSON.
@@ -34,16 +34,16 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Functions that every module has, besides those of its interface.
+/// Functions that every module has, in addition to those of its interface.
 pub(super) const COMMON: [(&str, &str); 5] = [
-    ("on", "Begins to work"),
+    ("on", "Starts its work"),
     ("off", "Goes to its safe state"),
-    ("status", "Says how it is"),
-    ("get", "Asks for its newest data of a kind"),
+    ("status", "Reports its state"),
+    ("get", "Returns the newest data of one kind"),
     ("output-level", "Sets which lines it sends"),
 ];
 
-/// What a function that every module has takes.
+/// The argument types of a function that every module has.
 fn usage_of_common(name: &str) -> Option<&'static str> {
     Some(match name {
         "on" | "off" | "status" => "nothing",
@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// What to print, and whether the function itself reported an error.
+/// The text to print, and whether the function itself reported an error.
 fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(String, bool), Failure> {
     let Some(name) = &arguments.function else {
         let description = tool.describe(module)?;
@@ -85,7 +85,7 @@ fn answer(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(S
         }
         (_, texts) => call(module, name, texts, tool)?,
     };
-    // A function's own error is an answer too; scripts see it by the exit code.
+    // A function's own error is an answer, too; scripts see it by the exit code.
     let (value, failed) = match value {
         Value::Variant(outcome, inner) if outcome == "Ok" => (*inner, false),
         Value::Variant(outcome, inner) if outcome == "Err" => (Value::Variant(outcome, inner), true),
@@ -118,7 +118,7 @@ fn get(module: Name, data: &str, tool: &mut ToolLink) -> Result<Value, Failure> 
     Ok(decode(&item.field.ty, value)?)
 }
 
-/// A postcard u64 and what follows it.
+/// A postcard u64, and the bytes after it.
 fn postcard_u64(bytes: &[u8]) -> Option<(u64, &[u8])> {
     let end = bytes.iter().position(|byte| byte & 0x80 == 0)? + 1;
     let (front, rest) = bytes.split_at(end);
@@ -146,7 +146,7 @@ pub(super) fn names(description: &Description) -> Vec<&str> {
     description.functions.iter().map(|function| function.name.as_str()).collect()
 }
 
-/// Arguments as they go into a package.
+/// Encodes arguments for a package.
 pub(super) fn body_of(function: &Function, texts: &[String]) -> Result<Vec<u8>, Failure> {
     if function.arguments.len() != texts.len() {
         return Err(

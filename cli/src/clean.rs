@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: rohrpost clean\nWhat a launch or a living process uses is left alone.")]
+#[command(after_help = "Example: rohrpost clean\nDirectories that a launch or a live process uses stay.")]
 pub(super) struct Arguments {
     /// Print one JSON object.
     #[arg(long)]
@@ -20,7 +20,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut done = Vec::new();
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
         match clean(&path) {
-            // Its launch has ended meanwhile, and removed it itself.
+            // Its launch has ended meanwhile and removed it.
             Err(_) if !path.exists() => {}
             outcome => done.push((path, outcome)),
         }
@@ -45,11 +45,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What was done with one node.
+/// The result for one node.
 enum Cleaned {
-    /// Nothing lived in it.
+    /// No process lived in it.
     Removed,
-    /// It is in use; so many mailboxes in it had no owner.
+    /// It is in use; this many of its mailboxes had no owner.
     InUse(usize),
 }
 
@@ -74,14 +74,14 @@ fn json(path: &Path, outcome: &Result<Cleaned, NodeError>) -> serde_json::Value 
     }
 }
 
-/// Removes what is dead of one node.
+/// Removes the dead remains of one node.
 fn clean(path: &Path) -> Result<Cleaned, NodeError> {
     let node = Node::open(path)?;
     if node.remove_if_dead()? {
         return Ok(Cleaned::Removed);
     }
     let mut removed = 0;
-    // A module that its launch is about to start again has no owner for a moment; its packages are waited for.
+    // A module that its launch is about to start again has no owner for a moment; its packages must stay.
     if node.launcher().is_none() {
         for name in node.mailboxes()? {
             removed += usize::from(node.remove_orphan(name)?);

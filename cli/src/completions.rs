@@ -1,8 +1,8 @@
-//! `rohrpost completions`, and the answers to the shells that it was set up in.
+//! `rohrpost completions`, and the completions themselves, for shells where the script is installed.
 //!
-//! A shell runs this command anew at each press of the key, with the words so far. Names of modules and nodes come from the
-//! configuration that launch has noted, functions and data from what modules have noted of themselves beside their mailboxes.
-//! Only a module whose parameters are to be completed is asked for them.
+//! A shell runs this command at each press of Tab, with the words typed so far. Names of modules and nodes come from
+//! the configuration that launch recorded; functions and data come from the descriptions that modules store beside
+//! their mailboxes. A module is asked only for its parameters, when one of them is to be completed.
 
 use super::call::COMMON;
 use super::target::{Running, Target};
@@ -21,9 +21,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// By this variable a shell tells that it asks, and which it is.
+/// The environment variable by which a shell asks for completions; its value is the shell's name.
 const VARIABLE: &str = "ROHRPOST_COMPLETE";
-/// Nobody waits longer for a list that they did not call for.
+/// Timeout for a module's answer: nobody wants to wait long for a completion.
 const PATIENCE: Duration = Duration::from_millis(300);
 
 #[derive(clap::Args)]
@@ -31,7 +31,7 @@ const PATIENCE: Duration = Duration::from_millis(300);
   source <(rohrpost completions bash)        in ~/.bashrc
   source <(rohrpost completions zsh)         in ~/.zshrc, after compinit
   rohrpost completions fish | source         in ~/.config/fish/config.fish
-Names of modules, functions and data are those of the node that runs.")]
+Names of modules, functions and data come from the running node.")]
 pub(super) struct Arguments {
     /// The shell.
     shell: Shell,
@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Shell::Zsh => &Zsh,
         Shell::Fish => &Fish,
     };
-    // Found on PATH, it is found there after an update too; else it is this very file.
+    // If PATH leads to this program, the name is used, so that it is found after an update, too; else its own path.
     let called = std::env::args_os().next().unwrap_or_default().to_string_lossy().into_owned();
     let completer = if called.contains('/') { std::env::current_exe()?.display().to_string() } else { called };
     let mut script = Vec::new();
@@ -59,12 +59,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Answers and ends, if a shell asks about this command line. To be called before anything else.
+/// Answers and ends the process if a shell asks for completions. Must be called before anything else.
 pub(super) fn answer(command: fn() -> Command) {
     CompleteEnv::with_factory(|| with_candidates(command())).var(VARIABLE).complete();
 }
 
-/// The same command line, with what each argument can be. Arguments mean the same wherever they have the same name.
+/// The same command line, with candidates for each argument. Arguments of one name mean the same in every subcommand.
 fn with_candidates(command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
     let named = command.get_name().to_owned();
@@ -74,7 +74,7 @@ fn with_candidates(command: Command) -> Command {
 
 fn completed(command: &str, arg: Arg) -> Arg {
     match (command, arg.get_id().as_str()) {
-        // A name that there is not yet.
+        // A new name: there is nothing to complete.
         ("new", _) => arg,
         ("mailbox", "name") => from(arg, mailboxes),
         (_, "name" | "names" | "module" | "modules") => from(arg, modules),
@@ -98,13 +98,13 @@ fn from(arg: Arg, candidates: fn() -> Vec<CompletionCandidate>) -> Arg {
     arg.add(ArgValueCandidates::new(candidates))
 }
 
-/// The words so far, without this command's own name. A file's name need not be text; names that are asked for are.
+/// The words so far, without the command's own name. A file name need not be UTF-8; names that we look up are.
 fn words() -> Vec<String> {
     let words = std::env::args_os().skip_while(|word| word != "--").skip(2);
     words.map(|word| word.to_string_lossy().into_owned()).collect()
 }
 
-/// The value of an option, if the words have it.
+/// The value of an option, if the words contain it.
 fn option(words: &[String], name: &str) -> Option<String> {
     let at = words.iter().position(|word| word == name)?;
     words.get(at + 1).cloned()
@@ -115,7 +115,7 @@ fn target() -> Target {
     Target::new(option(&words, "--config").map(PathBuf::from), option(&words, "--node"))
 }
 
-/// The configuration that is meant: the one named, or that of what runs.
+/// The configuration: the one named on the command line, or that of the running installation.
 fn installation() -> Option<Installation> {
     if let Ok(running) = target().find() {
         return Some(running.installation);
@@ -125,7 +125,7 @@ fn installation() -> Option<Installation> {
     Installation::load(named.as_ref()).ok()
 }
 
-/// The shell puts it on the command line and into its list: what a terminal would obey is written out.
+/// The shell shows candidates on the terminal: control characters are escaped.
 fn candidate(name: impl AsRef<str>, help: &str) -> CompletionCandidate {
     let help = Some(StyledStr::from(plain::line(help).into_owned())).filter(|_| !help.is_empty());
     CompletionCandidate::new(plain::line(name.as_ref()).into_owned()).help(help)
@@ -181,7 +181,7 @@ fn parameters() -> Vec<CompletionCandidate> {
     found.unwrap_or_default().iter().map(|parameter| candidate(&parameter.field.name, &parameter.field.text)).collect()
 }
 
-/// Arguments of functions that every module has; those of its own are numbers and words.
+/// Arguments of functions that every module has; a module's own functions take numbers and words.
 fn call_arguments() -> Vec<CompletionCandidate> {
     let words = words();
     let is = |function| words.iter().any(|word| word == function);
@@ -192,7 +192,7 @@ fn call_arguments() -> Vec<CompletionCandidate> {
     }
 }
 
-/// What the module says of itself that the words name.
+/// The description of the module that the words name.
 fn described() -> Option<Description> {
     let running = target().find().ok()?;
     running.describe(named(&running)?).ok()

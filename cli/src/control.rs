@@ -1,4 +1,4 @@
-//! `rohrpost restart`, `stop` and `start`: one module of a running node, by way of its launch.
+//! `rohrpost restart`, `stop` and `start`: one module of a running node, through its launch.
 
 use super::target::{Running, Target};
 use crate::terminal::{Failure, say};
@@ -12,24 +12,25 @@ use std::time::{Duration, Instant};
 
 /// Launch answers within this time: it waits for nobody.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How far it is, is asked so often.
+/// How often the progress is polled.
 const POLL: Duration = Duration::from_millis(20);
-/// Beyond what the module itself may take: for what is killed to end, and for launch to look.
+/// Added to the module's own limits: time for a killed process to end, and for launch to notice.
 const MARGIN: Duration = Duration::from_secs(7);
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: rohrpost restart pilot.0\nExits with 1 when launch refuses, or it did not come to that."
+    after_help = "Example: rohrpost restart pilot.0\nExit code 1: launch refused, or the module did not reach the \
+        state."
 )]
 pub(super) struct Arguments {
     /// Module, such as pilot.0.
     name: String,
     #[command(flatten)]
     target: Target,
-    /// Return as soon as launch knows of it.
+    /// Return as soon as launch has accepted the order.
     #[arg(long)]
     no_wait: bool,
-    /// Wait so long, seconds; without it, as long as the configuration gives the module to end and to get ready.
+    /// Timeout, seconds; without it, the time that the configuration gives the module to end and to get ready.
     #[arg(long, value_name = "SECONDS", conflicts_with = "no_wait")]
     timeout: Option<f64>,
 }
@@ -53,8 +54,8 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
     let launcher = running.launcher_of(module.name).ok_or_else(|| format!("no node `{node}`"))?;
     if running.is_own(module.name) && running.node.launcher().is_none() {
         return Err(format!(
-            "no launch watches over {text}: node {} runs by hand. End the module's process and start it yourself, or launch \
-             the node: `rohrpost launch {}`",
+            "no launch watches over {text}: node {} runs by hand. End the module's process and start it yourself, or \
+             launch the node: `rohrpost launch {}`",
             running.node_name,
             running.installation.path.display()
         )
@@ -73,12 +74,12 @@ pub(super) fn run(arguments: &Arguments, order: Order) -> Result<ExitCode, Failu
     Ok(ExitCode::SUCCESS)
 }
 
-/// An order, and whom it is about.
+/// An order, and the module it is about.
 struct ModuleOrder<'a> {
     running: &'a Running,
     name: Name,
     text: String,
-    /// Launch of its node.
+    /// Launch of the module's node.
     launcher: Name,
     tool: ToolLink,
     began: Instant,
@@ -86,31 +87,31 @@ struct ModuleOrder<'a> {
 }
 
 impl ModuleOrder<'_> {
-    /// What to say when it was done.
+    /// The message after success.
     fn carry_out(&mut self, order: Order, wait: bool) -> Result<String, Failure> {
-        let before = self.child()?.pid.map_or(String::new(), |pid| format!("; before it was process {pid}"));
+        let before = self.child()?.pid.map_or(String::new(), |pid| format!("; previously process {pid}"));
         let text = self.text.clone();
-        let life = match order {
+        let incarnation = match order {
             Order::Restart => self.tool.restart(self.launcher, &text),
             Order::Start => self.tool.start(self.launcher, &text),
             Order::Stop => {
                 self.tool.stop(self.launcher, &text).map_err(|error| self.told(&error))?;
-                return if wait { self.wait_stopped() } else { Ok(format!("{text} is told to end")) };
+                return if wait { self.wait_stopped() } else { Ok(format!("{text} is being stopped")) };
             }
         };
-        let life = life.map_err(|error| self.told(&error))?;
-        if wait { self.wait_running(life, &before) } else { Ok(format!("{text} is to be started")) }
+        let incarnation = incarnation.map_err(|error| self.told(&error))?;
+        if wait { self.wait_running(incarnation, &before) } else { Ok(format!("{text} is being started")) }
     }
 
-    fn wait_running(&mut self, life: u32, before: &str) -> Result<String, Failure> {
+    fn wait_running(&mut self, incarnation: u32, before: &str) -> Result<String, Failure> {
         loop {
             let child = self.child()?;
             let text = &self.text;
             match child.phase {
-                Phase::Running if child.lives == life => return self.at_work(&child, before),
-                Phase::Stopped => return Err(format!("somebody has stopped {text} meanwhile").into()),
-                // It had its incarnation, or could not even be begun.
-                _ if child.lives > life || child.lives == life && child.phase == Phase::Waiting => {
+                Phase::Running if child.lives == incarnation => return self.at_work(&child, before),
+                Phase::Stopped => return Err(format!("another user has stopped {text} meanwhile").into()),
+                // It ran and ended, or could not even be started.
+                _ if child.lives > incarnation || child.lives == incarnation && child.phase == Phase::Waiting => {
                     return Err(format!("{text} was started, and ended by itself: {}", child.last_end).into());
                 }
                 Phase::Failed | Phase::Ended => return Err(format!("{text} does not run: {}", child.last_end).into()),
@@ -119,7 +120,7 @@ impl ModuleOrder<'_> {
         }
     }
 
-    /// Its process is there, and was switched on if it is to be. How it is, it says itself.
+    /// Its process runs, and was switched on if required. The module itself reports its state.
     fn at_work(&mut self, child: &ChildState, before: &str) -> Result<String, Failure> {
         let (text, pid, took_s) = (&self.text, child.pid.unwrap_or_default(), self.began.elapsed().as_secs_f64());
         let survey = self.running.look(self.running.node_of(self.name), Scope::Module(self.name.raw()))?;
@@ -142,7 +143,7 @@ impl ModuleOrder<'_> {
                     let (text, how) = (&self.text, child.last_end.lines().next().unwrap_or("it never ran"));
                     return Ok(format!("{text} is stopped ({how}); `rohrpost start {text}` starts it"));
                 }
-                _ => return Err(format!("somebody has started {} again meanwhile", self.text).into()),
+                _ => return Err(format!("another user has started {} again meanwhile", self.text).into()),
             }
         }
     }
@@ -156,14 +157,14 @@ impl ModuleOrder<'_> {
         Err(format!("{text} is still {phase} after {within:?}; launch goes on with it, see `rohrpost list`").into())
     }
 
-    /// What launch knows of it.
+    /// Launch's record of the module.
     fn child(&mut self) -> Result<ChildState, Failure> {
         let children = self.tool.children(self.launcher).map_err(|error| self.told(&error.widen()))?;
         let child = children.into_iter().find(|child| child.module == self.text);
         child.ok_or_else(|| ControlError::NoModule(self.text.clone()).into())
     }
 
-    /// Lower layers know launch by its number only.
+    /// Lower layers know launch only by its number.
     fn told(&self, error: &CallError<ControlError>) -> Failure {
         let node = self.running.node_of(self.name);
         let launch = if self.running.is_own(self.name) { "launch".into() } else { format!("launch of node {node}") };

@@ -1,14 +1,15 @@
-//! Programs that slew the clock of a computer, found by their names: bounds of the nodes' common time assume that nobody does.
+//! Daemons that slew a computer's clock, found by their names. The bounds of the nodes' common time hold only without
+//! them.
 
 use std::path::Path;
 
-/// One of them.
+/// A time daemon.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Daemon {
-    /// Its name, as the kernel has it: 15 bytes at most.
+    /// Its name in the kernel: 15 bytes at most.
     comm: &'static str,
     pub(super) name: &'static str,
-    /// What ends it for good.
+    /// The command that stops it for good.
     pub(super) ends: &'static str,
 }
 
@@ -25,7 +26,7 @@ const ALL: [Daemon; 6] = [
     daemon("timemaster", "timemaster", "sudo systemctl disable --now timemaster"),
 ];
 
-/// Those that run, by the processes of a computer (`/proc`).
+/// The daemons that run, by the processes in a computer's `/proc`.
 pub(super) fn running(processes: &Path) -> Vec<Daemon> {
     let entries = std::fs::read_dir(processes).into_iter().flatten().flatten();
     let ids = entries.filter(|entry| entry.file_name().to_str().is_some_and(|name| name.parse::<u32>().is_ok()));
@@ -33,9 +34,9 @@ pub(super) fn running(processes: &Path) -> Vec<Daemon> {
     ALL.into_iter().filter(|daemon| names.iter().any(|name| name.trim_end() == daemon.comm)).collect()
 }
 
-/// What is the matter with them, in one sentence.
-pub(super) const WHY: &str = "it slews the clock by more than the nodes' common time allows for: whenever it does, nothing is known of the time, and the \
-                              node sends nothing in its time slots";
+/// The problem in one sentence.
+pub(super) const WHY: &str = "it slews the clock by more than the nodes' common time allows for: whenever it does, \
+    nothing is known of the time, and the node sends nothing in its time slots";
 
 #[cfg(test)]
 mod tests {

@@ -1,4 +1,4 @@
-//! `rohrpost delay`: how long packages wait to be taken, and how old data are when they are published.
+//! `rohrpost delay`: how long packages wait in mailboxes, and how old data are when they are published.
 
 use super::published::{WatchedModule, data_of};
 use super::summary::class_name;
@@ -17,10 +17,10 @@ use std::process::ExitCode;
 #[command(after_help = "Examples:
   rohrpost delay mapper.0             by mailbox and class, once a second; Ctrl-C ends it
   rohrpost delay mapper.0 --count 1 --window 5
-  rohrpost delay laser.0 --json       also how long its data wait for those that subscribed
-A package waits from being published to being taken. The mean is exact; p50 and p99 come from a histogram and are \
-right to a quarter or so; the longest is that of the mailbox's whole life. It reads counters, on other nodes by way of their \
-launches: the modules are sent nothing.")]
+  rohrpost delay laser.0 --json       also how long its data wait at the subscribers
+The waiting time runs from publishing a package to taking it. The mean is exact; p50 and p99 come from a histogram \
+    and are accurate to about 25 %; the longest is that since the mailbox was created. The tool reads counters, on \
+    other nodes through their launches: it sends nothing to the modules.")]
 pub(super) struct Arguments {
     /// Module or alias, such as mapper.0.
     name: String,
@@ -38,8 +38,8 @@ struct Wait {
     latency: Latency,
 }
 
-/// What the tool looks at.
-struct Looked {
+/// One observation.
+struct Observation {
     waits: Window<Vec<Wait>>,
     module: WatchedModule,
 }
@@ -48,7 +48,7 @@ struct Looked {
 struct WaitLine {
     mailbox: String,
     purpose: &'static str,
-    /// Somebody else's, to which this module sends data.
+    /// A mailbox of another module, to which this module sends data.
     subscriber: bool,
     class: String,
     received: u64,
@@ -77,9 +77,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut module = WatchedModule::new(&arguments.target, &arguments.name, long)?;
     module.require_present()?;
     let mut names = data_of(&module.running, module.module, None).unwrap_or_default();
-    let mut looked = Looked { waits: Window::new(long), module };
-    let look = |looked: &mut Looked| {
-        let Looked { waits: window, module } = looked;
+    let mut observed = Observation { waits: Window::new(long), module };
+    let look = |observed: &mut Observation| {
+        let Observation { waits: window, module } = observed;
         let Some(survey) = module.look()? else { return Ok(()) };
         let waits = waits(&module.running, module.module, &survey)?;
         if window.ends().is_some_and(|(_, before)| begins_anew(before, &waits)) {
@@ -89,23 +89,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         module.take_published(survey);
         Ok(())
     };
-    let tell = |looked: &mut Looked| {
-        looked.module.renew(&mut names, None);
-        let delays = delays(&arguments.name, looked, &names);
+    let tell = |observed: &mut Observation| {
+        observed.module.renew(&mut names, None);
+        let delays = delays(&arguments.name, observed, &names);
         Ok(say(if arguments.pace.json { serde_json::to_string(&delays)? } else { in_text(&delays) }))
     };
-    arguments.pace.watch(&mut looked, look, tell)?;
+    arguments.pace.watch(&mut observed, look, tell)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Whether mailboxes were made anew, and count from 0: as when their node was launched again.
+/// Whether mailboxes were created anew and count from 0, for example after their node was launched again.
 fn begins_anew(before: &[Wait], now: &[Wait]) -> bool {
     let known = |wait: &Wait| before.iter().find(|known| (known.mailbox, known.class) == (wait.mailbox, wait.class));
     now.iter().any(|wait| known(wait).is_some_and(|known| wait.latency.count() < known.latency.count()))
 }
 
-/// Waits in the module's mailboxes, and in those that it sends data to, on whichever nodes they are. What is on a node that does not
-/// answer is left out.
+/// Waits in the module's mailboxes and in the mailboxes that it sends data to, on any node. Nodes that do not answer
+/// are left out.
 fn waits(running: &Running, module: Name, survey: &Survey) -> Result<Vec<Wait>, Failure> {
     let is_sent = |flow: &&FlowInfo| matches!(flow.kind.kind(), Kind::Data(_)) && !flow.is_publication();
     let sent: Vec<Name> =
@@ -125,16 +125,16 @@ fn waits(running: &Running, module: Name, survey: &Survey) -> Result<Vec<Wait>, 
     Ok(mailboxes.into_iter().flat_map(|mailbox| mailbox.classes.iter().map(wait(mailbox.name))).collect())
 }
 
-fn delays<'a>(name: &'a str, looked: &Looked, names: &[(u16, String)]) -> Delays<'a> {
-    let installation = &looked.module.running.installation;
-    let (earlier, now) = looked.waits.ends().map_or((&[][..], &[][..]), |(a, b)| (&a[..], &b[..]));
+fn delays<'a>(name: &'a str, observed: &Observation, names: &[(u16, String)]) -> Delays<'a> {
+    let installation = &observed.module.running.installation;
+    let (earlier, now) = observed.waits.ends().map_or((&[][..], &[][..]), |(a, b)| (&a[..], &b[..]));
     let line = |wait: &Wait| {
         let before = earlier.iter().find(|known| (known.mailbox, known.class) == (wait.mailbox, wait.class));
         let latency = before.map_or(wait.latency.clone(), |before| wait.latency.since(&before.latency));
         WaitLine {
             mailbox: installation.classes.format_full(wait.mailbox),
             purpose: purpose(wait.mailbox.local()),
-            subscriber: wait.mailbox.module() != looked.module.module,
+            subscriber: wait.mailbox.module() != observed.module.module,
             class: class_name(installation, wait.class),
             received: latency.count(),
             waited_mean_s: latency.mean().map(|mean| mean.as_secs_f64()),
@@ -144,7 +144,7 @@ fn delays<'a>(name: &'a str, looked: &Looked, names: &[(u16, String)]) -> Delays
         }
     };
     let age = |(number, name): &(u16, String)| {
-        let figures = looked.module.figures(*number).unwrap_or_default();
+        let figures = observed.module.figures(*number).unwrap_or_default();
         AgeLine { data: name.clone(), values: figures.packages, age_mean_s: figures.age_mean_s }
     };
     Delays { module: name, waits: now.iter().map(line).collect(), published: names.iter().map(age).collect() }

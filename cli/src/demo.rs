@@ -19,7 +19,7 @@ use super::speech::Speech;
 use super::summary::print_classes;
 use crate::terminal::{Failure, say};
 pub(super) use arguments::Arguments;
-use arguments::Joined;
+use arguments::GuiConnection;
 use asked::{FIRST_FUNCTION, map_line, running};
 use drawing::{drawing, drawn};
 use folder::Folder;
@@ -34,7 +34,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// After the end of a log, so long for the last packages to be mapped and drawn.
+/// After the end of a log, wait this long until the last packages are mapped and drawn.
 const SETTLE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -42,11 +42,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
         return nodes::run(arguments, count, long);
     }
-    if arguments.gui == Joined::Tcp {
-        return Err("one node alone has its GUI beside it; say --nodes 3".into());
+    if arguments.gui == GuiConnection::Tcp {
+        return Err("with one node there is no other way to join the GUI; use --nodes 3".into());
     }
     if arguments.kill_master {
-        return Err("one node alone has no master to be killed; say --nodes 3".into());
+        return Err("one node alone has no master to kill; use --nodes 3".into());
     }
     let folder = Folder::new()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(if well { code } else { ExitCode::FAILURE })
 }
 
-/// Until the time is over, the log is over, or it is told to stop.
+/// Runs until the time is over, the log is over, or a stop is requested.
 fn watch(arguments: &Arguments, long: Option<Duration>, launch: &mut Launch, speech: &Speech) -> Result<(), Failure> {
     let mut deadline = long.map(|long| Instant::now() + long);
     let mut view = TerminalView::new(arguments.quiet, speech);
@@ -94,13 +94,13 @@ fn progress(launch: &mut Launch) -> Option<Progress> {
     ask(launch, player, PlayerInterface::hash())
 }
 
-/// The first function of a module's own, without arguments.
+/// The first function of a module's own interface that takes no arguments.
 fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interface: u32) -> Option<T> {
     let read = |bytes: &[u8]| rohrpost::wire::from_bytes::<T>(bytes);
     launch.tool().call(module, FIRST_FUNCTION, interface, |_| Ok(()), read).ok()
 }
 
-/// What there is to say at the end: packages, losses and latencies by class, and what came of them; and
+/// The summary: packages, losses and latencies by class, and their result; and
 /// whether all is well.
 fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
     let survey = launch.survey()?;
@@ -114,7 +114,7 @@ fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
         let Progress { scans, odometries, discarded, malformed, .. } = played;
         if played.finished && scans + odometries == 0 {
             well = false;
-            text.push_str("the log holds no record that is known: is it a CARMEN log?\n");
+            text.push_str("the log contains no known record: is it a CARMEN log?\n");
         }
         text.push_str(&format!(
             "log: {scans} scans and {odometries} odometry lines played, {discarded} discarded for their stamps, \

@@ -1,4 +1,4 @@
-//! `rohrpost echo`: the data a module publishes, by the module's own description.
+//! `rohrpost echo`: prints the data that a module publishes, using the module's own description.
 
 use super::target::Target;
 use crate::terminal::{Failure, say};
@@ -9,7 +9,7 @@ use rohrpost_mailbox::{Kind, local};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// A subscription lives so long without renewal, and is renewed three times in it.
+/// Lease of a subscription; it is renewed three times in this time.
 const LEASE: Duration = Duration::from_secs(3);
 const PATIENCE: Duration = Duration::from_secs(1);
 
@@ -21,17 +21,17 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub(super) struct Arguments {
     /// Module, such as laser.0.
     name: String,
-    /// Data; may be left out when the module has one kind only.
+    /// Data; optional if the module publishes only one kind.
     data: Option<String>,
     #[command(flatten)]
     target: Target,
-    /// At most so many a second; 0 for each.
+    /// Highest rate, values a second; 0 for all.
     #[arg(long, default_value_t = 0.0, value_name = "HZ", value_parser = super::units::rate_or_all)]
     rate: f64,
-    /// End after so many values.
+    /// End after this many values.
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
-    /// Fail when no data comes for so long, seconds; 0 waits for ever.
+    /// Fail when no data comes for this time, seconds; 0 waits for ever.
     #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
     timeout: f64,
     /// One JSON object a line.
@@ -57,7 +57,7 @@ fn echo(arguments: &Arguments, module: Name, tool: &mut ToolLink) -> Result<(), 
     let wish =
         Subscribe { number: item.number, id: 1, period_us: rate_us, lease_ms: LEASE.as_millis() as u32, mailbox };
     let result = follow(arguments, module, &description, item, wish, tool);
-    // The module may have ended meanwhile; its lease would end anyway.
+    // The module may have ended; the lease would expire anyway.
     let _ = tool.common::<()>(module, UNSUBSCRIBE, &Unsubscribe { id: wish.id, mailbox });
     result
 }
@@ -83,11 +83,11 @@ fn follow(
     tool: &mut ToolLink,
 ) -> Result<(), Failure> {
     tool.data()?;
-    // What an earlier program under this name asked for still comes for a while.
+    // Data that an earlier program subscribed to under this name may still arrive for a while.
     let incarnation = tool.link.incarnation();
     let patience = super::units::seconds(arguments.timeout)?;
     let (mut renew_at, mut count) = (Instant::now(), 0);
-    let mut heard = Instant::now();
+    let mut last_at = Instant::now();
     let stop = rohrpost::launch::events()?;
     loop {
         if Instant::now() >= renew_at {
@@ -98,7 +98,7 @@ fn follow(
         if let Ok(rohrpost::launch::Event::Stop) = stop.try_recv() {
             return Ok(());
         }
-        if !patience.is_zero() && heard.elapsed() > patience {
+        if !patience.is_zero() && last_at.elapsed() > patience {
             return Err(format!("no data within {patience:?}").into());
         }
         let Some(package) = tool.data()?.receive_timeout(Duration::from_millis(50)) else { continue };
@@ -108,7 +108,7 @@ fn follow(
         if (number, from, id, head.incarnation) != (item.number, module, wish.id, incarnation) {
             continue;
         }
-        heard = Instant::now();
+        last_at = Instant::now();
         let value = decode(&item.field.ty, value)?;
         let line = if arguments.json {
             let stamped = serde_json::json!({

@@ -1,4 +1,4 @@
-//! Declared flows as a table: how late each may be at most, and how late it was. Of `net`, and of the demo's summary.
+//! Declared flows as a table: the allowed latency and the measured latency. Used by `net` and by the demo's summary.
 
 use super::table::table;
 use super::units::fine;
@@ -8,15 +8,20 @@ use rohrpost::interfaces::{FlowState, FlowStates, Links};
 use rohrpost::schema::Description;
 use rohrpost_config::{Contents, Installation};
 
-/// What the columns say that their heads do not.
+/// Explains the columns.
 pub(super) const LEGEND: &str = "\
-at worst: the bound that `check` computes, for slots that are kept; kept: the slowest package since whose publishing none was missed or cut
-short; slowest: of all, as the router that sends measured it, up to the arrival at the other computer; beyond: packages slower than the bound,
-of kept: those among them whose slots were kept; late: slower than the deadline, `within`; lost: in that router's queue; oldest: data of the receiver's class
-when they came to its mailbox, by their stamp. A package between two modules is put to the flow that carries it (`carries`), else, declared
-or not, to one that does not say what it carries";
+at worst: the bound that `check` computes, if all slots are kept; kept: the slowest package with no slot missed or \
+    cut between its publishing
+and its arrival; slowest: of all, measured by the sending router, up to the arrival at the other computer; beyond: \
+    packages slower than the bound,
+of kept: those of them with all slots kept; late: slower than the deadline, `within`; lost: in that router's queue; \
+    oldest: data of the receiver's class
+at their arrival in its mailbox, by their stamp. A package between two modules belongs to the flow that carries it \
+    (`carries`), else, declared
+or not, to a flow without `carries`";
 
-/// A row for each flow that leaves one of these nodes; empty without any. `ask` asks a module for its interface.
+/// A row for each flow that starts at one of these nodes; empty if there is none. `ask` asks a module for its
+/// interface.
 pub(super) fn measured<'a>(
     installation: &Installation,
     nodes: impl IntoIterator<Item = &'a FlowStates>,
@@ -50,7 +55,7 @@ pub(super) fn measured<'a>(
     table(heads, rows)
 }
 
-/// What a flow carries, by the name in the interface where that is known; none if the file does not say.
+/// A flow's content, by its name in the interface if that is known; none if the file does not list it.
 fn carried(
     installation: &Installation,
     flow: &FlowState,
@@ -87,7 +92,7 @@ fn row(installation: &Installation, flow: &FlowState, carried: Option<String>, l
     ]
 }
 
-/// Of the receiver's class, on its node. Commands and replies have no stamp.
+/// Packages of the receiver's class, on its node. Commands and replies have no stamp.
 fn oldest_ns(installation: &Installation, flow: &FlowState, links: &[&Links]) -> Option<u64> {
     let to = installation.classes.parse_module(&flow.to).ok()?;
     let node = installation.node_of(to)?;
@@ -123,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_seen_and_what_is_not_known_is_left_open() {
+    fn unmeasured_and_unknown_figures_are_blank() {
         let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tdma.toml");
         let installation = Installation::load(&demo).unwrap();
         let words = |flow: FlowState| {
@@ -149,10 +154,10 @@ mod tests {
     }
 
     #[test]
-    fn what_a_flow_carries_has_the_name_that_the_interface_gives_it() {
+    fn a_flow_content_has_its_name_from_the_interface() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-nodes.toml");
         let text = std::fs::read_to_string(&file).unwrap();
-        // One whose interface has to be asked for, and one that does not tell it.
+        // One interface must be asked for; the other module does not answer.
         let program = |name: &str| format!("[[module]]\nname = \"{name}\"\nnode = \"base\"\nprogram = \"./laser\"\n");
         let text = text + &program("laser.1") + &program("laser.2");
         let installation = Installation::parse(&text, &file).unwrap();

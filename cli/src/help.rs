@@ -1,8 +1,8 @@
-//! `rohrpost --help`: its subcommands, those of every day first.
+//! `rohrpost --help`: groups the subcommands, the most used ones first.
 
 use clap::Command;
 
-/// Headings and their subcommands, in the order of a newcomer's days.
+/// Headings and their subcommands, in the order in which a newcomer needs them.
 const GROUPS: [(&str, &[&str]); 7] = [
     ("To begin", &["demo", "new", "check", "launch"]),
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn help_shows_what_is_done_first_and_keeps_within_eighty_columns() {
+    fn help_lists_common_commands_first_in_eighty_columns() {
         let help = grouped(Arguments::command()).render_help().to_string();
         let at = |text: &str| help.find(text).unwrap_or_else(|| panic!("{text}: {help}"));
         assert!(

@@ -11,12 +11,12 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost hz odometry.0              all its data, a line each a second; Ctrl-C ends it
+  rohrpost hz odometry.0              all its data, one line a second each; Ctrl-C ends it
   rohrpost hz laser.0 scan --seconds 5
   rohrpost hz laser.0 scan --window 60 --json
-It reads what the module counts in shared memory, on another node by way of that node's launch: nothing is subscribed \
-to, and the module is sent nothing. Rate and standard \
-deviation are exact; minimum and maximum are those of the whole seconds that the window touches.")]
+The tool reads the module's counters in shared memory, on another node through that node's launch: it does not \
+subscribe, and sends nothing to the module. Rate and standard \
+deviation are exact; minimum and maximum are those of the whole seconds that overlap the window.")]
 pub(super) struct Arguments {
     /// Module or alias, such as odometry.0.
     name: String,
@@ -66,8 +66,8 @@ fn in_text(name: &str, wide: usize, figures: Option<FlowFigures>) -> String {
     let (Some(rate_hz), Some(mean_s), Some(std_s)) = (figures.rate_hz, figures.interval_mean_s, figures.interval_std_s)
     else {
         return match figures.packages {
-            0 => format!("{name:wide$}  nothing new in this window; the last came {ago} ago"),
-            _ => format!("{name:wide$}  one value so far; it came {ago} ago"),
+            0 => format!("{name:wide$}  nothing new in this window; the last value was sent {ago} ago"),
+            _ => format!("{name:wide$}  one value so far, {ago} ago"),
         };
     };
     let (min, max) = figures.interval_s.map_or(("-".into(), "-".into()), |(min, max)| (fine(min), fine(max)));

@@ -1,4 +1,4 @@
-//! `rohrpost launch`: the modules of a node, with a live table.
+//! `rohrpost launch`: runs the modules of a node, with a live table.
 
 mod all;
 mod sockets;
@@ -19,7 +19,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The live table is drawn so often.
+/// Redraw period of the live table.
 const REFRESH: Duration = Duration::from_millis(500);
 
 #[derive(clap::Args)]
@@ -34,14 +34,14 @@ pub(super) struct Arguments {
     /// Node to launch, if the configuration has several.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
-    /// Launch all nodes on this computer, each in a network namespace of its own.
+    /// Launch all nodes on this computer, each in its own network namespace.
     #[arg(long, conflicts_with = "node")]
     all: bool,
-    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. To nodes that are reached by TCP alone
-    /// what is lost is a delay, for all that is behind it.
+    /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
+    /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.
     #[arg(long, value_name = "TEXT", requires = "all")]
     impair: Option<impair::Settings>,
-    /// No live table, only what happens.
+    /// No live table, only events.
     #[arg(long)]
     quiet: bool,
 }
@@ -60,7 +60,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
-/// An installation that could run here: mistakes that a router would only find when it starts are told at once. A node without one needs no keys.
+/// Reads an installation that can run here: mistakes that a router would find only at its start are reported at once. A
+/// node without a router needs no keys.
 fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
     let installation = super::check::load(&arguments.file)?;
     let node = arguments.node.as_deref();
@@ -70,10 +71,10 @@ fn load(arguments: &Arguments) -> Result<Arc<Installation>, Failure> {
     Ok(Arc::new(installation))
 }
 
-/// Every node here, until all have ended or it is told to stop.
+/// Runs all nodes on this computer, until they have ended or a stop is requested.
 fn launch_all(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let installation = load(arguments)?;
-    // Before the first thread, of which the speech has two.
+    // Must run before the first thread; the speech has two.
     let lab = all::lab(&installation)?;
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
@@ -103,26 +104,26 @@ fn launch(arguments: &Arguments, speech: &Speech) -> Result<ExitCode, Failure> {
     }
     view.leave();
     manager.stopping();
-    // Also when it can be shown no more: the modules are stopped in order.
+    // Also when the terminal is gone: the modules are stopped in order.
     let code = end(launch, speech);
     shown.map(|()| code)
 }
 
-/// Stops everything; what failed for good or is in error makes the exit code.
+/// Stops everything; a module that failed for good or is in error sets the exit code.
 pub(super) fn end(mut launch: Launch, speech: &Speech) -> ExitCode {
     launch.take_notes().iter().for_each(|note| speech.say(note));
     let failures = launch.failures();
     launch.stop().iter().for_each(|note| speech.say(note));
-    // What failed for good stands below all else, where both streams lead to one place.
+    // Failures come last, where both streams go to the same place.
     speech.settle();
     failures.iter().for_each(|failure| speech.complain(failure));
     if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// What a person at the terminal sees while a node runs.
+/// The output for a person at the terminal while a node runs.
 pub(super) struct TerminalView<'a> {
     speech: &'a Speech,
-    /// Draw the table over and over in one place.
+    /// Redraw the table in place.
     live: bool,
     begun: Instant,
     next: Instant,
@@ -149,12 +150,12 @@ impl<'a> TerminalView<'a> {
         }
     }
 
-    /// How long to watch until the next drawing.
+    /// Time until the next drawing.
     pub(super) fn wait(&self) -> Duration {
         self.next.saturating_duration_since(Instant::now()).max(Duration::from_millis(1))
     }
 
-    /// Shows what is new, if it is time.
+    /// Shows the news, if it is time.
     pub(super) fn show(&mut self, launch: &mut Launch) -> Result<(), Failure> {
         let notes = launch.take_notes();
         if !self.live {
@@ -179,15 +180,15 @@ impl<'a> TerminalView<'a> {
         let excess = self.notes.len().saturating_sub(NOTES_MAX);
         self.notes.drain(..excess);
         let head = format!("{installation}, {} s. Ctrl-C stops it.", self.begun.elapsed().as_secs());
-        // Home, then each line cleared to its end, then all below: no flicker. Lines that are too long are cut off, not
-        // wrapped: else the table would be no table.
+        // Home, then clear each line to its end, then everything below: no flicker. Long lines are cut, not wrapped, so
+        // that the table keeps its shape.
         let text = format!("{head}\n\n{}\n{}\n", print_modules_live(lines), self.notes.join("\n"));
         let text = Lines(text).to_string().replace('\n', "\x1b[K\n");
         let first = if self.last.is_none() { "\x1b[2J" } else { "" };
         self.speech.draw(format!("{first}\x1b[H\x1b[?7l{text}\x1b[?7h\x1b[J"));
     }
 
-    /// Leaves the last table where it stands.
+    /// Leaves the last table on the screen.
     pub(super) fn leave(&mut self) {
         if self.live {
             self.speech.say("");

@@ -15,9 +15,8 @@ use serde::Serialize;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
-#[command(
-    after_help = "Example: rohrpost list --mailboxes\nOf several nodes all are listed; --node lists one. Reading the counters disturbs nobody."
-)]
+#[command(after_help = "Example: rohrpost list --mailboxes\nLists all nodes; --node lists one. Reading the counters \
+        disturbs nobody.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
@@ -45,16 +44,16 @@ pub(super) struct MailboxLine {
     pub(super) received: u64,
     #[serde(flatten)]
     pub(super) losses: Losses,
-    /// The same in words.
+    /// Its state in words.
     #[serde(skip)]
     pub(super) lost_text: String,
 }
 
-/// A node, and whether it shows itself.
+/// A node, and whether it answers.
 #[derive(Serialize)]
 struct NodeLine {
     node: String,
-    /// Why not, if it does not.
+    /// Why not, if it does not answer.
     silent: Option<String>,
     /// For how long, as far as it is known.
     silent_s: Option<f64>,
@@ -69,27 +68,27 @@ fn node_line(node: &str, silent: &[Silence]) -> NodeLine {
     }
 }
 
-/// What is registered at the TCP router, and in no configuration here.
+/// A name that is registered at the TCP router and in no configuration here.
 #[derive(Serialize)]
 struct BeyondLine {
     module: String,
     system: u8,
-    /// Who hosts it.
+    /// The client that hosts it.
     by: String,
 }
 
 #[derive(Serialize)]
 struct Listing<'a> {
     installation: &'a str,
-    /// The node that the tool looked from.
+    /// The node that the tool runs on.
     node: &'a str,
     nodes: Vec<NodeLine>,
     modules: Vec<ModuleLine>,
     mailboxes: Vec<MailboxLine>,
     beyond: Vec<BeyondLine>,
-    /// Ranges of names there that the TCP router does not tell.
+    /// Ranges of names that the TCP router did not list, for lack of room.
     beyond_more: u64,
-    /// Why that is not known, if it is not; none without a TCP router, too.
+    /// Why the names are not known; none also without a TCP router.
     beyond_silent: Option<String>,
 }
 
@@ -131,7 +130,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     if listing.beyond_more > 0 {
         say(format_args!(
-            "(the TCP router knows {} further ranges of names, of this system or others, and does not tell them)",
+            "(the TCP router knows {} more ranges of names, of this system or others, than fit into its report)",
             listing.beyond_more
         ));
     }
@@ -148,7 +147,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Modules that the TCP router knows and the configuration does not. Tools come and go.
+/// Modules that the TCP router knows and the configuration does not. Tools are left out: they come and go.
 fn beyond(running: &Running, hosts: &BeyondHosts) -> Vec<BeyondLine> {
     let installation = &running.installation;
     let first = |host: &BeyondHost| Name::from_raw(host.first);

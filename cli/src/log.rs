@@ -1,4 +1,4 @@
-//! `rohrpost log`: what modules say, and how much of it.
+//! `rohrpost log`: shows the output of modules, and sets its level.
 
 mod arguments;
 mod filter;
@@ -19,7 +19,7 @@ use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// New lines are asked for so often.
+/// Polling period for new lines.
 const POLL: Duration = Duration::from_millis(200);
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     result.map(|()| code)
 }
 
-/// What is shown, and how.
+/// The selected lines and their format.
 struct Show<'a> {
     filter: Filter,
     format: Format<'a>,
@@ -67,7 +67,7 @@ struct Show<'a> {
 impl Show<'_> {
     fn all(&self, reader: &mut Reader<'_>, tool: &mut rohrpost::ToolLink) -> Result<(), Failure> {
         let stop = rohrpost::launch::events()?;
-        // With --last, what was said before is shown when all of it has been seen.
+        // With --last, earlier lines are shown after all of them have been read.
         let mut last = VecDeque::new();
         let keep = |line: OutputLine| {
             last.push_back(line);
@@ -90,7 +90,7 @@ impl Show<'_> {
         Ok(())
     }
 
-    /// All pages that are there; false when nobody reads any more.
+    /// Reads all available pages; false when nobody reads any more.
     fn pages(
         &self,
         reader: &mut Reader<'_>,
@@ -116,7 +116,7 @@ impl Show<'_> {
         say(if self.arguments.json { self.format.json(line) } else { self.format.short(line) })
     }
 
-    /// A word of ours between the lines; programs read lines alone.
+    /// A notice of the tool between the lines; programs get only lines.
     fn note(&self, note: &str) -> bool {
         if self.arguments.json {
             complain(format_args!("… {note}"));

@@ -1,5 +1,5 @@
-//! How tools look at nodes and at their modules: at their own node in its shared memory, at others by way of their launches. Nothing waits
-//! longer than [`PATIENCE`]; a node that does not answer is silent, and that is told.
+//! How tools observe nodes and their modules: their own node in its shared memory, others through their launches. No
+//! call waits longer than [`PATIENCE`]; a node that does not answer is silent, and the tool reports that.
 
 use crate::observer::{PATIENCE, Silence, silence};
 use crate::target::Running;
@@ -17,7 +17,8 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost_mailbox::{InspectError, Name};
 
 impl Running {
-    /// Looks at these nodes: at all of them at the same time. In their order: what each shows, or why it does not.
+    /// Observes these nodes, all at the same time. Returns, in their order, what each reports, or why it does not
+    /// answer.
     pub(super) fn look_at(&self, nodes: &[&str], scope: Scope) -> Result<Vec<Result<Survey, Silence>>, Failure> {
         let others: Vec<&str> = nodes.iter().copied().filter(|node| *node != self.node_name).collect();
         let launchers: Vec<Name> = others.iter().filter_map(|node| launcher_of(&self.installation, node)).collect();
@@ -43,7 +44,7 @@ impl Running {
         nodes.iter().map(look).collect()
     }
 
-    /// Looks at one node.
+    /// Observes one node.
     pub(super) fn look(&self, node: &str, scope: Scope) -> Result<Survey, Failure> {
         match self.look_at(&[node], scope)?.pop() {
             Some(seen) => seen.map_err(|silence| silence.text().into()),
@@ -51,7 +52,7 @@ impl Running {
         }
     }
 
-    /// Looks at all nodes that are meant, and makes one survey of them; of those that are silent, the modules that they should have.
+    /// Observes all selected nodes, and merges them into one survey; for a silent node it lists the configured modules.
     pub(super) fn survey(&self, scope: Scope) -> Result<(Survey, Vec<Silence>), Failure> {
         let mut silent = Vec::new();
         let mut surveys = Vec::new();
@@ -79,7 +80,7 @@ impl Running {
         }
     }
 
-    /// What the own node's router says of its links; none without a router that answers.
+    /// The own router's report of its links; none without a router that answers.
     fn links(&self) -> Option<Links> {
         let router = self.installation.router_of(&self.node_name)?;
         self.newest(router, RouterInterface::LINKS).ok()
@@ -93,24 +94,24 @@ impl Running {
         told.map(|(_, value)| value).map_err(|error| self.told(module, &error))
     }
 
-    /// What is registered at the TCP router, or why it is not known; none without `[tcp]`.
+    /// The names registered at the TCP router, or why they are not known; none without `[tcp]`.
     pub(super) fn hosts_beyond(&self) -> Option<Result<BeyondHosts, Failure>> {
         if let Some(own) = self.installation.tcp_router() {
             return Some(self.newest(own, TcpInterface::HOSTS));
         }
         let elsewhere = self.installation.tcp_router_elsewhere()?;
-        // Of a package to all systems nobody says that it did not arrive, and only the time would tell.
+        // A package to all systems gets no error when it is not delivered; only a timeout would show it.
         let told = self.takes_part().and_then(|()| self.newest(elsewhere, TcpInterface::HOSTS));
         Some(told.map_err(|error| format!("{error}; `rohrpost list` in the system that runs it shows them").into()))
     }
 
-    /// Whether the TCP router says that somebody hosts this name.
+    /// Whether the TCP router says that a client hosts this name.
     pub(super) fn is_hosted_beyond(&self, module: Name) -> bool {
         let Some(Ok(hosts)) = self.hosts_beyond() else { return false };
         hosts.hosts.iter().any(|host| (host.first..=host.last).contains(&module.raw()))
     }
 
-    /// Whether this node takes part at the TCP router, or why not.
+    /// Whether this node is connected to the TCP router, or why not.
     fn takes_part(&self) -> Result<(), Failure> {
         let Some(client) = self.installation.tcp_client_of(&self.node_name) else { return Ok(()) };
         let link = self.newest(client, TcpInterface::LINK)?;
@@ -121,7 +122,7 @@ impl Running {
         }
     }
 
-    /// The modules of all nodes that are meant, but for those that need not run; with why, those that cannot be asked.
+    /// The modules of all selected nodes, except optional ones; and those that cannot be asked, with the reason.
     pub(super) fn modules_to_ask(&self) -> Result<Vec<(Name, Option<Silence>)>, Failure> {
         let (survey, silent) = self.survey(Scope::Modules)?;
         let all = survey.modules.iter().filter(|module| !module.is_left_out(&self.installation));
@@ -129,7 +130,7 @@ impl Running {
         Ok(all.map(|module| (module.name, why(&module.node))).collect())
     }
 
-    /// Looks at a mailbox, on whichever node it is; none when that has none of this name.
+    /// Observes a mailbox on any node; none if that node has no mailbox of this name.
     pub(super) fn inspect(&self, name: Name) -> Result<Option<MailboxSnapshot>, Failure> {
         let node = self.node_of(name);
         if node == self.node_name {
@@ -149,7 +150,7 @@ impl Running {
         }
     }
 
-    /// What a module offers: as it noted beside its mailboxes, so that it is not asked; on another node it has to be.
+    /// A module's interface: read from its description beside its mailboxes; on another node the module is asked.
     pub(super) fn describe(&self, module: Name) -> Result<Description, Failure> {
         if self.is_own(module) {
             return noted(&self.node, module).ok_or_else(|| self.absent(module));
@@ -158,8 +159,8 @@ impl Running {
         described.map_err(|error| self.told(module, &error))
     }
 
-    /// The module or alias that a user names, or a program run by hand: one of the configuration, with mailboxes here, of another system,
-    /// or of this one and registered at the TCP router.
+    /// The module, alias or manually started program that a user names: one of the configuration, with mailboxes here,
+    /// of another system, or of this one and registered at the TCP router.
     pub(super) fn module(&self, text: &str) -> Result<Name, Failure> {
         let module = self.installation.classes.parse_name(text)?.module();
         let is_other = self.is_beyond(module) && module.system() != self.installation.system.id;
@@ -170,7 +171,7 @@ impl Running {
         Err(format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into())
     }
 
-    /// Asks from the tool's place on its own node.
+    /// Runs a query from the tool's place on its own node.
     fn ask<T>(&self, ask: impl FnOnce(&mut ToolLink) -> T) -> Result<T, Failure> {
         self.observer.with(|| self.join(PATIENCE), ask)
     }

@@ -1,4 +1,4 @@
-//! `rohrpost mailbox`: one mailbox from outside, down to its slots. Looking changes nothing and asks nobody.
+//! `rohrpost mailbox`: one mailbox from outside, down to its slots. It is read-only and sends nothing.
 
 use super::summary::{Losses, class_name, losses, print_classes};
 use super::table::{table, time};
@@ -20,12 +20,12 @@ const BAR: f64 = 40.0;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost mailbox laser.0           where the commands of laser.0 wait
+  rohrpost mailbox laser.0           the mailbox for commands to laser.0
   rohrpost mailbox laser.0.2         another of its mailboxes, by its local id
   watch -n1 rohrpost mailbox laser.0
-`rohrpost list --mailboxes` lists all. Looking disturbs nobody.")]
+`rohrpost list --mailboxes` lists all. Reading them disturbs nobody.")]
 pub(super) struct Arguments {
-    /// Mailbox to look at, such as laser.0 or laser.0.2.
+    /// Mailbox to show, such as laser.0 or laser.0.2.
     name: String,
     #[command(flatten)]
     target: Target,
@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// All that can be seen, as programs read it.
+/// Everything that is visible, as programs read it.
 #[derive(Serialize)]
 struct MailboxView {
     mailbox: String,
@@ -43,12 +43,12 @@ struct MailboxView {
     node: String,
     slots: u16,
     body_bytes_max: u16,
-    /// Shared memory that it takes.
+    /// Size of its shared memory.
     memory_bytes: usize,
     full: &'static str,
     max_age_s: Option<f64>,
     claims: u8,
-    /// Who receives, or did last.
+    /// The present receiver, or the last one.
     receiver: Option<PartyLine>,
     retired: bool,
     adoptions: u32,
@@ -69,11 +69,11 @@ struct PartyLine {
     pid: Option<u32>,
     participant: u16,
     alive: bool,
-    /// It stands: by SIGSTOP, Ctrl-Z or a debugger.
+    /// Its process is stopped: by SIGSTOP, Ctrl-Z or a debugger.
     stopped: bool,
 }
 
-/// What one class did.
+/// Counters of one class.
 #[derive(Serialize)]
 struct ClassLine {
     class: String,
@@ -89,7 +89,7 @@ struct ClassLine {
     waited: Vec<Bar>,
 }
 
-/// Packages that waited for so long.
+/// A bucket of waiting times.
 #[derive(Serialize)]
 struct Bar {
     from_s: f64,
@@ -101,17 +101,17 @@ struct Bar {
 struct SlotLine {
     slot: usize,
     state: &'static str,
-    /// Of a package that waits or is in hand.
+    /// For a package that waits or is being read.
     class: Option<String>,
     priority: Option<u8>,
     ticket: Option<u64>,
     redelivered: bool,
-    /// Who fills it.
+    /// The sender that fills it.
     by: Option<PartyLine>,
     victim: Option<VictimLine>,
 }
 
-/// What gave way to the package that is being written.
+/// The packages that were removed for the package that is being written.
 #[derive(Serialize)]
 struct VictimLine {
     class: String,
@@ -128,7 +128,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// There is no such mailbox: what there is instead.
+/// The error if there is no such mailbox, with the existing ones.
 fn missing(running: &Running, name: Name, text: &str) -> Failure {
     let node = running.node_of(name);
     let all: Vec<Name> = match running.look(node, Scope::Mailboxes) {
@@ -226,7 +226,7 @@ impl ClassLine {
     }
 }
 
-/// One for each octave, from the first in which a package was to the last.
+/// One bucket for each octave, from the first to the last that is not empty.
 fn bars(latency: &Latency) -> Vec<Bar> {
     let bar = |octave: usize| Bar {
         from_s: Latency::bucket_start(octave * 2).as_secs_f64(),
@@ -269,7 +269,7 @@ impl SlotLine {
         }
     }
 
-    /// Whether the next slot is free as this one, or has the package that was sent after this one's.
+    /// Whether the next slot is free like this one, or holds the package that was sent next.
     fn goes_on_in(&self, next: &Self) -> bool {
         let same = (self.state, &self.class, self.redelivered) == (next.state, &next.class, next.redelivered);
         let is_next = self.ticket.map(|ticket| ticket + 1) == next.ticket;
@@ -282,7 +282,7 @@ impl SlotLine {
             let how = if victim.replaced { "replaces" } else { "displaced" };
             format!("{how} a package of {} ({})", victim.class, victim.priority)
         });
-        let redelivered = self.redelivered.then(|| "an earlier receiver died with it in hand".to_owned());
+        let redelivered = self.redelivered.then(|| "an earlier receiver died while reading it".to_owned());
         [by, victim, redelivered].into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 }
@@ -290,9 +290,9 @@ impl SlotLine {
 fn print(installation: &Installation, detail: &MailboxDetail, seen: &MailboxView) -> String {
     let shape = &detail.info.shape;
     let when_full = match shape.full {
-        OverflowPolicy::Displace => "displace: the least important gives way to what is more important",
-        OverflowPolicy::Latest => "latest: what is of the same state gives way to the newer",
-        OverflowPolicy::Reject => "reject: what comes then is refused",
+        OverflowPolicy::Displace => "displace: a more important package replaces the least important one",
+        OverflowPolicy::Latest => "latest: a newer package replaces an older one of the same state",
+        OverflowPolicy::Reject => "reject: further packages are refused",
     };
     let receiver = match &seen.receiver {
         None => "nobody yet".into(),
@@ -313,7 +313,7 @@ fn print(installation: &Installation, detail: &MailboxDetail, seen: &MailboxView
         ("adoptions", seen.adoptions.to_string()),
     ];
     if seen.retired {
-        facts.push(("retired", "nobody sends here any more; the next receiver makes it anew".into()));
+        facts.push(("retired", "nobody sends here any more; the next receiver creates it again".into()));
     }
     let facts: String = facts.iter().map(|(what, text)| format!("  {what:10}  {text}\n")).collect();
     let mut text =
@@ -339,7 +339,7 @@ fn print_bars(class: &ClassLine) -> String {
     table([">from", ">to", ">packages", &head], rows)
 }
 
-/// Slots, one a line; those that go on as the one before are on its line.
+/// Slots, one a line; a run of similar slots shares a line.
 fn print_slots(slots: &[SlotLine]) -> String {
     let range = |first: String, last: String| if first == last { first } else { format!("{first}-{last}") };
     let runs = slots.chunk_by(SlotLine::goes_on_in);

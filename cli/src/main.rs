@@ -5,7 +5,7 @@
 //! `doctor` show.
 
 #![forbid(unsafe_code)]
-// What is printed goes through `say` and `complain`, and so nothing in it that a terminal would obey.
+// All output goes through `say` and `complain`, which escape what a terminal would obey.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
@@ -61,9 +61,10 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::complain;
 
-/// Prioritised mailboxes for robots: configure, launch, look, call.
+/// Prioritised mailboxes for robots: configure, launch, inspect, call.
 #[derive(Parser)]
-#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
+#[command(name = "rohrpost", version = version::text(), after_help = "Try `rohrpost demo`, then in another terminal \
+    `rohrpost top`.\nEach command explains itself: `rohrpost log --help`.")]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -71,9 +72,9 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Explain what a configuration will run, or what is wrong with it.
+    /// Explain what a configuration will run, or its mistakes.
     Check(check::Arguments),
-    /// Start the modules of a node and watch over them.
+    /// Start the modules of a node and supervise them.
     Launch(launch::Arguments),
     /// Run a simulated robot that drives and maps, or play a robot's log.
     Demo(demo::Arguments),
@@ -103,7 +104,7 @@ enum Command {
     Bw(bw::Arguments),
     /// Measure how long packages wait; disturbs nobody.
     Delay(delay::Arguments),
-    /// Show or draw who sends what to whom; disturbs nobody.
+    /// Show or draw which module sends what to which; disturbs nobody.
     Graph(graph::Arguments),
     /// Measure how long a module takes to answer.
     Ping(ping::Arguments),
@@ -117,7 +118,7 @@ enum Command {
     Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
     Clean(clean::Arguments),
-    /// SnapshotRequest whether this computer lets a robot run in time.
+    /// Check whether this computer lets a robot run in time.
     Doctor(doctor::Arguments),
     /// Measure how this computer hands packages over.
     Bench(bench::Arguments),

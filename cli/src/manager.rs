@@ -1,7 +1,7 @@
-//! What launch tells the service manager that started it (systemd). Started by hand, it tells nobody.
+//! What launch reports to the service manager that started it (systemd). Without a manager, it reports nothing.
 //!
-//! The protocol is sd_notify(3): lines in a datagram. The crate for it waits when the manager does not read, and knows no
-//! abstract socket; launch must never wait, and containers have such sockets.
+//! The protocol is sd_notify(3): lines in a datagram. The existing crate blocks when the manager does not read, and
+//! knows no abstract sockets; launch must never block, and containers use such sockets.
 
 use rohrpost::launch::Launch;
 use rohrpost::launcher::Phase;
@@ -13,22 +13,22 @@ use std::os::unix::ffi::OsStrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::time::{Duration, Instant};
 
-/// Words that wait for a manager that does not read; the oldest go first.
+/// Messages that wait for a manager that does not read; the oldest are dropped first.
 const WAITING_MAX: usize = 8;
 
-/// One who waits for word from launch.
+/// A service manager that expects messages from launch.
 pub(super) struct Manager {
     socket: Option<(UnixDatagram, SocketAddr)>,
     waiting: VecDeque<String>,
-    /// It wants to hear from us twice in this time.
+    /// Its watchdog expects two messages in this time.
     watchdog: Option<Duration>,
     ping_at: Instant,
     status: String,
 }
 
 impl Manager {
-    /// The one that the environment names, if there is one. One that cannot be told anything is no reason not to launch a
-    /// robot: then there is none, and `warn` hears why.
+    /// The manager that the environment names, if any. An unusable one does not keep a robot from starting:
+    /// the result is none, and `warn` gets the reason.
     pub(super) fn from_environment(warn: impl FnOnce(&str)) -> Self {
         let socket = std::env::var_os("NOTIFY_SOCKET").and_then(|name| match connect(&name) {
             Ok(socket) => Some(socket),
@@ -45,7 +45,7 @@ impl Manager {
 
     /// The modules are being started.
     pub(super) fn starting(&mut self, node: &str) {
-        self.say(format!("STATUS=starts the modules of node {node}"));
+        self.say(format!("STATUS=starting the modules of node {node}"));
     }
 
     /// All modules are on.
@@ -54,7 +54,7 @@ impl Manager {
         self.say(format!("READY=1\nSTATUS={}", self.status));
     }
 
-    /// Launch has gone round once: its loop lives. Says so when it is time, and what has changed.
+    /// Launch has completed a round of its loop. Sends the watchdog's message when it is due, and changes.
     pub(super) fn alive(&mut self, launch: &Launch) {
         if self.socket.is_none() {
             return;
@@ -73,7 +73,7 @@ impl Manager {
         self.send();
     }
 
-    /// How long launch may sleep until it has to go round again.
+    /// How long launch may sleep before the next round.
     pub(super) fn wait(&self) -> Duration {
         match (&self.socket, self.watchdog) {
             (Some(_), Some(_)) => self.ping_at.saturating_duration_since(Instant::now()),
@@ -81,9 +81,9 @@ impl Manager {
         }
     }
 
-    /// All modules are being stopped. The watchdog is off from here on: their time is bounded by `TimeoutStopSec`.
+    /// All modules are being stopped. The watchdog is off from here on: `TimeoutStopSec` bounds their time.
     pub(super) fn stopping(&mut self) {
-        self.say("STOPPING=1\nSTATUS=stops the modules, the last first\nWATCHDOG_USEC=0".into());
+        self.say("STOPPING=1\nSTATUS=stopping the modules, the last first\nWATCHDOG_USEC=0".into());
     }
 
     fn say(&mut self, words: String) {
@@ -99,7 +99,7 @@ impl Manager {
         while let Some(words) = self.waiting.front() {
             match socket.send_to_addr(words.as_bytes(), address) {
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
-                // A manager that went away hears nothing; that is no reason to stop a robot.
+                // A manager that is gone gets no message; that does not stop a robot.
                 Ok(_) | Err(_) => self.waiting.pop_front(),
             };
         }
@@ -112,7 +112,7 @@ fn connect(name: &OsStr) -> io::Result<(UnixDatagram, SocketAddr)> {
     Ok((socket, address))
 }
 
-/// A path, or a name behind an `@`.
+/// A path, or an abstract name after an `@`.
 fn address(name: &OsStr) -> io::Result<SocketAddr> {
     match name.as_bytes() {
         [b'@', name @ ..] => SocketAddr::from_abstract_name(name),

@@ -1,4 +1,4 @@
-//! A tool's observer of other nodes: its place among those that call, and why a node cannot be seen.
+//! A tool's observer of other nodes: its place among the callers, and why a node does not answer.
 
 use super::units::short;
 use crate::terminal::Failure;
@@ -12,15 +12,15 @@ use serde::Serialize;
 use std::cell::RefCell;
 use std::time::Duration;
 
-/// Another node shows itself, or a module describes itself, within this time, or is silent.
+/// Timeout for another node's report or a module's description.
 pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 
-/// A tool's place among those that call, taken when it first looks beyond its own node; given back with this.
+/// A tool's place among the callers. It is taken when the tool first asks another node, and released on drop.
 #[derive(Default)]
 pub(super) struct Observer(RefCell<Option<ToolLink>>);
 
 impl Observer {
-    /// Asks from this place, which `join` takes if it is not taken yet.
+    /// Asks from this place; `join` takes it if necessary.
     pub(super) fn with<T>(
         &self,
         join: impl FnOnce() -> Result<ToolLink, Failure>,
@@ -43,7 +43,7 @@ impl Drop for Observer {
     }
 }
 
-/// A node that does not show itself.
+/// A node that does not answer.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Silence {
     pub(super) node: String,
@@ -58,7 +58,7 @@ impl Silence {
         Self { node: node.into(), why: why.into(), silent_s: None }
     }
 
-    /// Silent, and since when: a moment of today, or of the day that it was.
+    /// Silent, and since when: a time of today, or a date.
     pub(super) fn since(&self) -> String {
         self.silent_s.map_or("silent".into(), |silent_s| {
             let now_ns = realtime_ns();
@@ -72,16 +72,18 @@ impl Silence {
     }
 }
 
-/// Why a node does not show itself, without the number of its launch.
+/// Why a node does not answer, without the number of its launch.
 pub(super) fn silence(installation: &Installation, node: &str, failure: &LookFailure) -> Silence {
     let launch = launcher_of(installation, node).map(|name| name.to_string()).unwrap_or_default();
     let why = match failure {
-        // A router has found out.
+        // A router found it out.
         LookFailure::Call(CallError::Fault(_, Fault::NodeSilent { .. })) => {
-            "nothing comes from it; is it on, does its router run, and is it reached at its address? (`rohrpost net`)"
+            "no datagrams come from it; is it on, does its router run, and is its address reachable? (`rohrpost net`)"
                 .into()
         }
-        LookFailure::Call(CallError::Fault(_, Fault::NoMailbox)) => "it has no launch; is it launched?".into(),
+        LookFailure::Call(CallError::Fault(_, Fault::NoMailbox)) => {
+            "no launch runs there; is the node launched?".into()
+        }
         LookFailure::Call(CallError::Fault(_, fault)) => fault.to_string(),
         LookFailure::Call(CallError::NotSent(SendError::NoMailbox(_) | SendError::NoRouter { .. })) => {
             "the router of this node does not run (`rohrpost list`)".into()

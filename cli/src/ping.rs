@@ -10,7 +10,7 @@ use rohrpost::common::TimeReport;
 use rohrpost::survey::Scope;
 use rohrpost::{CallError, Fault, Name};
 use rohrpost_mailbox::{Latency, ModuleState};
-use round_trip::{Moments, RoundTrip, WaySum};
+use round_trip::{DirectionSum, Moments, RoundTrip};
 use serde_json::json;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -19,25 +19,26 @@ use std::time::{Duration, Instant};
 #[command(after_help = "Examples:
   rohrpost ping motor.0               once a second; Ctrl-C ends it
   rohrpost ping motor.0 -c 100 --interval 0.01
-It asks for system time. The time is that of the whole round: a module answers between its own work, and so what it does just \
-then is in it, as is being waited for behind more important classes. The ways there and back are by system time, with how far \
-off they may be; between nodes that do not have the master's time, or where that is too unsure, it says so instead. p50 and p99 \
-come from a histogram and are right to a quarter or so; the others are exact. The exit code is 1 if nothing was answered.")]
+Each call asks for system time. The measured time is the whole round trip: a module answers between its own work, so \
+    the time includes its current work, and the wait behind more important classes. The one-way times use system \
+    time, and are shown with their error bounds; if the nodes do not follow the master's clock, or the bounds are too \
+    large, the output says so instead. p50 and p99 come from a histogram and are accurate to about 25 %; the others \
+    are exact. Exit code 1: no call was answered.")]
 pub(super) struct Arguments {
     /// Module or alias, such as motor.0.
     name: String,
     #[command(flatten)]
     target: Target,
-    /// End after so many calls; without it, at Ctrl-C.
+    /// End after this many calls; without it, at Ctrl-C.
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
-    /// From one to the next.
+    /// Time from one call to the next.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     interval: f64,
-    /// Wait so long for each answer.
+    /// Timeout for each answer.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     timeout: f64,
-    /// One JSON object a line: each answer, then all.
+    /// One JSON object a line: each answer, then the totals.
     #[arg(long)]
     json: bool,
 }
@@ -50,7 +51,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut tool = running.join(timeout)?;
     let mut rounds = PingRounds::default();
     loop {
-        // The round encloses the ways: whoever holds this process up in between makes neither longer than the round.
+        // The round trip encloses both one-way times: a delay of this process in between makes neither longer than the
+        // round trip.
         let (began, before) = (Instant::now(), TimeReport::of(&tool.clock));
         let answer = tool.time(module);
         let (after, took) = (TimeReport::of(&tool.clock), began.elapsed());
@@ -59,14 +61,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             Ok(there) => {
                 let pace = tool.clock.record().map_or(1.0, |record| record.pace_ppb as f64 / 1e9);
                 let moments = Moments { before: &before, there: &there, after: &after };
-                let ways = RoundTrip::new(&moments, running.is_own(module), pace);
-                rounds.answered(took, ways.as_ref().ok());
-                tell_answer(arguments, rounds.sent, took, &ways)
+                let one_way = RoundTrip::new(&moments, running.is_own(module), pace);
+                rounds.answered(took, one_way.as_ref().ok());
+                tell_answer(arguments, rounds.sent, took, &one_way)
             }
             // It has answered, if only that it does not know this function.
             Err(CallError::Fault(_, Fault::Unknown(_))) => {
                 rounds.answered(took, None);
-                let why = "the module was built with a Rohrpost that tells no time; build it anew".into();
+                let why = "the module was built with a Rohrpost that returns no time; rebuild it".into();
                 tell_answer(arguments, rounds.sent, took, &Err(why))
             }
             Err(error) => tell_loss(arguments, &running, module, rounds.sent, &error),
@@ -86,20 +88,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn tell_answer(arguments: &Arguments, number: u64, took: Duration, ways: &Result<RoundTrip, String>) -> bool {
+fn tell_answer(arguments: &Arguments, number: u64, took: Duration, one_way: &Result<RoundTrip, String>) -> bool {
     let name = &arguments.name;
     if arguments.json {
-        let (ways, why) = (ways.as_ref().ok(), ways.as_ref().err());
+        let (one_way, why) = (one_way.as_ref().ok(), one_way.as_ref().err());
         return say(json!({
-            "module": name, "number": number, "round_trip_s": took.as_secs_f64(), "there_s": ways.map(|ways| ways.there_s),
-            "back_s": ways.map(|ways| ways.back_s), "ways_error_s": ways.map(|ways| ways.error_s), "ways_unknown": why,
+            "module": name, "number": number, "round_trip_s": took.as_secs_f64(),
+            "there_s": one_way.map(|one_way| one_way.there_s),
+            "back_s": one_way.map(|one_way| one_way.back_s),
+            "ways_error_s": one_way.map(|one_way| one_way.error_s), "ways_unknown": why,
         }));
     }
-    let ways = match ways {
-        Ok(ways) => ways.text(),
-        Err(why) => format!("ways unknown: {why}"),
+    let one_way = match one_way {
+        Ok(one_way) => one_way.text(),
+        Err(why) => format!("one-way times unknown: {why}"),
     };
-    say(format_args!("{name}: answer {number} after {} ({ways})", time(took)))
+    say(format_args!("{name}: answer {number} after {} ({one_way})", time(took)))
 }
 
 fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64, error: &CallError) -> bool {
@@ -113,15 +117,16 @@ fn tell_loss(arguments: &Arguments, running: &Running, module: Name, number: u64
     say(format_args!("{}: none {number}: {why}", arguments.name))
 }
 
-/// What shared memory tells of a module that does not answer, and what to do.
+/// What shared memory shows of a module that does not answer, and what to do.
 fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
     let name = running.text(module);
     let survey = running.look(running.node_of(module), Scope::Module(module.raw()))?;
     let found = survey.module(module);
     Ok(match found.and_then(|found| found.process.as_ref().map(|process| (found, process))) {
         Some((found, process)) => format!(
-            "{name} answered nothing: its process {} is there, its state is {}, and {} packages wait for it; it hangs, was \
-             stopped (kill -CONT {0} goes on), or works longer than that: see `rohrpost log --module {name}`",
+            "{name} answered nothing: its process {} is there, its state is {}, and {} packages wait for it; it \
+             hangs, was stopped (kill -CONT {0} goes on), or works longer than that: see `rohrpost log --module \
+             {name}`",
             process.pid,
             process.state.map_or("unknown", ModuleState::name),
             found.depth
@@ -130,23 +135,23 @@ fn why_silent(running: &Running, module: Name) -> Result<String, Failure> {
     })
 }
 
-/// All rounds so far, in as much memory for a million as for one.
+/// Statistics of all rounds, in constant memory.
 #[derive(Default)]
 struct PingRounds {
     sent: u64,
     answered: u64,
     min: Option<Duration>,
     took: Latency,
-    there: WaySum,
-    back: WaySum,
+    there: DirectionSum,
+    back: DirectionSum,
 }
 
 impl PingRounds {
-    fn answered(&mut self, took: Duration, ways: Option<&RoundTrip>) {
+    fn answered(&mut self, took: Duration, one_way: Option<&RoundTrip>) {
         self.answered += 1;
-        if let Some(ways) = ways {
-            self.there.add(ways.there_s, ways.error_s);
-            self.back.add(ways.back_s, ways.error_s);
+        if let Some(one_way) = one_way {
+            self.there.add(one_way.there_s, one_way.error_s);
+            self.back.add(one_way.back_s, one_way.error_s);
         }
         self.min = Some(self.min.map_or(took, |min| min.min(took)));
         self.took.count_one(took);
@@ -156,10 +161,10 @@ impl PingRounds {
         self.sent - self.answered
     }
 
-    /// Min, mean, p50, p99, max; none when nothing was answered.
+    /// Min, mean, p50, p99, max; none without an answer.
     fn times(&self) -> Option<[Duration; 5]> {
         let (min, mean) = (self.min?, self.took.sum.div_f64(self.answered as f64));
-        // A bucket may begin before the shortest time in it.
+        // A bucket may begin below the shortest time in it.
         let at = |share| self.took.quantile(share).map_or(min, |found| found.max(min));
         Some([min, mean, at(0.5), at(0.99), self.took.max])
     }
@@ -168,9 +173,9 @@ impl PingRounds {
         let count = format!("\n{name}: {} sent, {} answered, {} lost", self.sent, self.answered, self.lost());
         let Some(times) = self.times() else { return count };
         let [min, mean, p50, p99, max] = times.map(time);
-        let ways = [("there", &self.there), ("back", &self.back)];
-        let ways = ways.map(|(name, way)| way.text().map_or(String::new(), |text| format!("\n{name:5} {text}")));
-        format!("{count}\nround min {min}  mean {mean}  p50 {p50}  p99 {p99}  max {max}{}", ways.concat())
+        let one_way = [("there", &self.there), ("back", &self.back)];
+        let one_way = one_way.map(|(name, way)| way.text().map_or(String::new(), |text| format!("\n{name:5} {text}")));
+        format!("{count}\nround min {min}  mean {mean}  p50 {p50}  p99 {p99}  max {max}{}", one_way.concat())
     }
 
     fn json(&self, module: &str) -> String {
@@ -192,7 +197,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rounds_are_told_exactly_but_for_the_quantiles() {
+    fn statistics_of_rounds_are_exact_except_quantiles() {
         let ms = Duration::from_millis;
         let mut rounds = PingRounds { sent: 101, ..PingRounds::default() };
         assert!(rounds.times().is_none());

@@ -1,4 +1,4 @@
-//! What a module publishes, by its own counters, on a node that may be launched again meanwhile.
+//! What a module publishes, by its own counters; its node may be launched again meanwhile.
 
 use super::target::{Running, Target};
 use super::watch::{FlowFigures, Tracks};
@@ -9,7 +9,7 @@ use rohrpost::survey::{Scope, Survey};
 use rohrpost_mailbox::{FlowInfo, Type};
 use std::time::Duration;
 
-/// Numbers and names of the data that are meant.
+/// Numbers and names of the selected data.
 pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Result<Vec<(u16, String)>, Failure> {
     let text = running.text(module);
     let description = running.describe(module)?;
@@ -31,31 +31,31 @@ pub(super) fn data_of(running: &Running, module: Name, name: Option<&str>) -> Re
     }
 }
 
-/// A module that is looked at again and again.
+/// A module that is observed repeatedly.
 pub(super) struct WatchedModule {
     pub(super) running: Running,
     pub(super) module: Name,
     /// The module as the user named it.
     text: String,
     pub(super) tracks: Tracks,
-    /// Whether a launch watched over the node when it was last looked for.
+    /// Whether a launch supervised the node at the last lookup.
     launched: bool,
-    /// Whether the node was launched again, or answers again, and what the module publishes now is not known yet.
+    /// Whether the node was launched again, or answers again, so that the module's data must be looked up anew.
     changed: bool,
-    /// Whether the module's node was heard, and does not answer now.
-    heard: bool,
+    /// Whether the module's node answered before and does not answer now.
+    has_answered: bool,
     silent: bool,
 }
 
 impl WatchedModule {
-    /// The module of this name, over so long a window.
+    /// The module of this name, over a window of this length.
     pub(super) fn new(target: &Target, text: &str, window: Duration) -> Result<Self, Failure> {
         let running = target.find()?;
         let module = running.module(text)?;
         if running.is_beyond(module) {
             return Err(format!(
-                "{text} is beyond this system's nodes, and what it counts stands in its own node's memory; run this in system {}, or \
-                 take `rohrpost echo {text}`, which subscribes",
+                "{text} is beyond this system's nodes, and what it counts stands in its own node's memory; run this \
+                 in system {}, or take `rohrpost echo {text}`, which subscribes",
                 module.system()
             )
             .into());
@@ -68,12 +68,12 @@ impl WatchedModule {
             tracks: Tracks::new(window),
             launched,
             changed: false,
-            heard: false,
+            has_answered: false,
             silent: false,
         })
     }
 
-    /// What there is of the module now; none while its node is away, which is said once.
+    /// The module's present state; none while its node is away, which is reported once.
     pub(super) fn look(&mut self) -> Result<Option<Survey>, Failure> {
         let own = self.running.is_own(self.module);
         if own {
@@ -86,12 +86,12 @@ impl WatchedModule {
                     complain(format_args!("node {node} answers again"));
                     self.changed = true;
                 }
-                self.heard = true;
+                self.has_answered = true;
                 Ok(Some(survey))
             }
-            // Its directory goes with a node that has ended; there is nothing to be seen until the next.
+            // A node that has ended loses its directory; there is nothing to see until the next launch.
             Err(_) if own && !self.launched => Ok(None),
-            Err(error) if own || !self.heard => Err(error),
+            Err(error) if own || !self.has_answered => Err(error),
             Err(error) => {
                 if !std::mem::replace(&mut self.silent, true) {
                     complain(format_args!("{error}; waiting for it (Ctrl-C ends this)"));
@@ -101,15 +101,15 @@ impl WatchedModule {
         }
     }
 
-    /// Looks once, and fails when the module has no mailboxes.
+    /// Observes once; an error if the module has no mailboxes.
     pub(super) fn require_present(&mut self) -> Result<(), Failure> {
         let module = self.module;
         let has = |survey: Survey| survey.mailboxes.iter().any(|mailbox| mailbox.name.module() == module);
         if self.look()?.is_some_and(has) { Ok(()) } else { Err(self.running.absent(module)) }
     }
 
-    /// If the node's launch has ended, looks for the node that was launched in its place; when there is one, what was seen
-    /// before counts no more. Both are said where they do not stand among the figures.
+    /// If the node's launch has ended, looks for the node that replaces it; if there is one, earlier observations
+    /// are dropped. Both events are reported apart from the figures.
     fn find_again(&mut self) -> Result<(), Failure> {
         if self.running.node.launcher().is_some() {
             self.launched = true;
@@ -131,8 +131,8 @@ impl WatchedModule {
         Ok(())
     }
 
-    /// What is to be told of, as [`data_of`] has it. On a node that was launched again it may be something else; until the
-    /// module is there, `known` is what it will be.
+    /// The selected data, as in [`data_of`]. They may differ after a new launch; until the module is there,
+    /// `known` is used.
     pub(super) fn renew(&mut self, known: &mut Vec<(u16, String)>, name: Option<&str>) {
         if self.changed
             && let Ok(found) = data_of(&self.running, self.module, name)
@@ -141,14 +141,14 @@ impl WatchedModule {
         }
     }
 
-    /// Takes in what is published under the module's name.
+    /// Records what is published under the module's name.
     pub(super) fn take_published(&mut self, survey: Survey) {
         let module = self.module;
         let is_own = |flow: &FlowInfo| flow.is_publication() && flow.from.module() == module;
         self.tracks.look(survey.at_ns, survey.flows.into_iter().filter(is_own));
     }
 
-    /// Figures of data of this number, if it was ever published.
+    /// Figures of the data with this number, if they were ever published.
     pub(super) fn figures(&self, number: u16) -> Option<FlowFigures> {
         self.tracks.figures().find(|(flow, _)| flow.kind == Type::data(number)).map(|(_, figures)| figures)
     }

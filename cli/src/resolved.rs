@@ -1,6 +1,6 @@
-//! What a configuration resolved to, for programs: `check --json`, and `node.json` beside the mailboxes of a node that runs.
+//! A resolved configuration for programs: `check --json`, and `node.json` beside the mailboxes of a running node.
 //!
-//! Durations are in milliseconds, sizes in bytes, names as people read them and as the number that heads of packages have.
+//! Durations are in milliseconds, sizes in bytes, names both as text and as the number in package heads.
 
 use rohrpost::Name;
 use rohrpost_config::{
@@ -11,10 +11,10 @@ use rohrpost_network::{Bound, FlowBound, Network, Tdma};
 use serde_json::{Value, json};
 use std::time::Duration;
 
-/// Raised when something that a program may read in `node.json` goes, or means something else.
+/// Raised when an entry of `node.json` that programs may read disappears or changes its meaning.
 const FORMAT: u32 = 1;
 
-/// What one needs to take part in a node without reading TOML: `node.json`, one JSON object.
+/// Everything needed to take part in a node without reading TOML: `node.json`, one JSON object.
 pub(crate) fn of_node(installation: &Installation, node: &str) -> Vec<u8> {
     let launch = installation.node(node).map(|node| installation.launch_of(node));
     let nodes = installation.lan_nodes();
@@ -35,7 +35,7 @@ pub(crate) fn of_node(installation: &Installation, node: &str) -> Vec<u8> {
     format!("{resolved:#}\n").into_bytes()
 }
 
-/// All that the file says, with what it leaves out; of this node alone, if one is named.
+/// Everything in the file, with defaults filled in; only for this node, if one is named.
 pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
     let Installation { name, system, classes, output, .. } = installation;
     let text = |name: Name| classes.format(name);
@@ -62,7 +62,8 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
         let bound = bounds.iter().find(|bound| bound.flow == index);
         json!({
             "from": text(flow.from), "to": text(flow.to), "carries": flow.carries.map(|carries| carries.to_string()),
-            "size": flow.size, "period_ms": ms(flow.period), "deadline_ms": ms(flow.deadline), "at_worst": bound.map(at_worst),
+            "size": flow.size, "period_ms": ms(flow.period), "deadline_ms": ms(flow.deadline),
+            "at_worst": bound.map(at_worst),
         })
     });
     let access = installation.access.iter().map(|rule| {
@@ -111,7 +112,8 @@ fn module(installation: &Installation, module: &Module) -> Value {
         "line": module.line,
         "priority": module.name.class().0,
         "scheduling": scheduling(installation.scheduling(module.name.class())),
-        "aliases": module.aliases.iter().map(|alias| json!({ "name": text(alias), "number": alias.raw() })).collect::<Vec<_>>(),
+        "aliases": module.aliases.iter()
+            .map(|alias| json!({ "name": text(alias), "number": alias.raw() })).collect::<Vec<_>>(),
         "runs": runs,
         "optional": module.optional,
         "required": module.required,
@@ -167,7 +169,7 @@ fn tdma(installation: &Installation, tdma: &Tdma) -> Value {
     })
 }
 
-/// The worst case of a flow between nodes: its latency and what that consists of, or why there is none.
+/// The worst case of a flow between nodes: its latency and the parts of it, or why there is no bound.
 fn at_worst(bound: &FlowBound) -> Value {
     match &bound.latency {
         Err(why) => json!({ "level": bound.level, "latency_ms": null, "why": why.to_string() }),

@@ -1,4 +1,4 @@
-//! The routers of all nodes, asked one after the other, once or again and again: what `net` and `time` have in common.
+//! Polls the routers of all nodes one after the other, once or repeatedly: shared by `net` and `time`.
 
 use super::target::{Running, Target};
 use super::units::{Stop, seconds};
@@ -12,18 +12,18 @@ use rohrpost::{CallError, Fault, ToolLink};
 use rohrpost_config::Installation;
 use std::time::Duration;
 
-/// A router that does not answer for so long is silent.
+/// A router without an answer after this time is silent.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Whom to ask, and how often.
+/// Which nodes to ask, and how often.
 #[derive(clap::Args)]
 pub(super) struct Rounds {
     #[command(flatten)]
     target: Target,
-    /// Show it again and again.
+    /// Repeat the output.
     #[arg(long)]
     pub(super) watch: bool,
-    /// From one to the next, seconds.
+    /// Time from one output to the next, seconds.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS", requires = "watch")]
     interval: f64,
     /// One JSON object a line.
@@ -31,7 +31,7 @@ pub(super) struct Rounds {
     pub(super) json: bool,
 }
 
-/// Who asks.
+/// Asks the routers.
 pub(super) struct Round {
     pub(super) running: Running,
     pub(super) interval: Duration,
@@ -40,7 +40,7 @@ pub(super) struct Round {
 }
 
 impl Rounds {
-    /// Finds the installation; of one that has nobody to ask, `alone` says what to look at instead.
+    /// Finds the installation; if it has no router to ask, `alone` says what to look at instead.
     pub(super) fn begin(&self, alone: &str, has: impl Fn(&Installation) -> bool) -> Result<Round, Failure> {
         let running = self.target.find()?;
         if !has(&running.installation) {
@@ -53,12 +53,12 @@ impl Rounds {
 }
 
 impl Round {
-    /// Names of the nodes that are meant.
+    /// Names of the selected nodes.
     pub(super) fn nodes(&self) -> Vec<String> {
         self.running.shown().into_iter().map(str::to_owned).collect()
     }
 
-    /// The newest value that a node's router has published and of when it is, or why there is none.
+    /// The newest value that a node's router has published, with its time, or why there is none.
     pub(super) fn newest<T: DeserializeOwned>(&mut self, node: &str, port: DataPort<T>) -> Result<(u64, T), String> {
         let router = self.running.installation.router_of(node).ok_or("it has no router")?;
         self.newest_of(router, port)
@@ -73,12 +73,12 @@ impl Round {
         let write = |body: &mut Vec<u8>| append(body, &(port.number,));
         let newest = self.tool.call(module, GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
         newest.map_err(|error| match error {
-            CallError::Fault(_, Fault::NothingYet) => "it has just begun; ask again".into(),
+            CallError::Fault(_, Fault::NothingYet) => "it has just started; ask again".into(),
             error => self.running.told(module, &error).to_string(),
         })
     }
 
-    /// Nobody is asked any more.
+    /// Ends the polling.
     pub(super) fn close(self) {
         self.tool.close();
     }

@@ -1,4 +1,4 @@
-//! `rohrpost run`: what launch starts built-in modules with, and what a person starts one by hand with.
+//! `rohrpost run`: runs a built-in module, started by launch or by hand.
 
 use crate::terminal::Failure;
 use rohrpost::Start;
@@ -12,7 +12,7 @@ pub(super) struct Arguments {
     /// Which built-in module.
     #[arg(value_parser = clap::builder::PossibleValuesParser::new(BUILTINS))]
     builtin: String,
-    /// What every module takes: --config FILE --name CLASS.INSTANCE [--off].
+    /// The arguments of every module: --config FILE --name CLASS.INSTANCE [--off].
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
 }
@@ -24,7 +24,7 @@ pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
     };
     match rohrpost_modules::builtin::run(&arguments.builtin, start) {
         Some(result) => Ok(exit(result)),
-        // The command line takes no other names; one of them without a program would be our own mistake.
+        // The command line accepts no other names; a name without a program is a bug.
         None => Err(format!("the built-in module `{}` has no program; report this", arguments.builtin).into()),
     }
 }

@@ -1,4 +1,4 @@
-//! `rohrpost send`: a command over and over, as somebody at a keyboard would send it. Unlike `call` it waits for no answer
+//! `rohrpost send`: repeats a command, like a person at a keyboard. Unlike `call` it waits for no answer
 //! before it sends the next; answers are counted.
 
 use super::call::{COMMON, body_of, names};
@@ -12,15 +12,15 @@ use rohrpost_mailbox::wait_any;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// At most so long is slept without a look at answers and at Ctrl-C.
+/// Longest sleep without a check for answers and Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost send motor.0 drive 0.3 0.5                 ten times a second, until Ctrl-C
   rohrpost send motor.0 drive 0.3 0.5 --rate 20 --count 40
-Each error is told once, then counted. A command that waits longer than --timeout is not run any more. Commands that \
-come due while earlier ones keep this program from sending are left out, not sent in a heap.")]
+Each error is printed once, then counted. A command that waits longer than --timeout is not run. Commands that \
+come due while this program is blocked are skipped, not sent in a burst.")]
 pub(super) struct Arguments {
     /// Module or alias, such as motor.0.
     name: String,
@@ -31,13 +31,13 @@ pub(super) struct Arguments {
     arguments: Vec<String>,
     #[command(flatten)]
     target: Target,
-    /// So many a second.
+    /// Commands a second.
     #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = rate)]
     rate: f64,
-    /// End after so many commands.
+    /// End after this many commands.
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
-    /// A command is valid for so long, and its answer is waited for so long at the end, seconds.
+    /// Validity of a command, seconds; at the end, answers are awaited for the same time.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     timeout: f64,
     /// Print the counts as one JSON object.
@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             sending.send();
             let late = now.duration_since(next).as_nanos();
             sending.counts.left_out += (late / period.as_nanos()) as u64;
-            // What is left of the period that this moment lies in; it is shorter than a period, and so fits.
+            // The rest of the current period; it is shorter than a period, and so fits.
             next = now + period - Duration::from_nanos((late % period.as_nanos()) as u64);
         }
         sending.collect_until(next.min(Instant::now() + LOOK));
@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             break;
         }
     }
-    // Ctrl-C once more, or for the first time, ends the wait for answers too.
+    // Ctrl-C, a second time or for the first time, ends the wait for answers, too.
     let deadline = Instant::now() + timeout;
     while !sending.under_way.is_empty() && Instant::now() < deadline && !stop.within(Duration::ZERO) {
         sending.collect_until(deadline.min(Instant::now() + LOOK));
@@ -89,11 +89,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     sending.finish(arguments.json)
 }
 
-/// Why there is nothing to send. What every module has besides, such as `off`, nobody needs over and over.
+/// Why there is nothing to send. Functions that every module has, such as `off`, need no repetition.
 fn no_function(arguments: &Arguments, description: &Description) -> String {
     let (name, function) = (&arguments.name, &arguments.function);
     if COMMON.iter().any(|(common, _)| common == function) {
-        return format!("`{function}` is not for send, but for once: `rohrpost call {name} {function}`");
+        return format!("`{function}` needs no repetition: `rohrpost call {name} {function}`");
     }
     match &names(description)[..] {
         [] => format!("no function `{function}`; {name} has none to send"),
@@ -101,7 +101,7 @@ fn no_function(arguments: &Arguments, description: &Description) -> String {
     }
 }
 
-/// A command that is sent again and again.
+/// A command that is sent repeatedly.
 struct Sending<'a> {
     running: &'a Running,
     module: Name,
@@ -110,17 +110,17 @@ struct Sending<'a> {
     body: Vec<u8>,
     timeout: Duration,
     tool: ToolLink,
-    /// Calls whose answers have not come.
+    /// Calls without an answer so far.
     under_way: Vec<u32>,
     counts: Counts,
-    /// Errors that were told already.
+    /// Errors that were reported already.
     told: Vec<String>,
 }
 
 #[derive(Default, serde::Serialize)]
 struct Counts {
     sent: u64,
-    /// Due while this program was kept from sending.
+    /// Due while this program did not run.
     left_out: u64,
     not_sent: u64,
     answered: u64,

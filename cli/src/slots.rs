@@ -1,10 +1,10 @@
-//! How nodes keep their time slots, as a table: of `net`, and of the demo's summary.
+//! How nodes keep their time slots, as a table: used by `net` and by the demo's summary.
 
 use super::table::table;
 use super::units::{bytes, fine};
 use rohrpost::interfaces::{SlotState, TunnelState};
 
-/// A row for each node, and why those are silent that are; empty without any.
+/// A row for each node, and the reason for each silent node; empty if there are no slots.
 pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String {
     let slots: Vec<&SlotState> = slots.into_iter().collect();
     if slots.is_empty() {
@@ -54,13 +54,13 @@ pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String
     table(heads, rows) + &silent.collect::<String>() + &hellos.collect::<String>() + &tunnels.collect::<String>()
 }
 
-/// What was said at a moment that nobody vouches for.
+/// Hellos that were sent at an unverified time.
 fn unproven(slots: &SlotState) -> String {
     let hellos = if slots.unproven == 1 { "1 hello".into() } else { format!("{} hellos", slots.unproven) };
-    format!("node {}: {hellos} left by the time of who had not shown that it lives\n", slots.node)
+    format!("node {}: {hellos} sent by the time of an unverified node\n", slots.node)
 }
 
-/// What ordinary traffic did; what went wrong is told if it did.
+/// Ordinary traffic in the slots; errors appear if there were any.
 fn tunnelled(node: &str, tunnel: &TunnelState) -> String {
     let TunnelState { sent, dropped, stray, received, refused } = *tunnel;
     let wrong =
@@ -74,22 +74,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_nobody_vouches_for_is_told_if_there_was_any() {
+    fn unverified_hellos_are_reported_if_there_were_any() {
         let slots = |unproven| SlotState { node: "arm".into(), unproven, ..SlotState::default() };
         assert!(!kept([&slots(0)]).contains("hello"));
-        let line = "node arm: 3 hellos left by the time of who had not shown that it lives";
+        let line = "node arm: 3 hellos sent by the time of an unverified node";
         assert!(kept([&slots(3)]).lines().any(|told| told == line));
-        assert!(kept([&slots(1)]).contains("arm: 1 hello left"));
+        assert!(kept([&slots(1)]).contains("arm: 1 hello sent"));
     }
 
     #[test]
-    fn a_tunnel_says_what_went_wrong_only_if_it_did() {
+    fn a_tunnel_reports_errors_only_if_there_were_any() {
         let well = TunnelState { sent: 7, received: 5, ..TunnelState::default() };
         assert_eq!(tunnelled("arm", &well), "tunnel of arm: 7 packets sent, 5 received\n");
         let badly = TunnelState { dropped: 3, stray: 2, refused: 1, ..well };
         assert_eq!(
             tunnelled("arm", &badly),
-            "tunnel of arm: 7 packets sent, 5 received, 3 dropped, since too many waited, 2 for nobody, 1 not taken by the kernel\n"
+            "tunnel of arm: 7 packets sent, 5 received, 3 dropped, since too many waited, 2 for nobody, 1 not taken \
+            by the kernel\n"
         );
     }
 }

@@ -1,6 +1,6 @@
-//! What launch says at its standard output and standard error. Whoever should read there may stand still (a full pipe, a
+//! Launch's output on standard output and standard error. A reader may block (a full pipe, a
 //! journal that hangs, a terminal after Ctrl-S), and launch must go on: so each stream has a queue, and a thread that
-//! writes. What finds no room is counted, and the count is said in its place.
+//! writes. Lines that find no room are dropped and counted, and the count is printed in their place.
 //!
 //! ```text
 //! launch ── line ──▶ queue, 256 lines ──▶ thread ──▶ stdout          the same with stderr
@@ -14,26 +14,26 @@ use std::os::unix::fs::MetadataExt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Texts that wait for a stream that is not read.
+/// Capacity of the queue for a stream that is not read.
 const WAITING_MAX: usize = 256;
-/// So long it waits at the end for who reads what it said.
+/// At the end, wait this long for the reader.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
-/// How urgent a line is, as the journal counts.
+/// The severity of a line, as the journal numbers it.
 #[derive(Clone, Copy)]
 enum Urgency {
     Error = 3,
     Notice = 5,
 }
 
-/// Says things and never waits, but for a moment at the end.
+/// Prints without blocking, except for a moment at the end.
 pub(super) struct Speech {
     out: Stream,
     err: Stream,
 }
 
 impl Speech {
-    /// Of this process's standard output and standard error.
+    /// For this process's standard output and standard error.
     pub(super) fn begin() -> io::Result<Self> {
         Ok(Self {
             out: Stream::begin("says", io::stdout(), Urgency::Notice)?,
@@ -41,17 +41,17 @@ impl Speech {
         })
     }
 
-    /// Something that happened.
+    /// Prints an event.
     pub(super) fn say(&self, line: &str) {
         self.out.line(line);
     }
 
-    /// Something that failed for good.
+    /// Prints a failure.
     pub(super) fn complain(&self, line: &str) {
         self.err.line(line);
     }
 
-    /// Draws over what was drawn before; not while that is still being written.
+    /// Redraws over the previous drawing; skipped while that is still being written.
     pub(super) fn draw(&self, picture: String) {
         let mut queue = self.out.shared.lock();
         if !queue.is_busy() {
@@ -68,10 +68,10 @@ impl Speech {
     }
 }
 
-/// A stream, and what waits to be written there.
+/// A stream, and its queue.
 struct Stream {
     shared: Arc<Shared>,
-    /// Stands before each line in the journal; empty elsewhere.
+    /// The prefix of each line in the journal; empty elsewhere.
     mark: String,
 }
 
@@ -86,7 +86,7 @@ impl Stream {
         let mark = if is_journal(&stream) { format!("<{}>", urgency as u8) } else { String::new() };
         let shared = Arc::new(Shared::default());
         let (source, lost_mark) = (shared.clone(), mark.clone());
-        // It is never waited for to the end: it may stand in a write for ever, and goes with the process.
+        // Never joined: it may block in a write for ever, and ends with the process.
         std::thread::Builder::new().name(name.into()).spawn(move || source.write_all(stream, &lost_mark))?;
         Ok(Self { shared, mark })
     }
@@ -97,7 +97,7 @@ impl Stream {
     }
 }
 
-/// A line, or several, as the journal wants them: each begins with its urgency.
+/// Lines in the journal's format: each begins with its severity.
 fn marked(mark: &str, line: &str) -> String {
     format!("{mark}{}\n", Lines(line).to_string().replace('\n', &format!("\n{mark}")))
 }
@@ -117,9 +117,9 @@ impl Shared {
             drop(queue);
             let text = match next {
                 Next::Text(text) => text,
-                Next::Lost(count) => marked(mark, &format!("… lost here: {count}, since nobody read this")),
+                Next::Lost(count) => marked(mark, &format!("… {count} lines lost here, since nobody read this stream")),
             };
-            // Who would read it may be gone; that is no reason to stop a robot.
+            // The reader may be gone; that does not stop a robot.
             let _ = stream.write_all(text.as_bytes()).and_then(|()| stream.flush());
             queue = self.lock();
             queue.writing = false;
@@ -134,18 +134,18 @@ impl Shared {
     }
 }
 
-/// What waits for a stream. What finds no room is lost, not what was there before: so the order stays, and the gap has a place.
+/// The queue of a stream. A new text without room is lost, not an older one: the order stays, and the gap has a place.
 #[derive(Default)]
 struct Queue {
     waiting: VecDeque<Next>,
-    /// What was taken last is being written.
+    /// The text that was taken last is being written.
     writing: bool,
 }
 
 #[derive(Debug, PartialEq)]
 enum Next {
     Text(String),
-    /// So many found no room here.
+    /// This many texts found no room here.
     Lost(u64),
 }
 
@@ -171,7 +171,7 @@ impl Queue {
     }
 }
 
-/// Whether it is the stream that systemd has connected to its journal: `JOURNAL_STREAM` has its device and number.
+/// Whether systemd has connected this stream to its journal: `JOURNAL_STREAM` has its device and inode.
 fn is_journal(stream: impl AsFd) -> bool {
     let Ok(wanted) = std::env::var("JOURNAL_STREAM") else { return false };
     let own = stream.as_fd().try_clone_to_owned().and_then(|stream| std::fs::File::from(stream).metadata());
@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_finds_no_room_is_counted_where_it_is_missing() {
+    fn dropped_lines_are_counted_at_their_place() {
         let mut queue = Queue::default();
         let text = |n: usize| Next::Text(n.to_string());
         for n in 0..WAITING_MAX + 3 {
@@ -191,7 +191,7 @@ mod tests {
         }
         for n in 0..WAITING_MAX {
             assert_eq!(queue.take(), Some(text(n)));
-            // Room again, from the second on: the first makes way for the count.
+            // There is room again from the second text on: the first makes room for the count.
             if n < 2 {
                 queue.push(format!("{}", 1000 + n));
             }
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn each_line_in_the_journal_begins_with_its_urgency() {
+    fn each_line_in_the_journal_begins_with_its_severity() {
         assert_eq!(marked("<5>", "probe.0 ended\n    why"), "<5>probe.0 ended\n<5>    why\n");
         assert_eq!(marked("", "a\nb"), "a\nb\n");
     }

@@ -14,13 +14,13 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example: rohrpost status mapper.0\nExits with 1 when a module does not answer or is in error.")]
+#[command(after_help = "Example: rohrpost status mapper.0\nExit code 1: a module does not answer or is in error.")]
 pub(super) struct Arguments {
     /// Module to ask; all, if none is named.
     name: Option<String>,
     #[command(flatten)]
     target: Target,
-    /// Wait so long for an answer, seconds.
+    /// Timeout for an answer, seconds.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     timeout: f64,
     /// One JSON object.
@@ -34,10 +34,10 @@ struct StatusRow {
     node: String,
     #[serde(flatten)]
     account: Account,
-    /// What it says itself.
+    /// The module's own report.
     #[serde(flatten)]
     figures: Option<ModuleFigures>,
-    /// Why it says nothing.
+    /// Why there is no report.
     failure: Option<String>,
 }
 
@@ -97,7 +97,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(if lines.iter().all(well) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// What there is to say of a module: as launch and its node's table have it, and what it says itself, unless it is known that it cannot.
+/// A module's state: from launch, from its node's table, and from the module itself, unless it is known that it cannot
+/// answer.
 fn ask(running: &Running, tool: &mut ToolLink, survey: &Survey, silent: &[Silence], name: Name) -> StatusRow {
     let (text, node) = (running.text(name), running.node_of(name).to_owned());
     let account = survey.module(name).map(|module| Account::of(module, &running.installation));

@@ -1,4 +1,4 @@
-//! What a node does, as text: modules, and traffic by class.
+//! A node's state as text: modules, and traffic by class.
 
 use super::table::{table, table_of, time};
 use rohrpost::Class;
@@ -29,15 +29,15 @@ pub(super) struct ModuleLine {
     pub(super) losses: Losses,
 }
 
-/// How a module stands, the same in every table and for every program that reads JSON.
+/// A module's state, the same in every table and JSON output.
 #[derive(Clone, Serialize)]
 pub(super) struct Account {
     pub(super) state: Standing,
-    /// It is started again for the so manieth time that counts,
+    /// The number of the present restart that counts,
     attempt: Option<u32>,
-    /// and at so many it is given up.
+    /// and the number at which launch gives up.
     attempts_max: Option<u32>,
-    /// The last that went wrong.
+    /// The last error.
     pub(super) error: Option<String>,
     pub(super) restarts: u32,
 }
@@ -58,14 +58,14 @@ impl Account {
         }
     }
 
-    /// As the module itself has just said; `before` is what others know of it.
+    /// From the module's own report; `before` is what others know of it.
     pub(super) fn said(status: &Status, before: Option<Self>) -> Self {
         let before = before.unwrap_or_else(Self::unknown);
         let error = Some(status.error.clone()).filter(|error| !error.is_empty()).or(before.error);
         Self { state: status.state.into(), attempt: None, attempts_max: None, error, restarts: before.restarts }
     }
 
-    /// Of one that does not answer, for this reason.
+    /// A module that does not answer, for this reason.
     pub(super) fn unreachable(why: &str, before: Option<Self>) -> Self {
         let before = before.unwrap_or_else(Self::unknown);
         Self { state: Standing::Unreachable, attempt: None, attempts_max: None, error: Some(why.into()), ..before }
@@ -75,7 +75,7 @@ impl Account {
         Self { state: Standing::Unreachable, attempt: None, attempts_max: None, error: None, restarts: 0 }
     }
 
-    /// The last that went wrong, at most so many characters of it.
+    /// The last error, with at most this many characters.
     pub(super) fn short_error(&self, most: usize) -> String {
         let error = plain::line(self.error.as_deref().unwrap_or_default());
         match error.char_indices().nth(most) {
@@ -85,7 +85,7 @@ impl Account {
     }
 }
 
-/// The modules of a survey; rates since an earlier one.
+/// The modules of a survey; rates are relative to an earlier one.
 pub(super) fn module_lines(installation: &Installation, survey: &Survey, earlier: Option<&Survey>) -> Vec<ModuleLine> {
     let line = |module: &ModuleSurvey| ModuleLine {
         module: installation.classes.format(module.name),
@@ -103,7 +103,7 @@ pub(super) fn module_lines(installation: &Installation, survey: &Survey, earlier
     survey.modules.iter().map(line).collect()
 }
 
-/// How the module's process really is scheduled, which may differ from what was asked for.
+/// The actual scheduling of the module's process, which may differ from the requested one.
 fn scheduling(scheduling: Option<Scheduling>) -> String {
     match scheduling {
         Some(Scheduling::Fifo(priority)) => format!("fifo {priority}"),
@@ -112,12 +112,12 @@ fn scheduling(scheduling: Option<Scheduling>) -> String {
     }
 }
 
-/// Modules as a table, one a line; of several nodes, with their nodes.
+/// Modules as a table, one a line; with their nodes if there are several.
 pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     let mut all = heads(">received").to_vec();
     let mut rows: Vec<Vec<String>> =
         lines.iter().map(|line| cells(line, " ", line.received.to_string()).into()).collect();
-    // As a column only if it says anything.
+    // A column only if it has any content.
     if lines.iter().any(|line| line.account.error.is_some()) {
         all.push("last error");
         rows.iter_mut().zip(lines).for_each(|(row, line)| row.push(line.account.short_error(ERROR_MAX)));
@@ -129,7 +129,7 @@ pub(super) fn print_modules(lines: &[ModuleLine], with_nodes: bool) -> String {
     table_of(&all, rows)
 }
 
-/// The same for a terminal of 80 columns: aliases below their module, and rates; below all, what went wrong last.
+/// The same for a terminal of 80 columns: aliases below their module, and rates; below all, the last errors.
 pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
     let rate = |line: &ModuleLine| line.received_per_s.map_or("-".into(), |rate| format!("{rate:.0}"));
     let mut text = table(heads(">in/s"), lines.iter().map(|line| cells(line, "\n", rate(line))));
@@ -140,7 +140,7 @@ pub(super) fn print_modules_live(lines: &[ModuleLine]) -> String {
     text
 }
 
-/// As much of an error as a table shows; the whole is in JSON.
+/// An error, shortened for a table; the whole text is in the JSON.
 const ERROR_MAX: usize = 100;
 const LIVE_COLUMNS: usize = 80;
 
@@ -150,7 +150,7 @@ const fn heads(received: &str) -> [&str; HEADS] {
     ["module", "state", ">priority", "scheduling", ">pid", received, ">waiting", ">lost", ">restarts"]
 }
 
-/// Of what does not answer, nothing is known.
+/// Nothing is known of a module that does not answer.
 fn cells(line: &ModuleLine, gap: &str, received: String) -> [String; HEADS] {
     let aliases: Vec<String> = line.aliases.iter().map(|alias| format!("{gap}+ {alias}")).collect();
     let known = |text: String| if line.account.state == Standing::Unreachable { "-".into() } else { text };
@@ -170,15 +170,15 @@ fn cells(line: &ModuleLine, gap: &str, received: String) -> [String; HEADS] {
 /// Packages that were lost so far, as programs read it.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Losses {
-    /// Somebody misses them.
+    /// Losses that a receiver misses.
     pub(super) lost: u64,
     pub(super) lost_by_cause: BTreeMap<&'static str, u64>,
-    /// A newer one took their place, as was wished.
+    /// Packages that a newer one replaced, as configured.
     pub(super) replaced: u64,
 }
 
 impl Losses {
-    /// Of these counts, in the order of [`Loss::ALL`].
+    /// From these counts, in the order of [`Loss::ALL`].
     pub(super) fn new(counts: &[u64; Loss::ALL.len()]) -> Self {
         let missed = Loss::ALL.into_iter().filter(|cause| cause.is_missed() && counts[*cause as usize] > 0);
         let lost_by_cause: BTreeMap<_, _> = missed.map(|cause| (cause.word(), counts[cause as usize])).collect();
@@ -190,7 +190,7 @@ impl Losses {
     }
 }
 
-/// Losses by cause. Packages that a newer one replaced are nobody's loss, so they stand apart.
+/// Losses by cause. Replaced packages are no loss, so they are listed separately.
 pub(super) fn losses(lost: impl Fn(Loss) -> u64) -> String {
     let (missed, replaced): (Vec<Loss>, _) =
         Loss::ALL.into_iter().filter(|cause| lost(*cause) > 0).partition(|cause| cause.is_missed());
@@ -200,7 +200,7 @@ pub(super) fn losses(lost: impl Fn(Loss) -> u64) -> String {
     if replaced.is_empty() { missed } else { format!("{missed} ({})", list(&replaced)) }
 }
 
-/// A class as tables name it; none: all for which there was no row left.
+/// A class as tables name it; none stands for all classes without a row of their own.
 pub(super) fn class_name(installation: &Installation, class: Option<Class>) -> String {
     let name = |class| installation.classes.name(class).map_or_else(|| class.0.to_string(), ToOwned::to_owned);
     class.map_or("others".into(), name)

@@ -6,12 +6,12 @@ use rohrpost::schema::{Schema, counters};
 use serde::Serialize;
 use std::time::Duration;
 
-/// A plain table: a line of heads, then rows; columns whose head begins with `>` stand to the right.
+/// A plain table: a line of heads, then rows; a head that begins with `>` aligns its column to the right.
 pub(super) fn table<const N: usize>(heads: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> String {
     table_of(&heads, rows)
 }
 
-/// The same, where the number of columns depends on what there is. What others wrote stays in its line.
+/// The same with a number of columns known at run time. Foreign text stays in its line.
 pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[&str], rows: impl IntoIterator<Item = R>) -> String {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
@@ -27,7 +27,7 @@ pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[&str], rows: impl IntoIter
     table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
-/// The counters of a value that counted something, in one cell: `3 lost, 1 damaged`.
+/// The non-zero counters of a value in one cell: `3 lost, 1 damaged`.
 pub(super) fn counted<T: Schema + Serialize>(value: &T) -> String {
     let counted = counters(value).into_iter().filter(|(_, count)| *count > 0);
     let words: Vec<String> = counted.map(|(field, count)| format!("{count} {}", field.name)).collect();

@@ -1,4 +1,4 @@
-//! Which running node a tool means, and what the other nodes of its system are.
+//! Which running node a tool uses, and the other nodes of its system.
 
 use super::observer::Observer;
 use crate::terminal::Failure;
@@ -14,25 +14,26 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Which node. Without options, a tool takes the installation that runs here; of several of its nodes that run here, the first of
-/// the configuration. Modules of the others are reached by its router, so for most tools it makes no difference which it is.
+/// Selects a node. Without options, a tool takes the installation that runs here; if several of its nodes run here, the
+/// first of the configuration. Its router reaches modules of the other nodes, so for most tools the choice makes no
+/// difference.
 #[derive(Args)]
 pub(super) struct Target {
     /// Configuration of the nodes; without it, the one that runs here.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// SnapshotRequest from this node, and show it alone; else from the first of the configuration that runs here.
+    /// Use this node, and show it alone; default: the first of the configuration that runs here.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
 }
 
-/// A node that runs, and its configuration.
+/// A running node and its configuration.
 pub(super) struct Running {
     pub(super) installation: Installation,
     /// The node that the tool takes part on.
     pub(super) node_name: String,
     pub(super) node: Arc<Node>,
-    /// The node that was asked for, which may be another one, on another computer.
+    /// The selected node; it may be another one, on another computer.
     only: Option<String>,
     pub(super) observer: Observer,
 }
@@ -42,7 +43,7 @@ impl Target {
         Self { config, node }
     }
 
-    /// Finds the node that is meant.
+    /// Finds the selected node.
     pub(super) fn find(&self) -> Result<Running, Failure> {
         let only = self.node.as_deref();
         let installation = match &self.config {
@@ -50,7 +51,7 @@ impl Target {
             None => Installation::load(&config_here(only)?)?,
         };
         let named = only.map(|name| choose_node(&installation, Some(name))).transpose()?;
-        // The one that is named, if it runs here; else the first that does.
+        // The named node, if it runs here; else the first that does.
         let all = named.into_iter().chain(&installation.nodes);
         let mut failed = None;
         for config in all {
@@ -71,7 +72,7 @@ impl Target {
 fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
     let running = rohrpost::find_running();
     if running.is_empty() {
-        // One that cannot be looked into is no reason to say that none is there.
+        // An unreadable node still exists, so the error must not say that there is none.
         let others = rohrpost::find_other_versions().into_iter().next();
         return Err(others.map_or_else(
             || "no node runs here; launch one: `rohrpost launch FILE`, or `rohrpost demo`".into(),
@@ -96,7 +97,7 @@ fn config_here(node: Option<&str>) -> Result<PathBuf, Failure> {
     }
 }
 
-/// What launch wrote about its configuration.
+/// Launch's record of its configuration.
 fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
     let file = directory.join(rohrpost::launch::CONFIG_FILE);
     let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
@@ -107,7 +108,7 @@ fn noted_config(directory: &Path) -> Result<(PathBuf, String), Failure> {
 }
 
 impl Running {
-    /// The same node, launched anew: what it runs may have changed since.
+    /// The same node after a new launch: its configuration may have changed.
     pub(super) fn again(&self) -> Result<Self, Failure> {
         let (config, node_name) = noted_config(self.node.path())?;
         let node = Node::open(self.node.path())?;
@@ -120,18 +121,18 @@ impl Running {
         Ok(ToolLink::join(&self.installation, &self.node, &self.node_name, timeout)?)
     }
 
-    /// The nodes that are meant when no module is named: the one asked for, or all.
+    /// The nodes to use when no module is named: the selected one, or all.
     pub(super) fn shown(&self) -> Vec<&str> {
         let all = self.installation.nodes.iter().map(|node| node.name.as_str());
         all.filter(|name| self.only.as_deref().is_none_or(|only| only == *name)).collect()
     }
 
-    /// Where a module is. What is in no configuration can only be here.
+    /// A module's node. A module in no configuration can only be here.
     pub(super) fn node_of(&self, module: Name) -> &str {
         node_of(&self.installation, module).unwrap_or(&self.node_name)
     }
 
-    /// The launch that watches over a module.
+    /// The launch that supervises a module.
     pub(super) fn launcher_of(&self, module: Name) -> Option<Name> {
         launcher_of(&self.installation, self.node_of(module))
     }
@@ -141,7 +142,8 @@ impl Running {
         self.node_of(module) == self.node_name && !self.is_beyond(module)
     }
 
-    /// Whether it is nowhere but at the TCP router: of another system, or a program of this one that the configuration does not have.
+    /// Whether it is reached only through the TCP router: a module of another system, or a program of this system
+    /// outside the configuration.
     pub(super) fn is_beyond(&self, module: Name) -> bool {
         if self.installation.tcp.is_none() || module.system() != self.installation.system.id {
             return self.installation.tcp.is_some();
@@ -149,7 +151,7 @@ impl Running {
         !self.is_known(module) && !self.is_here(module)
     }
 
-    /// Whether the configuration has it, or has a range of tools for it.
+    /// Whether the configuration has it, or a range of tools that includes it.
     pub(super) fn is_known(&self, module: Name) -> bool {
         self.installation.module(module).is_some() || module.class() == self.installation.classes.tool()
     }
@@ -159,7 +161,7 @@ impl Running {
         self.node.mailboxes().is_ok_and(|all| all.iter().any(|mailbox| mailbox.module() == module))
     }
 
-    /// A module that has no mailboxes where it should be: why, and what to do.
+    /// The error for a module without mailboxes: why, and what to do.
     pub(super) fn absent(&self, module: Name) -> Failure {
         let name = self.text(module);
         match self.installation.module(module) {
@@ -173,7 +175,7 @@ impl Running {
                 format!("{name} does not run; `rohrpost start {name}` starts it, or says why it cannot")
             }
             Some(_) => {
-                format!("{name} does not run, and no launch watches over it; start it as you started the others")
+                format!("{name} does not run, and no launch supervises it; start it as you started the others")
             }
             None if self.is_beyond(module) && module.system() != self.installation.system.id => {
                 format!("{name} does not run; start it in system {}, where it belongs", module.system())
@@ -185,10 +187,10 @@ impl Running {
         .into()
     }
 
-    /// An error about a module, with its name as users write it: the lower layers know numbers only.
+    /// An error about a module, with its name as users write it: the lower layers know only numbers.
     pub(super) fn told(&self, module: Name, error: &dyn std::error::Error) -> Failure {
         let text = error.to_string();
-        // Found by the sender, or by the router of the module's node.
+        // Detected by the sender, or by the router of the module's node.
         let absences = [SendError::NoMailbox(module).to_string(), Fault::NoMailbox.to_string()];
         if absences.iter().any(|absence| text.contains(absence)) {
             return self.absent(module);
@@ -199,15 +201,15 @@ impl Running {
         plain::line(&text.replace(&module.to_string(), &self.text(module))).into()
     }
 
-    /// An error about this node's own router, without which nothing goes to other nodes.
+    /// An error about this node's own router; without it nothing reaches other nodes.
     fn missing_router(&self, text: &str) -> Option<Failure> {
         let router = self.installation.router_of(&self.node_name)?;
         let transit = router.with_local(local::TRANSIT).to_string();
         text.contains(&transit).then(|| {
             let (router, node) = (self.text(router), &self.node_name);
             format!(
-                "the router of this node, {router}, does not run, and without it nothing goes from {node} to other nodes; \
-                 `rohrpost start {router}` starts it, or says why it cannot"
+                "the router of this node, {router}, does not run, and without it nothing goes from {node} to other \
+                 nodes; `rohrpost start {router}` starts it, or says why it cannot"
             )
             .into()
         })

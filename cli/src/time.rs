@@ -1,4 +1,4 @@
-//! `rohrpost time`: which node is the master of time, and how well each of the others knows it.
+//! `rohrpost time`: which node is the master of time, and the error bound of each other node.
 
 use super::round::{Round, Rounds};
 use super::table::{table, time};
@@ -13,30 +13,30 @@ use std::time::Duration;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost time              all nodes, once
-  rohrpost time --watch      again and again; Ctrl-C ends it
-`bound`: the node's time is not further off the master's. `off`: what it found itself off by at its last exchange with the master. \
-`way`: the shortest way there and back of late; a bound cannot be much less than half of it. `ago`: when the node said so. Two nodes \
-of the same term and epoch differ by at most the sum of their bounds. The exit code is 1 if a node does not answer or does not know the \
-time, or if there are two masters.")]
+  rohrpost time --watch      repeatedly; Ctrl-C ends it
+`bound`: largest possible error against the master's time. `off`: error measured at the last exchange with the \
+    master. `way`: shortest recent round trip; a bound cannot be much less than half of it. `ago`: age of the report. \
+    Two nodes of the same term and epoch differ by at most the sum of their bounds. Exit code 1: a node does not \
+    answer or does not know the time, or there are two masters.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,
 }
 
-/// What a node says of its time.
+/// A node's report of its time.
 #[derive(Clone, Debug, Default, Serialize)]
 struct NodeTime {
     node: String,
     clock: Option<ClockState>,
-    /// Of a node that has its time from the TCP router.
+    /// For a node that gets its time from the TCP router.
     #[serde(skip_serializing_if = "Option::is_none")]
     beyond: Option<BeyondTime>,
-    /// Shortest way there and back to that, ns.
+    /// Shortest round trip to the TCP router, ns.
     #[serde(skip_serializing_if = "Option::is_none")]
     round_trip_ns: Option<u64>,
-    /// How long ago it said so, by this node's system time, ns; less than nothing if this node's time is behind.
+    /// Age of the report, by this node's system time, ns; negative if this node's time is behind.
     ago_ns: Option<i64>,
-    /// Why there is nothing.
+    /// Why there is no report.
     failure: Option<String>,
 }
 
@@ -49,7 +49,7 @@ struct NodeTimes {
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let alone = "this installation has one node, whose time is its own; `rohrpost top` shows it";
+    let alone = "this installation has one node, and its own clock is the time; `rohrpost top` shows it";
     let mut round = rounds.begin(alone, |installation| installation.nodes.len() > 1)?;
     let clock = SystemClock::open(&round.running.node);
     let agree = loop {
@@ -71,7 +71,7 @@ fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
     let client = installation.tcp_client_of(&told.node).filter(|_| is_beyond);
     let asked = match client {
         Some(client) => round.newest_of(client, TcpInterface::LINK).map(|(_, link)| told.by_tcp(link)),
-        // With no other on its LAN there is no router, and its own clock is the time of all.
+        // A node alone on its LAN has no router, and its own clock is the common time.
         None if installation.network.is_none() => Ok(None),
         None => round.newest(&told.node, RouterInterface::CLOCK).map(|(_, clock)| {
             let now_ns = clock.now_ns;
@@ -87,7 +87,7 @@ fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {
 }
 
 impl NodeTime {
-    /// Takes what a client of the TCP router says; when it said so, system time.
+    /// Takes the report of a client of the TCP router; `at` is its system time.
     fn by_tcp(&mut self, link: BeyondLink) -> Option<u64> {
         (self.beyond, self.round_trip_ns) = (link.time, link.round_trip_ns);
         self.beyond.as_ref().map(|time| time.now_ns)
@@ -132,7 +132,7 @@ impl NodeTimes {
             let clock = told.clock.as_ref().filter(|clock| clock.error_ns.is_some())?;
             Some((clock.master.clone(), clock.term, clock.epoch)).filter(|(master, ..)| !master.is_empty())
         };
-        // Those that have it from the TCP router know no master, but its epoch.
+        // Nodes that get the time from the TCP router know only its epoch, not the master.
         let first = nodes.iter().find(|told| told.clock.is_some()).and_then(follows);
         let agrees = |told: &NodeTime| match (&told.clock, &told.beyond) {
             (Some(_), _) => first.is_some() && follows(told) == first,
@@ -159,7 +159,7 @@ impl NodeTimes {
     }
 }
 
-/// Who stamps the frames that it measures by.
+/// Where the time stamps of its measurements come from.
 fn stamps(clock: &ClockState) -> &'static str {
     match (clock.role, clock.exchanges) {
         (ClockRole::Master, _) | (_, 0) => "-",
@@ -176,7 +176,7 @@ fn role(role: ClockRole) -> &'static str {
     }
 }
 
-/// Microseconds, with as many places as clocks have.
+/// Microseconds, with as many decimals as clocks resolve.
 fn us(ns: f64) -> String {
     let us = ns / 1000.0;
     if us.abs() < 1000.0 { format!("{us:.1} µs") } else { format!("{:.2} ms", us / 1000.0) }

@@ -1,4 +1,4 @@
-//! Times, rates and bytes: as a user gives them, and as they are shown.
+//! Times, rates and bytes: parsed from arguments, and formatted for output.
 
 use super::table::time;
 use crate::terminal::Failure;
@@ -6,12 +6,12 @@ use rohrpost::launch::{Event, events};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-/// Nobody waits longer, and clocks can add it.
+/// Upper limit of a time; clocks can add it without an overflow.
 const SECONDS_MAX: f64 = 365.0 * 86_400.0;
-/// What a rate may be: its period goes into packages as whole microseconds, of which 32 bits hold 71 minutes.
+/// Lowest rate: packages carry the period as whole microseconds in 32 bits, at most 71 minutes.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=1e6;
 
-/// A time that a user gave in seconds.
+/// A time argument in seconds.
 pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
     if (0.0..=SECONDS_MAX).contains(&seconds) {
         Ok(Duration::from_secs_f64(seconds))
@@ -20,7 +20,7 @@ pub(super) fn seconds(seconds: f64) -> Result<Duration, Failure> {
     }
 }
 
-/// A rate that a user gave, a second.
+/// A rate argument, a second.
 pub(super) fn rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate| RATES_HZ.contains(rate));
     rate.ok_or_else(|| format!("write {} to {} a second", RATES_HZ.start(), RATES_HZ.end()))
@@ -34,7 +34,7 @@ pub(super) fn rate_or_all(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Signals, and the wish of Ctrl-C to end.
+/// Signals, and whether Ctrl-C was pressed.
 pub(super) struct Stop(Receiver<Event>);
 
 impl Stop {
@@ -42,7 +42,7 @@ impl Stop {
         Ok(Self(events()?))
     }
 
-    /// Waits, and says whether somebody wants an end meanwhile.
+    /// Waits, and returns whether the end was requested meanwhile.
     pub(super) fn within(&self, wait: Duration) -> bool {
         matches!(self.0.recv_timeout(wait), Ok(Event::Stop))
     }
@@ -53,7 +53,7 @@ pub(super) fn short(seconds: f64) -> String {
     time(Duration::try_from_secs_f64(seconds).unwrap_or_default())
 }
 
-/// Four digits or more: jitter is small beside the interval.
+/// Four digits or more: jitter is small compared to the interval.
 pub(super) fn fine(seconds: f64) -> String {
     let us = seconds * 1e6;
     match us {

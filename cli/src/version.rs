@@ -1,4 +1,4 @@
-//! `rohrpost version`: of this program, of what it shares with others, and of the nodes that are here.
+//! `rohrpost version`: versions of this program, of its shared formats, and of the nodes here.
 
 use crate::terminal::{Failure, say};
 use rohrpost::common;
@@ -8,7 +8,8 @@ use std::sync::OnceLock;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example: rohrpost version\nPrograms of one node must have the same layout and the same common functions."
+    after_help = "Example: rohrpost version\nPrograms of one node must have the same layout and the same common \
+        functions."
 )]
 pub(super) struct Arguments {
     /// Print one JSON object.
@@ -16,7 +17,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// What `--version` says after the program's name.
+/// The text of `--version` after the program's name.
 pub(super) fn text() -> &'static str {
     static TEXT: OnceLock<String> = OnceLock::new();
     TEXT.get_or_init(|| {
@@ -47,7 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_book_shows_these_versions() {
+    fn the_book_shows_the_present_versions() {
         let (page, said) = (include_str!("../../docs/src/tools.md"), format!("\nrohrpost {}\n", super::text()));
         assert!(page.contains(&said), "docs/src/tools.md does not show{said}");
     }

@@ -1,4 +1,5 @@
-//! What packages are called: commands and replies by their functions, data by their item, as the interfaces of modules declare them.
+//! Names of package types: commands and replies by their functions, data by their item, as the modules' interfaces
+//! declare them.
 
 use rohrpost::Name;
 use rohrpost::common as c;
@@ -7,14 +8,14 @@ use rohrpost_config::{Installation, Program};
 use rohrpost_mailbox::Kind;
 use std::collections::BTreeMap;
 
-/// The interfaces that were found out so far. Who does not tell its own is not asked again.
+/// The interfaces that are known so far. A module that did not answer is not asked again.
 #[derive(Default)]
 pub(super) struct Vocabulary {
     descriptions: BTreeMap<Name, Option<Description>>,
 }
 
 impl Vocabulary {
-    /// What packages of a type from one module to another are called; none if it is not known. `ask` asks a module for its interface.
+    /// The name of a package type between two modules; none if it is not known. `ask` asks a module for its interface.
     pub(super) fn word(
         &mut self,
         kind: Kind,
@@ -46,7 +47,7 @@ impl Vocabulary {
     }
 }
 
-/// What a reply to a function is called.
+/// The name of a reply to a function.
 pub(super) fn answered(function: &str) -> String {
     format!("{function} answered")
 }

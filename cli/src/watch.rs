@@ -1,4 +1,5 @@
-//! Counters watched over time: what `hz`, `bw` and `delay` have in common. Looking subscribes to nothing, and sends modules nothing.
+//! Counters observed over time: shared by `hz`, `bw` and `delay`. Observing subscribes to nothing, and sends nothing to
+//! modules.
 
 use super::units::{Stop, seconds};
 use crate::terminal::Failure;
@@ -6,23 +7,23 @@ use rohrpost_mailbox::{FlowInfo, FlowSecond};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
-/// A sender's table keeps the extremes of a few seconds; who looks so often misses none.
+/// A sender's table keeps the extremes of a few seconds; this period misses none.
 const LOOK: Duration = Duration::from_millis(250);
 const LINE: Duration = Duration::from_secs(1);
-/// A gap of so many intervals, and so long, is silence and no interval.
+/// A gap of this many intervals, and of this length, is silence and not an interval.
 const SILENT_INTERVALS: f64 = 3.0;
 const SILENT_NS: u64 = 100_000_000;
 
 /// How long to watch.
 #[derive(clap::Args)]
 pub(super) struct Pace {
-    /// End after so many reports, one a second; each may have several lines.
+    /// End after this many reports, one a second; each may have several lines.
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
-    /// End after so long.
+    /// End after this time.
     #[arg(long, value_name = "SECONDS")]
     seconds: Option<f64>,
-    /// Figures are those of the last so many seconds.
+    /// Window of the figures, seconds.
     #[arg(long, default_value_t = 10.0, value_name = "SECONDS")]
     window: f64,
     /// One JSON object a line.
@@ -35,12 +36,12 @@ impl Pace {
         if self.window > 0.0 {
             seconds(self.window)
         } else {
-            Err(format!("a window of {} s holds nothing; try --window 1", self.window).into())
+            Err(format!("a window of {} s is empty; try --window 1", self.window).into())
         }
     }
 
-    /// Looks at once and then again and again, and tells what was seen once a second, until it is time to end, Ctrl-C, or
-    /// `tell` says that nobody reads any more.
+    /// Observes repeatedly, and reports once a second, until it is time to end, Ctrl-C, or `tell` says that
+    /// nobody reads any more.
     pub(super) fn watch<W>(
         &self,
         watched: &mut W,
@@ -75,7 +76,7 @@ impl Pace {
     }
 }
 
-/// What was seen in the last seconds, oldest first; the oldest is what the others are compared with.
+/// The observations of the window, oldest first; the others are compared with the oldest.
 pub(super) struct Window<T> {
     seen: VecDeque<Observation<T>>,
     long: Duration,
@@ -92,7 +93,7 @@ impl<T> Window<T> {
         Self { seen: VecDeque::new(), long }
     }
 
-    /// Takes in what was seen at this time of the monotonic clock; if that began anew, all that was seen before is forgotten.
+    /// Adds an observation at this time of the monotonic clock; if the source restarted, earlier ones are dropped.
     pub(super) fn push(&mut self, at_ns: u64, what: T) {
         if self.seen.back().is_some_and(|last| at_ns < last.at_ns) {
             self.seen.clear();
@@ -134,8 +135,8 @@ impl Tracks {
         self.long
     }
 
-    /// Takes in what the flows are at this time of their node's monotonic clock; those that are gone (their process ended) are
-    /// forgotten.
+    /// Records the flows at this time of their node's monotonic clock; flows of ended processes are
+    /// dropped.
     pub(super) fn look(&mut self, at_ns: u64, flows: impl IntoIterator<Item = FlowInfo>) {
         let mut here = Vec::new();
         for flow in flows {
@@ -165,28 +166,28 @@ impl Tracks {
     }
 }
 
-/// What a flow did in the window. Rates and times are exact: they come from the sender's own clock.
+/// A flow's figures in the window. Rates and times are exact: they come from the sender's own clock.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FlowFigures {
     pub(super) packages: u64,
     pub(super) bytes: u64,
     pub(super) refused: u64,
-    /// Packages a second, from the last before the window to the last in it; if it is silent, to now. None when there was
-    /// none to count from or to.
+    /// Packages a second, from the last before the window to the last in it; for a silent flow, until now. None without
+    /// a package at either end.
     pub(super) rate_hz: Option<f64>,
     /// From one package to the next; silence since the last is no interval.
     pub(super) interval_mean_s: Option<f64>,
     pub(super) interval_std_s: Option<f64>,
-    /// Of the seconds that the window touches.
+    /// Extremes of the seconds that overlap the window.
     pub(super) interval_s: Option<(f64, f64)>,
     pub(super) bytes_min_max: Option<(u32, u32)>,
     pub(super) age_mean_s: Option<f64>,
-    /// Of the package that the rate counts from, and of the last.
+    /// Times of the first and the last package of the rate.
     pub(super) from_ns: u64,
     pub(super) last_ns: u64,
-    /// Time since the last package when one looked.
+    /// Time since the last package at the observation.
     pub(super) since_last_s: f64,
-    /// The same, if the next would have come long ago.
+    /// The same, if the next package is long overdue.
     pub(super) silent_s: Option<f64>,
 }
 
@@ -219,15 +220,15 @@ fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond
     let interval_ns = touched().filter_map(|second| second.interval_ns).reduce(both);
     let bytes = touched().map(|second| second.bytes).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let age_ns = now.age_sum_ns.saturating_sub(before(|flow| flow.age_sum_ns));
-    // Before its first package there was no silence.
+    // There is no silence before the first package.
     let began_ns = sent.map_or(from_ns, |_| *began_ns);
-    let lively = Lively { intervals, from_ns, began_ns, last_ns: now.last_ns, at_ns: *at_ns };
+    let times = FlowTimes { intervals, from_ns, began_ns, last_ns: now.last_ns, at_ns: *at_ns };
     let since_last_s = at_ns.saturating_sub(now.last_ns) as f64 / 1e9;
     FlowFigures {
         packages,
         bytes: now.bytes.saturating_sub(before(|flow| flow.bytes)),
         refused,
-        rate_hz: interval_mean_s.and_then(|_| lively.rate_hz()),
+        rate_hz: interval_mean_s.and_then(|_| times.rate_hz()),
         interval_mean_s,
         interval_std_s,
         interval_s: interval_ns.map(|(min, max)| (min as f64 / 1e9, max as f64 / 1e9)),
@@ -236,22 +237,22 @@ fn figures(window: &Window<Option<FlowInfo>>, seconds: &BTreeMap<u64, FlowSecond
         from_ns,
         last_ns: now.last_ns,
         since_last_s,
-        silent_s: lively.is_silent().then_some(since_last_s),
+        silent_s: times.is_silent().then_some(since_last_s),
     }
 }
 
-/// When a flow was heard, all on the monotonic clock.
-struct Lively {
+/// Times of a flow's packages and observations, on the monotonic clock.
+struct FlowTimes {
     intervals: u64,
-    /// The package before the first that is counted, the first look, the last package, the last look.
+    /// The package before the first that counts, the first observation, the last package, the last observation.
     from_ns: u64,
     began_ns: u64,
     last_ns: u64,
     at_ns: u64,
 }
 
-impl Lively {
-    /// Whether it is silence when nothing comes for so long, where so many came within that time.
+impl FlowTimes {
+    /// Whether this gap is silence, for a flow with this many packages in that time.
     fn is_silence(&self, gap_ns: u64, within_ns: u64) -> bool {
         let mean_ns = within_ns as f64 / self.intervals as f64;
         gap_ns > SILENT_NS && (self.intervals == 0 || gap_ns as f64 > SILENT_INTERVALS * mean_ns)
@@ -261,14 +262,14 @@ impl Lively {
         self.is_silence(self.at_ns.saturating_sub(self.last_ns), self.last_ns.saturating_sub(self.counted_from_ns()))
     }
 
-    /// The package before, unless that was followed by silence: then the beginning of the window.
+    /// The package before, unless silence followed it: then the beginning of the window.
     fn counted_from_ns(&self) -> u64 {
         let gap_ns = self.began_ns.saturating_sub(self.from_ns);
         let after = self.began_ns.max(self.from_ns);
         if self.is_silence(gap_ns, self.last_ns.saturating_sub(after)) { after } else { self.from_ns }
     }
 
-    /// From one package to the last it is exact, whenever one looks; after the last, one looks at silence.
+    /// From one package to the last it is exact at any time; after the last, it includes silence.
     fn rate_hz(&self) -> Option<f64> {
         let until_ns = if self.is_silent() { self.at_ns } else { self.last_ns };
         let ns = until_ns.checked_sub(self.counted_from_ns())?;
@@ -291,20 +292,20 @@ mod tests {
 
     fn rate(intervals: u64, [from, began, last, at]: [f64; 4]) -> (Option<f64>, bool) {
         let ns = |seconds: f64| (seconds * S as f64) as u64;
-        let lively = Lively { intervals, from_ns: ns(from), began_ns: ns(began), last_ns: ns(last), at_ns: ns(at) };
-        (lively.rate_hz(), lively.is_silent())
+        let times = FlowTimes { intervals, from_ns: ns(from), began_ns: ns(began), last_ns: ns(last), at_ns: ns(at) };
+        (times.rate_hz(), times.is_silent())
     }
 
     #[test]
-    fn what_goes_on_has_the_rate_from_package_to_package() {
+    fn an_active_flow_has_the_rate_from_package_to_package() {
         assert_eq!(rate(200, [99.99, 100.0, 109.99, 110.0]), (Some(20.0), false));
-        // One interval may be late; a slow one has long ones.
+        // One interval may be late; a slow flow has long intervals.
         assert_eq!(rate(200, [99.99, 100.0, 109.99, 110.08]), (Some(20.0), false));
         assert_eq!(rate(5, [98.0, 100.0, 108.0, 110.0]), (Some(0.5), false));
     }
 
     #[test]
-    fn what_has_stopped_is_slower_with_each_look() {
+    fn a_stopped_flow_gets_slower_with_each_observation() {
         assert_eq!(rate(90, [100.0, 100.0, 104.0, 109.0]), (Some(10.0), true));
         // A burst of 0.1 s, and nothing for 0.9 s.
         assert_eq!(rate(100, [100.0, 100.0, 100.1, 101.0]), (Some(100.0), true));
@@ -312,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_on_after_a_long_silence_is_counted_from_the_first_look() {
+    fn a_flow_after_a_long_silence_counts_from_the_first_observation() {
         assert_eq!(rate(200, [5.0, 100.0, 110.0, 110.01]), (Some(20.0), false));
         assert_eq!(rate(2, [5.0, 100.0, 100.5, 104.0]), (Some(0.5), true));
     }

@@ -24,7 +24,7 @@ fn a_module_is_restarted_stopped_and_started_and_nobody_else_notices() {
         let pid = robot.pid("probe.0");
         let said = place.say(&["restart", "probe.0"]).ok();
         assert!(said.contains("probe.0 runs and is on after "), "{said}");
-        assert!(said.contains(&format!("before it was process {pid}")), "{said}");
+        assert!(said.contains(&format!("previously process {pid}")), "{said}");
         assert_ne!(robot.pid("probe.0"), pid);
     }
     assert_eq!(place.say(&["list", "--json"]).json()["modules"][1]["restarts"], 0, "its policy was not asked");

@@ -100,7 +100,7 @@ fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
         }
         place.assert_empty();
         let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
-        assert!(said.contains("say --nodes 3"), "{said}");
+        assert!(said.contains("use --nodes 3"), "{said}");
     });
 }
 

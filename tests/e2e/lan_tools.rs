@@ -203,7 +203,7 @@ fn modules_of_another_node_are_asked_and_controlled_as_ones_own() {
         let old = two.arm.1.pid("probe.1");
         let said = two.say_at("base", &["restart", "probe.1"]).ok();
         assert!(
-            said.starts_with("probe.1 runs and is on after ") && said.contains(&format!("before it was process {old}"))
+            said.starts_with("probe.1 runs and is on after ") && said.contains(&format!("previously process {old}"))
         );
         assert!(two.say_at("base", &["stop", "probe.1"]).ok().starts_with("probe.1 is stopped"));
         let told = two.say_at("base", &["call", "probe.1", "count", "1"]).fails();
@@ -279,7 +279,7 @@ fn a_silent_node_is_told_and_nobody_waits_for_it() {
         let silent = wait("base's router has found out", || {
             let list = two.say(&["list", "--json"]).json();
             let arm = list["nodes"].as_array().unwrap().iter().find(|node| node["node"] == "arm").unwrap().clone();
-            arm["silent"].as_str().is_some_and(|why| why.contains("nothing comes from it")).then_some(list)
+            arm["silent"].as_str().is_some_and(|why| why.contains("no datagrams come from it")).then_some(list)
         });
         let far = module(&silent, "probe.1");
         assert_eq!((&far["state"], &far["node"], &far["pid"]), (&"unreachable".into(), &"arm".into(), &Value::Null));

@@ -96,7 +96,7 @@ fn a_full_mailbox_of_a_stopped_receiver_shows_its_senders_and_losses() {
         "mailbox 1.probe.0.0: commands of probe.0, node main\n",
         &format!("probe.0, process {pid}, which is stopped\n"),
         "4 x 1024 B",
-        "displace: the least important gives way",
+        "displace: a more important package replaces",
         "what has waited 90.0 s\n",
         "1 refused",
         "ready    tool (16)",

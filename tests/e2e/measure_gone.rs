@@ -28,7 +28,7 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
     // A stopped source is not called slow.
     halt(robot.pid("probe.0"));
     let text = place.say(&["hz", "probe.0", "beat", "--seconds", "0.3"]).ok();
-    assert!(text.contains("nothing new in this window; the last came "), "{text}");
+    assert!(text.contains("nothing new in this window; the last value was sent "), "{text}");
     let mut hz = Running::start(place.command(&["hz", "probe.0", "beat"]));
     hz.wait_for("nothing new");
     signal(robot.pid("probe.0"), Signal::SIGKILL);
@@ -62,7 +62,7 @@ fn what_stops_is_silent_and_no_longer_as_quick_as_it_was() {
         tool.stop();
     }
     let text = place.say(&["hz", "probe.0", "beat", "--count", "1"]).ok();
-    assert!(text.contains("nothing new in this window; the last came "), "{text}");
+    assert!(text.contains("nothing new in this window; the last value was sent "), "{text}");
     signal(robot.pid("probe.0"), Signal::SIGCONT);
 }
 

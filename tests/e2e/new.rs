@@ -49,7 +49,7 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
         (robot.state("wind-vane.0") == "on").then_some(())
     });
     let offered = place.say(&["call", "wind-vane.0"]).ok();
-    assert!(offered.contains("restart <from: u64> -> u64") && offered.contains("How far it is."), "{offered}");
+    assert!(offered.contains("restart <from: u64> -> u64") && offered.contains("The present count."), "{offered}");
     place.say(&["call", "wind-vane.0", "restart", "1000"]).ok();
     let count = place.say(&["echo", "wind-vane.0", "count", "--count", "1", "--json"]).json();
     assert!(count["value"].as_u64().unwrap() > 1000, "{count}");

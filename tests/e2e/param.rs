@@ -232,7 +232,7 @@ fn a_file_that_is_something_else_is_not_written_over() {
     let place = Place::new();
     let (_launch, _robot) = place.launched(&[OUTPUT, &tuned("probe.0", "", "")]);
     let told = place.say(&["param", "save"]).fails();
-    assert!(told.contains("save where? say `-o FILE`, or write `parameters = \"tuned.toml\"`"), "{told}");
+    assert!(told.contains("no file to save to; use `-o FILE`, or write `parameters = \"tuned.toml\"`"), "{told}");
     let before = std::fs::read_to_string(place.path("test.toml")).unwrap();
     let told = place.say(&["param", "save", "-o", "test.toml"]).fails();
     assert!(told.contains("test.toml is no file of parameters, and is left alone"), "{told}");

@@ -57,7 +57,7 @@ fn modules_are_selected_switched_sorted_and_filtered_by_keys() {
     terminal.keys("\x1b");
     terminal.wait_row("probe.0", &["on"]);
     terminal.keys("?");
-    terminal.wait_screen("help", |screen| screen.contains("restart it, once you have said y"));
+    terminal.wait_screen("help", |screen| screen.contains("restart it, after y"));
     terminal.keys("\x1b");
     terminal.wait_row("probe.0", &["on"]);
     terminal.keys("p");
@@ -376,7 +376,7 @@ fn programs_get_one_object_and_pipes_one_table() {
     let mut command = place.command(&["top"]);
     command.stdin(Stdio::null());
     let told = Running::start(command).said().fails();
-    assert!(told.contains("say `top --once` or `top --json`"), "{told}");
+    assert!(told.contains("use `top --once` or `top --json`"), "{told}");
     for interval in ["0", "-1", "nan", "1e9"] {
         let told = place.say(&["top", "--json", &format!("--interval={interval}")]).fails();
         assert!(told.contains("it takes 0.1 to 3600"), "{told}");

@@ -1,4 +1,4 @@
-//! What `check` says, for programs.
+//! The output of `check` for programs.
 
 use crate::resolved;
 use rohrpost_config::{Errors, Installation, MissingProgram};
@@ -13,7 +13,7 @@ pub(super) fn errors(errors: &Errors) -> Value {
     json!({ "file": file, "right": false, "errors": problems })
 }
 
-/// A file that is right, as `explain` tells it. `notes`: what people are told besides.
+/// A correct file, as `explain` describes it. `notes`: additional hints for people.
 pub(super) fn installation(
     installation: &Installation,
     only: Option<&str>,

@@ -1,4 +1,4 @@
-//! `rohrpost check`, and the reading of a configuration with all that can be known of it before anything runs.
+//! `rohrpost check`, and reading a configuration with every check that is possible before anything runs.
 
 mod json;
 
@@ -13,11 +13,11 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost check config/demo.toml
-  rohrpost check robot.toml --json         mistakes with file and line, or what the file means, for programs")]
+  rohrpost check robot.toml --json         mistakes with file and line, or the resolved file, for programs")]
 pub(super) struct Arguments {
     /// The configuration.
     file: PathBuf,
-    /// Explain this node only.
+    /// Explain only this node.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
     /// Print mistakes, or what the file means, as JSON.
@@ -25,7 +25,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Reads a configuration, and asks the built-in modules whether they could work with it.
+/// Reads a configuration, and asks the built-in modules whether they can work with it.
 ///
 /// # Errors
 /// Everything that is wrong, by line.
@@ -33,7 +33,7 @@ pub(super) fn load(file: &Path) -> Result<Installation, Errors> {
     validate(Installation::load(file)?)
 }
 
-/// Asks the built-in modules of an installation whether they could work with it.
+/// Asks the built-in modules of an installation whether they can work with it.
 ///
 /// # Errors
 /// Everything that they would refuse, by line.
@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         rohrpost::launch::choose_node(&installation, only)?;
     }
     let missing = missing_programs(&installation, only)?;
-    let mut notes = told_apart_by_size(&installation);
+    let mut notes = separated_by_size(&installation);
     notes.extend(daemons_here(&installation, Path::new("/proc")));
     if arguments.json {
         say(json::installation(&installation, only, &missing, &notes));
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Time daemons that run on this computer, where a common time is told.
+/// Time daemons that run on this computer, if the installation has a common time.
 fn daemons_here(installation: &Installation, processes: &Path) -> Vec<String> {
     if !matches!(installation.time, TimeSource::Master { .. }) {
         return Vec::new();
@@ -87,8 +87,9 @@ fn daemons_here(installation: &Installation, processes: &Path) -> Vec<String> {
     told.collect()
 }
 
-/// Flows between the same modules of two nodes of which the file does not say what they carry: routers go by the size of each package.
-fn told_apart_by_size(installation: &Installation) -> Vec<String> {
+/// Flows between the same two modules of two nodes, if the file does not list their content: routers go by the size of
+/// each package.
+fn separated_by_size(installation: &Installation) -> Vec<String> {
     let name = |name| installation.classes.format(name);
     let crosses = |flow: &&Flow| installation.node_of(flow.from) != installation.node_of(flow.to);
     let unsaid: Vec<&Flow> = installation.flows.iter().filter(|flow| flow.carries.is_none()).filter(crosses).collect();
@@ -98,8 +99,8 @@ fn told_apart_by_size(installation: &Installation) -> Vec<String> {
     }
     let notes = lines.into_iter().filter(|(_, lines)| lines.len() > 1).map(|((from, to), lines)| {
         format!(
-            "the [[flow]]s from {} to {} in lines {} are told apart by the size of packages alone; say what each carries, such as \
-             `carries = \"data 1\"`",
+            "the [[flow]]s from {} to {} in lines {} are told apart by the size of packages alone; say what each \
+             carries, such as `carries = \"data 1\"`",
             name(from),
             name(to),
             lines.join(", ")
@@ -108,7 +109,7 @@ fn told_apart_by_size(installation: &Installation) -> Vec<String> {
     notes.collect()
 }
 
-/// On which computer this runs is not said; a missing program is an error only where its node will be launched.
+/// The file does not say on which computer this runs; a missing program is an error only where its node is launched.
 fn missing_programs(installation: &Installation, only: Option<&str>) -> Result<Vec<MissingProgram>, Failure> {
     let beside = std::env::current_exe()?.parent().map(PathBuf::from).unwrap_or_default();
     let nodes = installation.nodes.iter().filter(|node| only.is_none_or(|name| name == node.name));
@@ -120,10 +121,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flows_that_size_alone_tells_apart_are_noted() {
+    fn flows_separated_only_by_size_get_a_note() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo-tdma.toml");
         let text = std::fs::read_to_string(&file).unwrap();
-        let notes = |text: &str| told_apart_by_size(&Installation::parse(text, &file).unwrap());
+        let notes = |text: &str| separated_by_size(&Installation::parse(text, &file).unwrap());
         assert_eq!(notes(&text), [""; 0], "each says what it carries");
         let line = |from: &str| 1 + text[..text.find(from).unwrap()].matches('\n').count();
         let lines = [line("[[flow]] # 181 beams"), line("[[flow]] # and answered")];

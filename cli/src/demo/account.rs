@@ -1,4 +1,4 @@
-//! What went between the nodes of the demo, and whether nothing was forgotten.
+//! The traffic between the nodes of the demo, and whether every package is accounted for.
 
 use crate::summary::class_name;
 use crate::table::{counted, table, time};
@@ -9,33 +9,34 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;
 
-/// Whether all that routers were given is accounted for, once nothing is on its way any more.
+/// Whether every package that routers were given is accounted for, once nothing is under way.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Balance {
     taken: u64,
     delivered: u64,
     /// Lost in routers, for any cause.
     lost: u64,
-    /// Sent by one router and not come to the other.
+    /// Sent by one router and not received by the other.
     on_wire: u64,
-    /// Datagrams that went missing with them.
+    /// Datagrams that were lost with them.
     datagrams: u64,
-    /// Nodes whose routers died: what those had counted is gone with them.
+    /// Nodes with a router that died: its counters are lost.
     died: Vec<String>,
-    /// What does not add up.
+    /// Counters that do not add up.
     wrong: Vec<String>,
 }
 
 impl Balance {
-    /// The snapshots are of different moments: what goes on meanwhile, calls of tools (class `tool`), is compared within each node only.
-    /// Routers of the nodes that have `died` count from their last start, so that between nodes only the others are compared, and as a whole.
+    /// The snapshots are not simultaneous: traffic that continues meanwhile, calls of tools (class `tool`), is compared
+    /// only within each node. Routers of the nodes that have `died` count from their last start, so between nodes only
+    /// the others are compared, and as a whole.
     pub(super) fn of(links: &[Links], tool: u8, died: &[&str]) -> Self {
         let mut balance = Self { died: died.iter().map(ToString::to_string).collect(), ..Self::default() };
         links.iter().for_each(|node| balance.within(node));
         let survived = |node: &str| !died.contains(&node);
         let to_survivors = links.iter().filter(|links| survived(&links.node));
-        let ways = to_survivors.flat_map(|to| to.peers.iter().filter(|from| survived(&from.node)));
-        balance.datagrams = ways.map(gone).sum();
+        let peers = to_survivors.flat_map(|to| to.peers.iter().filter(|from| survived(&from.node)));
+        balance.datagrams = peers.map(gone).sum();
         if died.is_empty() {
             balance.by_class(links, tool)
         } else {
@@ -44,7 +45,7 @@ impl Balance {
         balance
     }
 
-    /// What a router has got must be what it knows of.
+    /// A router's input must equal the sum of its outcomes.
     fn within(&mut self, node: &Links) {
         let waiting: u64 = node.waiting.iter().map(|level| level.packages).sum();
         let (mut into, mut out) = (0, waiting);
@@ -61,19 +62,19 @@ impl Balance {
         }
     }
 
-    /// What was sent must have come, class by class.
+    /// Every sent package must arrive, class by class.
     fn by_class(&mut self, links: &[Links], tool: u8) {
-        let mut ways: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
+        let mut totals: BTreeMap<u8, [u64; 2]> = BTreeMap::new();
         for class in links.iter().flat_map(|node| &node.classes) {
-            let way = ways.entry(class.class).or_default();
-            *way = [way[0] + class.sent, way[1] + class.came];
+            let total = totals.entry(class.class).or_default();
+            *total = [total[0] + class.sent, total[1] + class.came];
         }
-        for (class, sent_and_came) in ways.into_iter().filter(|(class, _)| *class != tool) {
+        for (class, sent_and_came) in totals.into_iter().filter(|(class, _)| *class != tool) {
             self.compare(&format!("of class {class}"), sent_and_came);
         }
     }
 
-    /// The same from each node to each other, as far as the routers of both have lived throughout.
+    /// The same for each pair of nodes, if both routers lived throughout.
     fn by_way(&mut self, links: &[Links]) {
         let survivors: Vec<&Links> = links.iter().filter(|links| !self.died.contains(&links.node)).collect();
         let towards = |of: &Links, to: &Links| of.peers.iter().position(|peer| peer.node == to.node);
@@ -111,7 +112,8 @@ impl fmt::Display for Balance {
         if !died.is_empty() {
             writeln!(
                 f,
-                "what the router of {} had counted before it died is gone with it: between nodes, packages are compared of the others alone",
+                "the counters of the router of {} from before its death are lost: between nodes, only packages of the \
+                 others are compared",
                 died.join(", of ")
             )?;
         }
@@ -126,7 +128,7 @@ fn lost_of(class: &ClassCarried) -> u64 {
     class.lost.iter().map(|lost| lost.packages).sum()
 }
 
-/// Datagrams from a peer that did not come whole.
+/// Datagrams from a peer that did not arrive intact.
 fn gone(peer: &PeerLink) -> u64 {
     peer.counters.lost + peer.counters.damaged
 }
@@ -153,7 +155,7 @@ pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
     )
 }
 
-/// A row for each pair of nodes and direction, as the one that receives sees it.
+/// A row for each pair of nodes and direction, as counted by the receiver.
 pub(super) fn by_link(links: &[Links]) -> String {
     let pairs = links.iter().flat_map(|to| to.peers.iter().map(move |from| (from, to)));
     let rows = pairs.map(|(from, to)| {
@@ -213,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn accounts_balance_if_every_package_is_known_of() {
+    fn accounts_balance_if_every_package_is_accounted_for() {
         let sent = || class(150, [10, 9, 0, 0], 1);
         assert_eq!(wrong(sent(), class(150, [0, 0, 9, 7], 2), 0), [""; 0]);
         assert_eq!(wrong(sent(), class(150, [0, 0, 8, 8], 0), 1), [""; 0], "one was in a datagram that is missing");
@@ -229,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_death_the_others_are_compared_and_each_life_for_itself() {
+    fn after_a_death_only_the_other_routers_are_compared() {
         let survivors = |came: u64| {
             let base = with_peers("base", vec![class(150, [3, 3, 0, 0], 0)], vec![peer("brain", [3, 9], 5)]);
             let brain = with_peers(
@@ -241,13 +243,13 @@ mod tests {
             Balance::of(&[base, brain, desk], TOOL, &["base"])
         };
         let balance = survivors(4);
-        assert!(balance.holds() && balance.to_string().contains("the router of base had counted"), "{balance}");
+        assert!(balance.holds() && balance.to_string().contains("the counters of the router of base"), "{balance}");
         assert_eq!(survivors(3).wrong, ["from brain to desk, packages that did not come: 1; no datagram was lost"]);
         assert_eq!(survivors(5).wrong, ["from brain to desk, 4 packages were sent and 5 came"]);
     }
 
     #[test]
-    fn calls_of_tools_go_on_between_two_snapshots() {
+    fn calls_of_tools_may_continue_between_two_snapshots() {
         assert_eq!(wrong(class(TOOL, [10, 10, 0, 0], 0), class(TOOL, [0, 0, 9, 9], 0), 0), [""; 0]);
         assert_eq!(wrong(class(TOOL, [10, 9, 0, 0], 0), class(TOOL, [0, 0, 9, 9], 0), 0).len(), 1, "not within a node");
     }

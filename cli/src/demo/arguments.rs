@@ -1,4 +1,4 @@
-//! What the command line says of a demo.
+//! The command line of a demo.
 
 use rohrpost_routers::impair;
 use std::path::PathBuf;
@@ -13,57 +13,58 @@ use std::path::PathBuf;
   rohrpost demo --nodes 3 --gui tcp --secure --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30
   rohrpost demo --nodes 3 --tdma --seconds 30 --kill-master
-Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) of the present folder if there is one, else its own copy.")]
+Reads config/demo.toml (or config/demo-log.toml, config/demo-nodes.toml, config/demo-tdma.toml, config/demo-tcp.toml) \
+    of the present folder if it exists, else its own copy.")]
 pub(crate) struct Arguments {
-    /// End by itself after so many seconds.
+    /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]
     pub(super) seconds: Option<f64>,
     /// Play this CARMEN log (also gzipped) instead of simulating.
     #[arg(long, value_name = "FILE")]
     pub(super) log: Option<PathBuf>,
-    /// Times the speed at which the log was recorded.
+    /// Playback speed; 1 is the speed of the recording.
     #[arg(long, default_value_t = 10.0, value_name = "X", requires = "log")]
     pub(super) speed: f64,
-    /// Over so many computers, each a network namespace of this one.
+    /// Number of simulated computers, each a network namespace on this computer.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..), conflicts_with = "log")]
     pub(super) nodes: Option<u8>,
     /// The nodes send in time slots, each in its own.
     #[arg(long, requires = "nodes", conflicts_with = "config")]
     pub(super) tdma: bool,
-    /// How the node with the GUI is joined to the robot: on its LAN, or through the TCP router alone. With `tcp` and --seconds the TCP router
-    /// is killed in the middle of the run (SIGKILL); launch starts it again.
+    /// How the node with the GUI is connected to the robot: by the LAN, or only through the TCP router. With `tcp` and
+    /// --seconds the TCP router is killed in the middle of the run (SIGKILL); launch restarts it.
     #[arg(long, value_enum, default_value = "lan", requires = "nodes", conflicts_with = "tdma")]
-    pub(super) gui: Joined,
-    /// What passes between the nodes is sealed, with keys and certificates that are made for this run.
+    pub(super) gui: GuiConnection,
+    /// Seal the traffic between the nodes, with keys and certificates that are made for this run.
     #[arg(long, requires = "nodes")]
     pub(super) secure: bool,
-    /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch starts it again.
+    /// In the middle of the run, kill (SIGKILL) the router of the node that is master of time; launch restarts it.
     #[arg(long, requires_all = ["nodes", "seconds"])]
     pub(super) kill_master: bool,
-    /// How bad the network between them is: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. To nodes that are reached by TCP alone
-    /// what is lost is a delay, for all that is behind it.
+    /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
+    /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.
     #[arg(long, value_name = "TEXT", requires = "nodes")]
     pub(super) impair: Option<impair::Settings>,
     /// Another configuration.
     #[arg(long, value_name = "FILE", conflicts_with = "log")]
     pub(super) config: Option<PathBuf>,
-    /// Show it live in the Rerun viewer, if one is installed, instead of writing a file.
+    /// Show the robot live in the Rerun viewer, if one is installed, instead of writing a file.
     #[arg(long)]
     pub(super) viewer: bool,
     /// Leave the GUI out.
     #[arg(long, conflicts_with = "viewer")]
     pub(super) no_gui: bool,
-    /// No live table, only what happens.
+    /// No live table, only events.
     #[arg(long)]
     pub(super) quiet: bool,
-    /// The summary of several nodes with mailboxes, links, time slots and declared flows.
+    /// The summary of several nodes also lists mailboxes, links, time slots and declared flows.
     #[arg(long, short, requires = "nodes")]
     pub(super) verbose: bool,
 }
 
-/// How a node is joined to the others.
+/// How a node is connected to the others.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum Joined {
+pub(super) enum GuiConnection {
     Lan,
     Tcp,
 }

@@ -1,10 +1,10 @@
-//! What the summary of a demo asks modules for.
+//! Data that the summary of a demo requests from modules.
 
 use rohrpost::interfaces::MapCounts;
 use rohrpost::{Class, Name};
 use rohrpost_config::Installation;
 
-/// Functions asked for in the summary; their numbers in the interfaces.
+/// Functions that the summary calls; their numbers in the interfaces.
 pub(super) const FIRST_FUNCTION: u16 = 16;
 
 /// The module of a class, if it runs.
@@ -13,7 +13,7 @@ pub(super) fn running(installation: &Installation, class: &str) -> Option<Name> 
     installation.modules.iter().flat_map(|module| module.names()).find(|name| name.class() == class)
 }
 
-/// How far the map has come.
+/// The progress of the map.
 pub(super) fn map_line(counts: &MapCounts) -> String {
     let MapCounts { scans, odometries, mapped, without_pose, free, occupied } = counts;
     format!(

@@ -1,4 +1,4 @@
-//! What went through the TCP router in the demo, as its clients have counted; and what it cost that it died.
+//! Traffic through the TCP router in the demo, as its clients count it; and the losses when it died.
 
 use crate::summary::class_name;
 use crate::table::{table, time};
@@ -10,7 +10,7 @@ use rohrpost::{CallError, Class, ToolLink};
 use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 
-/// What the clients of all nodes say; nobody without a TCP router.
+/// The reports of all nodes' clients; empty without a TCP router.
 pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<BeyondLink>, Failure> {
     let mut links = Vec::new();
     for node in &installation.nodes {
@@ -24,22 +24,22 @@ pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Result<Ve
     Ok(links)
 }
 
-/// What a class did, at all ends together.
+/// A class's counters, summed over all clients.
 #[derive(Default)]
 struct ClassSum {
-    /// Meant to go to the TCP router.
+    /// Addressed to the TCP router.
     meant: u64,
     left: u64,
-    /// By newer ones, at the clients' ends.
+    /// Replaced by newer ones, at the clients.
     replaced: u64,
     came: u64,
     delivered: u64,
-    /// By cause.
+    /// Losses by cause.
     lost: BTreeMap<String, u64>,
 }
 
 impl ClassSum {
-    /// Handed to a connection, and never come out of another.
+    /// Written to a connection, and never received from another.
     fn on_way(&self) -> u64 {
         self.left.saturating_sub(self.came)
     }
@@ -94,10 +94,12 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     let mut text = String::from("\nThrough the TCP router, by class, as the clients of all nodes have counted:\n\n");
     text += &table(heads, rows);
     if has_died {
-        text += "(lost on the way: with connections that broke, or waiting in a TCP router that died, less its own answers to what it could not hand on)\n";
+        text += "(lost on the way: with broken connections, or waiting in a TCP router that died, minus its own error \
+            answers)\n";
     }
     if is_any_on_way {
-        text += "(what newer ones replaced at the TCP router itself counts as lost on the way here; `rohrpost net` tells it apart)\n";
+        text += "(packages that newer ones replaced at the TCP router itself count as lost on the way here; `rohrpost \
+            net` lists them separately)\n";
     }
     let rows = links.iter().map(|link| {
         let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {
@@ -106,10 +108,10 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
         });
         [link.node.clone(), link.reconnects.to_string(), link.outages.to_string(), outage]
     });
-    text + "\n" + &table(["node", ">connected anew", ">outages", ">the last took"], rows)
+    text + "\n" + &table(["node", ">reconnected", ">outages", ">the last took"], rows)
 }
 
-/// Whether all take part in the end.
+/// Whether all clients are connected at the end.
 pub(super) fn is_well(links: &[BeyondLink]) -> bool {
     links.iter().all(|link| link.state == BeyondState::Up)
 }
@@ -119,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_never_took_part_is_not_well() {
+    fn a_client_that_never_took_part_is_not_well() {
         let link = |state| BeyondLink {
             node: "desk".into(),
             server: "192.168.7.1:7400".into(),

@@ -1,10 +1,10 @@
-//! The configuration of a demo: the folder's own, or a copy with what the command line says written in. A copy keeps each line
-//! where it was, and messages name the file that it was made from.
+//! The configuration of a demo: the folder's own, or a copy with the command line's options added. A copy keeps each
+//! line at its place, and messages name the original file.
 
-use super::arguments::{Arguments, Joined};
+use super::arguments::{Arguments, GuiConnection};
 use super::drawing::GUI;
 use crate::check;
-use crate::keys::certificates::{self, Which};
+use crate::keys::certificates::{self, Renewal};
 use crate::terminal::Failure;
 use rohrpost_config::{Installation, Keys, Program};
 use rohrpost_routers::security::random;
@@ -21,18 +21,18 @@ const BUILDING: &str = include_str!("../../../config/building.map");
 /// Folders of keys and certificates, beside the copy.
 const KEYS: &str = "keys";
 const CERTIFICATES: &str = "certificates";
-/// The certificates of a run hold for so many days.
+/// Validity of a run's certificates, days.
 const DAYS: u32 = 1;
 
-/// What runs. A copy is written into `temporary`.
+/// The configuration that runs. A copy is written into `temporary`.
 pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<Installation, Failure> {
     if arguments.tdma && arguments.nodes == Some(1) {
-        return Err("one node alone has no time slots; say --nodes 3".into());
+        return Err("one node alone has no time slots; use --nodes 3".into());
     }
     let (name, text) = match (&arguments.log, arguments.nodes) {
         (Some(_), _) => ("demo-log.toml", LOG),
         (None, Some(2..)) if arguments.tdma => ("demo-tdma.toml", TDMA),
-        (None, Some(2..)) if arguments.gui == Joined::Tcp => ("demo-tcp.toml", TCP),
+        (None, Some(2..)) if arguments.gui == GuiConnection::Tcp => ("demo-tcp.toml", TCP),
         (None, Some(2..)) => ("demo-nodes.toml", NODES),
         (None, _) => ("demo.toml", SIMULATION),
     };
@@ -46,7 +46,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     }
     let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
     let shown = if there { own } else { format!("built-in {name}").into() };
-    // Where its paths start from; those of the built-in one start from the folder of the copy.
+    // The base of its relative paths; the built-in configuration's base is the folder of the copy.
     let folder = if there { Some(folder(&shown)?) } else { None };
     let copy = temporary.join(name);
     std::fs::write(temporary.join("building.map"), BUILDING)?;
@@ -59,19 +59,19 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     };
     let mut installation = check::load(&copy).map_err(named)?;
     if arguments.secure && installation.tcp.is_some() {
-        certificates::make(&installation, Which::Missing, DAYS)?;
+        certificates::make(&installation, Renewal::Missing, DAYS)?;
     }
     installation.shown = shown;
     Ok(installation)
 }
 
-/// The folder of a file that is there; a file named without one is in the present folder.
+/// The folder of an existing file; a file named without one is in the present folder.
 fn folder(file: &Path) -> Result<PathBuf, Failure> {
     Ok(file.canonicalize()?.parent().map(Path::to_owned).unwrap_or_default())
 }
 
 fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Arguments) -> Result<String, Failure> {
-    // Checked as it was written, so that a mistake is told with its own file and line.
+    // Checked before the changes, so that a mistake names the original file and line.
     let installation = check::validate(Installation::parse(text, shown)?)?;
     let mut document: DocumentMut = text.parse()?;
     if let (Some(folder), Some(item)) = (folder, document.get_mut("parameters")) {
@@ -79,7 +79,7 @@ fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Argume
     }
     if arguments.secure {
         let network = document.get_mut("network").and_then(Item::as_table_like_mut).ok_or("no [network]")?;
-        // Also if the file has keys of its own: the demo's are for this run.
+        // Also if the file has its own keys: the demo's keys are for this run.
         network.insert("security", value("keys"));
         network.insert("keys", value(KEYS));
         if let Some(tcp) = document.get_mut("tcp").and_then(Item::as_table_like_mut) {
@@ -100,7 +100,7 @@ fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Argume
     Ok(document.to_string())
 }
 
-/// Removes a module and leaves empty lines, so that those of the modules behind it stay where they were.
+/// Replaces a module by empty lines, so that the modules behind it keep their line numbers.
 fn remove(modules: &mut ArrayOfTables, at: usize) {
     let lines = |modules: &ArrayOfTables| {
         let mut document = DocumentMut::new();
@@ -121,14 +121,14 @@ fn is_gui(name: &str) -> bool {
     name.split('.').next() == Some(GUI)
 }
 
-/// A path that started from this folder, so that it is found from another one.
+/// A path relative to this folder, rewritten for another folder.
 fn start_from(folder: &Path, item: &mut Item) {
     if let Some(path) = item.as_str() {
         *item = value(folder.join(path).display().to_string());
     }
 }
 
-/// Paths that started from the file's folder must find their way from another one; then what the command line says.
+/// Rewrites relative paths for another folder; then adds the command line's options.
 fn rewrite(
     entry: &mut dyn TableLike,
     program: &Program,
@@ -179,8 +179,8 @@ mod tests {
     }
 
     #[test]
-    fn lines_stay_where_they_are() {
-        // The GUI stands in the middle, with a table of its own.
+    fn lines_keep_their_numbers() {
+        // The GUI stands in the middle, with its own table.
         let (head, gui) = SIMULATION.split_once("[[module]]\nname = \"gui.0\"").unwrap();
         let (gui, _show) = gui.split_once("[gui]").unwrap();
         let (first, rest) = head.split_once("[[module]]\nname = \"mapper.0\"").unwrap();
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_start_from_the_folder_of_the_file() {
+    fn paths_are_relative_to_the_folder_of_the_file() {
         let program = "builtin = \"pilot\"";
         let text = SIMULATION.replace(program, "program = [\"../bin/pilot\", \"--fast\"]");
         let installation = copied(&text, &["--no-gui"]);

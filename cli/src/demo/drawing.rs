@@ -16,7 +16,7 @@ pub(super) fn drawing(installation: &Installation) -> Option<PathBuf> {
     Some(installation.resolve(file.as_str()?))
 }
 
-/// Says where the drawing is that was made since.
+/// Prints where the drawing is, if it was written since.
 pub(super) fn drawn(drawing: Option<PathBuf>, begun: SystemTime) {
     let is_new = |path: &PathBuf| path.metadata().and_then(|file| file.modified()).is_ok_and(|at| at >= begun);
     if let Some(path) = drawing.filter(is_new) {

@@ -1,4 +1,4 @@
-//! The folder with the files that a demo copies, and such folders that killed demos left.
+//! The folder of a demo's files, and removal of folders that killed demos left.
 
 use std::fs::{self, File};
 use std::io;
@@ -7,20 +7,20 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 const PREFIX: &str = "rohrpost-demo-";
-/// The file in it that is locked as long as the demo runs, by whatever it ends.
+/// The file in it that is locked while the demo runs; the kernel releases the lock in any case.
 const IN_USE: &str = "in-use";
 
-/// What that file is called until it is locked.
+/// The name of that file until it is locked.
 const NOT_LOCKED: &str = "not-locked-yet";
 
-/// A demo's folder; gone with it.
+/// A demo's folder; removed on drop.
 pub(super) struct Folder {
     folder: TempDir,
     _in_use: File,
 }
 
 impl Folder {
-    /// Among temporary files. What killed demos left there is removed.
+    /// Creates a folder among temporary files. Removes the folders of killed demos.
     pub(super) fn new() -> io::Result<Self> {
         let temp = std::env::temp_dir();
         remove_abandoned(&temp);
@@ -29,7 +29,8 @@ impl Folder {
 
     fn new_in(temp: &Path) -> io::Result<Self> {
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(temp)?;
-        // Under its name it is locked from the first moment on: without a lock, another demo would take the folder for one that was left.
+        // The final name appears only with the lock: without a lock, another demo would take the folder for an
+        // abandoned one.
         let in_use = File::create(folder.path().join(NOT_LOCKED))?;
         in_use.lock()?;
         fs::rename(folder.path().join(NOT_LOCKED), folder.path().join(IN_USE))?;
@@ -41,7 +42,8 @@ impl Folder {
     }
 }
 
-/// Removes the folders there of this user's demos that do not run any more; says which. Somebody else may have removed one meanwhile.
+/// Removes the folders of this user's demos that no longer run; returns their paths. Another process may have removed
+/// one meanwhile.
 pub(crate) fn remove_abandoned(temp: &Path) -> Vec<PathBuf> {
     let mut folders = abandoned(temp);
     folders.retain(|folder| fs::remove_dir_all(folder).is_ok());
@@ -56,7 +58,7 @@ fn abandoned(temp: &Path) -> Vec<PathBuf> {
         // Not through a link, which this does not follow.
         is_named_so && entry.metadata().is_ok_and(|found| found.is_dir() && found.uid() == us)
     });
-    // One that has just been made has no such file yet, and stays.
+    // A folder that has just been made has no such file yet, and stays.
     let is_over = |folder: &PathBuf| File::open(folder.join(IN_USE)).is_ok_and(|file| file.try_lock().is_ok());
     ours.map(|entry| entry.path()).filter(is_over).collect()
 }
@@ -66,14 +68,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_killed_demo_left_is_found_and_what_runs_is_not() {
+    fn only_folders_of_killed_demos_are_abandoned() {
         let temp = tempfile::tempdir().unwrap();
         fs::create_dir(temp.path().join("rohrpost-demo-begun")).unwrap();
         fs::create_dir(temp.path().join("another")).unwrap();
         fs::write(temp.path().join("another").join(IN_USE), "").unwrap();
         let runs = Folder::new_in(temp.path()).unwrap();
         assert_eq!(abandoned(temp.path()), Vec::<PathBuf>::new());
-        // As a kill leaves it: the folder is there, the lock is not.
+        // The state after a kill: the folder is there, the lock is not.
         let Folder { folder, _in_use } = Folder::new_in(temp.path()).unwrap();
         let left = folder.keep();
         assert_eq!(abandoned(temp.path()), Vec::<PathBuf>::new(), "it runs still");

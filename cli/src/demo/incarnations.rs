@@ -1,4 +1,4 @@
-//! The incarnations of routers: which one died, when, and when the next was there.
+//! The incarnations of routers: which one died, when, and when the next was ready.
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -17,11 +17,11 @@ pub(super) struct Death {
     pub(super) pid: u32,
     /// When it was found dead, monotonic ns.
     pub(super) at_ns: u64,
-    /// The next process, and when it was found ready; none as long as there is none.
+    /// The next process, and when it was found ready; none until then.
     pub(super) again: Option<(u32, u64)>,
 }
 
-/// A node whose router is watched.
+/// A node with a watched router.
 struct WatchedNode {
     /// By its place in the configuration.
     index: usize,
@@ -31,14 +31,14 @@ struct WatchedNode {
     pid: Option<u32>,
 }
 
-/// Watches routers, one of each node at most, in the tables of the nodes' memory: nobody is asked, so nobody is disturbed.
+/// Watches routers, at most one of each node, in the tables of the nodes' shared memory: it sends nothing.
 pub(super) struct Incarnations {
     nodes: Vec<WatchedNode>,
     pub(super) deaths: Vec<Death>,
 }
 
 impl Incarnations {
-    /// Of nodes that run; which router of each.
+    /// The routers of running nodes.
     pub(super) fn of(installation: &Installation, router: impl Fn(&str) -> Option<Name>) -> Result<Self, NodeError> {
         let watched = |(index, config): (usize, &rohrpost_config::Node)| {
             let router = router(&config.name)?;
@@ -52,7 +52,7 @@ impl Incarnations {
         Ok(incarnations)
     }
 
-    /// Looks who has died, and who has come back.
+    /// Checks which routers died, and which came back.
     pub(super) fn look(&mut self) {
         for watched in &mut self.nodes {
             let index = watched.index;
@@ -76,13 +76,13 @@ impl Incarnations {
     /// Kills the router of a node, as a crash would.
     pub(super) fn kill(&self, node: usize) -> Option<u32> {
         let pid = self.nodes.iter().find(|watched| watched.index == node)?.pid?;
-        // Found alive a moment ago, and its number is not given to others so soon.
+        // Found alive a moment ago; process ids are not reused so soon.
         kill(Pid::from_raw(pid.cast_signed()), Signal::SIGKILL).ok().map(|()| pid)
     }
 }
 
 impl WatchedNode {
-    /// The process that is the router now, if it is ready.
+    /// The process id of the present router, if it is ready.
     fn ready(&self) -> Option<u32> {
         let all = self.node.participants();
         let is_ready = |state: State| !matches!(state, State::Starting | State::Stopping);
@@ -91,10 +91,10 @@ impl WatchedNode {
     }
 }
 
-/// Dead is also who has ended, and whose parent has not noticed yet.
+/// A zombie counts as dead, too: it has ended, and its parent has not noticed yet.
 fn is_alive(pid: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    // The name before it may hold anything, also brackets.
+    // The name before it may contain anything, also brackets.
     let state = stat.rsplit(") ").next().and_then(|rest| rest.chars().next());
     state.is_some_and(|state| !matches!(state, 'Z' | 'X'))
 }

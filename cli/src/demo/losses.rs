@@ -1,4 +1,4 @@
-//! What was lost of the declared flows, from end to end: as the modules at both ends have counted it.
+//! End-to-end losses of the declared flows, as counted by the modules at both ends.
 
 use crate::table::table;
 use crate::vocabulary::{Vocabulary, built_in};
@@ -10,18 +10,18 @@ use rohrpost_mailbox::Kind;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// How long an answer that is overdue is waited for, and how often it is asked for.
+/// How long to wait for an overdue answer, and how often to poll.
 const OVERDUE: Duration = Duration::from_secs(1);
 const AGAIN: Duration = Duration::from_millis(50);
 
-/// What modules say of their exchange with others.
+/// The modules' counters of their exchange with others.
 pub(super) struct ExchangeLosses {
     told: BTreeMap<Name, Vec<Exchange>>,
 }
 
 impl ExchangeLosses {
-    /// Asks both ends of each declared flow. One that does not answer was told of elsewhere. A call that was given up a moment ago may yet
-    /// be answered: that is waited for a little.
+    /// Asks both ends of each declared flow. A module that does not answer is reported elsewhere. A call that timed out
+    /// a moment ago may still get its answer: wait a little for it.
     pub(super) fn ask(installation: &Installation, tool: &mut ToolLink) -> Self {
         let until = Instant::now() + OVERDUE;
         loop {
@@ -47,7 +47,7 @@ impl ExchangeLosses {
         Self { told }
     }
 
-    /// A row for each kind of package that each declared flow between nodes carries. `ask` asks a module for its interface.
+    /// A row for each kind of package on each declared flow between nodes. `ask` asks a module for its interface.
     pub(super) fn table(
         &self,
         installation: &Installation,
@@ -73,7 +73,7 @@ impl ExchangeLosses {
             }
         }
         rows.sort_unstable();
-        // Several flows may be declared between the same two.
+        // Several flows may be declared between the same two modules.
         rows.dedup();
         table(["flow", "what", ">packages", ">sent again", ">too late", ">lost"], rows)
     }

@@ -1,7 +1,7 @@
-//! `rohrpost demo --nodes 3`: the robot over several nodes, each in a network namespace of this computer.
+//! `rohrpost demo --nodes 3`: the robot over several nodes, each in its own network namespace of this computer.
 
 use super::account::{self, Balance};
-use super::arguments::{Arguments, Joined};
+use super::arguments::{Arguments, GuiConnection};
 use super::asked::{FIRST_FUNCTION, map_line, running};
 use super::drawing::{drawing, drawn};
 use super::losses::ExchangeLosses;
@@ -26,9 +26,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Modules answer within this time.
+/// Timeout for modules' answers.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Routers tell what they count twice a second; when all that was on its way has come, it stays as it is.
+/// Routers publish their counters twice a second; they stay constant when nothing is under way.
 const SETTLE: Duration = Duration::from_secs(8);
 const LOOK: Duration = Duration::from_millis(600);
 
@@ -37,15 +37,15 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let nodes = installation.nodes.len();
     if nodes != usize::from(count) {
-        return Err(format!("{} has {nodes} nodes; say --nodes {nodes}", installation.shown.display()).into());
+        return Err(format!("{} has {nodes} nodes; use --nodes {nodes}", installation.shown.display()).into());
     }
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
-    // Before the first thread, of which the speech has two.
+    // Must run before the first thread; the speech has two.
     let lab = lab(&installation)?;
     let speech = Speech::begin()?;
     installation.security_texts().iter().for_each(|security| speech.say(security));
     let mut nodes = LaunchedNodes::begin(installation.clone(), lab, arguments.impair, &speech)?;
-    let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == Joined::Tcp)];
+    let victims = [(Victim::Master, arguments.kill_master), (Victim::TcpRouter, arguments.gui == GuiConnection::Tcp)];
     let victims = victims.into_iter().filter(|(_, is_one)| *is_one).map(|(victim, _)| victim).collect();
     let summary =
         watch(&mut nodes, &installation, long, victims).map(|seen| summary(&installation, &seen?, arguments.verbose));
@@ -58,7 +58,8 @@ pub(super) fn run(arguments: &Arguments, count: u8, long: Option<Duration>) -> R
     Ok(if well { code } else { ExitCode::FAILURE })
 }
 
-/// Until the time is over, which begins when all modules are on, or it is told to stop; what was seen of routers, or none if not all ran.
+/// Runs until the time is over, counted from when all modules are on, or a stop is requested; returns the observed
+/// routers, or none if not all modules ran.
 fn watch(
     nodes: &mut LaunchedNodes<'_>,
     installation: &Arc<Installation>,
@@ -154,7 +155,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     Ok((text, well))
 }
 
-/// What the mailboxes of all nodes did.
+/// The mailboxes of all nodes.
 fn classes(surveys: &[Survey]) -> Vec<ClassTraffic> {
     let mut classes: Vec<ClassTraffic> = Vec::new();
     for traffic in surveys.iter().flat_map(|survey| &survey.classes) {
@@ -184,20 +185,20 @@ fn in_error(installation: &Installation, tool: &mut ToolLink) -> Vec<String> {
         let name = installation.classes.format(module.name);
         match tool.status(module.name) {
             Ok(status) if status.state == State::Error => Some(format!("{name} is in error: {}", status.error)),
-            Err(error) if !module.optional => Some(format!("{name} does not say how it is: {error}")),
+            Err(error) if !module.optional => Some(format!("{name} does not report its state: {error}")),
             _ => None,
         }
     };
     installation.modules.iter().filter_map(told).collect()
 }
 
-/// How far apart the clocks of the nodes are. All of them run on one computer here, so that it is known exactly: their pages are read at
-/// one moment of the one monotonic clock. False if one says that it is better than it is.
+/// The differences between the nodes' clocks. All run on one computer, so the true difference is known: their pages are
+/// read at one moment of the one monotonic clock. False if a node claims a better bound than is true.
 fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
     let clocks: Vec<SystemClock> = nodes.iter().map(|node| SystemClock::open(node)).collect();
     let moment = monotonic_ns();
     let times: Vec<_> = clocks.iter().map(|clock| clock.at(moment)).collect();
-    // Who is master is sure of its time, since it is that of all.
+    // The master is sure of its time, since its time is the common time.
     let master = (0..times.len()).min_by_key(|index| times[*index].error).unwrap_or(0);
     let (mut text, mut holds) = (String::new(), true);
     for (index, node) in installation.nodes.iter().enumerate() {
@@ -216,15 +217,15 @@ fn clocks(installation: &Installation, nodes: &[Arc<Node>]) -> (String, bool) {
         };
     }
     if !holds {
-        text += "a clock is further off than it says\n";
+        text += "a clock's error exceeds its own bound\n";
     }
     (text, holds)
 }
 
-/// What routers counted when all that was on its way had come: the modules that send are switched off first.
+/// The routers' counters when nothing is under way: the sending modules are switched off first.
 fn settled(installation: &Installation, tool: &mut ToolLink, died: &[&str]) -> Result<Vec<Links>, Failure> {
     for module in installation.modules.iter().filter(|module| module.is_in_file()) {
-        // One that does not answer was told of above.
+        // A module that does not answer is reported above.
         let _ = tool.switch(module.name, false);
     }
     let deadline = Instant::now() + SETTLE;
@@ -245,7 +246,7 @@ fn in_slots(installation: &Installation, tool: &mut ToolLink) -> Result<Vec<Slot
     of_routers(installation, tool, RouterInterface::SLOTS)
 }
 
-/// What the routers of all nodes publish.
+/// The reports of all nodes' routers.
 fn of_routers<T: DeserializeOwned>(
     installation: &Installation,
     tool: &mut ToolLink,

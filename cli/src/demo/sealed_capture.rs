@@ -1,4 +1,5 @@
-//! What tells the time on the bridge, where that is sealed: the demo has the keys, and so reads what each node reads that does not know who incarnations.
+//! Decodes sealed time datagrams from the bridge: the demo has the keys, and reads them like a node that has not
+//! authenticated its peers.
 
 use crate::router::keys;
 use crate::terminal::Failure;
@@ -9,17 +10,17 @@ use rohrpost_routers::settings::Settings;
 use rohrpost_routers::time::TIME_BYTES;
 use rohrpost_routers::time::message::Message;
 
-/// An incarnation that says nothing.
+/// The incarnation of an observer that sends nothing.
 const MUTE: u64 = 1;
 
-/// By node: what is sealed to it. None where nothing is sealed.
+/// By node: opens what is sealed to it. Empty where nothing is sealed.
 #[derive(Default)]
 pub(super) struct SealedCapture {
     nodes: Vec<Opening>,
 }
 
 impl SealedCapture {
-    /// With the keys of the LAN of an installation, if it has some.
+    /// With the LAN keys of an installation, if it has some.
     pub(super) fn of(installation: &Installation) -> Result<Self, Failure> {
         let mut nodes = Vec::new();
         for node in installation.lan_nodes() {
@@ -30,7 +31,7 @@ impl SealedCapture {
         Ok(Self { nodes })
     }
 
-    /// What a datagram of time says, sealed or not.
+    /// Parses a datagram of time, sealed or not.
     pub(super) fn hear(&mut self, datagram: &[u8]) -> Option<(FrameHead, Message)> {
         if let Ok((head, rest)) = FrameHead::parse(datagram) {
             return Some((head, Message::parse(head.kind, rest).ok()?));

@@ -1,6 +1,6 @@
-//! What the demo tells when a router dies: who stood in for a master, who is one now, and when the router was there again.
+//! The demo's report on a router's death: the backup master, the next master, and when the router was back.
 //!
-//! A thread looks at the bridge and at the nodes' tables. It asks nobody, so that nothing crosses the network for it.
+//! A thread observes the bridge and the nodes' tables. It sends nothing, so it adds no traffic.
 
 use super::incarnations::{Death, Incarnations};
 use super::masters::{MasterTerm, Masters};
@@ -15,22 +15,22 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Deaths are found so soon.
+/// A death is detected within this time.
 const LOOK: Duration = Duration::from_millis(5);
-/// And at the latest, on a busy computer: who told the time less than this before was the master when it died.
+/// The same on a busy computer: the master at a death is the node that sent the time at most this long before.
 const FOUND_NS: u64 = 500_000_000;
-/// What crossed the bridge is read so often, in looks; it waits in the kernel with its time.
+/// The capture is read every so many polls; frames wait in the kernel with their time stamps.
 const READ_LOOKS: u32 = 10;
 
-/// The thread that watches.
+/// The observing thread.
 pub(super) struct Watch {
-    /// Who is to be killed; without this end, the thread ends.
+    /// Requests to kill a router; when this end closes, the thread ends.
     kill: Sender<Victim>,
     thread: JoinHandle<TakeoverRecord>,
     installation: Arc<Installation>,
 }
 
-/// Whom to kill.
+/// Which router to kill.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Victim {
     /// The router of the present master of time.
@@ -39,22 +39,22 @@ pub(super) enum Victim {
     TcpRouter,
 }
 
-/// What it has seen.
+/// Its observations.
 pub(super) struct TakeoverRecord {
     installation: Arc<Installation>,
     began_ns: u64,
     incarnations: Incarnations,
-    /// Of the TCP router.
+    /// Incarnations of the TCP router.
     beyond: Incarnations,
     masters: Masters,
     /// Processes that were killed on purpose.
     on_purpose: Vec<u32>,
-    /// Kills that were wanted when nobody was master.
+    /// Requests to kill while there was no master.
     in_vain: u32,
 }
 
 impl Watch {
-    /// Of nodes that all run.
+    /// For nodes that all run.
     pub(super) fn begin(installation: &Arc<Installation>, capture: Capture) -> Result<Self, Failure> {
         let (kill, words) = channel();
         let seen = TakeoverRecord {
@@ -74,11 +74,11 @@ impl Watch {
 
     /// Kills a router.
     pub(super) fn kill(&self, victim: Victim) {
-        // It ends only when told to.
+        // It ends only when the channel closes.
         let _ = self.kill.send(victim);
     }
 
-    /// Ends it.
+    /// Ends the thread.
     pub(super) fn end(self) -> Result<TakeoverRecord, Failure> {
         drop(self.kill);
         let name = &self.installation.name;
@@ -119,7 +119,7 @@ impl TakeoverRecord {
         }
     }
 
-    /// Nodes whose routers had more than one incarnation.
+    /// Nodes with more than one incarnation of the router.
     pub(super) fn died(&self) -> Vec<&str> {
         let name = |death: &Death| self.installation.nodes[death.node].name.as_str();
         let mut names: Vec<&str> = self.incarnations.deaths.iter().map(name).collect();
@@ -128,7 +128,7 @@ impl TakeoverRecord {
         names
     }
 
-    /// Whether each that died came back, and was killed if it was to be.
+    /// Whether each dead router came back, and was killed if requested.
     pub(super) fn is_well(&self) -> bool {
         self.in_vain == 0
             && self.incarnations.deaths.iter().chain(&self.beyond.deaths).all(|death| death.again.is_some())
@@ -139,15 +139,15 @@ impl TakeoverRecord {
         !self.beyond.deaths.is_empty()
     }
 
-    /// All of it in words; empty when no router died.
+    /// The report in words; empty when no router died.
     pub(super) fn text(&self) -> String {
         let mut text: String = self.incarnations.deaths.iter().map(|death| self.event(death)).collect();
         for death in &self.beyond.deaths {
-            text += &format!("The TCP router {}.\n", self.life(death));
+            text += &format!("The TCP router {}.\n", self.death_text(death));
         }
         if self.in_vain > 0 {
-            text += "no router was killed, as there was none: no master, if [time] of the configuration is without `source = \"master\"`, or no \
-                     TCP router\n";
+            text += "no router was killed, as there was none: no master, if [time] of the configuration is without \
+                `source = \"master\"`, or no TCP router\n";
         }
         if !self.incarnations.deaths.is_empty() {
             let master = self.masters.master_at(u64::MAX).map(|term| self.name(term));
@@ -161,12 +161,12 @@ impl TakeoverRecord {
     }
 
     fn event(&self, death: &Death) -> String {
-        let what = format!("The router of {} {}.\n", self.installation.nodes[death.node].name, self.life(death));
+        let what = format!("The router of {} {}.\n", self.installation.nodes[death.node].name, self.death_text(death));
         what + &self.takeover(death).unwrap_or_else(|| "  It was not the master.\n".into())
     }
 
-    /// When it died, and when it was there again.
-    fn life(&self, death: &Death) -> String {
+    /// When it died, and when it was back.
+    fn death_text(&self, death: &Death) -> String {
         let after = |from_ns: u64, to_ns: u64| time(Duration::from_nanos(to_ns.saturating_sub(from_ns)));
         let why = if self.on_purpose.contains(&death.pid) { "killed on purpose" } else { "not by this command" };
         let again = match death.again {
@@ -177,7 +177,7 @@ impl TakeoverRecord {
         format!("died {at} after the beginning (process {}, {why}); {again}", death.pid)
     }
 
-    /// What became of its time, if it was the master.
+    /// The succession of the master, if it was the master.
     fn takeover(&self, death: &Death) -> Option<String> {
         let is_its = |last: &&MasterTerm| death.at_ns < last.last_ns + FOUND_NS || self.on_purpose.contains(&death.pid);
         let last = self.masters.last_of(death.node, death.at_ns).filter(is_its)?;
@@ -189,13 +189,13 @@ impl TakeoverRecord {
         let mut next = self.masters.since(last.last_ns).peekable();
         let mut text = String::from("  It was the master.");
         while let Some(term) = next.next_if(|term| term.replacement) {
-            let (who, many) = (self.name(term), term.cycles());
+            let (backup, many) = (self.name(term), term.cycles());
             let syncs = if many == 1 { "synchronisation" } else { "synchronisations" };
-            text += &format!(" {who} stood in with {many} {syncs}, the first {}.", after(term));
+            text += &format!(" {backup} stood in with {many} {syncs}, the first {}.", after(term));
         }
         text += &match next.peek() {
             None => " No other took over.\n".into(),
-            Some(term) if term.node == last.node => format!(" It told the time again {}.\n", after(term)),
+            Some(term) if term.node == last.node => format!(" It was master again {}.\n", after(term)),
             Some(term) => format!(" {} was master from the sync on that came {}.\n", self.name(term), after(term)),
         };
         Some(text)

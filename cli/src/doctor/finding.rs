@@ -1,12 +1,12 @@
-//! What was found of one thing, and how good that is.
+//! One finding, and how good it is.
 
 /// How good something is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum Grade {
     Ok,
-    /// A robot runs, and may be late.
+    /// A robot runs, but may be late.
     Warn,
-    /// It does not run, or not for long.
+    /// A robot does not run, or not for long.
     Bad,
 }
 
@@ -20,16 +20,16 @@ impl Grade {
     }
 }
 
-/// One thing that was looked at.
+/// The result of one check.
 #[derive(Debug)]
 pub(super) struct Finding {
     pub(super) what: &'static str,
     pub(super) state: Grade,
-    /// What is.
+    /// What was found.
     pub(super) is: String,
     /// Why it matters.
     pub(super) why: &'static str,
-    /// What fixes it: a command, if one does.
+    /// The fix: a command, if there is one.
     pub(super) fix: Option<String>,
 }
 
@@ -38,7 +38,7 @@ impl Finding {
         Self { what, state: Grade::Ok, is: is.into(), why, fix: None }
     }
 
-    /// Something that is not as it should be, and what fixes it.
+    /// A problem, and its fix.
     pub(super) fn not(
         state: Grade,
         what: &'static str,

@@ -1,12 +1,12 @@
-//! The kernel and the processor: what may keep a thread waiting.
+//! The kernel and the processor: what may delay a thread.
 
 use super::finding::{Finding, Grade};
 use super::machine::Machine;
 use crate::daemons::{self, Daemon};
 
-/// Open-file-description locks came with it.
+/// The first version with open-file-description locks.
 const KERNEL_LEAST: (u32, u32) = (3, 15);
-/// A core that has to be woken out of a state for longer than this is late by as much, µs.
+/// Idle states with a longer exit latency delay a wake-up noticeably, µs.
 const IDLE_LATENCY_US: u64 = 50;
 const CPUS: &str = "/sys/devices/system/cpu";
 
@@ -18,13 +18,13 @@ pub(super) fn findings(machine: &Machine) -> Vec<Finding> {
     found.chain(time_daemons(machine)).collect()
 }
 
-/// Where nodes have a common time, nobody else may slew their clocks.
+/// If nodes have a common time, no other program may slew their clocks.
 fn time_daemons(machine: &Machine) -> Vec<Finding> {
     let finding = |daemon: Daemon| {
         let (what, is) = ("time daemon", format!("{} runs", daemon.name));
         match machine.asked.lan {
             Some(_) => Finding::not(Grade::Warn, what, is, daemons::WHY, daemon.ends),
-            None => Finding::ok(what, is, "it is in nobody's way, unless nodes have the time of a master"),
+            None => Finding::ok(what, is, "it does no harm, unless nodes follow a master clock"),
         }
     };
     let running = daemons::running(&machine.folder("/proc"));
@@ -35,7 +35,7 @@ fn time_daemons(machine: &Machine) -> Vec<Finding> {
 }
 
 fn version(machine: &Machine) -> Option<Finding> {
-    let why = "a death is told by open-file-description locks, which came with Linux 3.15";
+    let why = "a module's death is detected by open-file-description locks, which need Linux 3.15";
     let text = machine.read("/proc/sys/kernel/osrelease")?;
     let mut parts = text.split(|c: char| !c.is_ascii_digit()).map(|part| part.parse().unwrap_or(0));
     let version = (parts.next()?, parts.next().unwrap_or(0));
@@ -47,17 +47,17 @@ fn version(machine: &Machine) -> Option<Finding> {
 }
 
 fn preemption(machine: &Machine) -> Option<Finding> {
-    let why = "bounds how long the kernel itself keeps an urgent thread waiting";
+    let why = "bounds how long the kernel itself delays an urgent thread";
     let built = machine.read("/proc/version")?;
     if machine.number("/sys/kernel/realtime") == Some(1) || built.contains("PREEMPT_RT") {
         return Some(Finding::ok("preemption", "PREEMPT_RT", why));
     }
-    // `none voluntary (full) lazy`: the one in brackets. Mostly only root may read it.
+    // `none voluntary (full) lazy`: the mode in brackets is active. Mostly only root may read the file.
     let chosen = machine.read("/sys/kernel/debug/sched/preempt");
     let chosen = chosen.as_deref().and_then(|text| text.split(['(', ')']).nth(1));
     let model = match chosen {
         Some(model) => format!("dynamic, now `{model}`"),
-        None if built.contains("PREEMPT_DYNAMIC") => "dynamic (which is in use only root may read)".into(),
+        None if built.contains("PREEMPT_DYNAMIC") => "dynamic (only root may read the active mode)".into(),
         None if built.contains("PREEMPT") => "full".into(),
         None => "none or voluntary".into(),
     };
@@ -71,30 +71,34 @@ fn preemption(machine: &Machine) -> Option<Finding> {
 }
 
 fn throttling(machine: &Machine) -> Option<Finding> {
-    let why = "a SCHED_FIFO thread that never sleeps must leave something to others, and all must get some time";
+    let why = "a SCHED_FIFO thread that never sleeps must leave some time to other threads";
     let (path, what) = ("/proc/sys/kernel/sched_rt_runtime_us", "real-time share");
     let runtime: i64 = machine.read(path)?.parse().ok()?;
     let period = machine.number("/proc/sys/kernel/sched_rt_period_us").unwrap_or(1_000_000).max(1);
     let fix = "sudo sysctl -w kernel.sched_rt_runtime_us=950000";
     Some(match runtime {
         0 => Finding::not(Grade::Bad, what, "0 µs: SCHED_FIFO threads never run", why, fix),
-        ..0 => Finding::not(Grade::Warn, what, "no limit: a runaway takes the computer with it", why, fix),
+        ..0 => Finding::not(Grade::Warn, what, "no limit: an endless loop blocks the computer", why, fix),
         _ => Finding::ok(what, format!("{runtime} of {period} µs"), why),
     })
 }
 
-/// Since 6.12 the kernel serves ordinary threads in time of their own; the share above counts no more then.
+/// Since 6.12 the kernel reserves time for ordinary threads by a deadline server; the share above no longer matters.
 fn fair_server(machine: &Machine) -> Option<Finding> {
     let runtime = machine.number("/sys/kernel/debug/sched/fair_server/cpu0/runtime")?;
     let period = machine.number("/sys/kernel/debug/sched/fair_server/cpu0/period")?;
     let is = format!("{} of {} ms go to ordinary threads if they starve", runtime / 1_000_000, period / 1_000_000);
-    let why = "so long may a real-time thread be kept waiting when others starve";
+    let why = "a real-time thread may be delayed this long when others starve";
     Some(Finding::ok("fair server", is, why))
 }
 
 fn clock_source(machine: &Machine) -> Option<Finding> {
     let folder = "/sys/devices/system/clocksource/clocksource0";
-    let (what, why) = ("clock source", "every package and deadline reads the clock; some take a system call for it");
+    let (what, why) = (
+        "clock source",
+        "every package and deadline reads the clock; some clock sources need a system \
+        call",
+    );
     let source = machine.read(&format!("{folder}/current_clocksource"))?;
     let slow = ["hpet", "acpi_pm", "jiffies", "refined-jiffies", "pit"];
     if !slow.contains(&source.as_str()) {
@@ -104,13 +108,13 @@ fn clock_source(machine: &Machine) -> Option<Finding> {
     let better = available.split_whitespace().find(|source| !slow.contains(source));
     let fix = match better {
         Some(better) => format!("echo {better} | sudo tee {folder}/current_clocksource"),
-        None => "look why the kernel gave up the better one: `dmesg | grep -i clocksource`".into(),
+        None => "find out why the kernel rejected the better one: `dmesg | grep -i clocksource`".into(),
     };
     Some(Finding::not(Grade::Warn, what, format!("{source} (slow)"), why, fix))
 }
 
 fn governor(machine: &Machine) -> Finding {
-    let (what, why) = ("CPU governor", "a core that has to speed up first is late by tens of microseconds");
+    let (what, why) = ("CPU governor", "a core that must first speed up is late by tens of microseconds");
     let cpus = machine.numbered(CPUS, "cpu").into_iter();
     let mut governors: Vec<String> =
         cpus.filter_map(|cpu| machine.read(&format!("{CPUS}/{cpu}/cpufreq/scaling_governor"))).collect();
@@ -127,7 +131,7 @@ fn governor(machine: &Machine) -> Finding {
 }
 
 fn idle(machine: &Machine) -> Finding {
-    let (what, why) = ("idle states", "a core that sleeps deeply takes that long to wake up");
+    let (what, why) = ("idle states", "a core in a deep idle state takes this long to wake up");
     let folder = format!("{CPUS}/cpu0/cpuidle");
     let states = machine.numbered(&folder, "state").into_iter().filter_map(|state| {
         let of = |file| machine.read(&format!("{folder}/{state}/{file}"));
@@ -135,7 +139,7 @@ fn idle(machine: &Machine) -> Finding {
         Some((of("latency")?.parse::<u64>().ok()?, of("name")?)).filter(|_| used)
     });
     match states.max() {
-        None => Finding::ok(what, "none, or the host's business", why),
+        None => Finding::ok(what, "none, or controlled by the host", why),
         Some((latency, name)) if latency <= IDLE_LATENCY_US => {
             Finding::ok(what, format!("deepest is {name}, {latency} µs"), why)
         }
@@ -147,11 +151,11 @@ fn idle(machine: &Machine) -> Finding {
 }
 
 fn cores(machine: &Machine) -> Finding {
-    let (what, why) = ("cores", "with one, whoever computes keeps all less urgent modules waiting");
+    let (what, why) = ("cores", "with one core, a busy module delays all less urgent ones");
     let allowed = machine.field("/proc/self/status", "Cpus_allowed_list");
     let count = allowed.as_deref().map_or(0, count_of_list);
     let is = match (count, allowed) {
-        (0, _) => "not told".into(),
+        (0, _) => "unknown".into(),
         (1, Some(list)) => format!("1 (number {list})"),
         (count, list) => format!("{count} (numbers {})", list.unwrap_or_default()),
     };
@@ -162,7 +166,7 @@ fn cores(machine: &Machine) -> Finding {
     Finding::ok(what, is, why)
 }
 
-/// `0-3,8`: five.
+/// Counts the processors of a list: `0-3,8` is five.
 fn count_of_list(list: &str) -> u32 {
     let range = |part: &str| {
         let (first, last) = part.split_once('-').unwrap_or((part, part));
@@ -181,6 +185,6 @@ fn isolated(machine: &Machine) -> Finding {
     Finding::ok(
         "isolated cores",
         is,
-        "the kernel puts nobody there by itself (boot with `isolcpus=`); worth it for the last microseconds only",
+        "the kernel schedules no other threads there (boot with `isolcpus=`); useful only for the last microseconds",
     )
 }

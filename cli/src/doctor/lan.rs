@@ -2,7 +2,7 @@
 
 use std::net::IpAddr;
 
-/// The network of a node, as its configuration has it and as this computer sees it.
+/// A node's network in its configuration and on this computer.
 #[derive(Clone, Debug)]
 pub(super) struct LanView {
     pub(super) node: String,
@@ -10,9 +10,9 @@ pub(super) struct LanView {
     pub(super) mtu: u16,
     /// Whether this computer has the address.
     pub(super) is_here: bool,
-    /// The addresses that it has, and on which device.
+    /// This computer's addresses, with their devices.
     pub(super) addresses: Vec<(String, IpAddr)>,
-    /// That of packages, that of time, and without time slots that of packages that are not real time.
+    /// The ports for packages, for time and, without time slots, for packages that are not real time.
     pub(super) ports: Vec<Port>,
     /// A router of this node runs here.
     pub(super) runs: bool,
@@ -27,24 +27,24 @@ pub(super) struct Port {
     pub(super) state: PortState,
 }
 
-/// Whether a port can be had.
+/// Whether a port is free.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum PortState {
     Free,
     InUse,
-    /// Not known, since the address is not here.
+    /// Unknown, since this computer does not have the address.
     Unknown,
     Refused(String),
 }
 
-/// Which times of datagrams the kernel tells.
+/// Which kernel time stamps datagrams get.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Stamps {
     Both,
-    /// Not those of leaving.
+    /// Only on reception, not on transmission.
     NoSent,
     None(String),
-    /// There was no peer to send anything to.
+    /// There was no peer to send to.
     Unknown,
 }
 
@@ -53,20 +53,20 @@ pub(super) enum Stamps {
 pub(super) struct PeerNode {
     pub(super) name: String,
     pub(super) address: IpAddr,
-    /// Largest packet on the way there, as far as this computer knows.
+    /// Path MTU, as far as this computer knows.
     pub(super) mtu: Option<u32>,
     pub(super) reach: Reach,
 }
 
-/// What came back from a peer.
+/// A peer's reaction to a probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Reach {
-    /// It is there, and nobody has its port.
+    /// The computer answers, but no program has the port.
     NoRouter,
-    /// It is there; its router, if that was it, answers nobody who says nothing.
+    /// The computer is there. If its router has the port, it does not answer an empty datagram.
     Neighbour,
-    /// Nothing.
+    /// No reaction.
     Silent,
-    /// The system sends nothing there.
+    /// The system cannot send there.
     NoWay(String),
 }

@@ -1,4 +1,4 @@
-//! What is read of a computer: files below a root, and the few things that no file tells.
+//! What is read of a computer: files below a root directory, and the few facts that no file holds.
 
 use super::lan::LanView;
 use super::protection::Protection;
@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 
 const BRIDGE: &str = "rohrpost-gui-bridge";
 
-/// What a configuration needs; without one, what any may need.
+/// What a configuration needs; without one, what any configuration may need.
 pub(super) struct Needs {
-    /// Highest priority of SCHED_FIFO that is asked for.
+    /// Highest SCHED_FIFO priority that is requested.
     pub(super) priority: u8,
     /// Bytes of mailboxes.
     pub(super) memory: u64,
-    /// Whether something is to be shown.
+    /// Whether a GUI runs.
     pub(super) gui: bool,
-    /// The bridge, where the configuration has it.
+    /// The viewer's bridge, if the configuration has it.
     pub(super) bridge: Option<PathBuf>,
-    /// Processes that are started.
+    /// Number of processes.
     pub(super) processes: usize,
     /// The configuration's file.
     pub(super) from: Option<PathBuf>,
@@ -49,7 +49,7 @@ impl Needs {
     }
 }
 
-/// Where the program of a module is, if that is the bridge.
+/// The path of a module's program, if that is the bridge.
 fn bridge_of(installation: &Installation, module: &Module) -> Option<PathBuf> {
     let Program::Command(words) = &module.program else { return None };
     let program = words.first().filter(|program| is_bridge(Path::new(program)))?;
@@ -64,21 +64,21 @@ fn beside() -> PathBuf {
 /// A computer.
 pub(super) struct Machine {
     root: PathBuf,
-    pub(super) asked: AskedOfKernel,
+    pub(super) asked: KernelFacts,
 }
 
-/// What no file tells.
-pub(super) struct AskedOfKernel {
-    /// Whether a thread was given the scheduling that is needed, or why not.
+/// Facts that no file holds.
+pub(super) struct KernelFacts {
+    /// Whether a thread got the required scheduling, or why not.
     pub(super) fifo: Result<(), String>,
-    /// Where nodes lie.
+    /// The directory of all nodes.
     pub(super) base: PathBuf,
-    /// Room of the file system there.
+    /// Free and total space of its file system.
     pub(super) room: Option<Room>,
     pub(super) nodes: Vec<NodeFound>,
     pub(super) bridge: Option<Bridge>,
     pub(super) viewer: Option<PathBuf>,
-    /// The network of a configuration of several nodes.
+    /// The network of a configuration with several nodes.
     pub(super) lan: Option<LanView>,
     pub(super) protection: Protection,
 }
@@ -86,7 +86,7 @@ pub(super) struct AskedOfKernel {
 /// The program that draws.
 pub(super) struct Bridge {
     pub(super) path: PathBuf,
-    /// Its process, if one of this user's nodes has it.
+    /// Its process, if one of this user's nodes runs it.
     pub(super) pid: Option<u32>,
 }
 
@@ -98,13 +98,13 @@ pub(super) struct NodeFound {
 
 /// What is in a node's directory.
 pub(super) enum NodeDirectory {
-    /// A launch of this process id watches over it.
+    /// A launch with this process id runs it.
     Launched(u32),
     /// Processes run in it without a launch.
     InUse,
-    /// Nothing lives there.
+    /// No process uses it.
     Dead,
-    /// It was made by a program of another layout version.
+    /// It was created by a program with another layout version.
     OtherVersion(u32),
     /// It cannot be read.
     Unreadable(String),
@@ -115,9 +115,9 @@ impl Machine {
     pub(super) fn this(needs: &Needs, lan: Option<LanView>, protection: Protection) -> Self {
         let base = base_directory();
         let program = |name| find_program(name, Path::new("."), &beside());
-        // The directory is made by the first launch; before that, what counts is where it will be.
+        // The first launch creates the directory; until then its future place counts.
         let there = base.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
-        let asked = AskedOfKernel {
+        let asked = KernelFacts {
             fifo: try_fifo(needs.priority),
             room: sys::room(there).ok(),
             nodes: nodes(&base),
@@ -130,19 +130,19 @@ impl Machine {
         Self { root: "/".into(), asked }
     }
 
-    /// A computer that was written down.
+    /// A recorded computer.
     #[cfg(test)]
-    pub(super) fn at(root: &Path, asked: AskedOfKernel) -> Self {
+    pub(super) fn at(root: &Path, asked: KernelFacts) -> Self {
         Self { root: root.into(), asked }
     }
 
-    /// What a file holds, without white space around it.
+    /// A file's content, without surrounding white space.
     pub(super) fn read(&self, path: &str) -> Option<String> {
         let text = std::fs::read_to_string(self.root.join(path.trim_start_matches('/'))).ok()?;
         Some(text.trim().to_owned())
     }
 
-    /// Where a folder of it is.
+    /// The path of one of its folders.
     pub(super) fn folder(&self, path: &str) -> PathBuf {
         self.root.join(path.trim_start_matches('/'))
     }
@@ -155,7 +155,7 @@ impl Machine {
         self.root.join(path.trim_start_matches('/')).exists()
     }
 
-    /// Names in a folder that begin so and go on with a number, in its order.
+    /// Names in a folder that consist of this prefix and a number, sorted by the number.
     pub(super) fn numbered(&self, folder: &str, begin: &str) -> Vec<String> {
         let entries = std::fs::read_dir(self.root.join(folder.trim_start_matches('/'))).into_iter().flatten();
         let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
@@ -165,7 +165,7 @@ impl Machine {
         names
     }
 
-    /// A line of a file of lines `key: value`.
+    /// A value from a file with lines `key: value`.
     pub(super) fn field(&self, path: &str, key: &str) -> Option<String> {
         let text = self.read(path)?;
         text.lines().find_map(|line| Some(line.strip_prefix(key)?.strip_prefix(':')?.trim().to_owned()))
@@ -180,14 +180,15 @@ impl Machine {
     }
 }
 
-/// A limit of the kernel's.
+/// A limit of the kernel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Limit {
     None,
     Of(u64),
 }
 
-/// Tries for a moment, in a thread of its own: only the kernel knows what limits, capabilities and control groups come to.
+/// Tries it for a moment in a separate thread: only the kernel knows the sum of limits, capabilities and control
+/// groups.
 fn try_fifo(priority: u8) -> Result<(), String> {
     if priority == 0 {
         return Ok(());
@@ -207,18 +208,18 @@ fn directories(base: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// The bridge that runs; else the one that would.
+/// The running bridge; else the one that would be started.
 fn bridge(base: &Path, found: Option<PathBuf>) -> Option<Bridge> {
     let pids = directories(base).into_iter().filter_map(|path| Node::open(&path).ok());
     let pids = pids.flat_map(|node| node.participants()).map(|participant| participant.pid).filter(|pid| *pid != 0);
     let running = pids.filter_map(|pid| Some((std::fs::read_link(format!("/proc/{pid}/exe")).ok()?, pid)));
-    // Whoever launched it may have another PATH than this program.
+    // The launch that started it may have a different PATH from this program's.
     let running = running.map(|(path, pid)| Bridge { path, pid: Some(pid) }).find(|bridge| is_bridge(&bridge.path));
     running.or_else(|| found.map(|path| Bridge { path, pid: None }))
 }
 
 fn is_bridge(program: &Path) -> bool {
-    // A program that was built anew since is marked by the kernel.
+    // The kernel marks a program that was replaced since it started.
     program.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.trim_end_matches(" (deleted)") == BRIDGE)
 }
 

@@ -1,4 +1,4 @@
-//! How late a thread wakes up: a second of sleeping until each millisecond.
+//! How late a thread wakes up: for one second it sleeps until each full millisecond.
 
 use super::finding::{Finding, Grade};
 use crate::table::time;
@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 
 const PERIOD: Duration = Duration::from_millis(1);
 const WAKES: u32 = 1000;
-/// More is late for anything that drives.
+/// More than this is late for a robot that drives.
 const LATE: Duration = Duration::from_millis(5);
 
 const WHAT: &str = "wake-up";
-const WHY: &str = "so late is a module that waits for its time, when this computer does what it does now";
+const WHY: &str = "a module that sleeps until a time wakes up this late, under the present load";
 
-/// Measures under the scheduling that the most urgent module would get.
+/// Measures with the scheduling that the most urgent module would get.
 pub(super) fn wake_up(priority: u8) -> Finding {
     match std::thread::spawn(move || measure(priority)).join() {
         Ok((latenesses, fifo)) => validate(&latenesses, fifo.then_some(priority)),
@@ -21,20 +21,20 @@ pub(super) fn wake_up(priority: u8) -> Finding {
     }
 }
 
-/// Judges latenesses, in order, that were measured in real time of a priority, or under the normal scheduler.
+/// Judges sorted latenesses, measured with a real-time priority or under the normal scheduler.
 pub(super) fn validate(latenesses: &[Duration], fifo: Option<u8>) -> Finding {
     let at = |part: f64| time(latenesses[((latenesses.len() - 1) as f64 * part) as usize]);
     let how = fifo.map_or_else(|| "the normal scheduler".into(), |priority| format!("SCHED_FIFO {priority}"));
     let wakes = latenesses.len();
     let is = format!("half by {}, 99 % by {}, all by {} late, of {wakes} under {how}", at(0.5), at(0.99), at(1.0));
     if latenesses.last().is_some_and(|most| *most > LATE) {
-        let fix = "see what warns above; then look for what else runs (`top -H`)";
+        let fix = "fix the warnings above; then look for other busy threads (`top -H`)";
         return Finding::not(Grade::Warn, WHAT, is, WHY, fix);
     }
     Finding::ok(WHAT, is, WHY)
 }
 
-/// Latenesses, in order, and whether it was in real time.
+/// Sorted latenesses, and whether the thread was real time.
 fn measure(priority: u8) -> (Vec<Duration>, bool) {
     let fifo = priority > 0 && sys::schedule(Scheduling::Fifo(priority)).is_ok();
     let begin = Instant::now();

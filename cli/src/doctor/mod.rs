@@ -1,4 +1,4 @@
-//! `rohrpost doctor`: whether this computer lets a robot run in time, and what would fix it.
+//! `rohrpost doctor`: checks whether this computer can run a robot in time, and names the fixes.
 
 mod finding;
 mod kernel;
@@ -21,18 +21,18 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost doctor                            what this computer allows
-  rohrpost doctor --config robot.toml        and whether that suffices for this configuration
-  rohrpost doctor --measure                  and how late a thread wakes up, in one second
-Ends with 1 if something is bad. Changes nothing.")]
+  rohrpost doctor                            the state of this computer
+  rohrpost doctor --config robot.toml        also whether it suffices for this configuration
+  rohrpost doctor --measure                  also how late a thread wakes up, in one second
+Exit code 1: something is bad. Changes nothing.")]
 pub(super) struct Arguments {
-    /// Configuration that is to run here.
+    /// Configuration that will run here.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Node of the configuration, if it has several.
     #[arg(long, value_name = "NAME", requires = "config")]
     node: Option<String>,
-    /// Measure for a second how late a thread wakes up.
+    /// Measure for one second how late a thread wakes up.
     #[arg(long)]
     measure: bool,
     /// Print one JSON object.
@@ -71,7 +71,7 @@ fn examine(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     findings
 }
 
-/// Where the words of a finding begin.
+/// The column at which a finding's text begins.
 const INDENT: usize = 24;
 
 fn page(findings: &[Finding]) -> String {

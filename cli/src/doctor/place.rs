@@ -1,15 +1,15 @@
-//! Where a node would lie, what surrounds it, and what is there already.
+//! The directory where a node would be created, its limits, and what exists there already.
 
 use super::finding::{Finding, Grade};
 use super::machine::{Bridge, Machine, Needs, NodeDirectory};
 use rohrpost_config::size_text;
 use std::path::Path;
 
-/// Room for tools, and for mailboxes that modules make themselves, bytes.
+/// Room for tools, and for mailboxes that modules create at run time, bytes.
 const SPARE: u64 = 16 << 20;
-/// What the smallest node takes: its own pages, an output module, and a tool that looks.
+/// Size of the smallest node: its own pages, an output module, and one tool.
 const LEAST: u64 = 2 << 20;
-/// Threads that a process of a node has, at most of our making.
+/// Upper limit of our threads in a process of a node.
 const THREADS: u64 = 4;
 
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
@@ -22,7 +22,7 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     found
 }
 
-/// A size in its largest unit, with at most one place after the point.
+/// A size in its largest unit, with at most one decimal.
 pub(super) fn size(bytes: u64) -> String {
     let (unit, one) = [("GiB", 1u64 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)]
         .into_iter()
@@ -31,13 +31,13 @@ pub(super) fn size(bytes: u64) -> String {
     if bytes.is_multiple_of(one) { size_text(bytes) } else { format!("{:.1} {unit}", bytes as f64 / one as f64) }
 }
 
-/// Where a file system is mounted, and of what kind it is.
+/// A mount point, and its file system type.
 struct Mount {
     point: String,
     kind: String,
 }
 
-/// The one that nodes lie on; none where the kernel does not tell.
+/// The file system of the nodes; none where the kernel does not tell.
 fn mount(machine: &Machine) -> Option<Mount> {
     let mounts = machine.read("/proc/mounts")?;
     let mounts = mounts.lines().filter_map(|line| {
@@ -46,7 +46,7 @@ fn mount(machine: &Machine) -> Option<Mount> {
         let point = words.next()?.replace("\\040", " ").replace("\\011", "\t").replace("\\134", "\\");
         Some(Mount { point, kind: words.next()?.to_owned() })
     });
-    // The last of the longest: a later mount hides an earlier one.
+    // The longest match wins; of equal ones the last, since a later mount hides an earlier one.
     mounts.filter(|mount| machine.asked.base.starts_with(&mount.point)).max_by_key(|mount| mount.point.len())
 }
 
@@ -55,7 +55,7 @@ impl Mount {
         matches!(self.kind.as_str(), "tmpfs" | "ramfs")
     }
 
-    /// For a command line.
+    /// Its path for a command line.
     fn quoted(&self) -> String {
         if self.point.contains(char::is_whitespace) { format!("'{}'", self.point) } else { self.point.clone() }
     }
@@ -73,14 +73,14 @@ fn file_system(machine: &Machine) -> Option<Finding> {
 }
 
 fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
-    let (what, why) = ("shared memory", "a mailbox takes its memory when it is made; then it must be there");
+    let (what, why) = ("shared memory", "a mailbox takes all of its memory when it is created");
     let mount = mount(machine);
     let Some(room) = machine.asked.room else {
         let fix = match &mount {
             Some(mount) if mount.is_memory() => format!("df {}", mount.quoted()),
             _ => "mount -t tmpfs tmpfs /dev/shm".to_owned(),
         };
-        return Some(Finding::not(Grade::Warn, what, "its size is not told", why, fix));
+        return Some(Finding::not(Grade::Warn, what, "its size is unknown", why, fix));
     };
     let needed = match &needs.from {
         Some(file) => format!("; {} needs {} for its mailboxes", file.display(), size(needs.memory)),
@@ -98,7 +98,7 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
     })
 }
 
-/// What makes a file system so large.
+/// The command that gives a file system this size.
 fn more_room(mount: Option<&Mount>, mib: u64) -> String {
     let Some(mount) = mount else { return format!("give the node directory a tmpfs of {mib} MiB") };
     if !mount.is_memory() {
@@ -109,27 +109,27 @@ fn more_room(mount: Option<&Mount>, mib: u64) -> String {
 }
 
 fn container(machine: &Machine) -> Option<Finding> {
-    let why = "in a container its host decides on rights, shared memory and cores";
+    let why = "a container's host decides on rights, shared memory and cores";
     let marks = [
         ("/.dockerenv", "Docker"),
         ("/run/.containerenv", "Podman"),
         ("/run/systemd/container", "systemd-nspawn or LXC"),
     ];
     let kind = marks.iter().find(|(mark, _)| machine.exists(mark)).map(|(_, kind)| *kind);
-    Some(Finding::ok("container", kind.unwrap_or("none that is known"), why))
+    Some(Finding::ok("container", kind.unwrap_or("none known"), why))
 }
 
-/// Limits of the control group that this process is in, and of those around it.
+/// Limits of this process's control group and of its ancestors.
 fn groups_of_control(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     let mut found: Vec<Finding> = share_of_time(machine).into_iter().chain(share_of_real_time(machine)).collect();
-    // Of version 2, and of version 1.
+    // Version 2, then version 1.
     found.extend(["memory.max", "memory.limit_in_bytes"].iter().filter_map(|file| memory_limit(machine, needs, file)));
     found.extend(process_limit(machine, needs));
     found
 }
 
 fn share_of_time(machine: &Machine) -> Option<Finding> {
-    let why = "a control group that has used up its share stands still, however urgent its threads are";
+    let why = "a control group that has used up its share is stopped, however urgent its threads are";
     let (value, path) = tightest(machine, "cpu", "cpu.max", |text| {
         let (quota, period) = text.split_once(' ')?;
         Some(quota.parse::<f64>().ok()? / period.parse::<f64>().ok()?)
@@ -138,17 +138,17 @@ fn share_of_time(machine: &Machine) -> Option<Finding> {
     Some(Finding::not(Grade::Warn, "CPU quota", format!("{value} cores ({path})"), why, fix))
 }
 
-/// Version 1 of control groups gives real-time threads nothing unless told.
+/// Version 1 of control groups gives real-time threads no time by default.
 fn share_of_real_time(machine: &Machine) -> Option<Finding> {
     let least = tightest(machine, "cpu", "cpu.rt_runtime_us", |text| text.parse::<f64>().ok());
     let (_, path) = least.filter(|(value, _)| *value <= 0.0)?;
     let fix = format!("echo 950000 | sudo tee {path}, in the groups around it first");
-    let why = "SCHED_FIFO is refused in such a group";
+    let why = "without this share, the group may not use SCHED_FIFO";
     Some(Finding::not(Grade::Warn, "real-time quota", format!("0 µs ({path})"), why, fix))
 }
 
 fn memory_limit(machine: &Machine, needs: &Needs, file: &str) -> Option<Finding> {
-    let (what, why) = ("memory limit", "who goes beyond is killed; shared memory counts");
+    let (what, why) = ("memory limit", "a process beyond it is killed; shared memory counts");
     let (limit, path) = tightest(machine, "memory", file, whole)?;
     let (limit, is) = (limit as u64, format!("{} ({path})", size(limit as u64)));
     if limit >= needs.memory + SPARE {
@@ -172,12 +172,12 @@ fn process_limit(machine: &Machine, needs: &Needs) -> Option<Finding> {
     Some(Finding::not(Grade::Bad, what, is, why, fix))
 }
 
-/// A limit in bytes or processes. What is as good as none (version 1 writes it as the largest number of pages) is none.
+/// A limit in bytes or processes. A huge limit counts as none (version 1 writes "none" as the largest number of pages).
 fn whole(text: &str) -> Option<f64> {
     text.parse::<u64>().ok().filter(|limit| *limit < 1 << 60).map(|limit| limit as f64)
 }
 
-/// The least value of a file of the control group of this process and those around it, and the file. `max` is no value.
+/// The least value of a file in this process's control group and its ancestors, and that file. `max` is no value.
 fn tightest(
     machine: &Machine,
     controller: &str,
@@ -214,7 +214,7 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
             NodeDirectory::Launched(pid) => Finding::ok(what, format!("{path}: launched by process {pid}"), why),
             NodeDirectory::InUse => Finding::ok(what, format!("{path}: in use, without a launch"), why),
             NodeDirectory::Dead => {
-                Finding::not(Grade::Warn, what, format!("{path}: nothing lives there"), why, "rohrpost clean")
+                Finding::not(Grade::Warn, what, format!("{path}: no process uses it"), why, "rohrpost clean")
             }
             NodeDirectory::OtherVersion(version) => Finding::not(
                 Grade::Warn,
@@ -224,7 +224,7 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
                     rohrpost_mailbox::LAYOUT_VERSION
                 ),
                 why,
-                format!("stop what runs there (with the program that launched it), then rm -r {path}"),
+                format!("stop the node (with the program that launched it), then rm -r {path}"),
             ),
             NodeDirectory::Unreadable(error) => {
                 Finding::not(Grade::Warn, what, error.clone(), why, format!("rm -r {path}, if nothing uses it"))
@@ -235,12 +235,12 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
 }
 
 fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
-    // Who wants to see nothing misses nothing.
+    // Without a GUI the bridge is not needed.
     let missing = |what, why, fix: &str| match &needs.from {
-        Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} shows nothing", file.display()), why),
+        Some(file) if !needs.gui => Finding::ok(what, format!("not found; {} has no GUI", file.display()), why),
         _ => Finding::not(Grade::Warn, what, "not found", why, fix),
     };
-    let (what, why) = ("GUI bridge", "draws what modules publish; the module `gui.0` of the demo is it");
+    let (what, why) = ("GUI bridge", "draws the modules' data; the demo's module `gui.0` uses it");
     let bridge = match &machine.asked.bridge {
         Some(Bridge { path, pid: Some(pid) }) => Finding::ok(what, format!("{}, process {pid}", path.display()), why),
         Some(Bridge { path, pid: None }) => Finding::ok(what, path.display().to_string(), why),
@@ -248,7 +248,7 @@ fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
             missing(what, why, "cargo build -p rohrpost-gui-bridge --profile bridge, then PATH=target/bridge:$PATH")
         }
     };
-    let (what, why) = ("viewer", "shows live what the bridge draws, and opens drawings");
+    let (what, why) = ("viewer", "shows drawings, live or from a file");
     let viewer = match &machine.asked.viewer {
         Some(path) => Finding::ok(what, path.display().to_string(), why),
         None => missing(what, why, "pip install rerun-sdk==0.36.3"),
@@ -258,5 +258,5 @@ fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 
 fn systemd(machine: &Machine) -> Finding {
     let is = if machine.exists("/run/systemd/system") { "runs" } else { "does not run here" };
-    Finding::ok("systemd", is, "can start a node at boot, and again when it ended")
+    Finding::ok("systemd", is, "can start a node at boot, and restart it")
 }

@@ -1,20 +1,20 @@
-//! What a configuration says of security, and whether what that takes is here.
+//! The configuration's security, and whether its files are here.
 
 use crate::keys::certificates;
 use rohrpost_config::{Installation, Keys};
 use rohrpost_network::Security;
 use std::path::PathBuf;
 
-/// What a configuration says of security, and what is here of it.
+/// The configuration's security, and the files that exist here.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Protection {
-    /// Between the nodes of the LAN; none if nothing goes over one.
+    /// Between the nodes of the LAN; none without a LAN.
     pub(super) lan: Option<LanProtection>,
     /// To the TCP router; none if the file has none.
     pub(super) tcp: Option<Tcp>,
 }
 
-/// What protects datagrams of the LAN.
+/// The protection of LAN datagrams.
 #[derive(Clone, Debug)]
 pub(super) enum LanProtection {
     Open,
@@ -25,11 +25,11 @@ pub(super) enum LanProtection {
     },
 }
 
-/// What protects sessions with the TCP router.
+/// The protection of sessions with the TCP router.
 #[derive(Clone, Debug)]
 pub(super) enum Tcp {
     Open,
-    /// Both ends show certificates; what this node lacks of its own.
+    /// Both ends show certificates; the files that this node lacks.
     Tls {
         folder: PathBuf,
         lacking: Vec<String>,

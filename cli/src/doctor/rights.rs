@@ -1,4 +1,4 @@
-//! What this user and this process may.
+//! The rights of this user and this process.
 
 use super::finding::{Finding, Grade};
 use super::machine::{Limit, Machine, Needs};
@@ -6,7 +6,7 @@ use rohrpost_config::FIFO_MAX;
 
 /// Bit of CAP_SYS_NICE.
 const SYS_NICE: u32 = 23;
-/// A process of a node keeps a few files for each mailbox that it has or sends to.
+/// A process of a node keeps a few files open for each mailbox that it owns or sends to.
 const FILES_LEAST: u64 = 1024;
 
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
@@ -17,7 +17,8 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
     let (what, why) = (
         "real time",
-        "without the right, modules of classes from 128 up run under the normal scheduler, and wait for others",
+        "without the right, modules of classes from 128 up run under the normal scheduler, and other threads delay \
+         them",
     );
     let wanted = match (&needs.from, needs.priority) {
         (Some(file), 0) => return Some(Finding::ok(what, format!("{} asks for none", file.display()), why)),
@@ -36,8 +37,8 @@ fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
         Ok(()) => Some(Finding::ok(what, format!("granted ({right}); {wanted}"), why)),
         Err(error) => {
             let fix = format!(
-                "echo \"$USER - rtprio {FIFO_MAX}\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in anew; \
-                 in a container: `--ulimit rtprio={FIFO_MAX} --cap-add=SYS_NICE`"
+                "echo \"$USER - rtprio {FIFO_MAX}\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
+                 anew; in a container: `--ulimit rtprio={FIFO_MAX} --cap-add=SYS_NICE`"
             );
             Some(Finding::not(Grade::Warn, what, format!("refused ({right}): {error}; {wanted}"), why, fix))
         }
@@ -45,7 +46,7 @@ fn real_time(machine: &Machine, needs: &Needs) -> Option<Finding> {
 }
 
 fn nice(machine: &Machine) -> Option<Finding> {
-    // The limit is counted from the other end: 20 less the lowest nice value.
+    // The limit counts from the other end: 20 minus the lowest nice value.
     let is = match machine.limit("Max nice priority")? {
         Limit::Of(..=20) => "from 0 on".into(),
         Limit::Of(limit) => format!("from -{} on", limit.min(40) - 20),
@@ -57,27 +58,27 @@ fn nice(machine: &Machine) -> Option<Finding> {
 fn memory_lock(machine: &Machine) -> Option<Finding> {
     let (what, why) = (
         "locked memory",
-        "modules in real time lock their memory only if they may lock all of it; else a page that is fetched makes them late",
+        "real-time modules lock their memory only if the limit allows all of it; else page faults delay them",
     );
     Some(match machine.limit("Max locked memory")? {
         Limit::None => Finding::ok(what, "no limit", why),
         Limit::Of(bytes) => {
-            let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log in \
-                        anew; in a container: `--ulimit memlock=-1`";
+            let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log \
+                in anew; in a container: `--ulimit memlock=-1`";
             Finding::not(Grade::Warn, what, format!("at most {}", super::place::size(bytes)), why, fix)
         }
     })
 }
 
 fn swap(machine: &Machine) -> Option<Finding> {
-    let (what, why) = ("swap", "memory that was paged out takes milliseconds to come back");
+    let (what, why) = ("swap", "swapped-out memory takes milliseconds to come back");
     let text = machine.read("/proc/swaps")?;
     let areas: Vec<&str> = text.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
     if areas.is_empty() {
         return Some(Finding::ok(what, "none", why));
     }
     let is = areas.join(", ");
-    // Who locks its memory is not paged out.
+    // Locked memory is not paged out.
     if machine.limit("Max locked memory") == Some(Limit::None) {
         return Some(Finding::ok(what, format!("{is}; real-time modules lock their memory"), why));
     }
@@ -85,7 +86,7 @@ fn swap(machine: &Machine) -> Option<Finding> {
 }
 
 fn files(machine: &Machine) -> Option<Finding> {
-    let (what, why) = ("open files", "a process opens each mailbox that it has or sends to");
+    let (what, why) = ("open files", "a process opens each mailbox that it owns or sends to");
     Some(match machine.limit("Max open files")? {
         Limit::Of(limit) if limit < FILES_LEAST => {
             let fix =

@@ -20,8 +20,8 @@ fn lan(protection: &LanProtection, from: &str) -> Finding {
             format!("none, as {from} says"),
             why,
             format!(
-                "a network of the robot's own, without a way in from others; or write `security = \"keys\"` into [network] of {from}, \
-                 and run `rohrpost keys new {from}`"
+                "use a separate network for the robot, without access from others; or write `security = \"keys\"` \
+                 into [network] of {from}, and run `rohrpost keys new {from}`"
             ),
         ),
         LanProtection::Keys { file, ids: Ok(ids) } => {
@@ -32,9 +32,10 @@ fn lan(protection: &LanProtection, from: &str) -> Finding {
         LanProtection::Keys { ids: Err(error), .. } => Finding::not(
             Grade::Bad,
             what,
-            format!("keys, as {from} says, and there are none: {error}"),
+            format!("{from} requires keys, and there are none: {error}"),
             why,
-            "copy the keys from the first computer of the installation; only if none has any, `rohrpost keys new` makes them",
+            "copy the keys from the first computer of the installation; only if none has any, `rohrpost keys new` \
+            makes them",
         ),
     }
 }
@@ -49,8 +50,8 @@ fn tcp(protection: &Tcp, from: &str) -> Finding {
             format!("none, as {from} says"),
             why,
             format!(
-                "a network that nobody else reaches; or write `security = \"tls\"` and `certificates = \"certificates\"` into [tcp] of \
-                 {from}, and run `rohrpost keys new {from}`"
+                "use a network without access from others; or write `security = \"tls\"` and `certificates \
+                 = \"certificates\"` into [tcp] of {from}, and run `rohrpost keys new {from}`"
             ),
         ),
         Tcp::Tls { folder, lacking } if lacking.is_empty() => {
@@ -59,7 +60,7 @@ fn tcp(protection: &Tcp, from: &str) -> Finding {
         Tcp::Tls { lacking, .. } => Finding::not(
             Grade::Bad,
             what,
-            format!("TLS, as {from} says, and this node cannot: {}", lacking.join("; ")),
+            format!("{from} requires TLS, and this node lacks files: {}", lacking.join("; ")),
             why,
             "copy `ca.pem` and the two files of this node from where the certificates were made",
         ),

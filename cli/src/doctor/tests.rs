@@ -1,7 +1,7 @@
-//! What `doctor` says of computers that were written down, and of networks.
+//! Output of `doctor` for recorded computers and networks.
 
 use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
-use super::machine::{AskedOfKernel, Bridge, NodeDirectory, NodeFound};
+use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound};
 use super::protection::{LanProtection, Tcp};
 use super::*;
 use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// Unpacks a computer that was written down: lines `== PATH`, each followed by what the file holds.
+/// Unpacks a recorded computer: lines `== PATH`, each followed by that file's content.
 fn unpack(text: &str, to: &Path) {
     for file in text.split("\n== ").skip(1) {
         let (path, content) = file.split_once('\n').unwrap_or((file, ""));
@@ -19,18 +19,18 @@ fn unpack(text: &str, to: &Path) {
     }
 }
 
-fn examined(name: &str, (asked, needs): (AskedOfKernel, Needs)) -> Vec<Finding> {
+fn examined(name: &str, (asked, needs): (KernelFacts, Needs)) -> Vec<Finding> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/doctor");
     let root = tempfile::tempdir().unwrap();
     unpack(&fs::read_to_string(folder.join(format!("{name}.machine"))).unwrap(), root.path());
     examine(&Machine::at(root.path(), asked), &needs)
 }
 
-fn said(name: &str, computer: (AskedOfKernel, Needs)) -> String {
+fn said(name: &str, computer: (KernelFacts, Needs)) -> String {
     page(&examined(name, computer)) + "\n"
 }
 
-/// `UPDATE_GOLDEN=1 cargo test --bin rohrpost doctor` writes the texts anew; read the difference before you commit.
+/// `UPDATE_GOLDEN=1 cargo test --bin rohrpost doctor` rewrites the texts; read the diff before you commit.
 fn compare(name: &str, said: &str) {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../tests/doctor/{name}.txt"));
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
@@ -89,8 +89,8 @@ fn open() -> Protection {
     Protection { lan: Some(LanProtection::Open), tcp: Some(Tcp::Open) }
 }
 
-fn good() -> (AskedOfKernel, Needs) {
-    let asked = AskedOfKernel {
+fn good() -> (KernelFacts, Needs) {
+    let asked = KernelFacts {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-1000".into(),
         room: Some(Room { bytes: 8 << 30, free: 7 << 30 }),
@@ -104,8 +104,8 @@ fn good() -> (AskedOfKernel, Needs) {
     (asked, Needs { priority: 34, memory: 4 << 20, gui: true, bridge: None, processes: 6, from })
 }
 
-fn bad() -> (AskedOfKernel, Needs) {
-    let asked = AskedOfKernel {
+fn bad() -> (KernelFacts, Needs) {
+    let asked = KernelFacts {
         fifo: Err("Operation not permitted (os error 1)".into()),
         base: "/home/robot/nodes".into(),
         room: Some(Room { bytes: 64 << 20, free: 1 << 20 }),
@@ -125,9 +125,9 @@ fn bad() -> (AskedOfKernel, Needs) {
     (asked, Needs { priority: 34, memory: 40 << 20, gui: true, bridge: None, processes: 6, from })
 }
 
-/// As the unit for systemd has it, in /run: what holds there is told of /run, not of /dev/shm.
-fn too_little_room_in_run() -> (AskedOfKernel, Needs) {
-    let asked = AskedOfKernel {
+/// As in the systemd unit, in /run: the text must name /run, not /dev/shm.
+fn too_little_room_in_run() -> (KernelFacts, Needs) {
+    let asked = KernelFacts {
         base: "/run/rohrpost/main".into(),
         room: Some(Room { bytes: 64 << 20, free: 60 << 20 }),
         bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: None }),
@@ -136,18 +136,18 @@ fn too_little_room_in_run() -> (AskedOfKernel, Needs) {
     (asked, Needs { memory: 70 << 20, from: Some("robot.toml".into()), ..Needs::default() })
 }
 
-fn elsewhere() -> (AskedOfKernel, Needs) {
+fn elsewhere() -> (KernelFacts, Needs) {
     let lan = LanView {
         addresses: Vec::new(),
         stamps: Stamps::None("Protocol not available".into()),
         ..LanView { is_here: false, ..lan([PortState::Unknown, PortState::Unknown, PortState::Unknown], &[]) }
     };
-    let asked = AskedOfKernel { lan: Some(lan), protection: open(), ..nothing_told() };
+    let asked = KernelFacts { lan: Some(lan), protection: open(), ..nothing_told() };
     (asked, Needs { from: Some("robot.toml".into()), ..Needs::default() })
 }
 
-fn nothing_told() -> AskedOfKernel {
-    AskedOfKernel {
+fn nothing_told() -> KernelFacts {
+    KernelFacts {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-0".into(),
         room: None,
@@ -160,15 +160,15 @@ fn nothing_told() -> AskedOfKernel {
 }
 
 #[test]
-fn a_computer_made_for_a_robot() {
+fn a_well_configured_computer_has_no_warnings() {
     let said = said("good", good());
     assert!(!said.contains("\nwarn ") && !said.contains("\nbad "), "{said}");
     compare("good", &said);
 }
 
 #[test]
-fn a_computer_on_which_all_is_wrong() {
-    // The version of the layout goes its own way.
+fn a_badly_configured_computer_fails_every_check() {
+    // The layout version changes independently.
     compare("bad", &said("bad", bad()).replace(&format!("this program {LAYOUT_VERSION}"), "this program …"));
 }
 
@@ -178,25 +178,25 @@ fn a_computer_with_too_little_room_in_run() {
 }
 
 #[test]
-fn a_node_whose_address_is_elsewhere() {
+fn an_address_of_another_computer_is_reported() {
     let said = said("silent", elsewhere());
     let network = said.split_once("warn  network security").unwrap().1;
     compare("elsewhere", &format!("warn  network security{network}"));
 }
 
-/// What a kernel does not tell is not guessed at.
+/// A fact that the kernel does not report is not guessed.
 #[test]
-fn a_computer_that_tells_nothing() {
+fn unknown_facts_are_left_out() {
     let said = said("silent", (nothing_told(), Needs::default()));
     assert!(!said.contains("\nbad "), "{said}");
     compare("silent", &said);
 }
 
-/// With or without a configuration, a node cannot be made in no room.
+/// With or without a configuration, a node needs free space.
 #[test]
 fn full_shared_memory_is_bad() {
     for (free, state) in [(64 << 10, Grade::Bad), (8 << 20, Grade::Warn), (64 << 20, Grade::Ok)] {
-        let asked = AskedOfKernel { room: Some(Room { bytes: 1 << 30, free }), ..nothing_told() };
+        let asked = KernelFacts { room: Some(Room { bytes: 1 << 30, free }), ..nothing_told() };
         let found = examined("run", (asked, Needs::default()));
         let found = found.iter().find(|finding| finding.what == "shared memory").unwrap();
         assert_eq!(found.state, state, "{found:?}");
@@ -204,18 +204,18 @@ fn full_shared_memory_is_bad() {
 }
 
 #[test]
-fn waking_up_late_is_told() {
+fn late_wake_ups_are_reported() {
     let validate = |most| measure::validate(&[Duration::from_micros(60), Duration::from_micros(most)], Some(34));
     assert_eq!((validate(90).state, validate(6000).state), (Grade::Ok, Grade::Warn));
     assert_ne!(validate(90).is, validate(6000).is);
 }
 
-/// A line that says the same of each computer tells nothing, or lies.
+/// A line that is the same for every computer says nothing, or is wrong.
 #[test]
 fn each_line_is_tested_with_the_opposite_state() {
-    // Nothing of it is wrong: each says how it is, in one way here and in another there.
+    // None of these is a problem: each describes a state, which differs between the computers.
     const NEVER_WRONG: [&str; 6] = ["fair server", "nice", "user", "container", "isolated cores", "systemd"];
-    // There only when something is wrong.
+    // These appear only for a problem.
     const NEVER_RIGHT: [&str; 2] = ["CPU quota", "real-time quota"];
     let computers = [
         ("good", good()),
@@ -229,11 +229,11 @@ fn each_line_is_tested_with_the_opposite_state() {
         let same = || found.iter().filter(|finding| finding.what == what);
         let (fine, wrong): (Vec<_>, Vec<_>) = same().partition(|finding| finding.state == Grade::Ok);
         if NEVER_RIGHT.contains(&what) {
-            assert!(fine.is_empty(), "{what} is said although nothing is wrong");
+            assert!(fine.is_empty(), "{what} appears although nothing is wrong");
             continue;
         }
         assert_eq!(wrong.is_empty(), NEVER_WRONG.contains(&what), "{what}: {wrong:?}");
-        assert!(!fine.is_empty(), "{what} is never seen to be right");
-        assert!(same().any(|other| other.is != fine[0].is), "{what} says of each computer: {}", fine[0].is);
+        assert!(!fine.is_empty(), "{what} never appears with the grade ok");
+        assert!(same().any(|other| other.is != fine[0].is), "{what} is the same for each computer: {}", fine[0].is);
     }
 }

@@ -1,4 +1,4 @@
-//! `rohrpost graph`: who sends what to whom, how often, from the counters of those who send.
+//! `rohrpost graph`: senders, receivers, content and rates of packages, read from the senders' counters.
 
 mod dot;
 mod parts;
@@ -21,34 +21,34 @@ use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost graph                             a table: who, to whom, what, how often
+  rohrpost graph                             a table: sender, receiver, content, rate
   rohrpost graph --svg -o graph.svg          a drawing
   rohrpost graph --dot | dot -Tpdf > graph.pdf
-Rates are of the time that it looks. Of several nodes all are shown; --node shows one. A drawing leaves out replies and the calls that every module has (such as the \
-renewing of subscriptions); --all draws them too. It reads counters in shared memory, on other nodes by way \
-of their launches: modules are sent nothing.")]
+Rates are those of the observed time. All nodes are shown; --node shows one. A drawing leaves out replies and the \
+    calls that every module has (such as the renewal of subscriptions); --all draws them, too. The tool reads \
+    counters in shared memory, on other nodes through their launches: it sends nothing to modules.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
-    /// SnapshotRequest for so long.
+    /// Watch for this time.
     #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
     seconds: f64,
-    /// Print it for Graphviz.
+    /// Print the graph for Graphviz.
     #[arg(long, conflicts_with_all = ["svg", "json"])]
     dot: bool,
-    /// Draw it.
+    /// Draw the graph as SVG.
     #[arg(long, conflicts_with = "json")]
     svg: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Draw replies and calls that every module has, too; table and JSON have them anyway.
+    /// Draw replies and calls that every module has, too; table and JSON always have them.
     #[arg(long)]
     all: bool,
-    /// Also what was silent meanwhile.
+    /// Show also flows that were silent meanwhile.
     #[arg(long)]
     silent: bool,
-    /// Write it there.
+    /// Write the output into this file.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -85,13 +85,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 impl Graph {
     fn new(running: &Running, long: Duration, silent: bool) -> Result<Self, Failure> {
-        // Each node has a clock of its own. The window is as long as the look at it.
+        // Each node has its own clock. The window is as long as the observation.
         let nodes = running.shown();
         let mut tracks: Vec<Tracks> = nodes.iter().map(|_| Tracks::new(Duration::MAX)).collect();
         let stop = Stop::new()?;
         look(running, &nodes, &mut tracks)?;
         let began = Instant::now();
-        // Ctrl-C ends it early: then it is a shorter look.
+        // Ctrl-C ends it early: the observation is then shorter.
         stop.within(long);
         let (surveys, away) = look(running, &nodes, &mut tracks)?;
         let interval_s = began.elapsed().as_secs_f64();
@@ -99,7 +99,7 @@ impl Graph {
         let survey = Survey::joined(surveys, &away_names, &running.installation);
         let mut names = Names { running, survey: &survey, vocabulary: Vocabulary::default() };
         let mut edges: Vec<Edge> = Vec::new();
-        // What a router delivers for a node that is seen too is counted there.
+        // Packages that a router delivers for an observed node are counted there.
         let is_seen = |node: &str| nodes.contains(&node) && !away_names.contains(&node);
         let counts = |node: &str, flow: &FlowInfo| {
             !is_hop(&running.installation, node, flow) || !is_seen(running.node_of(flow.from))
@@ -143,7 +143,7 @@ impl Graph {
                 is_left_out: module.is_left_out(&running.installation),
             })
             .collect();
-        // Tools send too, and are in no configuration.
+        // Tools send, too, and are in no configuration.
         for name in edges.iter().flat_map(|edge| [&edge.from, &edge.to]) {
             if modules.iter().all(|module| module.module != *name) {
                 let found = running.module(name).ok();
@@ -159,7 +159,7 @@ impl Graph {
     }
 }
 
-/// Looks at all nodes, and takes in what everybody sends.
+/// Observes all nodes, and records what each module sends.
 fn look(running: &Running, nodes: &[&str], tracks: &mut [Tracks]) -> Result<(Vec<Survey>, Vec<Silence>), Failure> {
     let (mut surveys, mut silent) = (Vec::new(), Vec::new());
     for (seen, tracks) in running.look_at(nodes, Scope::All)?.into_iter().zip(tracks) {
@@ -174,7 +174,7 @@ fn look(running: &Running, nodes: &[&str], tracks: &mut [Tracks]) -> Result<(Vec
     Ok((surveys, silent))
 }
 
-/// What names and numbers mean.
+/// Resolves names and numbers.
 struct Names<'a> {
     running: &'a Running,
     survey: &'a Survey,
@@ -182,13 +182,14 @@ struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// The module behind a name, which may be one of its aliases.
+    /// The module that has this name or alias.
     fn process(&self, name: Name) -> String {
         let name = self.survey.module(name).map_or(name.module(), |module| module.name);
         self.running.text(name)
     }
 
-    /// Whether output lines go there. Any other module's mailbox of that local id is its own, for whatever data it likes.
+    /// Whether this is a mailbox for output lines. In any other module a mailbox of that local id has the module's own
+    /// data.
     fn is_collector(&self, mailbox: Name) -> bool {
         let class = self.running.installation.classes.id(rohrpost::output::CLASS);
         class == Some(mailbox.class()) && mailbox.local() == rohrpost::output::LINES
@@ -220,7 +221,7 @@ fn in_text(graph: &Graph) -> String {
 
 fn edges_in_text(graph: &Graph) -> String {
     if graph.edges.is_empty() {
-        return format!("nobody sent anything within {:.1} s; --silent shows who did before", graph.interval_s);
+        return format!("no package was sent within {:.1} s; --silent shows earlier senders", graph.interval_s);
     }
     let rows = graph.edges.iter().map(|edge| {
         let kind = match edge.carries {

@@ -1,21 +1,21 @@
-//! The parts of a graph: modules, and edges with what they carry.
+//! The parts of a graph: modules, and edges with their content.
 
 use crate::observer::Silence;
 use rohrpost::output::plain;
 use rohrpost::survey::Standing;
 use serde::Serialize;
 
-/// Modules, and what goes from one to another.
+/// Modules and the edges between them.
 #[derive(Serialize)]
 pub(super) struct Graph {
     pub(super) installation: String,
-    /// The node that the tool looked from.
+    /// The node that the tool runs on.
     pub(super) node: String,
-    /// Those that are shown.
+    /// The nodes that are shown.
     pub(super) nodes: Vec<String>,
-    /// Those of them that do not answer.
+    /// The shown nodes that do not answer.
     pub(super) silent: Vec<Silence>,
-    /// What rates are measured over.
+    /// The window of the rates.
     pub(super) interval_s: f64,
     pub(super) modules: Vec<Module>,
     pub(super) edges: Vec<Edge>,
@@ -34,14 +34,14 @@ pub(super) struct Module {
 }
 
 impl Module {
-    /// Whether nothing of it runs that one could see. What sends from outside the configuration has no standing.
+    /// Whether no process of it is visible. Senders outside the configuration have no state.
     pub(super) fn is_down(&self) -> bool {
         let down = [Standing::Stopped, Standing::Unreachable];
         down.iter().any(|standing| standing.word() == self.state)
     }
 }
 
-/// What an edge carries.
+/// The content of an edge.
 #[derive(Serialize, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Carries {
@@ -66,13 +66,13 @@ pub(super) struct Edge {
 }
 
 impl Graph {
-    /// What a drawing is of.
+    /// The nodes and edges of a drawing.
     pub(super) fn title(&self) -> String {
         let word = if self.nodes.len() == 1 { "node" } else { "nodes" };
         format!("{word} {} of {}", self.nodes.join(", "), self.installation)
     }
 
-    /// What stands below a module's name: its node if there are several, its aliases.
+    /// The text below a module's name: its node if there are several, its aliases.
     pub(super) fn below<'a>(&'a self, module: &'a Module) -> impl Iterator<Item = String> + use<'a> {
         let node = (self.nodes.len() > 1).then(|| format!("on {}", module.node));
         node.into_iter().chain(module.aliases.iter().map(|alias| format!("+ {alias}")))
@@ -92,7 +92,7 @@ impl Edge {
         self.refused += other.refused;
     }
 
-    /// What a drawing says of it.
+    /// Its label in a drawing.
     pub(super) fn label(&self) -> String {
         format!("{} {}", plain::line(&self.what), self.rate())
     }

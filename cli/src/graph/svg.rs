@@ -1,4 +1,4 @@
-//! The graph as a drawing. The library `layout` says where things go; this says how they look.
+//! The graph as a drawing. The library `layout` places the elements; this file draws them.
 
 use super::parts::{Carries, Edge, Graph, Module};
 use layout::core::base::Orientation;
@@ -12,12 +12,12 @@ use std::fmt::Write;
 
 const FONT: usize = 14;
 const LABEL_FONT: usize = 11;
-/// Around all.
+/// Margin around the drawing.
 const MARGIN: f64 = 12.0;
 /// The library reserves a square for each letter; letters are narrower.
 const LETTER: f64 = 0.62;
 
-/// Colours that can be told apart on white and on dark paper, also by those who see no red or no green.
+/// Colours that differ on white and on dark paper, also for readers with red-green colour blindness.
 const DATA: u32 = 0x2a_6f_b5;
 const COMMAND: u32 = 0xb5_43_2a;
 const OUTPUT: u32 = 0x7a_7a_7a;
@@ -38,7 +38,7 @@ pub(super) fn write(graph: &Graph, all: bool) -> String {
         }
     }
     let mut drawing = Drawing::default();
-    // With nothing to draw the library has nothing to begin with.
+    // The library cannot draw an empty graph.
     if !modules.is_empty() {
         plan.do_it(false, false, false, &mut drawing);
     }
@@ -69,11 +69,11 @@ fn arrow_of(edge: &Edge) -> Arrow {
         Carries::Reply => (REPLY, LineStyleKind::Dashed),
         Carries::Output => (OUTPUT, LineStyleKind::Normal),
     };
-    // Ten times as often is one point wider.
+    // A rate ten times as high makes the line one point wider.
     let width = (1.0 + edge.packages_per_s.max(1.0).log10()).round() as usize;
     let look = StyleAttr::new(colour(ink), width, None, 0, LABEL_FONT);
     let text = edge.label();
-    // The library makes room for the text; where it is written is for the line to say, which gets it as its property.
+    // The library reserves room for the text; the line writes it, and gets it as its property.
     Arrow::with_properties(LineEndKind::None, LineEndKind::Arrow, dashed, &text, &look, text.clone(), &None, &None)
 }
 
@@ -86,7 +86,7 @@ fn web(colour: Color) -> String {
     colour.to_web_color().chars().take(7).collect()
 }
 
-/// What is drawn, layer by layer, and how far it reaches.
+/// The drawing layer by layer, and its extent.
 #[derive(Default)]
 struct Drawing {
     arrows: String,
@@ -102,7 +102,7 @@ impl Drawing {
         self.reach = Some((left.min(x), top.min(y), right.max(x), bottom.max(y)));
     }
 
-    /// The text of a box, its first line bold.
+    /// The text of a box, with a bold first line.
     fn text(&mut self, at: Point, text: &str, look: &StyleAttr) {
         let lines = text.lines().count() as f64;
         let step = look.font_size as f64 * 1.2;
@@ -111,7 +111,8 @@ impl Drawing {
             let weight = if n == 0 { " font-weight=\"bold\"" } else { "" };
             let _ = writeln!(
                 self.texts,
-                "<text x=\"{:.1}\" y=\"{y:.1}\" font-size=\"{}\" text-anchor=\"middle\" fill=\"#1c2128\"{weight}>{}</text>",
+                "<text x=\"{:.1}\" y=\"{y:.1}\" font-size=\"{}\" text-anchor=\"middle\" \
+                fill=\"#1c2128\"{weight}>{}</text>",
                 at.x,
                 look.font_size,
                 escaped(line)
@@ -119,7 +120,7 @@ impl Drawing {
         }
     }
 
-    /// A label on the middle of its line, in the line's colour, on paper of its own.
+    /// A label on the middle of its line, in the line's colour, on its own background.
     fn label(&mut self, at: Point, text: &str, look: &StyleAttr) {
         let font = look.font_size as f64;
         let (wide, high) = (text.chars().count() as f64 * font * LETTER + 4.0, font * 1.3);
@@ -142,7 +143,7 @@ impl Drawing {
         let (x, y) = (left - MARGIN, top - MARGIN);
         let (wide, high) = (right - left + 2.0 * MARGIN, bottom - top + 2.0 * MARGIN);
         let tip = |rgb: u32| {
-            // One for each end of a line: renderers disagree about turning a marker round.
+            // One marker for each end of a line: renderers disagree about reversing a marker.
             let marker = |end: &str, shape: &str, at: u8| {
                 format!(
                     "<marker id=\"{end}{rgb:06x}\" viewBox=\"0 0 10 8\" refX=\"{at}\" refY=\"4\" markerWidth=\"10\" \
@@ -154,8 +155,8 @@ impl Drawing {
         };
         let tips: String = [DATA, COMMAND, OUTPUT, REPLY].into_iter().map(tip).collect();
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide:.0}\" height=\"{high:.0}\" \
-             viewBox=\"{x:.1} {y:.1} {wide:.1} {high:.1}\" font-family=\"sans-serif\">\n<title>{}</title>\n<defs>\n{tips}</defs>\n\
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide:.0}\" height=\"{high:.0}\" viewBox=\"{x:.1} \
+             {y:.1} {wide:.1} {high:.1}\" font-family=\"sans-serif\">\n<title>{}</title>\n<defs>\n{tips}</defs>\n\
              <rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{wide:.1}\" height=\"{high:.1}\" fill=\"white\"/>\n{}{}{}</svg>",
             escaped(title),
             self.arrows,
@@ -182,7 +183,7 @@ impl RenderBackend for Drawing {
         );
     }
 
-    /// Of boxes: what the library writes beside lines is left to the lines.
+    /// Only the text of boxes: the lines write their own labels.
     fn draw_text(&mut self, at: Point, text: &str, look: &StyleAttr) {
         if look.font_size == FONT {
             self.text(at, text, look);
@@ -225,7 +226,7 @@ impl RenderBackend for Drawing {
         self.draw_arrow(&[(start, start), (stop, stop)], false, (false, false), look, None, "");
     }
 
-    /// No shape of ours is round, or clipped.
+    /// We use no round or clipped shape.
     fn draw_circle(&mut self, _: Point, _: Point, _: &StyleAttr, _: Option<String>) {}
 
     fn create_clip(&mut self, _: Point, _: Point, _: usize) -> ClipHandle {
@@ -233,8 +234,8 @@ impl RenderBackend for Drawing {
     }
 }
 
-/// The middle of a line made of Bézier curves, by its length. The first pair of points is the start and the control that leaves it,
-/// each other one the control that arrives and the end; a control that leaves mirrors the one that arrived.
+/// The middle of a line made of Bézier curves, by its length. The first pair of points is the start and its control
+/// point, each other pair is an incoming control point and an end; the outgoing control point mirrors the incoming one.
 fn middle(path: &[(Point, Point)]) -> Point {
     let mut points = Vec::new();
     let (mut from, mut leaving) = path[0];
@@ -300,7 +301,7 @@ mod tests {
 
     #[test]
     fn any_graph_can_be_drawn() {
-        // Circles, to itself, several between two, nobody with anybody: a linear congruence brings all of them.
+        // Circles, self loops, parallel edges, unconnected modules: a linear congruence produces all of them.
         let mut seed = 1u64;
         let mut number = move |below: usize| {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

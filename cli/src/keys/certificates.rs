@@ -1,4 +1,4 @@
-//! What the TCP router and the nodes of a system show each other, so that sessions are sealed and everyone is who he says.
+//! The certificates of the TCP router and of a system's nodes: sessions are sealed, and each end proves its identity.
 
 mod error;
 mod shown;
@@ -21,28 +21,28 @@ use std::time::Duration;
 use written::{PUBLIC, SECRET, Written};
 
 pub(super) const DAY: Duration = Duration::from_secs(24 * 3600);
-/// What the authority itself holds, days.
+/// Validity of the authority's own certificate, days.
 const AUTHORITY_DAYS: u32 = 3650;
-/// Clocks of computers without a network are behind now and then.
+/// Backdating: clocks of computers without a network are sometimes behind.
 const BEFORE: Duration = DAY;
 
-/// What is made.
+/// What to make.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Which {
-    /// What is not there, or does not hold.
+pub(crate) enum Renewal {
+    /// Certificates that are missing or not valid.
     Missing,
-    /// New certificates of all, by the authority that is there.
+    /// New certificates for all holders, signed by the existing authority.
     All,
-    /// The same by a new authority; the old one is kept aside.
+    /// New certificates signed by a new authority; the old one is kept under another name.
     WithAuthority,
 }
 
-/// Where they are, if the file wants any.
+/// Their folder, if the file requires certificates.
 pub(super) fn folder(installation: &Installation) -> Option<PathBuf> {
     installation.tcp.as_ref()?.certificates.as_ref().map(|folder| installation.resolve(folder))
 }
 
-/// Those who need one: the nodes of the file, and the TCP router if one of them runs it.
+/// All holders: the nodes of the file, and the TCP router if one of them runs it.
 fn holders(installation: &Installation) -> impl Iterator<Item = Holder> {
     let system = installation.system.id;
     let nodes = installation.nodes.iter().map(move |node| Holder::Node { node: node.name.clone(), system });
@@ -50,19 +50,19 @@ fn holders(installation: &Installation) -> impl Iterator<Item = Holder> {
     nodes.chain(server.map(|_| Holder::Router))
 }
 
-/// The files of who has that name: what is shown, and the secret.
+/// The files of a holder: certificate and secret key.
 fn files(folder: &Path, name: &str) -> [PathBuf; 2] {
     ["pem", "key"].map(|end| folder.join(format!("{name}.{end}")))
 }
 
-/// What is there of a holder.
+/// A holder's existing files.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum HolderState {
     Holds,
     Missing,
-    /// The key is not that of the certificate.
+    /// The key does not belong to the certificate.
     NoPair,
-    /// Not by the authority that is there, or not now.
+    /// Not signed by the existing authority, or not valid now.
     Unsigned,
 }
 
@@ -84,37 +84,37 @@ fn is_pair(certificate: &Path, secret: &Path) -> bool {
     KeyPair::from_pem(&text).is_ok_and(|key| is_about(certificate, key.public_key_raw()))
 }
 
-/// Makes what is wanted, to hold for so many days; the files that are new. None if the file wants no certificates.
+/// Makes the certificates, valid for this many days; returns the new files. None if the file requires no certificates.
 ///
-/// All of it is made before the first file is written.
-pub(crate) fn make(installation: &Installation, which: Which, days: u32) -> Result<Vec<PathBuf>, CertificateError> {
+/// Everything is made in memory before the first file is written.
+pub(crate) fn make(installation: &Installation, which: Renewal, days: u32) -> Result<Vec<PathBuf>, CertificateError> {
     let Some(folder) = folder(installation) else { return Ok(Vec::new()) };
     let Signing { authority, issuer, mut made } = match which {
-        Which::WithAuthority => begin(&folder, installation)?,
-        Which::Missing | Which::All => signing(&folder, installation)?,
+        Renewal::WithAuthority => begin(&folder, installation)?,
+        Renewal::Missing | Renewal::All => signing(&folder, installation)?,
     };
     for holder in holders(installation) {
-        if which != Which::Missing || state(&folder, Some(&authority), &holder) != HolderState::Holds {
+        if which != Renewal::Missing || state(&folder, Some(&authority), &holder) != HolderState::Holds {
             let [certificate, secret] = files(&folder, AUTHORITY);
             let issuer = issuer.as_ref();
             let issuer = issuer.ok_or_else(|| CertificateError::NoKey(certificate, secret, installation.shown.clone()));
             made.extend(issue(&folder, issuer?, &holder, days)?);
         }
     }
-    written::put(&folder, &made, || if which == Which::WithAuthority { keep_aside(&folder) } else { Ok(()) })?;
+    written::put(&folder, &made, || if which == Renewal::WithAuthority { keep_aside(&folder) } else { Ok(()) })?;
     Ok(made.into_iter().map(|made| made.path).collect())
 }
 
-/// Who signs.
+/// The signing authority.
 struct Signing {
     authority: Authority,
-    /// None where its key is not.
+    /// None if its key is not here.
     issuer: Option<Issuer<'static, KeyPair>>,
-    /// What of it is new.
+    /// Its files that are new.
     made: Vec<Written>,
 }
 
-/// The authority that is there, fixed if only its certificate is lost; a new one where nothing is signed yet.
+/// The existing authority, fixed if only its certificate is lost; a new one where nothing is signed yet.
 fn signing(folder: &Path, installation: &Installation) -> Result<Signing, CertificateError> {
     let [certificate, secret] = files(folder, AUTHORITY);
     let file = || installation.shown.clone();
@@ -132,7 +132,7 @@ fn signing(folder: &Path, installation: &Installation) -> Result<Signing, Certif
         if key.as_ref().is_some_and(|key| !authority.has_key(key.public_key_raw())) {
             return Err(CertificateError::OtherKey(certificate, secret, file()));
         }
-        // By the name in it: the installation may have another one by now.
+        // Uses the name in the certificate: the installation may have been renamed.
         let issuer = key.map(|key| Issuer::new(authority_params(&authority.name), key));
         return Ok(Signing { authority, issuer, made: Vec::new() });
     }
@@ -143,13 +143,13 @@ fn signing(folder: &Path, installation: &Installation) -> Result<Signing, Certif
     }
 }
 
-/// One that somebody shows: an authority was there.
+/// A certificate that exists already: it was signed by an authority.
 fn a_certificate(folder: &Path) -> Option<PathBuf> {
     let paths = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     paths.filter(|path| path.extension().is_some_and(|end| end == "pem")).min()
 }
 
-/// A new authority.
+/// Makes a new authority.
 fn begin(folder: &Path, installation: &Installation) -> Result<Signing, CertificateError> {
     let [_, secret] = files(folder, AUTHORITY);
     let key = KeyPair::generate().map_err(|error| CertificateError::Unfit(secret.clone(), error))?;
@@ -159,7 +159,7 @@ fn begin(folder: &Path, installation: &Installation) -> Result<Signing, Certific
     Ok(signing)
 }
 
-/// The certificate of an authority, from its key.
+/// An authority's certificate, made from its key.
 fn signed_by_itself(folder: &Path, installation: &Installation, key: KeyPair) -> Result<Signing, CertificateError> {
     let [certificate, _] = files(folder, AUTHORITY);
     let params = authority_params(&format!("{PREFIX}{}", installation.name));
@@ -170,7 +170,8 @@ fn signed_by_itself(folder: &Path, installation: &Installation, key: KeyPair) ->
     Ok(Signing { authority, issuer: Some(Issuer::new(params, key)), made })
 }
 
-/// Gives what there is of the authority another name besides, which nothing has: it is still needed if the new one is not wanted.
+/// Links the authority's files under a second, unused name: the old authority is still needed if the new one is
+/// rejected.
 fn keep_aside(folder: &Path) -> Result<(), CertificateError> {
     let files = files(folder, AUTHORITY);
     let aside = |number: u32| {
@@ -194,7 +195,7 @@ fn authority_params(name: &str) -> CertificateParams {
     params
 }
 
-/// A new key and certificate of a holder, to take the place of older ones.
+/// A new key and certificate of a holder; they replace older ones.
 fn issue(
     folder: &Path,
     issuer: &Issuer<'static, KeyPair>,
@@ -210,8 +211,8 @@ fn issue(
         Holder::Router => ExtendedKeyUsagePurpose::ServerAuth,
         Holder::Node { .. } => ExtendedKeyUsagePurpose::ClientAuth,
     }];
-    // RFC 5280 asks for all of these, and strict verifiers with it: that it is no authority, what its key is for, and
-    // whose key signed it.
+    // RFC 5280 requires all of these, and strict verifiers check them: that it is no authority, the purpose of its key,
+    // and the key that signed it.
     params.is_ca = IsCa::ExplicitNoCa;
     params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
     params.use_authority_key_identifier_extension = true;
@@ -221,7 +222,7 @@ fn issue(
     Ok([secret, Written { path: certificate, text: signed.pem(), mode: PUBLIC }])
 }
 
-/// From a little before now on.
+/// The start of the validity, a little in the past.
 fn hold(params: &mut CertificateParams, days: u32) {
     let now = date_time_ymd(1970, 1, 1) + Duration::from_nanos(realtime_ns());
     (params.not_before, params.not_after) = (now - BEFORE, now + days * DAY);

@@ -1,4 +1,4 @@
-//! Keys and certificates of a robot, made, changed and shown in a folder.
+//! Keys and certificates of a robot are made, changed and shown in a folder.
 
 use super::*;
 
@@ -18,7 +18,7 @@ fn begin_anew(place: Place) -> Step {
 }
 
 #[test]
-fn keys_are_made_changed_and_shown_but_never_said() {
+fn keys_are_made_changed_and_shown_only_as_fingerprints() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("keys");
     let file = Keys::file(&folder);
@@ -39,7 +39,7 @@ fn keys_are_made_changed_and_shown_but_never_said() {
     assert_eq!(Keys::load(&file).unwrap(), Keys { older: None, ..both });
 }
 
-/// A robot of two computers and a laptop, of an installation of this name.
+/// A robot of two computers and a laptop; the installation has this name.
 fn robot(place: &Path, installation: &str) -> PathBuf {
     let text = include_str!("../../../config/demo-tcp.toml")
         .replace("installation = \"demo-tcp\"", &format!("installation = \"{installation}\""))
@@ -51,7 +51,7 @@ fn robot(place: &Path, installation: &str) -> PathBuf {
     file
 }
 
-/// All that is in the folder of certificates.
+/// All files in the folder of certificates.
 fn shown(place: &Path) -> std::collections::BTreeMap<String, String> {
     let read = |entry: std::io::Result<std::fs::DirEntry>| {
         let path = entry.unwrap().path();
@@ -60,7 +60,7 @@ fn shown(place: &Path) -> std::collections::BTreeMap<String, String> {
     std::fs::read_dir(place.join("shown")).unwrap().map(read).collect()
 }
 
-/// Whether the certificates of base and TCP router are by the authority that is there.
+/// Whether the existing authority signed the certificates of base and TCP router.
 fn fit(file: &Path) -> bool {
     use rohrpost_routers::tcp::{Authority, Holder};
     let installation = load(file).unwrap();
@@ -71,7 +71,7 @@ fn fit(file: &Path) -> bool {
 }
 
 #[test]
-fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
+fn one_command_makes_all_files_and_one_renews_them() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
@@ -86,7 +86,7 @@ fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
     );
     assert!(fit(&file));
     step(Step::New, &file).unwrap();
-    assert_eq!(shown(place.path()), first, "what is there stays");
+    assert_eq!(shown(place.path()), first, "existing files stay");
     std::fs::remove_file(place.path().join("shown/brain.system-1.pem")).unwrap();
     step(Step::New, &file).unwrap();
     let fixed = shown(place.path());
@@ -97,18 +97,18 @@ fn one_command_makes_all_that_a_file_needs_and_one_renews_it() {
     assert!(rotated["ca.pem"] == first["ca.pem"] && rotated["desk.system-1.pem"] != first["desk.system-1.pem"]);
     assert_eq!(Keys::load(&Keys::file(&place.path().join("keys"))).unwrap().older, Some(key.newest));
     let refused = step(rotate, &file).unwrap_err();
-    assert!(refused.contains("keys finish") && shown(place.path()) == rotated, "nothing is done by halves: {refused}");
+    assert!(refused.contains("keys finish") && shown(place.path()) == rotated, "all or nothing: {refused}");
     step(Step::Finish, &file).unwrap();
     step(Step::Show, &file).unwrap();
 }
 
 #[test]
-fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
+fn a_damaged_or_renamed_authority_is_fixed_or_reported() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
     let first = shown(place.path());
-    // Renamed, it signs under the name that it has.
+    // A renamed installation still signs under the authority's name.
     robot(place.path(), "another");
     std::fs::remove_file(place.path().join("shown/desk.system-1.pem")).unwrap();
     step(Step::New, &file).unwrap();
@@ -118,34 +118,34 @@ fn an_authority_that_is_torn_or_of_another_name_is_mended_or_said_to_be_lost() {
     std::fs::remove_file(place.path().join("shown/ca.pem")).unwrap();
     step(Step::New, &file).unwrap();
     assert!(shown(place.path())["ca.key"] == first["ca.key"] && fit(&file), "old certificates hold");
-    // Under another name, what was signed under the old one counts no more.
+    // Under another name, old signatures are no longer valid.
     robot(place.path(), "another");
     std::fs::remove_file(place.path().join("shown/ca.pem")).unwrap();
     step(Step::New, &file).unwrap();
-    assert!(shown(place.path())["ca.key"] == first["ca.key"] && fit(&file), "all are signed anew");
-    // Its key cannot.
+    assert!(shown(place.path())["ca.key"] == first["ca.key"] && fit(&file), "all are signed again");
+    // Its key cannot be made anew.
     std::fs::remove_file(place.path().join("shown/ca.key")).unwrap();
     let sealing = Keys::file(&place.path().join("keys"));
     let key = Keys::load(&sealing).unwrap();
     let lost = step(rotate, &file).unwrap_err();
     assert!(lost.contains("keys rotate --authority"), "{lost}");
-    assert_eq!(Keys::load(&sealing).unwrap(), key, "nothing is done by halves");
+    assert_eq!(Keys::load(&sealing).unwrap(), key, "all or nothing");
     step(begin_anew, &file).unwrap();
     assert!(fit(&file) && shown(place.path()).contains_key("ca.pem.old"));
     step(Step::Finish, &file).unwrap();
-    // Halves of two.
+    // Key and certificate belong to different authorities.
     let now = shown(place.path());
     std::fs::write(place.path().join("shown/ca.key"), &first["ca.key"]).unwrap();
     for halves in [step(rotate, &file), step(Step::New, &file)] {
         let other = halves.unwrap_err();
         assert!(other.contains("of two authorities"), "{other}");
     }
-    assert!(super::show(&Wanted::by(&file).unwrap()).unwrap().join("\n").contains("ca.key: is not the key of"));
+    assert!(super::show(&KeyFiles::by(&file).unwrap()).unwrap().join("\n").contains("ca.key: is not the key of"));
     assert_eq!(shown(place.path())["desk.system-1.pem"], now["desk.system-1.pem"]);
 }
 
 #[test]
-fn no_new_authority_begins_over_certificates_of_another() {
+fn a_new_authority_never_replaces_certificates_of_another() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
@@ -154,7 +154,7 @@ fn no_new_authority_begins_over_certificates_of_another() {
         let before = shown(place.path());
         let said = step(Step::New, &file);
         match name {
-            // Moved off the robots.
+            // The authority's key is kept off the robots.
             "ca.key" => assert!(said.is_ok(), "{said:?}"),
             _ => assert!(said.as_ref().is_err_and(|said| said.contains("keys rotate --authority")), "{said:?}"),
         }
@@ -163,17 +163,17 @@ fn no_new_authority_begins_over_certificates_of_another() {
 }
 
 #[test]
-fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
+fn invalid_certificates_are_listed_and_replaced_and_valid_ones_stay() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
-    let says = || super::show(&Wanted::by(&file).unwrap()).unwrap().join("\n");
+    let says = || super::show(&KeyFiles::by(&file).unwrap()).unwrap().join("\n");
     step(Step::New, &file).unwrap();
     let first = shown(place.path());
     assert!(!says().contains("keys new"), "{}", says());
     let put = |name: &str, text: &str| std::fs::write(place.path().join("shown").join(name), text).unwrap();
-    // As a crash between the two leaves it.
+    // The state after a crash between the two writes.
     put("base.system-1.key", &first["desk.system-1.key"]);
-    assert!(says().contains("base.system-1.pem: certificate and key do not fit; `rohrpost keys new`"), "{}", says());
+    assert!(says().contains("base.system-1.pem: certificate and key do not match; `rohrpost keys new`"), "{}", says());
     step(Step::New, &file).unwrap();
     let fixed = shown(place.path());
     assert!(!says().contains("keys new") && fixed["base.system-1.pem"] != first["base.system-1.pem"]);
@@ -181,7 +181,7 @@ fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
         assert_eq!(text, &first[name], "{name} stays");
     }
     // Expired.
-    certificates::make(&load(&file).unwrap(), Which::All, 0).unwrap();
+    certificates::make(&load(&file).unwrap(), Renewal::All, 0).unwrap();
     while fit(&file) {
         std::thread::sleep(std::time::Duration::from_millis(100));
     }
@@ -191,7 +191,7 @@ fn what_does_not_hold_is_shown_and_made_anew_and_the_rest_stays() {
 }
 
 #[test]
-fn what_cannot_be_written_leaves_all_as_it_was() {
+fn a_failed_write_changes_nothing() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     step(Step::New, &file).unwrap();
@@ -206,7 +206,7 @@ fn what_cannot_be_written_leaves_all_as_it_was() {
     }
     std::fs::remove_dir(&in_the_way).unwrap();
     assert_eq!(shown(place.path()), first);
-    // Each authority that was there is kept, also when one begins anew once more.
+    // Each earlier authority is kept, even after another new start.
     step(begin_anew, &file).unwrap();
     let second = shown(place.path());
     step(Step::Finish, &file).unwrap();
@@ -217,7 +217,7 @@ fn what_cannot_be_written_leaves_all_as_it_was() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_no_folder_of_keys() {
+fn a_missing_file_is_no_folder_of_keys() {
     let place = tempfile::tempdir().unwrap();
     let mistyped = place.path().join("robto.toml");
     let said = step(Step::New, &mistyped).unwrap_err();
@@ -225,32 +225,32 @@ fn a_file_that_is_not_there_is_no_folder_of_keys() {
 }
 
 #[test]
-fn what_seals_nothing_needs_no_keys() {
+fn a_configuration_without_security_needs_no_keys() {
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo.toml");
     let said = step(Step::New, &demo).unwrap_err();
     assert!(said.contains("nothing here is sealed"), "{said}");
 }
 
 #[test]
-fn how_long_certificates_hold_is_shown_and_the_age_of_keys() {
+fn validity_of_certificates_and_age_of_keys_are_shown() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
     let says = |of: &str| {
-        let lines = super::show(&Wanted::by(&file).unwrap()).unwrap();
+        let lines = super::show(&KeyFiles::by(&file).unwrap()).unwrap();
         lines.into_iter().find(|line| line.contains(of)).unwrap()
     };
     step(Step::New, &file).unwrap();
-    let make = |days| certificates::make(&load(&file).unwrap(), Which::All, days).unwrap();
+    let make = |days| certificates::make(&load(&file).unwrap(), Renewal::All, days).unwrap();
     // Less than a second may have passed, or more.
     let lasts = |days: u32| {
         let said = says("desk.system-1.pem");
         let is_so =
-            [days - 1, days].iter().any(|days| said.contains(&format!("is there, holds for {days} days, until ")));
+            [days - 1, days].iter().any(|days| said.contains(&format!("is there, valid for {days} days, until ")));
         assert!(is_so, "{said}");
         said.contains("`rohrpost keys rotate` makes new ones")
     };
     make(20);
-    assert!(lasts(20), "soon it holds no more");
+    assert!(lasts(20), "it expires soon");
     assert!(
         says("desk.system-1.key").ends_with("desk.system-1.key: is there"),
         "a key holds as long as its certificate"
@@ -263,12 +263,12 @@ fn how_long_certificates_hold_is_shown_and_the_age_of_keys() {
     assert!(says("udp.keys: written").ends_with("written 3 days ago"));
 }
 
-/// Python 3.13 asks for no less by itself.
+/// Python 3.13 checks this strictly by default.
 #[test]
-fn strict_verifiers_take_the_certificates() {
+fn strict_verifiers_accept_the_certificates() {
     let place = tempfile::tempdir().unwrap();
     let file = robot(place.path(), "one");
-    // Those of a first authority, and of one that was read from its files.
+    // Certificates of a first authority, and of one that was read from its files.
     for made in [Step::New, rotate as fn(Place) -> Step] {
         step(made, &file).unwrap();
         let mut python = std::process::Command::new("python3");

@@ -1,4 +1,4 @@
-//! `rohrpost launch --all`: every node of a configuration on this computer, each in a network namespace of its own.
+//! `rohrpost launch --all`: every node of a configuration on this computer, each in its own network namespace.
 //!
 //! ```text
 //!  this command ─┬─ rohrpost launch FILE --node base ─┬─ router.0      namespace of base ──┐
@@ -6,8 +6,9 @@
 //!                └─ rohrpost launch FILE --node desk ─── router.1 …    namespace of desk ──┘
 //! ```
 //!
-//! The nodes start at once, as computers that are switched on together do, and are stopped one after the other, the last first. If this
-//! command dies, the kernel tells each launch to stop; when the last process of a node has ended, its namespace is gone.
+//! The nodes start together, like computers that are switched on together, and stop one after the other, the last
+//! first. If this command dies, the kernel tells each launch to stop; when the last process of a node has ended, its
+//! namespace is gone.
 
 use crate::speech::Speech;
 use crate::terminal::Failure;
@@ -25,26 +26,26 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Tells a launch which process it must not outlive.
+/// The environment variable with the id of the process that a launch must not outlive.
 const WITHIN: &str = "ROHRPOST_LAUNCH_ALL";
-/// Of links where no configuration says it, as of Ethernet.
+/// Link rate where the configuration gives none: Ethernet.
 const MTU: u16 = 1500;
-/// Lines on their way from the nodes; who has more to say waits.
+/// Capacity for lines from the nodes; a full channel makes their threads wait.
 const LINES_MAX: usize = 256;
-/// How a launch is told to stop, and to hurry. Two signals, since of two that are the same the kernel may deliver one.
+/// The signals for "stop" and "stop at once". They differ, since the kernel may merge two equal signals into one.
 const WORDS: [Signal; 2] = [Signal::SIGINT, Signal::SIGTERM];
-/// So long, at the end, for the last lines.
+/// At the end, wait this long for the last lines.
 const LAST_LINES: Duration = Duration::from_secs(1);
 
-/// What a launch says when all its modules are on.
+/// The line that a launch prints when all its modules are on.
 pub(super) fn runs(node: &str, installation: &str) -> String {
     format!("node {node} of {installation} runs")
 }
 
-/// Ends this launch in order when the command that started it for one of its nodes dies. Started otherwise, it does nothing.
+/// Ends this launch in order when its parent `launch --all` dies. A launch without such a parent is not affected.
 ///
 /// # Errors
-/// When that command is gone already.
+/// When that command has already ended.
 pub(super) fn stop_with_it() -> Result<(), Failure> {
     let Some(parent) = std::env::var(WITHIN).ok().and_then(|pid| pid.parse().ok()) else { return Ok(()) };
     nix::sys::prctl::set_pdeathsig(Some(Signal::SIGTERM))?;
@@ -56,17 +57,17 @@ pub(super) fn stop_with_it() -> Result<(), Failure> {
     }
 }
 
-/// The nodes of an installation, all running here.
+/// The nodes of an installation, all on this computer.
 pub(crate) struct LaunchedNodes<'a> {
     installation: Arc<Installation>,
     nodes: Vec<Node>,
-    happenings: Receiver<Happening>,
-    /// Streams of nodes that have not ended.
+    happenings: Receiver<NodeEvent>,
+    /// Open output streams of all nodes.
     open: usize,
     speech: &'a Speech,
-    /// Words to stop so far.
+    /// Stop requests so far.
     words: u32,
-    /// The nodes are being stopped, so that their ends are no news.
+    /// The nodes are being stopped: their ends are expected.
     stopping: bool,
     lab: Lab,
 }
@@ -77,29 +78,29 @@ struct Node {
     /// All its modules are on.
     runs: bool,
     ended: Option<ExitStatus>,
-    /// Words to stop that it was given.
+    /// Stop signals that it was sent.
     told: usize,
 }
 
-enum Happening {
-    /// A node said something.
+enum NodeEvent {
+    /// A node printed a line.
     Line { node: usize, text: String, complaint: bool },
     /// One of its two streams has ended.
     Closed,
-    /// A word to stop, or a child may have ended.
+    /// A stop was requested, or a child may have ended.
     Event(Event),
 }
 
-/// The namespaces of all nodes. To be called before this process has a second thread.
+/// Creates the namespaces of all nodes. Must be called before this process has a second thread.
 ///
 /// # Errors
-/// When there is one node only, or the system does not allow it.
+/// When there is only one node, or the system does not allow namespaces.
 pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
     if installation.nodes.len() == 1 {
         let file = installation.shown.display();
         return Err(format!("{file} has one node; launch it without --all: rohrpost launch {file}").into());
     }
-    // One that is alone on its LAN may have no address there: then it is reached where the TCP router is.
+    // A node that is alone on its LAN may have no address there: then it gets one on the network of the TCP router.
     let server = installation.tcp.as_ref().and_then(|tcp| Some((tcp.server.as_deref()?, tcp.address.ip())));
     let address = |node: &rohrpost_config::Node| node.address.or_else(|| server.map(|(_, address)| address));
     let spec = |node: &rohrpost_config::Node| Some(NodeSpec { name: node.name.clone(), address: address(node)? });
@@ -118,10 +119,11 @@ pub(crate) fn lab(installation: &Installation) -> Result<Lab, Failure> {
 }
 
 impl<'a> LaunchedNodes<'a> {
-    /// Starts the launch of each node. The calling thread must live as long as they: the kernel takes its end for this command's.
+    /// Starts the launch of each node. The calling thread must live as long as the nodes: the kernel takes its end for
+    /// this command's end.
     ///
     /// # Errors
-    /// When one cannot be started; then none is left running.
+    /// When one cannot be started; then all are stopped.
     pub(crate) fn begin(
         installation: Arc<Installation>,
         lab: Lab,
@@ -148,7 +150,7 @@ impl<'a> LaunchedNodes<'a> {
         index: usize,
         executable: &Path,
         bad: Option<impair::Settings>,
-        sender: &SyncSender<Happening>,
+        sender: &SyncSender<NodeEvent>,
     ) -> Result<(), Failure> {
         let name = self.installation.nodes[index].name.clone();
         let mut command = Command::new(executable);
@@ -157,7 +159,7 @@ impl<'a> LaunchedNodes<'a> {
         if let Some(bad) = bad {
             command.env(impair::ENVIRONMENT, bad.to_string());
         }
-        // A process group of its own: a Ctrl-C is ours to handle.
+        // A separate process group: Ctrl-C reaches only this command.
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let mut child = self.lab.command(&name, &mut command).map_err(|error: LabError| Failure::from(error))?;
         let (out, err) = (child.stdout.take(), child.stderr.take());
@@ -169,13 +171,13 @@ impl<'a> LaunchedNodes<'a> {
         Ok(())
     }
 
-    /// Begins to watch what crosses the network.
+    /// Begins to capture the network's traffic.
     pub(crate) fn capture(&self) -> Result<Capture, Failure> {
         Ok(self.lab.capture()?)
     }
 
-    /// Watches for at most `period`, or until something happens; false when it is time to stop: somebody said so, a node did not start,
-    /// or none runs any more.
+    /// Handles events for at most `period`, or until something happens; false when it is time to stop: a stop was
+    /// requested, a node did not start, or no node runs any more.
     pub(crate) fn watch(&mut self, period: Duration) -> bool {
         match self.happenings.recv_timeout(period) {
             Ok(happening) => self.note(happening),
@@ -192,12 +194,12 @@ impl<'a> LaunchedNodes<'a> {
         self.nodes.iter().all(|node| node.runs)
     }
 
-    fn note(&mut self, happening: Happening) {
+    fn note(&mut self, happening: NodeEvent) {
         match happening {
-            Happening::Line { node, text, complaint } => self.line(node, &text, complaint),
-            Happening::Closed => self.open -= 1,
-            Happening::Event(Event::Stop) => self.words += 1,
-            Happening::Event(Event::Child) => self.look_for_ended(),
+            NodeEvent::Line { node, text, complaint } => self.line(node, &text, complaint),
+            NodeEvent::Closed => self.open -= 1,
+            NodeEvent::Event(Event::Stop) => self.words += 1,
+            NodeEvent::Event(Event::Child) => self.look_for_ended(),
         }
     }
 
@@ -219,9 +221,9 @@ impl<'a> LaunchedNodes<'a> {
         }
     }
 
-    /// Stops all nodes, the last first; all at once when another word to stop comes. A node that failed makes the exit code.
+    /// Stops all nodes, the last first; all at once on a second stop request. A node that failed sets the exit code.
     pub(crate) fn stop(mut self) -> ExitCode {
-        // What ended before is told.
+        // Earlier ends are reported already.
         self.look_for_ended();
         self.stopping = true;
         let words = self.words;
@@ -246,11 +248,11 @@ impl<'a> LaunchedNodes<'a> {
 }
 
 impl Node {
-    /// Tells it to stop, until it has been told so often.
+    /// Sends it stop signals, until it has got this many.
     fn tell(&mut self, often: usize) {
         for word in WORDS.iter().take(often).skip(self.told) {
             if self.ended.is_none() {
-                // It is our child and not reaped, so the number is its own.
+                // It is our child and not reaped, so its process id is not reused.
                 let _ = kill(Pid::from_raw(self.child.id() as i32), *word);
             }
         }
@@ -258,12 +260,12 @@ impl Node {
     }
 }
 
-/// Passes signals on.
-fn listen(sender: SyncSender<Happening>) -> Result<(), Failure> {
+/// Forwards signals as events.
+fn listen(sender: SyncSender<NodeEvent>) -> Result<(), Failure> {
     let events = events()?;
     let pass = move || {
         for event in events {
-            if sender.send(Happening::Event(event)).is_err() {
+            if sender.send(NodeEvent::Event(event)).is_err() {
                 break;
             }
         }
@@ -272,22 +274,22 @@ fn listen(sender: SyncSender<Happening>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Passes on what a node says.
+/// Forwards a node's output as events.
 fn read(
     node: usize,
     complaint: bool,
     pipe: Option<impl Read + Send + 'static>,
-    sender: SyncSender<Happening>,
+    sender: SyncSender<NodeEvent>,
 ) -> Result<(), Failure> {
     let Some(pipe) = pipe else { return Ok(()) };
     let pass = move || {
         for line in BufReader::new(pipe).split(b'\n').map_while(Result::ok) {
             let text = String::from_utf8_lossy(&line).into_owned();
-            if sender.send(Happening::Line { node, text, complaint }).is_err() {
+            if sender.send(NodeEvent::Line { node, text, complaint }).is_err() {
                 return;
             }
         }
-        let _ = sender.send(Happening::Closed);
+        let _ = sender.send(NodeEvent::Closed);
     };
     std::thread::Builder::new().name("lines".into()).spawn(pass)?;
     Ok(())

@@ -1,10 +1,11 @@
-//! The sockets of a node's router are launch's: what peers send while a router that died is started again waits in the kernel for the next one.
+//! Launch owns the sockets of a node's router: while a dead router is restarted, datagrams of peers wait in the kernel
+//! for the next one.
 
 use rohrpost_config::{Installation, Module};
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
 
-/// What launch keeps for the modules of a node: for its router, the sockets by which that is reached.
+/// What launch keeps for a node's modules: the sockets of its router.
 pub(super) fn of(installation: Arc<Installation>, node: String) -> impl Fn(&Module) -> Vec<OwnedFd> {
     move |module| {
         let network = installation.network.filter(|_| installation.router_of(&node) == Some(module.name));

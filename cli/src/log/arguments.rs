@@ -1,27 +1,27 @@
-//! What the command line says of lines and levels.
+//! The command line's options for lines and levels.
 
 use crate::target::Target;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost log                           what was said so far
-  rohrpost log --follow                  and what is said from now on
+  rohrpost log                           the output so far
+  rohrpost log --follow                  also new output, as it comes
   rohrpost log --level warn              only warnings and errors
   rohrpost log --module pilot.0 --text wall --since '5 min'
-  rohrpost log --level pilot.0=debug     makes pilot.0 say more; with --follow, and shows it
-  rohrpost log --level laser=error       makes all lasers say errors only
-  rohrpost log --levels                  from which level on each module speaks")]
+  rohrpost log --level pilot.0=debug     makes pilot.0 more verbose; with --follow, also shows it
+  rohrpost log --level laser=error       limits all lasers to errors
+  rohrpost log --levels                  the level of each module")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub(super) target: Target,
     /// Go on with new lines until Ctrl-C.
     #[arg(long, short)]
     pub(super) follow: bool,
-    /// LEVEL: only lines as important as this: error, warn, info, debug, trace. NAME=LEVEL: set from which level on this
-    /// module, or each of this class, speaks, until it starts anew.
+    /// LEVEL: only lines of this severity and above: error, warn, info, debug, trace. NAME=LEVEL: set the level of this
+    /// module, or of each module of this class, until it restarts.
     #[arg(long, value_name = "LEVEL|NAME=LEVEL")]
     pub(super) level: Vec<String>,
-    /// List from which level on each module speaks.
+    /// List each module's level.
     #[arg(long, conflicts_with_all = ["follow", "level"])]
     pub(super) levels: bool,
     /// Only lines of this module; may be given several times.
@@ -30,16 +30,16 @@ pub(crate) struct Arguments {
     /// Only lines of modules of this class; may be given several times.
     #[arg(long, value_name = "CLASS")]
     pub(super) class: Vec<String>,
-    /// Only lines that contain this, in small or capital letters.
+    /// Only lines that contain this text; case does not matter.
     #[arg(long)]
     pub(super) text: Option<String>,
-    /// Only lines of the last while, such as '5 min'.
+    /// Only lines of this last time, such as '5 min'.
     #[arg(long, value_name = "DURATION")]
     pub(super) since: Option<String>,
-    /// Only the last lines, so many.
+    /// Only this many last lines.
     #[arg(long, short = 'n', value_name = "COUNT")]
     pub(super) last: Option<usize>,
-    /// Wait so long for each answer, seconds.
+    /// Timeout for each answer, seconds.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     pub(super) timeout: f64,
     /// One JSON object a line.
@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Whether something here says which lines to show.
+    /// Whether any option selects lines.
     pub(super) fn chooses_lines(&self) -> bool {
         let level = self.level.iter().any(|level| !level.contains('='));
         level

@@ -1,4 +1,4 @@
-//! Which lines are shown. The collector knows nothing of it: it hands out pages, and the tool chooses.
+//! Selects lines. The collector does not filter: it hands out pages, and the tool selects.
 
 use super::super::call;
 use super::super::target::Running;
@@ -13,22 +13,25 @@ pub(super) struct Filter {
     level: OutputLevel,
     modules: Vec<Name>,
     classes: Vec<Class>,
-    /// In small letters.
+    /// In lower case.
     text: Option<String>,
     pub(super) since_ns: Option<u64>,
 }
 
-/// `NAME=LEVEL`, taken apart.
-type Wish<'a> = (&'a str, &'a str);
+/// A parsed `NAME=LEVEL`.
+type LevelAssignment<'a> = (&'a str, &'a str);
 
 impl Filter {
-    /// Reads the command line: what to set, and what to show.
-    pub(super) fn read<'a>(arguments: &'a Arguments, running: &Running) -> Result<(Vec<Wish<'a>>, Self), Failure> {
+    /// Parses the command line: levels to set, and lines to show.
+    pub(super) fn read<'a>(
+        arguments: &'a Arguments,
+        running: &Running,
+    ) -> Result<(Vec<LevelAssignment<'a>>, Self), Failure> {
         let (settings, shown): (Vec<_>, Vec<_>) = arguments.level.iter().partition(|level| level.contains('='));
         let level = match shown[..] {
             [] => OutputLevel::Trace,
             [level] => call::level_of(level)?,
-            _ => return Err("--level says twice which lines to show; to set levels write --level NAME=LEVEL".into()),
+            _ => return Err("--level selects lines twice; to set levels write --level NAME=LEVEL".into()),
         };
         let modules = arguments.module.iter().map(|name| module(name, running)).collect::<Result<_, _>>()?;
         let classes = arguments.class.iter().map(|name| class(name, running)).collect::<Result<_, _>>()?;
@@ -47,13 +50,13 @@ impl Filter {
     }
 }
 
-/// The module that a user names by its own name or an alias's: lines carry its own.
+/// Resolves a module's own name or an alias: lines carry the module's own name.
 pub(super) fn module(text: &str, running: &Running) -> Result<Name, Failure> {
     let name = running.module(text)?;
     let module = running
         .installation
         .module(name)
-        .ok_or_else(|| format!("{text} is a program run by hand, and says nothing to the collector"))?;
+        .ok_or_else(|| format!("{text} is a program run by hand, and sends no lines to the collector"))?;
     Ok(module.name)
 }
 

@@ -1,4 +1,4 @@
-//! From which level on modules speak: listed, and set while they run.
+//! Lists modules' output levels, and sets them at run time.
 
 use super::super::call;
 use super::super::table::table;
@@ -19,7 +19,7 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    /// Reads a module or a class, and a level.
+    /// Parses a module or a class, and a level.
     pub(super) fn read(name: &str, level: &str, running: &Running) -> Result<Self, Failure> {
         let level = call::level_of(level)?;
         if name.contains('.') {
@@ -51,7 +51,7 @@ struct LevelArguments {
     before: Option<&'static str>,
 }
 
-/// Sets levels and says what they were. One that fails does not keep the others from being set.
+/// Sets levels and prints the previous ones. A failure does not prevent the others.
 pub(super) fn set(settings: &[Setting], running: &Running, arguments: &Arguments, tool: &mut ToolLink) -> ExitCode {
     let mut code = ExitCode::SUCCESS;
     for (module, level) in settings.iter().flat_map(|set| set.modules.iter().map(|module| (*module, set.level))) {
@@ -77,7 +77,7 @@ pub(super) fn set(settings: &[Setting], running: &Running, arguments: &Arguments
             Some(before) => format!("{}: {}, was {before}", set.module, set.level),
             None => format!("{}: it sends no lines, whatever its level", set.module),
         };
-        // Followed by lines, it is not one of them.
+        // On the standard error, so that it does not mix with lines.
         if arguments.follow {
             complain(text);
         } else {
@@ -88,7 +88,7 @@ pub(super) fn set(settings: &[Setting], running: &Running, arguments: &Arguments
 }
 
 #[derive(Serialize)]
-struct Listed {
+struct LevelRow {
     module: String,
     level: Option<&'static str>,
     at_start: &'static str,
@@ -109,7 +109,7 @@ pub(super) fn list(running: &Running, json: bool, tool: &mut ToolLink) -> Result
             Ok(status) => (Some(status), None),
             Err(why) => (None, Some(why)),
         };
-        lines.push(Listed {
+        lines.push(LevelRow {
             module: names(module, running),
             level: status.as_ref().and_then(|status| status.output_level).map(OutputLevel::name),
             at_start: running.installation.output_level(module).as_str(),

@@ -1,8 +1,8 @@
 //! Reads the collector's lines page by page, across its restarts.
 //!
-//! Asking for pages disturbs less than a subscription would: a quiet collector answers one short command five times a second, with
-//! the least urgent priority there is, instead of sending a package for each line; nothing has to be renewed; and a reader
-//! that is slow or stopped misses nothing that the collector still keeps, and sees what it missed.
+//! Polling pages costs less than a subscription: a quiet collector answers one short command five times a second, at
+//! the lowest priority, instead of sending a package for each line; nothing must be renewed; and a slow or stopped
+//! reader misses nothing that the collector still keeps, and notices what it missed.
 
 use super::super::target::Running;
 use crate::terminal::Failure;
@@ -16,19 +16,19 @@ pub(crate) const LINES_FROM: u16 = 16;
 pub(super) struct Reader<'a> {
     running: &'a Running,
     collector: Name,
-    /// Whether launch ran when this began; if so, the node ends with it.
+    /// Whether launch ran at the start; if so, the node ends with it.
     launched: bool,
-    /// The collector's incarnation that `next` counts in.
-    life: Option<u32>,
+    /// The collector's incarnation that `next` belongs to.
+    incarnation: Option<u32>,
     next: u64,
-    /// Whether it is being waited for.
+    /// Whether the reader waits for a collector.
     waiting: bool,
 }
 
-/// What one look brought.
+/// The result of one poll.
 pub(super) struct News {
     pub(super) lines: Vec<OutputLine>,
-    /// Something to say before the lines.
+    /// A notice to print before the lines.
     pub(super) note: Option<String>,
     /// Whether there is more to read at once.
     pub(super) more: bool,
@@ -36,16 +36,16 @@ pub(super) struct News {
 
 impl<'a> Reader<'a> {
     pub(super) fn new(running: &'a Running, collector: Name) -> Self {
-        // Of a collector on another node it is not known: it is waited for.
+        // For a collector on another node this is unknown: the reader waits for it.
         let launched = running.is_own(collector) && running.node.launcher().is_some();
-        Self { running, collector, launched, life: None, next: 0, waiting: false }
+        Self { running, collector, launched, incarnation: None, next: 0, waiting: false }
     }
 
-    /// The next page. A follower waits for a collector that it has heard once.
+    /// The next page. A follower waits for a collector that has answered once.
     pub(super) fn read(&mut self, tool: &mut ToolLink, follow: bool) -> Result<News, Failure> {
         match self.page(tool) {
             Ok(page) => Ok(self.take(page)),
-            Err(error) if follow && self.life.is_some() => self.missed(&error),
+            Err(error) if follow && self.incarnation.is_some() => self.missed(&error),
             Err(error) => Err(told(self.running, self.collector, &error).into()),
         }
     }
@@ -60,19 +60,18 @@ impl<'a> Reader<'a> {
     fn take(&mut self, page: Page) -> News {
         let name = self.running.text(self.collector);
         let waited = std::mem::take(&mut self.waiting);
-        let known = self.life.replace(page.life);
-        if known.is_some_and(|life| life != page.life) {
-            // What this page has counts in the new incarnation; it may begin in its middle.
+        let known = self.incarnation.replace(page.life);
+        if known.is_some_and(|incarnation| incarnation != page.life) {
+            // This page's numbers belong to the new incarnation; it may begin in the middle.
             self.next = 0;
             let file = &self.running.installation.output.file;
             let file = file.as_ref().map(|file| format!("; {} has them", file.display())).unwrap_or_default();
-            let note =
-                format!("{name} was started again; lines that it had taken since the last one above are gone{file}");
+            let note = format!("{name} was started again; the lines since the last one above are lost{file}");
             return News { lines: Vec::new(), note: Some(note), more: true };
         }
         let skipped = page.first.saturating_sub(self.next);
         let note = match (skipped, known) {
-            (1.., Some(_)) => Some(format!("{skipped} lines are gone: {name} keeps fewer")),
+            (1.., Some(_)) => Some(format!("{skipped} lines are lost: {name} keeps fewer")),
             _ if waited => Some(format!("{name} answers again")),
             _ => None,
         };
@@ -80,7 +79,7 @@ impl<'a> Reader<'a> {
         News { more: !page.lines.is_empty() && self.next < page.next, lines: page.lines, note }
     }
 
-    /// Said once; after that it is waited for in silence.
+    /// Reported once; after that the reader waits silently.
     fn missed(&mut self, error: &CallError) -> Result<News, Failure> {
         if self.launched && self.running.node.launcher().is_none() {
             let node = &self.running.node_name;
@@ -92,7 +91,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// An answer that did not come, with what to do about it.
+/// A missing answer, and what to do about it.
 fn told(running: &Running, collector: Name, error: &CallError) -> String {
     let name = running.text(collector);
     let said = running.told(collector, error).to_string();
@@ -102,7 +101,8 @@ fn told(running: &Running, collector: Name, error: &CallError) -> String {
         }
         CallError::Timeout(..) => {
             format!(
-                "{said} It hangs or is stopped: `rohrpost list` shows its process; if you end that, launch starts another"
+                "{said} It hangs or is stopped: `rohrpost list` shows its process; if you end that, launch starts \
+                 another"
             )
         }
         CallError::NotSent(_) => format!("{said} It collects what modules say; `rohrpost list` shows what runs"),

@@ -1,4 +1,5 @@
-//! What `rohrpost net` shows of the TCP router: the clients of all nodes as they see themselves, and the server's own view.
+//! The TCP router's part of `rohrpost net`: the clients of all nodes as they report themselves, and the server's own
+//! view.
 
 use super::node_report::NodeReport;
 use crate::table::{table, time};
@@ -9,7 +10,8 @@ use rohrpost::interfaces::{BeyondClients, BeyondCrowded, BeyondLink, BeyondState
 use rohrpost::output::plain;
 use std::time::Duration;
 
-/// Tables of clients, of the server's connections and of what was lost or replaced, and why who takes no part does not; empty without a TCP router.
+/// Tables of clients, of the server's connections and of lost or replaced packages, and why a client is not connected;
+/// empty without a TCP router.
 pub(super) fn text(running: &Running, all: &[NodeReport]) -> [String; 4] {
     let links: Vec<&BeyondLink> = all.iter().filter_map(|told| told.beyond.as_ref()).collect();
     let servers: Vec<&BeyondClients> = all.iter().filter_map(|told| told.clients.as_ref()).collect();
@@ -53,12 +55,12 @@ fn links(links: &[&BeyondLink]) -> String {
     if links.is_empty() { String::new() } else { table(heads, links.iter().map(row)) }
 }
 
-/// How often it took part no more, and for how long.
+/// How often it was disconnected, and for how long.
 fn outages(link: &BeyondLink) -> String {
     let Some(last) = link.outage else { return "none".into() };
     let took = match last.ended_ns {
         Some(ended_ns) => format!("the last took {}", time(last.duration(ended_ns))),
-        None => "it is away".into(),
+        None => "it is disconnected".into(),
     };
     format!("{}, {took}", link.outages)
 }
@@ -94,12 +96,12 @@ fn clients(servers: &[&BeyondClients]) -> String {
         let BeyondCrowded { greetings, clients, ranges, packages } = server.crowded;
         if greetings + clients + ranges + packages > 0 {
             text += &format!(
-                "(beyond the part of one certificate or address: {packages} packages lost, {clients} clients and {greetings} connections \
-                 before their hello gave way, {ranges} registrations of too many ranges)\n"
+                "(beyond the part of one certificate or address: {packages} packages lost, {clients} clients and \
+                 {greetings} connections before their hello gave way, {ranges} registrations of too many ranges)\n"
             );
         }
         if server.overtaken > 0 {
-            text += &format!("({} registrations were overtaken by later ones of the same client)\n", server.overtaken);
+            text += &format!("({} registrations were replaced by later ones of the same client)\n", server.overtaken);
         }
         if !server.refusal.is_empty() {
             text += &format!("the last that was refused: {}\n", plain::line(&server.refusal));
@@ -108,7 +110,7 @@ fn clients(servers: &[&BeyondClients]) -> String {
     text
 }
 
-/// Classes of which something was lost or replaced; the others are in the JSON.
+/// Classes with lost or replaced packages; the others are in the JSON.
 fn losses(running: &Running, links: &[&BeyondLink], servers: &[&BeyondClients]) -> String {
     let ends = links.iter().flat_map(|link| {
         [(format!("{}, to the TCP router", link.node), &link.sent), (format!("{}, from it", link.node), &link.received)]

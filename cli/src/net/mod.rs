@@ -1,4 +1,5 @@
-//! `rohrpost net`: how the routers of all nodes are: who hears whom, what waits, what was lost and why, and whose time is how good.
+//! `rohrpost net`: the state of all nodes' routers: links, queues, losses with their causes, and the quality of each
+//! clock.
 
 mod beyond;
 mod node_report;
@@ -12,21 +13,23 @@ use rohrpost::interfaces::{RouterInterface, TcpInterface};
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Between the two looks that a rate is made of: routers tell how they are twice a second.
+/// Time between the two observations of a rate: routers publish their state twice a second.
 const LOOK_AGAIN: Duration = Duration::from_millis(600);
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost net                all nodes, once
-  rohrpost net --watch        again and again; Ctrl-C ends it
+  rohrpost net --watch        repeatedly; Ctrl-C ends it
   rohrpost net --node arm --json
-`lost` are datagrams from the peer that never came, `missed` those to it that it misses; both are losses on the wire. `refused` are \
-those that came from the peer's address and were not taken. With time slots, `late` are those that were left out because the router woke \
-up too late, `skipped` those that went by while it stood still, `silent` those in which it was not sure enough of the time; `held` are datagrams that missed the end of their slot. \
-Where datagrams are sealed, a line counts hellos of a node that went by the time of who had not shown that it lives. Packages lost in routers stand \
-below, by class and cause (at the TCP router and its clients also those that were `replaced`: of data of which only the newest counts a newer one came while they \
-waited, which is no loss), and at the end the declared flows: how late each may be, and how late it was. The \
-exit code is 1 if a router or a client of the TCP router does not answer, a peer is not alive, or a client takes no part.")]
+`lost`: datagrams from the peer that never arrived; `missed`: datagrams to the peer that it misses; both are losses \
+    on the wire. `refused`: datagrams from the peer's address that were rejected. With time slots, `late`: slots that \
+    were not used because the router woke up too late; `skipped`: slots that passed while it did not run; `silent`: \
+    slots in which its time was too uncertain; `held`: datagrams that missed the end of their slot. Where datagrams \
+    are sealed, a line counts hellos that a node sent by the time of an unverified node. Packages lost in routers \
+    follow below, by class and cause (at the TCP router and its clients also `replaced` packages: only the newest \
+    data count, and newer data came while they waited, which is no loss), and at the end the declared flows: allowed \
+    and measured latency. Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, \
+    or a client is not connected.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,
@@ -59,7 +62,7 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
     Ok(if well || (stopped && rounds.watch) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Asks the routers of all nodes that are meant.
+/// Asks the routers of all selected nodes.
 fn look(round: &mut Round) -> Vec<NodeReport> {
     round.nodes().into_iter().map(|node| ask(round, node)).collect()
 }
@@ -86,7 +89,7 @@ fn ask(round: &mut Round, node: String) -> NodeReport {
 
 fn ask_router(round: &mut Round, node: String) -> NodeReport {
     let links = round.newest(&node, RouterInterface::LINKS);
-    // A router that has no clock publishes none, and none slots that has none.
+    // A router without a clock publishes none, and one without slots publishes none.
     let clock = links.as_ref().ok().and_then(|_| round.newest(&node, RouterInterface::CLOCK).ok());
     let in_slots = links.is_ok() && round.running.installation.tdma.is_some();
     let slots = in_slots.then(|| round.newest(&node, RouterInterface::SLOTS).ok()).flatten();

@@ -1,33 +1,33 @@
-//! What the routers of a node say of themselves.
+//! The reports of a node's routers.
 
 use rohrpost::interfaces::{
     BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, LinkState, Links, SlotState,
 };
 use serde::Serialize;
 
-/// What a node's router says.
+/// The report of a node's router.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct NodeReport {
     pub(super) node: String,
-    /// When it said so, system time.
+    /// The time of the report, system time.
     pub(super) time_ns: u64,
     pub(super) links: Option<Links>,
     pub(super) clock: Option<ClockState>,
     pub(super) slots: Option<SlotState>,
     pub(super) flows: Option<FlowStates>,
-    /// How its client stands with the TCP router.
+    /// The state of its client of the TCP router.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) beyond: Option<BeyondLink>,
-    /// What the TCP router says, if it runs there.
+    /// The TCP router's report, if it runs there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) clients: Option<BeyondClients>,
-    /// Bytes and packages a second, by peer; empty at the first look.
+    /// Bytes and packages a second, by peer; empty on the first poll.
     pub(super) rates: Vec<Rates>,
-    /// Why there is nothing.
+    /// Why there is no report.
     pub(super) failure: Option<String>,
 }
 
-/// What goes to and comes from a peer, a second.
+/// Traffic to and from a peer, a second.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Rates {
     pub(super) node: String,
@@ -38,7 +38,7 @@ pub(super) struct Rates {
 }
 
 impl NodeReport {
-    /// Whether what it has of routers answers, all its peers are there, and so is the TCP router.
+    /// Whether its routers answer, all its peers are there, and the TCP router is connected.
     pub(super) fn is_well(&self) -> bool {
         let all_alive = |links: &Links| links.peers.iter().all(|peer| peer.state == LinkState::Alive);
         self.failure.is_none()
@@ -47,7 +47,7 @@ impl NodeReport {
     }
 }
 
-/// What went by between two looks; nothing if the router was started anew in between, or has not told anything new.
+/// Traffic between two reports; none if the router was restarted in between, or has not published a new report.
 pub(super) fn rates(before: &NodeReport, now: &NodeReport) -> Vec<Rates> {
     let (Some(old), Some(new)) = (&before.links, &now.links) else { return Vec::new() };
     let elapsed_s = now.time_ns.saturating_sub(before.time_ns) as f64 * 1e-9;

@@ -1,4 +1,4 @@
-//! `rohrpost net`, for people.
+//! The output of `rohrpost net` for people.
 
 use super::beyond;
 use super::node_report::NodeReport;
@@ -13,7 +13,7 @@ use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Re
 use rohrpost::output::plain;
 use std::time::Duration;
 
-/// All that was told: a table of links, and one each of what waits, what was lost and clocks, if there is any.
+/// The whole report: a table of links, and tables of queues, losses and clocks, if there are any.
 pub(super) fn text(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) -> String {
     let mut parts = vec![links(all)];
     parts.extend(
@@ -84,14 +84,15 @@ fn state(state: LinkState) -> &'static str {
     }
 }
 
-/// Datagrams that were not taken since they came from nobody, or from a peer that is another than it should be, and what to do.
+/// Rejected datagrams from unknown senders or from a peer with an unexpected identity, and what to do.
 fn strangers(all: &[NodeReport]) -> String {
     let mut text = String::new();
     for links in all.iter().filter_map(|told| told.links.as_ref()) {
         for peer in links.peers.iter().filter(|peer| peer.counters.refused > 0) {
             text += &format!(
-                "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or version (launch all \
-                 nodes from the same file; `rohrpost version`), or of a router of it that is over\n",
+                "node {}: {} refused that came from {}, the address of node {}: they were of another configuration or \
+                 version (launch all nodes from the same file; `rohrpost version`), or of a router of it that is \
+                 over\n",
                 links.node,
                 datagrams(peer.counters.refused),
                 peer.address,
@@ -100,8 +101,9 @@ fn strangers(all: &[NodeReport]) -> String {
         }
         if links.foreign > 0 {
             text += &format!(
-                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's, or found the router's socket full: if \
-                 another installation uses this network, give one of them another `port` in [network]\n",
+                "node {}: {} dropped that came from addresses of no node, or are nothing of Rohrpost's, or found the \
+                 router's socket full: if another installation uses this network, give one of them another `port` in \
+                 [network]\n",
                 links.node,
                 datagrams(links.foreign)
             );
@@ -110,7 +112,7 @@ fn strangers(all: &[NodeReport]) -> String {
     text
 }
 
-/// Datagrams that were not sealed as they must be, by where they seem to come from.
+/// Datagrams with a missing or wrong seal, by their apparent sender.
 fn rejections(all: &[NodeReport]) -> String {
     let links = all.iter().filter_map(|told| told.links.as_ref());
     let told = links.flat_map(|links| links.rejections.iter().map(|rejected| (&links.node, rejected)));
@@ -127,7 +129,7 @@ fn datagrams(count: u64) -> String {
     if count == 1 { "1 datagram".into() } else { format!("{count} datagrams") }
 }
 
-/// What was refused by computers themselves. That nobody listened is no news: that one is silent.
+/// Errors that computers returned. "Nobody listens" is not shown: that node is silent already.
 fn failures(all: &[NodeReport]) -> String {
     let links = all.iter().filter_map(|told| told.links.as_ref());
     let all = links.flat_map(|links| links.failures.iter().map(|failure| (&links.node, failure)));
@@ -147,7 +149,7 @@ fn waiting(all: &[NodeReport]) -> String {
     queues.collect()
 }
 
-/// Classes of which something was lost; the others are in the JSON.
+/// Classes with losses; the others are in the JSON.
 fn losses(running: &Running, all: &[NodeReport]) -> String {
     let mut rows = Vec::new();
     for links in all.iter().filter_map(|told| told.links.as_ref()) {
@@ -171,7 +173,7 @@ fn losses(running: &Running, all: &[NodeReport]) -> String {
     table(["node", "class", ">taken", ">sent", ">came", ">delivered", "lost"], rows)
 }
 
-/// Declared flows; nothing without any.
+/// Declared flows; empty if there is none.
 fn measured(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) -> String {
     let links: Vec<&Links> = all.iter().filter_map(|told| told.links.as_ref()).collect();
     let states = all.iter().filter_map(|told| told.flows.as_ref());

@@ -1,4 +1,4 @@
-//! `rohrpost new`: a module's project that compiles, runs and has a test.
+//! `rohrpost new`: creates a module's project that compiles, runs and has a test.
 
 mod name;
 
@@ -8,10 +8,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Where this command was built from: there the library is, too.
+/// Rohrpost's sources that this command was built from; they contain the library.
 const BUILT_FROM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// The project's files: where they go, and what is in them, with `{{…}}` for what differs.
+/// The project's files: path and content, with `{{…}}` for placeholders.
 const FILES: [(&str, &str); 7] = [
     ("Cargo.toml", include_str!("template/Cargo.toml.in")),
     (".gitignore", include_str!("template/gitignore.in")),
@@ -29,10 +29,10 @@ const FILES: [(&str, &str); 7] = [
 pub(super) struct Arguments {
     /// The module's class, which names the project too: lower-case letters, digits and `-`.
     name: String,
-    /// Folder of the project; NAME in the present folder unless said.
+    /// Folder of the project; default: NAME in the present folder.
     #[arg(long, value_name = "DIR")]
     path: Option<PathBuf>,
-    /// Folder of Rohrpost's sources; where this command was built from unless said.
+    /// Folder of Rohrpost's sources; default: where this command was built from.
     #[arg(long, value_name = "DIR")]
     rohrpost: Option<PathBuf>,
 }
@@ -41,7 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let name: ModuleName = arguments.name.parse()?;
     let rohrpost = sources(arguments.rohrpost.as_deref())?;
     let folder = arguments.path.clone().unwrap_or_else(|| name.as_str().into());
-    // Whatever is there stays as it is.
+    // Existing files are never overwritten.
     match fs::read_dir(&folder).map(|mut entries| entries.next().is_none()) {
         Ok(true) => {}
         Ok(false) => {
@@ -55,7 +55,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let shown = folder.display();
     say(format_args!(
-        "made {shown}: a module that counts, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost launch robot.toml\n\n\
+        "made {shown}: a module that counts, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost \
+        launch robot.toml\n\n\
          README.md there says how to go on."
     ));
     Ok(ExitCode::SUCCESS)
@@ -74,7 +75,7 @@ fn fill(template: &str, name: &ModuleName, rohrpost: &str) -> String {
     filled.replace("{{Type}}", &name.type_name()).replace("{{rohrpost}}", rohrpost)
 }
 
-/// Rohrpost's sources, as they stand in a Cargo.toml.
+/// Rohrpost's dependency line for a Cargo.toml.
 fn sources(given: Option<&Path>) -> Result<String, Failure> {
     let folder = given.unwrap_or(Path::new(BUILT_FROM));
     let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
@@ -87,7 +88,7 @@ fn sources(given: Option<&Path>) -> Result<String, Failure> {
         .into());
     }
     let folder = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
-    // As TOML writes it between quotes.
+    // Quoted as in TOML.
     Ok(folder.display().to_string().replace('\\', "\\\\").replace('"', "\\\""))
 }
 
@@ -96,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_is_left_to_fill_in_and_the_configuration_is_right() {
+    fn the_template_has_no_placeholders_left_and_a_valid_configuration() {
         let name: ModuleName = "wind-vane".parse().unwrap();
         for (file, template) in FILES {
             let text = fill(template, &name, "/opt/rohrpost");

@@ -1,27 +1,27 @@
-//! Names that a module's project can have: it is a class, a crate and a program at once.
+//! Valid names of a module's project: each is a class, a crate and a program at once.
 
 use rohrpost_config::is_class_name;
 use std::str::FromStr;
 
-/// Words of Rust's own; a crate of such a name could not be spoken of.
-const KEYWORDS: &str = "abstract as async await become box break const continue crate do dyn else enum extern false final fn \
-                        for gen if impl in let loop macro match mod move mut override priv pub ref return self static \
-                        struct super trait true try type typeof union unsafe unsized use virtual where while yield";
-/// Crates that every project has, ours, and folders that Cargo keeps beside programs.
+/// Rust's keywords; a crate of such a name cannot be used.
+const KEYWORDS: &str = "abstract as async await become box break const continue crate do dyn else enum extern false \
+    final fn for gen if impl in let loop macro match mod move mut override priv pub ref return self static struct \
+    super trait true try type typeof union unsafe unsized use virtual where while yield";
+/// Crates that every project uses, our own crates, and folders that Cargo creates beside programs.
 const CRATES: &str = "alloc build core deps examples incremental module proc-macro rohrpost std test tests";
 
-/// A name that is right.
+/// A valid name.
 #[derive(Debug)]
 pub(super) struct ModuleName(String);
 
-/// Why a name is not right for a module's project.
+/// Why a name is not valid for a module's project.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub(super) enum NameError {
     #[error("`{0}` is no class name; use lower-case letters, digits and `-`, a letter first{1}")]
     NoClass(String, String),
     #[error("`{0}`: a `-` stands alone, between letters or digits; write for example `{1}`")]
     Dashes(String, String),
-    #[error("`{0}` is a word of Rust's own; choose another name, such as `{0}-module`")]
+    #[error("`{0}` is a keyword of Rust; choose another name, such as `{0}-module`")]
     Keyword(String),
     #[error("`{0}` would be taken for something of Cargo's or Rohrpost's own; choose another name, such as `my-{0}`")]
     Crate(String),
@@ -52,7 +52,7 @@ impl FromStr for ModuleName {
         }
         match text {
             "tool" => Err(NameError::Class(own(), "programs run by hand")),
-            "output" => Err(NameError::Class(own(), "the collector of what modules say")),
+            "output" => Err(NameError::Class(own(), "the collector of the modules' output")),
             _ => match rohrpost_modules::builtin::of_class(text) {
                 Some(builtin) => Err(NameError::BuiltIn(own(), builtin)),
                 None => Ok(Self(own())),
@@ -61,7 +61,7 @@ impl FromStr for ModuleName {
     }
 }
 
-/// What was likely meant: `WindVane`, `wind_vane` and `Wind Vane` as `wind-vane`.
+/// The likely intention: `WindVane`, `wind_vane` and `Wind Vane` as `wind-vane`.
 fn likely(text: &str) -> String {
     let mut word = String::new();
     for c in text.chars() {
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_made_into_what_rust_needs() {
+    fn names_become_valid_rust_names() {
         for (text, krate, ty) in [
             ("arm", "arm", "Arm"),
             ("wind-vane", "wind_vane", "WindVane"),
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_names_say_what_would_be_right() {
+    fn errors_of_names_suggest_valid_names() {
         let rule = "use lower-case letters, digits and `-`, a letter first";
         for (text, message) in [
             ("WindVane", format!("`WindVane` is no class name; {rule}: `wind-vane`")),
@@ -125,7 +125,7 @@ mod tests {
             ("grüße", format!("`grüße` is no class name; {rule}: `gre`")),
             ("arm-", "`arm-`: a `-` stands alone, between letters or digits; write for example `arm`".into()),
             ("a--b", "`a--b`: a `-` stands alone, between letters or digits; write for example `a-b`".into()),
-            ("loop", "`loop` is a word of Rust's own; choose another name, such as `loop-module`".into()),
+            ("loop", "`loop` is a keyword of Rust; choose another name, such as `loop-module`".into()),
             (
                 "tool",
                 "`tool` is the class of programs run by hand; a module of yours needs another name, such as `my-tool`"

@@ -1,4 +1,4 @@
-//! The file that `param save` writes: TOML that people read, and that loads again.
+//! The file that `param save` writes: TOML that people can read and `param load` can load.
 
 use crate::terminal::Failure;
 use rohrpost::output::plain;
@@ -10,13 +10,13 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-/// What a file is to say, by module as people write it.
+/// The file's content, by module name.
 pub(super) struct Contents {
     modules: BTreeMap<String, String>,
 }
 
 impl Contents {
-    /// What stands in a file already, without its comments; nothing, if there is none.
+    /// The existing file's content without its comments; empty if there is no file.
     pub(super) fn of(path: &Path, installation: &Installation) -> Result<Self, Failure> {
         let saved = Saved::load(path, installation).map_err(|errors| {
             let problem = errors.problems().first().map_or("", |problem| problem.message.as_str());
@@ -36,7 +36,7 @@ impl Contents {
         Ok(Self { modules })
     }
 
-    /// Replaces what is said of a module.
+    /// Replaces a module's entries.
     pub(super) fn put(&mut self, module: &str, parameters: &[Parameter]) -> Result<(), Failure> {
         let mut text = String::new();
         for parameter in parameters {
@@ -48,9 +48,9 @@ impl Contents {
         Ok(())
     }
 
-    /// Writes the file whole: whoever reads it meanwhile, or after a power cut, finds the old one or the new one.
+    /// Replaces the file atomically: a reader, also after a power cut, finds the old file or the new one.
     pub(super) fn write(&self, path: &Path, installation: &Installation) -> Result<(), Failure> {
-        // Where a link leads, so that it stays one.
+        // The target of a symbolic link, so that the link stays.
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let told = |error: std::io::Error| format!("{} cannot be written: {error}", path.display());
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -67,8 +67,10 @@ impl Contents {
 
     fn text(&self, installation: &Installation) -> String {
         let mut text = format!(
-            "# Parameters of `{}`, written by `rohrpost param save`. When a module starts they go before the settings of the\n\
-             # same names, if this is the file that the configuration names as `parameters`. `rohrpost param load` sets them\n\
+            "# Parameters of `{}`, written by `rohrpost param save`. When a module starts they go before the settings \
+            of the\n\
+             # same names, if this is the file that the configuration names as `parameters`. `rohrpost param load` \
+             sets them\n\
              # while it runs.\n",
             installation.name
         );
@@ -84,7 +86,7 @@ fn key(name: &str) -> String {
     if bare { name.into() } else { toml::Value::from(name).to_string() }
 }
 
-/// For a comment: whatever a module says, it ends with the line.
+/// Text for a comment: a module's text must end with the line.
 fn one_line(text: &str) -> Cow<'_, str> {
     plain::line(text)
 }

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> Result<ExitCode, Failure> {
     let installation = &session.running.installation;
     let path = file.or(installation.parameters.as_deref()).map(Path::to_owned);
-    let path = path.ok_or("load what? name a file, such as one that `rohrpost param save -o FILE` wrote")?;
+    let path = path.ok_or("no file to load; name one, such as `rohrpost param save -o FILE` writes")?;
     std::fs::metadata(&path).map_err(|error| format!("{}: {error}", path.display()))?;
     let saved = Saved::load(&path, installation)?;
     let modules: Vec<Name> = saved.modules().collect();
@@ -25,7 +25,7 @@ pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> 
         let name = session.running.text(module);
         let node = session.running.node_of(module);
         if !session.running.shown().contains(&node) {
-            say(format_args!("{name} is on node {node}, which is not meant; leave --node out"));
+            say(format_args!("{name} is on node {node}, not on the selected one; leave --node out"));
             continue;
         }
         match load(session, &saved, module, dry_run) {
@@ -46,7 +46,7 @@ pub(super) fn run(session: &mut Session, file: Option<&Path>, dry_run: bool) -> 
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// Sets what the file says of one module, all of it or nothing; a line for each parameter.
+/// Sets the file's values for one module, all or none; one line for each parameter.
 fn load(session: &mut Session, saved: &Saved, module: Name, dry_run: bool) -> Result<Vec<String>, Failure> {
     let values = saved.values::<Value>(&session.running.installation, module)?;
     let parameters = session.parameters(module)?;

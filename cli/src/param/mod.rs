@@ -1,4 +1,4 @@
-//! `rohrpost param`: settings that modules change while they run.
+//! `rohrpost param`: settings of modules that change at run time.
 
 mod file;
 mod load;
@@ -16,10 +16,10 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   rohrpost param list                          the parameters of all modules
-  rohrpost param get pilot.0                   those of one
-  rohrpost param set pilot.0 cruise-m-s 0.4    another value, from now on
-  rohrpost param save                          into the file that the configuration names
-  rohrpost param load tuned.toml --dry-run     what a file would change")]
+  rohrpost param get pilot.0                   the parameters of one module
+  rohrpost param set pilot.0 cruise-m-s 0.4    sets a value at once
+  rohrpost param save                          saves to the file that the configuration names
+  rohrpost param load tuned.toml --dry-run     shows what a file would change")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     action: ParamCommand,
@@ -35,7 +35,7 @@ enum ParamCommand {
     ParamAssignment(ParamAssignment),
     /// Write present values into a file.
     Save(Save),
-    /// Set what a file says: of each module all of it, or nothing.
+    /// Set the values of a file: for each module all of them, or none.
     Load(Load),
 }
 
@@ -43,7 +43,7 @@ enum ParamCommand {
 struct Common {
     #[command(flatten)]
     target: Target,
-    /// Wait so long for an answer, seconds.
+    /// Timeout for an answer, seconds.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     timeout: f64,
 }
@@ -89,7 +89,7 @@ struct ParamAssignment {
 struct Save {
     /// Modules; all that have parameters, if none is named.
     names: Vec<String>,
-    /// File to write; else the one that the configuration names as `parameters`.
+    /// File to write; default: `parameters` of the configuration.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -98,9 +98,9 @@ struct Save {
 
 #[derive(clap::Args)]
 struct Load {
-    /// File to read; else the one that the configuration names as `parameters`.
+    /// File to read; default: `parameters` of the configuration.
     file: Option<PathBuf>,
-    /// Only say what would change, or be refused for its name, type or range.
+    /// Only show what would change, or be refused for its name, type or range.
     #[arg(long)]
     dry_run: bool,
     #[command(flatten)]
@@ -127,7 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Takes part as a tool for as long as `work` takes.
+/// Takes part as a tool while `work` runs.
 fn at_work(common: &Common, work: impl FnOnce(&mut Session) -> Result<ExitCode, Failure>) -> Result<ExitCode, Failure> {
     let running = common.target.find()?;
     let tool = running.join(super::units::seconds(common.timeout)?)?;

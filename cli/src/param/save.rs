@@ -10,14 +10,14 @@ pub(super) fn run(session: &mut Session, names: &[String], output: Option<&Path>
     let installation = &session.running.installation;
     let path = output.or(installation.parameters.as_deref()).map(Path::to_owned).ok_or_else(|| {
         let file = installation.path.display();
-        format!("save where? say `-o FILE`, or write `parameters = \"tuned.toml\"` at the top of {file}")
+        format!("no file to save to; use `-o FILE`, or write `parameters = \"tuned.toml\"` at the top of {file}")
     })?;
     let mut contents = Contents::of(&path, installation)?;
     let named: Result<Vec<_>, Failure> = names.iter().map(|name| session.running.module(name)).collect();
     let modules = if names.is_empty() { session.modules()? } else { named? };
     let (mut saved, mut failures) = (Vec::new(), Vec::new());
     for module in modules {
-        // A process has one set of parameters, whichever of its names it is asked by.
+        // A process has one set of parameters, under each of its names.
         let owner = session.running.installation.module(module).map_or(module, |owner| owner.name);
         let name = session.running.text(owner);
         match session.parameters(owner) {
@@ -27,7 +27,7 @@ pub(super) fn run(session: &mut Session, names: &[String], output: Option<&Path>
             }
             Ok(_) if names.is_empty() => {}
             Ok(_) => failures.push(no_parameters(&name)),
-            Err(error) => failures.push(format!("{error}; what was saved of it before stays")),
+            Err(error) => failures.push(format!("{error}; its earlier entries in the file stay")),
         }
     }
     for failure in &failures {

@@ -13,18 +13,18 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// The parameters of a module, with what went wrong in words.
+    /// A module's parameters, or the error in words.
     pub(super) fn parameters(&mut self, module: Name) -> Result<Vec<Parameter>, Failure> {
         match self.tool.parameters(module) {
             Err(CallError::Fault(_, Fault::Unknown(_))) => {
                 let name = self.running.text(module);
-                Err(format!("{name} was built with a Rohrpost that had no parameters; build it anew").into())
+                Err(format!("{name} was built with a Rohrpost that had no parameters; rebuild it").into())
             }
             other => other.map_err(|error| self.running.told(module, &error)),
         }
     }
 
-    /// All modules, as the configuration has them; what cannot be asked is told.
+    /// All modules of the configuration; those that cannot be asked are reported.
     pub(super) fn modules(&self) -> Result<Vec<Name>, Failure> {
         let mut asked = Vec::new();
         for (module, silence) in self.running.modules_to_ask()? {
@@ -36,7 +36,7 @@ impl Session {
         Ok(asked)
     }
 
-    /// A refusal or failed call, with the module as people write it, and what to try.
+    /// A refusal or failed call, with the module's name and what to try.
     pub(super) fn refused(&self, module: Name, error: CallError<Refusal>) -> Failure {
         match error {
             CallError::NotSent(error @ rohrpost_mailbox::SendError::TooLarge { .. }) => {
@@ -49,7 +49,7 @@ impl Session {
     }
 }
 
-/// The parameter of this name; else the nearest, and all there are.
+/// The parameter of this name; else an error with the nearest name and all names.
 pub(super) fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) -> Result<&'p Parameter, Failure> {
     let unknown = || {
         if parameters.is_empty() {
@@ -63,7 +63,7 @@ pub(super) fn find<'p>(parameters: &'p [Parameter], module: &str, name: &str) ->
     parameters.iter().find(|parameter| parameter.field.name == name).ok_or_else(unknown)
 }
 
-/// What there is to say of a module that has none.
+/// The message for a module without parameters.
 pub(super) fn no_parameters(module: &str) -> String {
     format!("{module} has no parameters: its settings are read when it starts")
 }

@@ -21,7 +21,7 @@ pub(super) fn run(session: &mut Session, name: &str, parameter: &str, value: &st
     Ok(ExitCode::SUCCESS)
 }
 
-/// Sets all of these, or none; or only asks whether they would do.
+/// Sets all of these, or none; or only checks whether they are valid.
 pub(super) fn set(
     session: &mut Session,
     module: Name,

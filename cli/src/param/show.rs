@@ -75,7 +75,8 @@ fn object(module: &str, parameter: &Parameter) -> Result<serde_json::Value, Fail
     let Field { name, unit, text, ty, least, most } = &parameter.field;
     let bound = |bytes: &Option<Vec<u8>>| bytes.as_ref().map(|bytes| decode(ty, bytes)).transpose();
     Ok(serde_json::json!({
-        "module": module, "parameter": name, "value": parameter.value()?, "unit": unit, "type": rohrpost::schema::describe_type(ty),
+        "module": module, "parameter": name, "value": parameter.value()?, "unit": unit,
+        "type": rohrpost::schema::describe_type(ty),
         "min": bound(least)?, "max": bound(most)?, "text": text,
     }))
 }

@@ -1,45 +1,46 @@
-//! The ways there and back of a round, by system time. Pure.
+//! The one-way times of a round trip, by system time. Pure.
 //!
-//! Two nodes have one time as far as both have the master's, in the same epoch, and each knows how far off it is at most; a difference
-//! of their times is off by the sum of both bounds. A figure that is smaller than its bound says nothing, and is not told.
+//! Two nodes share a time if both follow the master's clock in the same epoch, and each knows its error bound; the
+//! error of a difference of their times is at most the sum of both bounds. A figure below its bound means nothing, and
+//! is not shown.
 
 use super::super::units::short;
 use rohrpost::common::TimeReport;
 use serde_json::{Value, json};
 
-/// What the name of the source of time is where nodes share one.
+/// The name of the source of time, where nodes share one.
 const MASTER: &str = "master";
 
-/// System time when the command was sent, when it was run, and when the answer was here.
+/// System time when the command was sent, when it was run, and when the answer arrived.
 pub(super) struct Moments<'a> {
     pub(super) before: &'a TimeReport,
     pub(super) there: &'a TimeReport,
     pub(super) after: &'a TimeReport,
 }
 
-/// How long the command took, and its answer.
+/// The one-way times of the command and of its answer.
 #[derive(Debug, PartialEq)]
 pub(super) struct RoundTrip {
     pub(super) there_s: f64,
     pub(super) back_s: f64,
-    /// Each is off by at most so much; what one is too long, the other is too short.
+    /// Bound of each one's error; if one is too long, the other is too short by the same amount.
     pub(super) error_s: f64,
 }
 
 impl RoundTrip {
-    /// Between modules of one node there is one clock; `pace` is how fast that goes.
+    /// Modules of one node share its clock; `pace` is that clock's rate.
     pub(super) fn new(moments: &Moments<'_>, one_clock: bool, pace: f64) -> Result<Self, String> {
         let Moments { before, there, after } = moments;
         if !one_clock {
-            for (whose, time) in [("this node", before), ("its node", there)] {
+            for (place, time) in [("this node", before), ("its node", there)] {
                 if time.source != MASTER {
-                    return Err(format!("{whose} does not have the master's time, but its own ({})", time.source));
+                    return Err(format!("{place} does not have the master's time, but its own ({})", time.source));
                 }
             }
         }
         if (before.epoch, before.epoch) != (there.epoch, after.epoch) {
             return Err(format!(
-                "time was set anew, or not on all nodes (epochs {}, {}, {})",
+                "time was set again, or not on all nodes (epochs {}, {}, {})",
                 before.epoch, there.epoch, after.epoch
             ));
         }
@@ -54,7 +55,7 @@ impl RoundTrip {
         let (there_s, back_s) = (way(before, there), way(there, after));
         if there_s.min(back_s) < error_s || there_s.min(back_s) < 0.0 {
             return Err(format!(
-                "the clocks of both nodes may differ by {}, which is more than a way takes",
+                "the clocks of both nodes may differ by {}, which is more than the one-way time",
                 short(error_s)
             ));
         }
@@ -67,9 +68,9 @@ impl RoundTrip {
     }
 }
 
-/// One way of all rounds.
+/// One direction of all rounds.
 #[derive(Default)]
-pub(super) struct WaySum {
+pub(super) struct DirectionSum {
     count: u64,
     sum_s: f64,
     least_s: f64,
@@ -77,7 +78,7 @@ pub(super) struct WaySum {
     error_s: f64,
 }
 
-impl WaySum {
+impl DirectionSum {
     pub(super) fn add(&mut self, way_s: f64, error_s: f64) {
         self.least_s = if self.count == 0 { way_s } else { self.least_s.min(way_s) };
         self.most_s = self.most_s.max(way_s);
@@ -90,7 +91,7 @@ impl WaySum {
         (self.count > 0).then(|| self.sum_s / self.count as f64)
     }
 
-    /// None when no way is known.
+    /// None if no one-way time is known.
     pub(super) fn text(&self) -> Option<String> {
         let mean_s = self.mean_s()?;
         let error = if self.error_s > 0.0 { format!("  each ± {}", short(self.error_s)) } else { String::new() };
@@ -100,7 +101,8 @@ impl WaySum {
     pub(super) fn json(&self) -> Value {
         match self.mean_s() {
             Some(mean_s) => json!({
-                "known": self.count, "min_s": self.least_s, "mean_s": mean_s, "max_s": self.most_s, "error_s": self.error_s,
+                "known": self.count, "min_s": self.least_s, "mean_s": mean_s, "max_s": self.most_s,
+                "error_s": self.error_s,
             }),
             None => Value::Null,
         }
@@ -115,38 +117,39 @@ mod tests {
         TimeReport { ns: 1_000_000_000 + us * 1000, epoch, error_ns: error_us * 1000, source: source.into() }
     }
 
-    fn ways(there: TimeReport, one_clock: bool) -> Result<RoundTrip, String> {
+    fn round_trip(there: TimeReport, one_clock: bool) -> Result<RoundTrip, String> {
         let (before, after) = (time(0, 3, 2, MASTER), time(150, 3, 2, MASTER));
         RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, one_clock, 1.0)
     }
 
     #[test]
-    fn a_way_is_told_only_where_it_is_known() {
-        let told = |ways: Result<RoundTrip, String>| ways.map_or_else(|why| why, |ways| ways.text());
+    fn a_one_way_time_appears_only_where_it_is_known() {
+        let told =
+            |round_trip: Result<RoundTrip, String>| round_trip.map_or_else(|why| why, |round_trip| round_trip.text());
         for (there, one_clock, words) in [
             (time(100, 3, 5, MASTER), false, "there 100 µs, back 50 µs, each ± 7 µs"),
             (time(100, 3, 5, "local"), true, "there 100 µs, back 50 µs"),
             (time(100, 3, 5, "local"), false, "its node does not have the master's time, but its own (local)"),
-            (time(100, 4, 5, MASTER), false, "time was set anew, or not on all nodes (epochs 3, 4, 3)"),
+            (time(100, 4, 5, MASTER), false, "time was set again, or not on all nodes (epochs 3, 4, 3)"),
             (
                 time(100, 3, 60, MASTER),
                 false,
-                "the clocks of both nodes may differ by 62 µs, which is more than a way takes",
+                "the clocks of both nodes may differ by 62 µs, which is more than the one-way time",
             ),
             (
                 time(151, 3, 0, MASTER),
                 false,
-                "the clocks of both nodes may differ by 2 µs, which is more than a way takes",
+                "the clocks of both nodes may differ by 2 µs, which is more than the one-way time",
             ),
         ] {
-            assert_eq!(told(ways(there, one_clock)), words);
+            assert_eq!(told(round_trip(there, one_clock)), words);
         }
     }
 
     #[test]
-    fn a_simulation_that_runs_faster_is_told_in_real_time() {
+    fn times_of_a_faster_simulation_are_in_real_time() {
         let (before, there, after) = (time(0, 1, 0, "local"), time(100, 1, 0, "local"), time(300, 1, 0, "local"));
-        let ways = RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, true, 2.0).unwrap();
-        assert_eq!((ways.there_s, ways.back_s), (50e-6, 100e-6));
+        let round_trip = RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, true, 2.0).unwrap();
+        assert_eq!((round_trip.there_s, round_trip.back_s), (50e-6, 100e-6));
     }
 }

@@ -1,4 +1,4 @@
-//! How it stands with system time, as a router publishes it.
+//! The state of system time, as a router publishes it.
 
 use rohrpost::interfaces::{ClockRole, ClockState};
 use rohrpost_mailbox::monotonic_ns;
@@ -6,7 +6,7 @@ use rohrpost_routers::shell::Shell;
 use rohrpost_routers::shell::clock::ClockState as Shown;
 use rohrpost_routers::time::Role;
 
-/// How it stands now.
+/// The present state.
 pub(super) fn of(shell: &Shell, clock: &Shown) -> ClockState {
     let (settings, seen, now_ns) = (shell.settings(), clock.snapshot(), monotonic_ns());
     let name = |node: u8| settings.nodes.get(usize::from(node)).map(|node| node.name.clone()).unwrap_or_default();

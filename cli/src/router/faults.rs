@@ -1,4 +1,4 @@
-//! What a router answers to commands that it cannot deliver: the faults of the modules' crate, which routers do not know.
+//! A router's answers to commands that it cannot deliver: faults of the modules' crate, which routers do not know.
 
 use rohrpost::Fault;
 use rohrpost_config::Installation;
@@ -9,9 +9,9 @@ use rohrpost_routers::shell::{Faults, Undelivered, difference};
 
 const _: () = assert!(BEGINNING_BYTES >= CallEnvelope::BYTES, "the answer needs the command's envelope");
 
-/// Writes them as modules write theirs.
+/// Encodes them as modules encode theirs.
 pub(crate) struct Encoded {
-    /// Of this node's configuration.
+    /// This node's configuration.
     digest: u64,
     /// Its file, as messages name it.
     file: String,
@@ -25,7 +25,7 @@ impl Encoded {
     fn fault(&self, why: &Undelivered<'_>) -> Option<Fault> {
         let node = || why.node.unwrap_or("?").to_owned();
         Some(match why.cause {
-            // No way leads to a router's own mailboxes from elsewhere.
+            // No route leads from another node to a router's own mailboxes.
             Cause::NoRoute | Cause::RoutersOwn => Fault::NoRoute,
             Cause::Silent => Fault::NodeSilent { node: node() },
             Cause::Unheard => Fault::NodeDeaf { node: node() },
@@ -41,9 +41,9 @@ impl Encoded {
             Cause::NotAllowed => {
                 Fault::NotAllowed { node: node(), rule: format!("{}:{}", self.file, why.rule.unwrap_or_default()) }
             }
-            // Who speaks in another's name is not answered.
+            // A forged sender name gets no answer.
             Cause::ForeignName | Cause::BadPacket => return None,
-            // Of these the caller's next try comes through, or brings another answer.
+            // After these, the caller's next try succeeds or gets another answer.
             Cause::Socket | Cause::Late | Cause::Incomplete => return None,
         })
     }
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn every_cause_of_which_a_caller_should_know_has_a_fault_that_names_a_remedy() {
+    fn each_reported_cause_has_a_fault_with_a_remedy() {
         let call = CallEnvelope { interface: 1, incarnation: 7, sequence: 9, valid_for_us: 1, age_us: 0 }.to_bytes();
         let mismatch = Some(Mismatch { reason: Reason::Digest, version: 1, digest: Some(0xabc) });
         for (cause, words) in [

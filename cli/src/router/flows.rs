@@ -1,4 +1,4 @@
-//! How late packages of declared flows were, as a router publishes it.
+//! The latency of declared flows, as a router publishes it.
 
 use rohrpost::interfaces::{CarriedLoss, FlowState, FlowStates};
 use rohrpost_config::ClassTable;
@@ -8,7 +8,7 @@ use rohrpost_routers::flows::{Flow, FlowCounts};
 use rohrpost_routers::shell::Shell;
 use std::time::Duration;
 
-/// How it stands now.
+/// The present state.
 pub(super) fn of(shell: &Shell, classes: &ClassTable) -> FlowStates {
     let (settings, counts) = (shell.settings(), shell.stats().flows.counts());
     FlowStates {

@@ -1,4 +1,4 @@
-//! What a router seals with, and who it says that it is then.
+//! A router's keys, and its identity under them.
 
 use rohrpost_config::{Installation, Key, Keys, KeysError};
 use rohrpost_mailbox::realtime_ns;
@@ -15,7 +15,8 @@ pub(crate) fn of(installation: &Installation) -> Result<Option<KeyRing>, KeysErr
     Ok(Some(KeyRing::new(key(&newest), older.as_ref().map(key))))
 }
 
-/// Tells this incarnation of a router from all others. Sealed, two incarnations with one would use a key twice in one way: so nobody can guess it.
+/// The random id of this incarnation of a router. Two sealed incarnations with one id would use a key twice in one
+/// direction: so the id cannot be guessed.
 ///
 /// # Errors
 /// [`NoRandom`]

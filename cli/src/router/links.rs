@@ -15,7 +15,7 @@ use rohrpost_routers::stats::{PeerStats, Stats};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// How it stands now.
+/// The present state.
 pub(super) fn of(shell: &Shell) -> Links {
     let (settings, stats, now_ns) = (shell.settings(), shell.stats(), monotonic_ns());
     let in_all = |of: fn(&Stats) -> u64| lanes(shell).map(of).sum();
@@ -37,7 +37,7 @@ pub(super) fn of(shell: &Shell) -> Links {
     }
 }
 
-/// What counts datagrams: of what is real time, and of the rest where that goes its own way.
+/// Datagram counters: for real time, and for the rest where that has its own port.
 fn lanes(shell: &Shell) -> impl Iterator<Item = &Stats> {
     [Some(shell.stats()), shell.rest_stats()].into_iter().flatten().map(|stats| &**stats)
 }
@@ -107,7 +107,7 @@ fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
     }
 }
 
-/// Both directions of each class that did something, the most urgent first.
+/// Both directions of each active class, the most urgent first.
 fn classes(shell: &Shell) -> Vec<ClassCarried> {
     let stats = shell.stats();
     let mut classes: BTreeMap<u8, ClassCarried> = BTreeMap::new();

@@ -20,14 +20,15 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often it tells how it is.
+/// How often it publishes its state.
 const PERIOD: Duration = Duration::from_millis(500);
 
 #[derive(clap::Args)]
 #[command(after_help = "Example, on the first node of robot.toml: rohrpost router --config robot.toml --name router.0
-Launch starts it by itself on each node of a system with several; by hand it is of use where modules are started by hand.")]
+Launch starts it on each node of a system with several nodes; start it by hand only if you start modules by hand.")]
 pub(super) struct Arguments {
-    /// What every module takes: --config FILE --name router.I [--off]; I is the place of its node in the configuration, from 0.
+    /// The arguments of every module: --config FILE --name router.I [--off]; I is the place of its node in the
+    /// configuration, from 0.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
 }
@@ -37,7 +38,7 @@ pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
     Ok(exit(start.and_then(run_started::<RouterModule>)))
 }
 
-/// Settings of a router: there are none in `[[module]]`, all is said in the sections of the network.
+/// A router's settings: there are none in `[[module]]`; the network's sections configure it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NoSettings {}
@@ -65,7 +66,7 @@ impl Module for RouterModule {
             }
         }
         if let Some(impair) = impair {
-            tracing::warn!("makes the network worse, as {} says: {impair}", impair::ENVIRONMENT);
+            tracing::warn!("adds network faults, as {} requests: {impair}", impair::ENVIRONMENT);
         }
         let faults = Arc::new(faults::Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
@@ -81,7 +82,7 @@ impl Module for RouterModule {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        // Without one of its threads it is of no use; started again, it is.
+        // It cannot work without one of its threads; launch restarts it.
         assert!(self.shell.is_well(), "a thread of the router has ended");
         context.publish_now(RouterInterface::LINKS, &links::of(&self.shell))?;
         if let Some(clock) = self.shell.clock() {
@@ -96,7 +97,7 @@ impl Module for RouterModule {
     }
 }
 
-/// The bad network that a test wants.
+/// The network faults that a test requests.
 pub(super) fn impairment() -> Result<Option<impair::Settings>, ModuleError> {
     let text = std::env::var(impair::ENVIRONMENT).unwrap_or_default();
     if text.is_empty() {

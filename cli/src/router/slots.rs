@@ -1,4 +1,4 @@
-//! How it keeps its time slots, as a router publishes it.
+//! How a router keeps its time slots, as it publishes it.
 
 use rohrpost::interfaces::{SlotState, SlotUse, TunnelState};
 use rohrpost_routers::driver::Used;
@@ -7,7 +7,7 @@ use rohrpost_routers::shell::slots::State;
 use rohrpost_routers::shell::tunnel::Passed;
 use rohrpost_routers::tdma::Kind;
 
-/// How it stands now.
+/// The present state.
 pub(super) fn of(shell: &Shell, slots: &State) -> SlotState {
     let (settings, seen) = (shell.settings(), slots.snapshot());
     let (counts, syncs) = (seen.counts, seen.counts.syncs);

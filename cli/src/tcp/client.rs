@@ -47,10 +47,13 @@ impl Module for ClientModule {
         let server = tcp.address;
         let others = installation.nodes.iter().filter(|other| !is_beyond && other.name != node_name);
         let others = others.flat_map(|other| installation.names_registered(&other.name)).collect();
-        // Of nodes on the LAN the network there is made worse.
+        // Between nodes on the LAN, the faults apply to the LAN.
         let impair = if is_beyond { impairment()? } else { None };
         if let Some(impair) = impair {
-            tracing::warn!("makes the way to the TCP router worse, as {} says: {impair}", impair::ENVIRONMENT);
+            tracing::warn!(
+                "adds faults to the connection with the TCP router, as {} requests: {impair}",
+                impair::ENVIRONMENT
+            );
         }
         let node = context.link().borrow().participant().node().clone();
         let shell = ClientShell::start(ClientParts {
@@ -71,7 +74,7 @@ impl Module for ClientModule {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        // Without its thread it is of no use; started again, it is.
+        // It cannot work without its thread; launch restarts it.
         assert!(self.shell.is_well(), "the thread of the client of the TCP router has ended");
         let link = self.shell.link();
         let (now_ns, system) = (monotonic_ns(), context.now());

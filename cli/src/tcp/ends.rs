@@ -1,4 +1,4 @@
-//! What the TCP router and its clients have in common as modules.
+//! Code that the modules of the TCP router and of its clients share.
 
 use rohrpost::ModuleError;
 use rohrpost::interfaces::{CarriedLoss, ClassPassed};
@@ -8,9 +8,9 @@ use rohrpost_routers::tcp::Class;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How often they tell how they are.
+/// How often they publish their state.
 pub(super) const PERIOD: Duration = Duration::from_millis(500);
-/// Bytes of a name that sessions take.
+/// Longest name in a session, bytes.
 pub(super) const NAME_BYTES_MAX: usize = rohrpost_routers::session::frame::NAME_BYTES_MAX;
 
 /// The section `[tcp]`.
@@ -18,7 +18,7 @@ pub(super) fn configured(installation: &Installation) -> Result<&Tcp, ModuleErro
     installation.tcp.as_ref().ok_or_else(|| ModuleError::new("the configuration has no [tcp]"))
 }
 
-/// The folder of the certificates; without one nothing is sealed, and that is said.
+/// The folder of the certificates; without one nothing is sealed, and a warning says so.
 pub(super) fn certificates(installation: &Installation, tcp: &Tcp) -> Option<PathBuf> {
     if tcp.certificates.is_none() {
         tracing::warn!("{}", Tcp::UNPROTECTED);
@@ -31,12 +31,12 @@ pub(super) fn levels(tcp: &Tcp) -> [u8; 256] {
     std::array::from_fn(|priority| tcp.level(Priority(priority as u8)))
 }
 
-/// What a node's client calls itself at the TCP router.
+/// The name of a node's client at the TCP router.
 pub(super) fn called(node: &str, installation: &Installation) -> String {
     short(&format!("node {node} of {}", installation.system.name))
 }
 
-/// A name for people, no longer than sessions take it.
+/// A display name, cut to the limit of sessions.
 pub(super) fn short(name: &str) -> String {
     let printable = || name.chars().filter(|c| !c.is_control());
     let ends = printable().scan(0, |end, c| {
@@ -46,7 +46,7 @@ pub(super) fn short(name: &str) -> String {
     printable().take(ends.take_while(|end| *end <= NAME_BYTES_MAX).count()).collect()
 }
 
-/// What was counted of each class, as it is told.
+/// Each class's counters, in the published form.
 pub(super) fn classes(all: &[Class]) -> Vec<ClassPassed> {
     let class = |class: &Class| ClassPassed {
         class: class.priority.0,

@@ -1,4 +1,5 @@
-//! `rohrpost tcp-router` and `rohrpost tcp-client`: what carries packages beyond the LAN. Launch starts them where `[tcp]` says so.
+//! `rohrpost tcp-router` and `rohrpost tcp-client`: carry packages beyond the LAN. Launch starts them as `[tcp]`
+//! requires.
 
 mod client;
 mod ends;
@@ -11,11 +12,13 @@ use std::process::ExitCode;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example, on the node that `server` of [tcp] names: rohrpost tcp-router --config robot.toml --name tcp.255
-Launch starts both by itself, the client on every node; by hand they are of use where modules are started by hand."
+    after_help = "Example, on the node that `server` of [tcp] names: rohrpost tcp-router --config robot.toml --name \
+        tcp.255
+Launch starts both, the client on every node; start them by hand only if you start modules by hand."
 )]
 pub(super) struct Arguments {
-    /// What every module takes: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the clients of the nodes.
+    /// The arguments of every module: --config FILE --name tcp.I [--off]; 255 is the TCP router, the others are the
+    /// clients of the nodes.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
 }

@@ -47,7 +47,7 @@ impl Module for ServerModule {
             own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
             incarnation: realtime_ns().max(1),
             clients_max: tcp.clients,
-            greetings_max: tcp.clients.max(GREETINGS_MIN),
+            greetings_max: tcp.clients.max(HANDSHAKES_MIN),
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
         };
@@ -60,7 +60,7 @@ impl Module for ServerModule {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        // Without its thread it is of no use; started again, it is.
+        // It cannot work without its thread; launch restarts it.
         assert!(self.shell.is_well(), "the thread of the TCP router has ended");
         let seen = self.shell.members();
         context.publish_now(TcpInterface::HOSTS, &hosts(&seen.members))?;
@@ -89,10 +89,10 @@ impl Module for ServerModule {
     }
 }
 
-/// Connections that have not said hello yet, at least.
-const GREETINGS_MIN: u16 = 64;
+/// Lower bound of connections that have not completed the handshake.
+const HANDSHAKES_MIN: u16 = 64;
 
-/// Ranges that are told at a time: with the names of their clients they fit in a package.
+/// Ranges per report: with the names of their clients they fit in a package.
 const HOSTS_MAX: usize = 512;
 
 fn hosts(members: &[Member]) -> BeyondHosts {
@@ -130,9 +130,9 @@ mod tests {
     use rohrpost_routers::session::Cause;
     use rohrpost_routers::tcp::MEMBERS_MAX;
 
-    /// With more than that nothing would be shown at all.
+    /// A report with more entries would not fit, and nothing would be shown.
     #[test]
-    fn as_many_clients_as_are_told_fit_into_a_package() {
+    fn the_largest_report_of_clients_fits_into_a_package() {
         let most = u64::from(u32::MAX);
         let client = BeyondClient {
             name: "x".repeat(NAME_BYTES_MAX),

@@ -1,4 +1,4 @@
-//! What the person at the terminal has chosen, and what keys change about it. Pure: what has to be done comes back as an
+//! The user's selections, and how keys change them. Pure: a key's further effect is returned as a
 //! [`ScreenAction`].
 
 use super::columns::Column;
@@ -11,27 +11,27 @@ use rohrpost::output::OutputLine;
 /// Lines that a page key moves by.
 const PAGE: usize = 10;
 
-/// What is shown, and how.
+/// The selections: what is shown, and how.
 pub(super) struct App {
     pub(super) screen: Screen,
     pub(super) prompt: Prompt,
     /// None: in the order of the configuration.
     pub(super) sort: Option<Column>,
-    /// Those that have room on the screen.
+    /// Columns that fit on the screen.
     pub(super) columns: Vec<Column>,
     pub(super) reversed: bool,
-    /// Only modules whose name holds this.
+    /// Only modules with this text in their name.
     pub(super) filter: String,
     pub(super) selected: Option<Name>,
-    /// First line of what is longer than the screen: details, help.
+    /// First visible line of a text longer than the screen: details, help.
     pub(super) scroll: usize,
     pub(super) paused: bool,
     pub(super) lines: LineFilter,
-    /// What the last key came to.
+    /// The result of the last key.
     pub(super) message: Option<String>,
 }
 
-/// What fills the screen.
+/// The content of the screen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Screen {
     Table,
@@ -39,25 +39,25 @@ pub(super) enum Screen {
     Help,
 }
 
-/// What the last line asks for.
+/// The question in the last line.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Prompt {
     None,
-    /// The filter is typed; it was this before.
+    /// The filter is being typed; this was the previous one.
     Filter(String),
     /// Restart it?
     Restart(Name),
 }
 
-/// Which output lines are shown.
+/// The filter of output lines.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct LineFilter {
     pub(super) level: OutputLevel,
-    /// Of this module alone.
+    /// Only lines of this module.
     pub(super) module: Option<Name>,
 }
 
-/// What a key asks for beyond the screen.
+/// A key's effect outside the screen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum ScreenAction {
     Quit,
@@ -90,7 +90,7 @@ impl App {
         };
         let mut rows: Vec<&Row> = model.modules.iter().filter(holds).collect();
         if let Some(column) = self.sort {
-            // Stable: what is equal keeps the order of the configuration.
+            // A stable sort: equal modules keep the order of the configuration.
             rows.sort_by(|a, b| column.compare(a, b));
         }
         if self.reversed {
@@ -104,7 +104,7 @@ impl App {
         rows.iter().position(|row| Some(row.name) == self.selected).unwrap_or(0)
     }
 
-    /// Takes a key.
+    /// Handles a key.
     pub(super) fn key(&mut self, key: KeyEvent, model: &Model) -> Option<ScreenAction> {
         if key.modifiers.contains(KeyModifiers::CONTROL) {
             return (key.code == KeyCode::Char('c')).then_some(ScreenAction::Quit);
@@ -211,14 +211,14 @@ impl App {
         (self.screen, self.scroll) = (screen, 0);
     }
 
-    /// Sorts by the next column; after the last one in the order of the configuration again.
+    /// Sorts by the next column; after the last one, by the order of the configuration again.
     fn sort_on(&mut self) {
         let at = self.sort.and_then(|column| self.columns.iter().position(|known| *known == column));
         self.sort = self.columns.get(at.map_or(0, |at| at + 1)).copied();
         self.reversed = false;
     }
 
-    /// The module that keys are about.
+    /// The module that keys apply to.
     fn target(&self, model: &Model) -> Option<Name> {
         if let Screen::Details(name) = self.screen {
             return Some(name);
@@ -228,7 +228,7 @@ impl App {
     }
 }
 
-/// From the usual one to the more talkative, then from errors alone back to it.
+/// Cycles from the usual level to the more verbose ones, then from errors alone back to it.
 fn next_level(level: OutputLevel) -> OutputLevel {
     match level {
         OutputLevel::Info => OutputLevel::Debug,

@@ -1,5 +1,5 @@
-//! What `top` asks for: to switch modules on and off, what was said, why a module is in error. Nothing here waits:
-//! calls are begun, and looked after each time round, so that a module that hangs freezes no screen.
+//! The calls of `top`: to switch modules on and off, for output lines, for the causes of errors. Nothing here blocks:
+//! calls are begun, and polled in each round, so that a module that hangs freezes no screen.
 
 use super::super::observer::{Silence, silence};
 use super::super::target::Running;
@@ -12,39 +12,39 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Name, ToolLink};
 use std::time::Duration;
 
-/// An answer comes within this time, or it does not come.
+/// Timeout for an answer.
 pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A call that is under way.
 struct Call {
     sequence: u32,
     to: Name,
-    wants: Wants,
+    purpose: Purpose,
 }
 
-/// What its answer is for.
-enum Wants {
+/// The purpose of its answer.
+enum Purpose {
     Switch(bool),
     Lines,
     Why,
     Restart(Name),
 }
 
-/// What came of a call.
+/// The result of a call.
 pub(super) enum Answer {
     Switched(Name, bool, Result<(), String>),
     Lines(Result<Page, String>),
     Why(Name, String),
     Restarted(Name, Result<(), String>),
-    /// What another node shows, or why it does not.
+    /// Another node's report, or why it does not answer.
     Snapshot(String, Result<Survey, Silence>),
 }
 
-/// Top's place among those that call.
+/// The place of `top` among the callers.
 pub(super) struct Calls {
     tool: ToolLink,
     under_way: Vec<Call>,
-    /// Looks at other nodes.
+    /// Observes other nodes.
     looks: Vec<(String, Distant)>,
 }
 
@@ -54,35 +54,35 @@ impl Calls {
         Ok(Self { tool: running.join(PATIENCE)?, under_way: Vec::new(), looks: Vec::new() })
     }
 
-    /// Gives the place back.
+    /// Releases the place.
     pub(super) fn close(self) {
         self.tool.close();
     }
 
     pub(super) fn switch(&mut self, running: &Running, module: Name, on: bool) -> Option<Answer> {
         let begun = self.tool.begin_switch(module, on);
-        self.begun(running, module, Wants::Switch(on), begun)
+        self.begun(running, module, Purpose::Switch(on), begun)
     }
 
     /// Asks the collector for the lines from this number on.
     pub(super) fn lines(&mut self, running: &Running, collector: Name, from: u64) -> Option<Answer> {
-        if self.under_way.iter().any(|call| matches!(call.wants, Wants::Lines)) {
+        if self.under_way.iter().any(|call| matches!(call.purpose, Purpose::Lines)) {
             return None;
         }
         let write = |body: &mut Vec<u8>| append(body, &(from,));
         let function = super::super::log::LINES_FROM;
         let begun = self.tool.begin(collector, function, CollectorInterface::hash(), write);
-        self.begun(running, collector, Wants::Lines, begun)
+        self.begun(running, collector, Purpose::Lines, begun)
     }
 
-    /// Has launch restart a module.
+    /// Asks launch to restart a module.
     pub(super) fn restart(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let launcher = running.launcher_of(module).unwrap_or(self.tool.launcher());
         let begun = self.tool.begin_restart(launcher, &running.text(module));
-        self.begun(running, launcher, Wants::Restart(module), begun)
+        self.begun(running, launcher, Purpose::Restart(module), begun)
     }
 
-    /// Begins to look at other nodes, but for those that are being looked at.
+    /// Begins to observe other nodes, except those with an unfinished request.
     pub(super) fn look(&mut self, running: &Running, nodes: &[&str]) {
         for node in nodes {
             let launcher = launcher_of(&running.installation, node);
@@ -94,29 +94,35 @@ impl Calls {
         }
     }
 
-    /// Asks a module in error why.
+    /// Asks a module in error for the cause.
     pub(super) fn why(&mut self, running: &Running, module: Name) -> Option<Answer> {
         let begun = self.tool.begin(module, common::STATUS, common::HASH, |_| Ok(()));
-        self.begun(running, module, Wants::Why, begun)
+        self.begun(running, module, Purpose::Why, begun)
     }
 
-    /// Keeps a call that was begun; one that could not be is answered by that.
-    fn begun(&mut self, running: &Running, to: Name, wants: Wants, begun: Result<u32, CallError>) -> Option<Answer> {
+    /// Records a call that was begun; a call that could not begin gets its error as the answer.
+    fn begun(
+        &mut self,
+        running: &Running,
+        to: Name,
+        purpose: Purpose,
+        begun: Result<u32, CallError>,
+    ) -> Option<Answer> {
         match begun {
             Ok(sequence) => {
-                self.under_way.push(Call { sequence, to, wants });
+                self.under_way.push(Call { sequence, to, purpose });
                 None
             }
-            Err(error) => failed(running, to, wants, &error),
+            Err(error) => failed(running, to, purpose, &error),
         }
     }
 
-    /// Whether answers are awaited.
+    /// Whether any answer is outstanding.
     pub(super) fn waits(&self) -> bool {
         !self.under_way.is_empty() || !self.looks.is_empty()
     }
 
-    /// The answers that have come, and the calls whose time is over.
+    /// The answers that arrived, and the calls that timed out.
     pub(super) fn poll(&mut self, running: &Running) -> Vec<Answer> {
         self.tool.link.collect();
         let mut answers = Vec::new();
@@ -126,15 +132,15 @@ impl Calls {
                 continue;
             };
             answers.extend(match outcome {
-                Ok(bytes) => self.answer(running, call.to, call.wants, &bytes),
-                Err(error) => failed(running, call.to, call.wants, &error),
+                Ok(bytes) => self.answer(running, call.to, call.purpose, &bytes),
+                Err(error) => failed(running, call.to, call.purpose, &error),
             });
         }
         for (node, mut look) in std::mem::take(&mut self.looks) {
             match look.poll(&mut self.tool.link) {
                 None => self.looks.push((node, look)),
                 Some(Ok(Snapshot::Survey(survey))) => answers.push(Answer::Snapshot(node, Ok(*survey))),
-                // It was not asked for one.
+                // This call requested no data.
                 Some(Ok(Snapshot::Mailbox(_))) => {}
                 Some(Err(failure)) => {
                     let silence = silence(&running.installation, &node, &failure);
@@ -145,37 +151,37 @@ impl Calls {
         answers
     }
 
-    fn answer(&mut self, running: &Running, to: Name, wants: Wants, bytes: &[u8]) -> Option<Answer> {
+    fn answer(&mut self, running: &Running, to: Name, purpose: Purpose, bytes: &[u8]) -> Option<Answer> {
         let unread = |error: &dyn std::fmt::Display| CallError::BadReply(to, error.to_string());
-        match wants {
-            Wants::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
-            Wants::Lines => match from_bytes::<Page>(bytes) {
+        match purpose {
+            Purpose::Switch(on) => Some(Answer::Switched(to, on, Ok(()))),
+            Purpose::Lines => match from_bytes::<Page>(bytes) {
                 Ok(page) => Some(Answer::Lines(Ok(page))),
-                Err(error) => failed(running, to, wants, &unread(&error)),
+                Err(error) => failed(running, to, purpose, &unread(&error)),
             },
-            Wants::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
-            Wants::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
+            Purpose::Why => from_bytes::<Status>(bytes).ok().map(|status| Answer::Why(to, status.error)),
+            Purpose::Restart(module) => match from_bytes::<Result<u32, ControlError>>(bytes) {
                 Ok(outcome) => Some(Answer::Restarted(module, outcome.map(|_| ()).map_err(|error| error.to_string()))),
-                Err(error) => failed(running, to, wants, &unread(&error)),
+                Err(error) => failed(running, to, purpose, &unread(&error)),
             },
         }
     }
 }
 
-/// What a call that failed comes to. What is asked again at the next look is told only when it was asked by a key.
-fn failed(running: &Running, to: Name, wants: Wants, error: &CallError) -> Option<Answer> {
-    let who = match wants {
-        Wants::Restart(_) => "launch".into(),
+/// The result of a failed call. Periodic queries report nothing; a failure is shown only for a call that a key started.
+fn failed(running: &Running, to: Name, purpose: Purpose, error: &CallError) -> Option<Answer> {
+    let asked = match purpose {
+        Purpose::Restart(_) => "launch".into(),
         _ => running.text(to),
     };
     let told = match error {
-        CallError::Timeout(..) => format!("{who}: no answer within {} s", PATIENCE.as_secs()),
-        error => error.to_string().replace(&to.to_string(), &who),
+        CallError::Timeout(..) => format!("{asked}: no answer within {} s", PATIENCE.as_secs()),
+        error => error.to_string().replace(&to.to_string(), &asked),
     };
-    match wants {
-        Wants::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
-        Wants::Lines => Some(Answer::Lines(Err(told))),
-        Wants::Restart(module) => Some(Answer::Restarted(module, Err(told))),
-        Wants::Why => None,
+    match purpose {
+        Purpose::Switch(on) => Some(Answer::Switched(to, on, Err(told))),
+        Purpose::Lines => Some(Answer::Lines(Err(told))),
+        Purpose::Restart(module) => Some(Answer::Restarted(module, Err(told))),
+        Purpose::Why => None,
     }
 }

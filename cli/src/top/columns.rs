@@ -1,4 +1,4 @@
-//! Columns of the table: what they say, by what they sort, and which go first when the terminal is narrow.
+//! The table's columns: their text, their sort order, and which ones a narrow terminal drops first.
 
 use super::super::units;
 use super::model::Row;
@@ -28,9 +28,9 @@ pub(super) enum Column {
     Why,
 }
 
-/// Room between columns.
+/// Space between columns.
 const GAP: u16 = 1;
-/// A name is not cut below this, nor is it given more than that.
+/// Narrowest and widest column of names.
 const NAME_MIN: u16 = 12;
 const NAME_MAX: u16 = 34;
 
@@ -56,7 +56,7 @@ impl Column {
         Self::Why,
     ];
 
-    /// As they are given room, the first always.
+    /// In order of importance; the first is always shown.
     const BY_IMPORTANCE: [Self; 17] = [
         Self::Module,
         Self::State,
@@ -99,32 +99,33 @@ impl Column {
         }
     }
 
-    /// What it means, for the help.
+    /// Its meaning, for the help.
     pub(super) const fn text(self) -> &'static str {
         match self {
             Self::Module => "name, and with + the number of its further names",
             Self::Node => "where it runs; shown when there are several nodes",
             Self::State => {
-                "starting, on, off, stopped; error; busy: its code does not come back; restarting; failed: given up; unreachable"
+                "starting, on, off, stopped; error; busy: its code does not return; restarting; failed: given up; \
+                 unreachable"
             }
-            Self::Class => "class: who is of it, is as important",
+            Self::Class => "its class, which gives its importance",
             Self::Priority => "class id = priority of its commands, 255 most urgent",
-            Self::Scheduling => "what the kernel says: fifo 1..99, or nice",
+            Self::Scheduling => "as the kernel has it: fifo 1..99, or nice",
             Self::In => "packages received a second",
             Self::Out => "packages sent a second",
             Self::Waiting => "packages that wait in its mailboxes now",
             Self::Lost => "packages lost in its mailboxes so far",
-            Self::P50 => "half of the packages of the interval waited so long at most",
-            Self::P99 => "99 of 100 waited so long at most",
-            Self::Restarts => "times that launch has started it again",
+            Self::P50 => "half of the packages of the interval waited at most this long",
+            Self::P99 => "99 of 100 waited at most this long",
+            Self::Restarts => "how often launch has restarted it",
             Self::Cpu => "of one processor",
             Self::Memory => "resident, mailboxes included",
             Self::Pid => "process",
-            Self::Why => "what went wrong last, or how packages were lost",
+            Self::Why => "the last error, or the causes of losses",
         }
     }
 
-    /// Columns that hold it. Fixed, so that nothing jumps as numbers change.
+    /// Its width. Fixed, so that nothing moves as numbers change.
     const fn width(self) -> u16 {
         match self {
             Self::Module => NAME_MIN,
@@ -140,12 +141,12 @@ impl Column {
         }
     }
 
-    /// Numbers stand to the right.
+    /// Numbers are aligned to the right.
     pub(super) const fn is_number(self) -> bool {
         !matches!(self, Self::Module | Self::Node | Self::State | Self::Class | Self::Scheduling | Self::Why)
     }
 
-    /// What it says of a module.
+    /// Its text for a module.
     pub(super) fn cell(self, row: &Row) -> String {
         let number = |number: Option<f64>| number.map_or("-".into(), short);
         let waited = |seconds: Option<f64>| seconds.map_or("-".into(), units::short);
@@ -170,7 +171,7 @@ impl Column {
         }
     }
 
-    /// How two modules stand to each other in this column: what deserves a look comes first.
+    /// The order of two modules by this column: what needs attention comes first.
     pub(super) fn compare(self, a: &Row, b: &Row) -> Ordering {
         let state = |row: &Row| row.line.account.state;
         let number = |of: fn(&Row) -> Option<f64>| of(b).unwrap_or(-1.0).total_cmp(&of(a).unwrap_or(-1.0));
@@ -192,7 +193,7 @@ impl Column {
     }
 }
 
-/// Why it does not work; else how its packages were lost, or what went wrong before. Those that a newer one replaced are nobody's loss.
+/// Why it does not work; else the causes of its losses, or the last error. Replaced packages are no loss.
 fn why(row: &Row) -> String {
     let account = &row.line.account;
     let losses = row.line.losses.lost_by_cause.iter().map(|(cause, lost)| format!("{lost} {cause}"));
@@ -226,15 +227,15 @@ pub(super) fn memory(bytes: u64) -> String {
     }
 }
 
-/// The columns that have room in so many, with their widths, from left to right. `names` is what the longest name needs;
-/// `nodes`: whether there are several.
+/// The columns that fit into this width, with their widths, from left to right. `names` is the length of the longest
+/// name; `nodes`: whether there are several.
 pub(super) fn fit(room: u16, names: u16, nodes: bool) -> Vec<(Column, u16)> {
     let names = names.clamp(NAME_MIN, NAME_MAX);
     let mut chosen = Vec::new();
     let mut used = 0;
     for column in Column::BY_IMPORTANCE.into_iter().filter(|column| nodes || *column != Column::Node) {
         let width = column.width() + if chosen.is_empty() { 0 } else { GAP };
-        // The first that finds no room ends it: a less important one is not shown in the place of a more important one.
+        // The first column that does not fit ends the list: a less important one never replaces a more important one.
         if used + width > room && !chosen.is_empty() {
             break;
         }
@@ -279,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn narrow_terminals_keep_what_matters() {
+    fn narrow_terminals_keep_the_important_columns() {
         for room in 0..200 {
             let columns = fit(room, 20, true);
             let used: u16 = columns.iter().map(|(_, width)| width + GAP).sum::<u16>() - GAP;

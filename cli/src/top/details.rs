@@ -1,4 +1,4 @@
-//! The page about one module: what it is, its mailboxes and how long packages waited there, what it offers.
+//! The page about one module: its process, its mailboxes with their waiting times, and its interface.
 
 use super::super::call::usage;
 use super::super::list::mailbox_lines;
@@ -14,7 +14,7 @@ use rohrpost_config::{Installation, Program};
 use rohrpost_mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use std::time::Duration;
 
-/// The page as lines; those that begin without a blank are headings. `describe` knows what modules say of themselves.
+/// The page as lines; headings begin without a blank. `describe` returns a module's description.
 pub(super) fn page(
     installation: &Installation,
     sample: &Sample,
@@ -23,7 +23,7 @@ pub(super) fn page(
     mut describe: impl FnMut(Name) -> Option<Description>,
 ) -> Vec<String> {
     let Some(row) = model.row(name) else {
-        return vec![format!("{} is not here any more", installation.classes.format(name))];
+        return vec![format!("{} no longer exists", installation.classes.format(name))];
     };
     let mut lines = vec![format!("{}: {}", row.line.module, row.line.account.state)];
     lines.extend(indented(&about(installation, sample, row)));
@@ -61,7 +61,7 @@ fn indented(text: &str) -> Vec<String> {
     text.lines().map(|line| format!("  {line}")).collect()
 }
 
-/// What it is and how its process does.
+/// The module and its process.
 fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
     let mut lines = Vec::new();
     let mut say = |what: &str, text: String| lines.push(format!("{what:<11}{text}"));
@@ -103,7 +103,7 @@ fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
     lines.join("\n")
 }
 
-/// Narrower than that of `list`: it stands in a terminal of 80 columns.
+/// Narrower than that of `list`: it fits into a terminal of 80 columns.
 fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> String {
     let lines = mailbox_lines(installation, mailboxes);
     let rows = mailboxes.iter().zip(lines).map(|(mailbox, line)| {
@@ -119,7 +119,7 @@ fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> Stri
     table(["", ">slots", "when full", ">waiting", ">received", "lost"], rows)
 }
 
-/// Whom it has to do with, and how much.
+/// The modules that it exchanges packages with, and the amounts.
 fn peers(head: &str, peers: &[FlowEnd]) -> Vec<String> {
     if peers.is_empty() {
         return Vec::new();
@@ -139,7 +139,7 @@ fn span(time: Duration) -> String {
     format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
 }
 
-/// Bars for the octaves of waiting times that were seen, from the shortest to the longest.
+/// Bars for the octaves of waiting times, from the shortest to the longest that occurred.
 fn histogram(class: &str, latency: &Latency) -> Vec<String> {
     const BAR: usize = 40;
     let octaves: Vec<(usize, u64)> = (0..LATENCY_BUCKETS)
@@ -154,7 +154,7 @@ fn histogram(class: &str, latency: &Latency) -> Vec<String> {
     let (first, last) = (octaves.iter().position(seen), octaves.iter().rposition(seen));
     let mut lines = vec![format!("  {class}")];
     for (at, count) in &octaves[first.unwrap_or(0)..=last.unwrap_or(0)] {
-        // One of a million is seen, too.
+        // One in a million is visible, too.
         let bar = (*count as f64 / most as f64 * BAR as f64).ceil() as usize;
         let below = time(Latency::bucket_start(at + 2));
         lines.push(format!("    below {below:>7}  {count:>9}  {}", "#".repeat(bar)));

@@ -1,4 +1,4 @@
-//! The screen: what there is to show, drawn into a buffer of any size. Nothing is told by colour alone.
+//! The screen: the model is drawn into a buffer of any size. Colour is never the only mark.
 //!
 //! ```text
 //! demo.main  2026-11-21 10:40:12 UTC simulation              head
@@ -22,20 +22,20 @@ use rohrpost::output::plain;
 
 /// Room before a name for the mark of the selected module.
 const MARK: u16 = 2;
-/// Lines that output gets, its title included, before the table gets more than one module.
+/// Lines for output, including its title, before the table gets more than one module.
 const OUTPUT_MIN: u16 = 4;
-/// On a lower terminal there is no output below details and help.
+/// A lower terminal shows no output below details and help.
 const SPLIT_MIN: u16 = 20;
 
-/// All that a screen is drawn from.
+/// Everything that a screen shows.
 pub(super) struct ScreenModel<'a> {
     pub(super) model: &'a Model,
     pub(super) app: &'a App,
     /// Output lines that pass the filter, oldest first.
     pub(super) output: &'a [OutputText],
-    /// What is said of the output, if it cannot be had.
+    /// The message in place of output that is not available.
     pub(super) silence: Option<&'a str>,
-    /// Lines of the details, if they are shown; those that begin without blank are headings.
+    /// Lines of the details, if they are shown; headings begin without a blank.
     pub(super) details: &'a [String],
     pub(super) palette: Palette,
 }
@@ -101,7 +101,7 @@ impl ScreenModel<'_> {
         });
         line(to, head, "", cells);
         if rows.is_empty() {
-            put(to, body, "  no module is called so; Esc shows all", Style::new());
+            put(to, body, "  no module matches; Esc shows all", Style::new());
         }
         let selected = self.app.selected_at(rows);
         let first = (selected + 1).saturating_sub(body.height.into());
@@ -120,11 +120,11 @@ impl ScreenModel<'_> {
     fn output(&self, area: Rect, to: &mut Buffer) {
         let [title, body] = Layout::vertical([Constraint::Length(1), Constraint::Min(0)]).areas(area);
         let filter = self.app.lines;
-        let whose = filter.module.map_or("all modules".into(), |module| {
+        let source = filter.module.map_or("all modules".into(), |module| {
             self.model.row(module).map_or(module.to_string(), |row| row.line.module.clone())
         });
         let text = match self.silence {
-            None => format!("── output: {} and above, {whose} ", filter.level.name()),
+            None => format!("── output: {} and above, {source} ", filter.level.name()),
             Some(why) => format!("── no output: {why} "),
         };
         let rest = usize::from(title.width).saturating_sub(text.chars().count());
@@ -140,7 +140,7 @@ impl ScreenModel<'_> {
         }
     }
 
-    /// Lines that may be more than the screen holds.
+    /// Lines that may exceed the screen.
     fn text(&self, lines: &[String], area: Rect, to: &mut Buffer) {
         let wrapped: Vec<(bool, String)> = lines
             .iter()
@@ -166,7 +166,7 @@ impl ScreenModel<'_> {
         };
         let (text, style) = match (&self.app.prompt, &self.app.message) {
             (Prompt::Filter(_), _) => {
-                (format!("/{}_   Enter keeps it, Esc takes it back", self.app.filter), Style::new())
+                (format!("/{}_   Enter keeps it, Esc restores the old one", self.app.filter), Style::new())
             }
             (Prompt::Restart(name), _) => {
                 let text = self.model.row(*name).map_or(name.to_string(), |row| row.line.module.clone());
@@ -179,14 +179,15 @@ impl ScreenModel<'_> {
     }
 }
 
-/// A text in the first line of a place, cut to its width, and nothing in it that the terminal would obey. On a small terminal a place may be empty.
+/// Text in the first line of an area, cut to its width, with control characters escaped. On a small terminal an area
+/// may be empty.
 fn put(to: &mut Buffer, place: Rect, text: &str, style: Style) {
     if !place.is_empty() {
         to.set_stringn(place.x, place.y, plain::line(text), place.width.into(), style);
     }
 }
 
-/// The columns that a table of this width has.
+/// The columns of a table of this width.
 pub(super) fn columns(model: &Model, width: u16) -> Vec<(Column, u16)> {
     let longest = model.modules.iter().map(|row| full_name(row).chars().count()).max().unwrap_or(0);
     fit(width.saturating_sub(MARK), longest as u16, model.nodes.len() > 1)
@@ -197,7 +198,7 @@ fn full_name(row: &Row) -> String {
     row.line.module.clone() + &aliases.concat()
 }
 
-/// All its names if they have room, else its own and how many more there are.
+/// All names of a module if they fit, else its own and the number of the others.
 fn name(row: &Row, width: u16) -> String {
     let full = full_name(row);
     match row.line.aliases.len() {
@@ -206,7 +207,7 @@ fn name(row: &Row, width: u16) -> String {
     }
 }
 
-/// A text in so many columns; what is cut is seen to be.
+/// Text cut to a width, with a mark where it is cut.
 fn pad(text: &str, width: u16, right: bool) -> String {
     let (text, width) = (plain::line(text), usize::from(width));
     let text = match text.chars().count() {

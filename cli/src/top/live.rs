@@ -1,4 +1,4 @@
-//! The loop at the terminal: looks, draws, takes keys, and looks after what was asked.
+//! The loop at the terminal: observes, draws, handles keys, and polls calls.
 
 use super::super::observer::Silence;
 use super::super::target::Running;
@@ -9,13 +9,13 @@ use super::draw::{OutputText, ScreenModel, columns};
 use super::model::{Model, Sample};
 use super::output::Output;
 use super::palette::Palette;
-use super::sample::{self, NodeSurveys, Said};
-use super::terminal::{Opened, keyboard};
+use super::sample::{self, ErrorCauses, NodeSurveys};
+use super::terminal::{RawTerminal, keyboard};
 use crate::terminal::Failure;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{Event, KeyEventKind};
 use rohrpost::Name;
-use rohrpost::launch::{Event as Told, events};
+use rohrpost::launch::{Event as LaunchEvent, events};
 use rohrpost::schema::Description;
 use rohrpost::survey::Standing;
 use std::collections::HashMap;
@@ -23,18 +23,18 @@ use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Signals are looked after so often, and answers that are awaited.
+/// Polling period for signals and for outstanding answers.
 const LOOK: Duration = Duration::from_millis(100);
 const LOOK_WAITING: Duration = Duration::from_millis(10);
 
-/// Draws until it is told to end.
+/// Draws until the user or a signal ends it.
 pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Result<ExitCode, Failure> {
     let told = events()?;
     let mut live = Live::new(running, interval, palette)?;
     let outcome = {
-        let mut screen = Opened::new()?;
+        let mut screen = RawTerminal::new()?;
         let typed = keyboard()?;
-        live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(Told::Stop)))
+        live.watch(&mut screen.0, &typed, || matches!(told.try_recv(), Ok(LaunchEvent::Stop)))
     };
     if let Some(calls) = live.calls {
         calls.close();
@@ -42,16 +42,16 @@ pub(super) fn run(running: Running, interval: Duration, palette: Palette) -> Res
     outcome.map(|()| ExitCode::SUCCESS)
 }
 
-/// The nodes that are meant, but for the own one.
+/// The selected nodes, except the own one.
 fn others(running: &Running) -> impl Iterator<Item = &str> {
     running.shown().into_iter().filter(|node| *node != running.node_name)
 }
 
 fn not_seen_yet(running: &Running) -> NodeSurveys {
-    others(running).map(|node| Err(Silence::new(node, "it was not heard yet"))).collect()
+    others(running).map(|node| Err(Silence::new(node, "no report yet"))).collect()
 }
 
-/// What all nodes that are meant show, in the order of the configuration.
+/// The reports of all selected nodes, in the order of the configuration.
 fn in_order(running: &Running, own: NodeSurveys, others: &NodeSurveys) -> NodeSurveys {
     let (mut own, mut others) = (own.into_iter(), others.iter().cloned());
     let next = |node: &str| if node == running.node_name { own.next() } else { others.next() };
@@ -63,28 +63,28 @@ struct Live {
     interval: Duration,
     palette: Palette,
     app: App,
-    /// The look that rates are counted from, and the newest.
+    /// The observation that rates are relative to, and the newest.
     earlier: Option<Sample>,
     now: Sample,
     model: Model,
-    /// What other nodes showed last, in the order of the configuration.
+    /// The last reports of other nodes, in the order of the configuration.
     others: NodeSurveys,
-    /// Since when those are silent that are.
+    /// Since when silent nodes are silent.
     silent_since: HashMap<String, Instant>,
-    /// What modules of other nodes offer, as they said when they were asked once.
+    /// Interfaces of other nodes' modules; each module is asked once.
     described: HashMap<Name, Option<Description>>,
-    /// Our place among those that call; none when there is no room for one more.
+    /// Our place among the callers; none if all places are taken.
     calls: Option<Calls>,
     output: Output,
-    /// Why modules are in error, as they said.
-    said: Said,
+    /// Why modules are in error, as they reported.
+    said: ErrorCauses,
 }
 
 impl Live {
     fn new(running: Running, interval: Duration, palette: Palette) -> Result<Self, Failure> {
         let others = not_seen_yet(&running);
         let seen = in_order(&running, sample::own(&running)?, &others);
-        let now = sample::put_together(&running, seen, None, &Said::default());
+        let now = sample::put_together(&running, seen, None, &ErrorCauses::default());
         let model = Model::new(&running.installation, &running.node_name, &running.shown(), &now, None);
         let output = Output::new(&running.installation);
         let mut live = Self {
@@ -100,13 +100,13 @@ impl Live {
             described: HashMap::new(),
             calls: None,
             output,
-            said: Said::default(),
+            said: ErrorCauses::default(),
         };
         live.join();
         Ok(live)
     }
 
-    /// Takes part as a tool, if there is room. Counters are shown without, too.
+    /// Takes part as a tool, if a place is free. Counters are shown without it, too.
     fn join(&mut self) {
         match Calls::join(&self.running) {
             Ok(calls) => self.calls = Some(calls),
@@ -133,7 +133,7 @@ impl Live {
                 Ok(event) if self.event(&event) => return Ok(()),
                 Ok(_) => changed = true,
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return Err("the terminal says nothing more".into()),
+                Err(RecvTimeoutError::Disconnected) => return Err("the terminal was closed".into()),
             }
             if Instant::now() >= next && !self.app.paused {
                 next = Instant::now() + self.interval;
@@ -145,7 +145,7 @@ impl Live {
         Ok(())
     }
 
-    /// Looks at the node anew; rates are counted from the look before.
+    /// Observes the node again; rates are relative to the previous observation.
     fn look(&mut self) {
         match self.sample(Some(&self.now)) {
             Ok(now) => self.earlier = Some(std::mem::replace(&mut self.now, now)),
@@ -158,7 +158,7 @@ impl Live {
         self.ask();
     }
 
-    /// Looks for what has just changed; rates are counted from where they were.
+    /// Updates what has just changed; the base of rates stays.
     fn peek(&mut self) {
         if let Ok(now) = self.sample(self.earlier.as_ref()) {
             self.now = now;
@@ -166,7 +166,7 @@ impl Live {
         self.make_model();
     }
 
-    /// What there is now: of the own node anew, of the others what they showed last.
+    /// The present state: a new observation of the own node, and the last reports of the others.
     fn sample(&self, earlier: Option<&Sample>) -> Result<Sample, Failure> {
         let mut others = self.others.clone();
         for silence in others.iter_mut().filter_map(|seen| seen.as_mut().err()) {
@@ -183,12 +183,12 @@ impl Live {
         self.model = Model::new(&running.installation, &running.node_name, &running.shown(), now, earlier.as_ref());
     }
 
-    /// The node may have been launched again, and perhaps with another configuration.
+    /// The node may have been launched again, perhaps with another configuration.
     fn find_again(&mut self) {
         let Ok(running) = self.running.again() else { return };
         let Ok(own) = sample::own(&running) else { return };
         let others = not_seen_yet(&running);
-        let now = sample::put_together(&running, in_order(&running, own, &others), None, &Said::default());
+        let now = sample::put_together(&running, in_order(&running, own, &others), None, &ErrorCauses::default());
         if !now.launched {
             return;
         }
@@ -199,21 +199,21 @@ impl Live {
             calls.close();
         }
         (self.running, self.now, self.earlier) = (running, now, None);
-        self.said = Said::default();
+        self.said = ErrorCauses::default();
         self.output = Output::new(&self.running.installation);
         self.join();
     }
 
-    /// Asks for what is worth knowing at each look: new output lines, and why modules are in error.
+    /// Requests, once per observation, new output lines and the causes of modules' errors.
     fn ask(&mut self) {
         let Some(calls) = &mut self.calls else { return };
         let mut answers = Vec::new();
         let others: Vec<&str> = others(&self.running).collect();
         calls.look(&self.running, &others);
-        if let Some((collector, from)) = self.output.wants() {
+        if let Some((collector, from)) = self.output.purpose() {
             answers.extend(calls.lines(&self.running, collector, from));
         }
-        // What is over is forgotten: the next error may be another one.
+        // A past error is dropped: the next one may be different.
         let is_in_error =
             |name: &Name| self.model.row(*name).is_some_and(|row| row.line.account.state == Standing::Error);
         self.said.retain(|name, _| is_in_error(name));
@@ -223,7 +223,7 @@ impl Live {
         answers.into_iter().for_each(|answer| self.answer(answer));
     }
 
-    /// Takes the answers that have come; whether there were any.
+    /// Takes the answers that arrived; returns whether there were any.
     fn answers(&mut self) -> bool {
         let Some(calls) = &mut self.calls else { return false };
         let answers = calls.poll(&self.running);
@@ -241,7 +241,7 @@ impl Live {
                 self.peek();
             }
             Answer::Restarted(name, outcome) => {
-                let done = format!("{} is told to end, and starts again", self.running.text(name));
+                let done = format!("{} is being restarted", self.running.text(name));
                 self.app.message = Some(outcome.map_or_else(|error| error, |()| done));
                 self.peek();
             }
@@ -256,7 +256,7 @@ impl Live {
                 }
                 let at = others(&self.running).position(|other| other == node);
                 if let Some(known) = at.and_then(|at| self.others.get_mut(at)) {
-                    // What it shows first is not to wait for the next look.
+                    // Its first report is shown at once.
                     let first = known.is_err() && seen.is_ok();
                     *known = seen;
                     if first {
@@ -276,7 +276,7 @@ impl Live {
         }
     }
 
-    /// Takes what the terminal says; true when it is time to end.
+    /// Handles terminal events; true when it is time to end.
     fn event(&mut self, event: &Event) -> bool {
         let Event::Key(key) = *event else { return false };
         if key.kind == KeyEventKind::Release {
@@ -320,7 +320,7 @@ impl Live {
                 let Self { running, described, now, model, .. } = self;
                 let describe = |alias| match running.is_own(alias) {
                     true => running.describe(alias).ok(),
-                    // Asked once, and not if it would only be waited for.
+                    // Asked once, and not if the call would only time out.
                     false if now.is_silent(name) => None,
                     false => described.entry(alias).or_insert_with(|| running.describe(alias).ok()).clone(),
                 };

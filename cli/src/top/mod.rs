@@ -6,7 +6,7 @@
 //! keys ──▶ App ──▶ ScreenAction ──▶ Calls ──answers──▶ Live ──────┴──▶ ScreenModel ──▶ screen
 //! ```
 //!
-//! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` touch the world.
+//! `model`, `app`, `columns` and `draw` are pure; `sample`, `calls` and `live` do the input and output.
 
 mod app;
 mod calls;
@@ -28,7 +28,7 @@ use crate::terminal::{Failure, say};
 use model::Model;
 use rohrpost::Name;
 use rohrpost::survey::Scope;
-use sample::Said;
+use sample::ErrorCauses;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -38,11 +38,11 @@ use std::time::Duration;
   rohrpost top                  ? shows the keys, q ends it
   rohrpost top --once           one plain table
   rohrpost top --json           one object with everything, for programs
-Counters are read from shared memory, of other nodes by way of their launches: looking disturbs nobody.")]
+Counters are read from shared memory, on other nodes through their launches: this disturbs nobody.")]
 pub(super) struct Arguments {
     #[command(flatten)]
     target: Target,
-    /// SnapshotRequest so often, seconds; rates are those of this time.
+    /// Refresh period, seconds; rates are those of this time.
     #[arg(long, default_value_t = 1.0, value_name = "SECONDS")]
     interval: f64,
     /// Print the table once, after one interval.
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     no_color: bool,
 }
 
-/// Shorter intervals count too little to make a rate of; longer ones show nothing.
+/// Shorter periods count too few packages for a rate; longer ones show nothing.
 const INTERVAL_S: std::ops::RangeInclusive<f64> = 0.1..=3600.0;
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
     if !arguments.once && !arguments.json {
         if !std::io::stdout().is_terminal() || !std::io::stdin().is_terminal() {
-            return Err("`top` draws on a terminal; into a file or pipe, say `top --once` or `top --json`".into());
+            return Err("`top` draws on a terminal; for a file or pipe, use `top --once` or `top --json`".into());
         }
         return live::run(running, interval, palette::Palette::new(arguments.no_color));
     }
@@ -76,13 +76,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What there is to show after one interval. Whoever is in error, and no launch knows why, is asked.
+/// The state after one period. A module in error is asked for the cause if no launch knows it.
 fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
     let look = || running.look_at(&running.shown(), Scope::All);
-    let earlier = sample::put_together(running, look()?, None, &Said::default());
+    let earlier = sample::put_together(running, look()?, None, &ErrorCauses::default());
     std::thread::sleep(interval);
     let seen = look()?;
-    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &Said::default());
+    let mut now = sample::put_together(running, seen.clone(), Some(&earlier), &ErrorCauses::default());
     let unexplained: Vec<Name> = now.unexplained().collect();
     if !unexplained.is_empty()
         && let Ok(mut tool) = running.join(calls::PATIENCE)

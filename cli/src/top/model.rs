@@ -1,4 +1,4 @@
-//! What `top` shows: two looks at a node, made into one table. Pure; also what `--json` prints.
+//! The content of `top`: two observations, combined into one table. Pure; `--json` prints it, too.
 
 use super::super::list::{MailboxLine, mailbox_lines};
 use super::super::observer::Silence;
@@ -11,41 +11,41 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// What is shown, at one moment.
+/// One observation.
 pub(super) struct Sample {
-    /// All nodes that are meant, as one.
+    /// All selected nodes, merged.
     pub(super) survey: Survey,
-    /// Nodes that do not show themselves.
+    /// Nodes that do not answer.
     pub(super) silent: Vec<Silence>,
-    /// What the table of `list` says, in the order of the survey's modules.
+    /// The summaries of `list`, in the order of the survey's modules.
     pub(super) lines: Vec<ModuleLine>,
     pub(super) time: TimeNow,
-    /// Whether a launch watches over the node that is looked from.
+    /// Whether a launch supervises the node that the tool runs on.
     pub(super) launched: bool,
 }
 
 impl Sample {
-    /// Modules that are in error, and nobody has said why.
+    /// Modules in error without a known cause.
     pub(super) fn unexplained(&self) -> impl Iterator<Item = Name> {
         let modules = self.survey.modules.iter().zip(&self.lines);
         let is_it = |line: &ModuleLine| line.account.state == Standing::Error && line.account.error.is_none();
         modules.filter(move |(_, line)| is_it(line)).map(|(module, _)| module.name)
     }
 
-    /// Whether the module's node does not show itself.
+    /// Whether the module's node does not answer.
     pub(super) fn is_silent(&self, name: Name) -> bool {
         self.survey.module(name).is_some_and(|module| module.at_ns.is_none())
     }
 }
 
-/// System time as the node has it.
+/// System time on the node.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct TimeNow {
     /// Nanoseconds since 1970.
     pub(super) time_ns: u64,
     /// Where it comes from.
     pub(super) time_source: &'static str,
-    /// Seconds of it in one of this computer.
+    /// Its seconds per second of this computer.
     pub(super) time_pace: f64,
 }
 
@@ -53,16 +53,16 @@ pub(super) struct TimeNow {
 #[derive(Serialize)]
 pub(super) struct Model {
     pub(super) installation: String,
-    /// The node that is looked from.
+    /// The node that the tool runs on.
     pub(super) node: String,
-    /// Those that are shown.
+    /// The nodes that are shown.
     pub(super) nodes: Vec<String>,
-    /// Those of them that do not show themselves.
+    /// The shown nodes that do not answer.
     pub(super) silent: Vec<Silence>,
     #[serde(flatten)]
     pub(super) time: TimeNow,
     pub(super) launched: bool,
-    /// What rates and waiting times are measured over; none with the first look.
+    /// The interval of rates and waiting times; none with the first observation.
     pub(super) interval_s: Option<f64>,
     /// Number of modules by state.
     pub(super) states: BTreeMap<&'static str, usize>,
@@ -86,10 +86,10 @@ pub(super) struct Row {
     pub(super) lost_per_s: Option<f64>,
     /// Packages sent a second.
     pub(super) sent_per_s: Option<f64>,
-    /// What the packages waited that it took in the interval; none when it took none.
+    /// Waiting times of the packages that it took in the interval; none without any.
     pub(super) waited_p50_s: Option<f64>,
     pub(super) waited_p99_s: Option<f64>,
-    /// Since its process joined the node.
+    /// Time since its process joined the node.
     pub(super) uptime_s: Option<f64>,
     /// Share of one processor.
     pub(super) cpu_percent: Option<f64>,
@@ -98,7 +98,7 @@ pub(super) struct Row {
     pub(super) receives_from: Vec<FlowEnd>,
 }
 
-/// The other end of a way that packages took.
+/// The other end of a flow.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct FlowEnd {
     pub(super) module: String,
@@ -107,7 +107,7 @@ pub(super) struct FlowEnd {
 }
 
 impl Model {
-    /// What there is to show of `now`; with an earlier look also what is counted over time.
+    /// The table for `now`; with an earlier observation also rates.
     pub(super) fn new(
         installation: &Installation,
         node: &str,
@@ -176,18 +176,18 @@ impl Model {
     }
 }
 
-/// A process that began anew counts anew what it sends.
+/// A restarted process counts its output from 0.
 fn sent_per_s(now: &ModuleSurvey, before: &ModuleSurvey, interval: Duration) -> Option<f64> {
-    let life = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.incarnation);
-    (now.process.is_some() && life(now) == life(before)).then(|| per_s(now.sent, before.sent, interval))
+    let incarnation = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.incarnation);
+    (now.process.is_some() && incarnation(now) == incarnation(before)).then(|| per_s(now.sent, before.sent, interval))
 }
 
-/// Who sends: the module, or the name that a tool's answers go to.
+/// The sender: the module, or the name that a tool's answers go to.
 fn sender(flow: &FlowInfo) -> Name {
     if flow.module == Name::NONE { flow.from } else { flow.module }
 }
 
-/// The other ends of flows, as `end` finds them, the busiest first.
+/// The other ends of flows, selected by `end`, the busiest first.
 fn peers(
     installation: &Installation,
     now: &Sample,
@@ -215,7 +215,7 @@ fn peers(
     peers
 }
 
-/// Mailboxes may go with their counters, so the later sum may be the smaller one.
+/// Mailboxes may disappear with their counters, so the later sum may be smaller.
 fn per_s(now: u64, before: u64, interval: Duration) -> f64 {
     if interval.is_zero() { 0.0 } else { now.saturating_sub(before) as f64 / interval.as_secs_f64() }
 }
@@ -225,14 +225,15 @@ fn between(earlier_ns: u64, now_ns: u64) -> Duration {
     Duration::from_nanos(now_ns.saturating_sub(earlier_ns))
 }
 
-/// The module at an earlier look, and how long ago that was on its own node's clock; none if that did not show itself anew.
+/// The module at an earlier observation, and the time since, on its own node's clock; none if the node did not report
+/// again.
 fn since<'a>(module: &ModuleSurvey, earlier: &'a Sample) -> Option<(&'a ModuleSurvey, Duration)> {
     let before = earlier.survey.module(module.name)?;
     let interval = between(before.at_ns?, module.at_ns?);
     (!interval.is_zero()).then_some((before, interval))
 }
 
-/// Of one processor, in the time between two looks; none when the process is not the same any more.
+/// Share of one processor between two observations; none when the process has changed.
 fn cpu_percent(now: &ModuleSurvey, before: &ModuleSurvey, interval: Duration) -> Option<f64> {
     let pid = |module: &ModuleSurvey| module.process.as_ref().map(|process| process.pid);
     let ran = now.usage?.cpu.checked_sub(before.usage?.cpu).filter(|_| pid(now) == pid(before))?;

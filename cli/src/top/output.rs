@@ -9,37 +9,37 @@ use rohrpost::output::{Format, OutputLine};
 use rohrpost_config::Installation;
 use std::collections::VecDeque;
 
-/// Lines that were said before, and that are kept.
+/// Number of kept lines.
 const BACKLOG: u64 = 200;
 const KEPT: usize = 2000;
 /// No screen shows more.
 const SHOWN: usize = 500;
 
-/// What was said, as far as it is kept here.
+/// The lines that are kept here.
 pub(super) struct Output {
     collector: Option<Name>,
     lines: VecDeque<OutputLine>,
-    /// The collector's incarnation that `next` counts in; none until it has said how far it is.
-    life: Option<u32>,
+    /// The collector's incarnation that `next` belongs to; none before its first answer.
+    incarnation: Option<u32>,
     /// Number of the next line.
     next: u64,
-    /// Why there is none.
+    /// Why there are no lines.
     pub(super) silence: Option<String>,
 }
 
 impl Output {
-    /// Of the installation's collector.
+    /// For the installation's collector.
     pub(super) fn new(installation: &Installation) -> Self {
         let class = installation.classes.id(CollectorInterface::CLASS);
         let name = class.map(|class| Name::new(installation.system.id, class.0, 0, 0));
         let collector = name.filter(|name| installation.module(*name).is_some());
         let silence = collector.is_none().then(|| "the configuration has no module `output.0`".into());
-        Self { collector, lines: VecDeque::new(), life: None, next: u64::MAX, silence }
+        Self { collector, lines: VecDeque::new(), incarnation: None, next: u64::MAX, silence }
     }
 
-    /// Whom to ask for lines, and from which number on.
-    pub(super) fn wants(&self) -> Option<(Name, u64)> {
-        // No line has the highest number: the first answer tells how far the collector is.
+    /// The collector to ask, and the first line to ask for.
+    pub(super) fn purpose(&self) -> Option<(Name, u64)> {
+        // No line has the highest number: the first answer only tells the collector's position.
         Some((self.collector?, self.next))
     }
 
@@ -53,8 +53,8 @@ impl Output {
             }
         };
         self.silence = None;
-        if self.life != Some(page.life) {
-            (self.life, self.next) = (Some(page.life), page.next.saturating_sub(BACKLOG));
+        if self.incarnation != Some(page.life) {
+            (self.incarnation, self.next) = (Some(page.life), page.next.saturating_sub(BACKLOG));
             return page.next > 0;
         }
         let more = !page.lines.is_empty();
@@ -65,7 +65,7 @@ impl Output {
         more && self.next < page.next
     }
 
-    /// The newest lines that pass, as they are shown.
+    /// The newest lines that pass the filter, in the displayed form.
     pub(super) fn shown(&self, installation: &Installation, filter: LineFilter) -> Vec<OutputText> {
         let format = Format::new(installation);
         let passing = self.lines.iter().rev().filter(|line| filter.passes(line)).take(SHOWN);

@@ -1,4 +1,4 @@
-//! Colours, which only repeat what words say; without them bold and reversed letters remain.
+//! Colours, which only repeat what words say; without them there is bold and reversed text.
 
 use super::columns::Column;
 use super::model::Row;
@@ -13,7 +13,7 @@ pub(super) struct Palette {
 }
 
 impl Palette {
-    /// Without colours if the user said so here, or to all programs (<https://no-color.org>).
+    /// No colours if the user requested that here, or for all programs (<https://no-color.org>).
     pub(super) fn new(no_color: bool) -> Self {
         let asked = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         Self { colours: !no_color && !asked }

@@ -1,4 +1,4 @@
-//! One look at a node, and at those others that showed themselves: it waits for nobody.
+//! One observation of the own node, and of other nodes from their last reports; it never blocks.
 
 use super::super::observer::Silence;
 use super::super::summary::module_lines;
@@ -10,21 +10,26 @@ use rohrpost::survey::{Scope, Standing, Survey};
 use rohrpost_mailbox::SystemClock;
 use std::collections::HashMap;
 
-/// Why modules are in error, as they said when they were asked.
-pub(super) type Said = HashMap<Name, String>;
+/// Why modules are in error, as they reported.
+pub(super) type ErrorCauses = HashMap<Name, String>;
 
-/// What each of some nodes shows, or why it does not.
+/// The reports of some nodes, or why they do not answer.
 pub(super) type NodeSurveys = Vec<Result<Survey, Silence>>;
 
-/// Looks at the own node, if it is meant.
+/// Observes the own node, if it is selected.
 pub(super) fn own(running: &Running) -> Result<NodeSurveys, Failure> {
     let is_own = |node: &&str| *node == running.node_name;
     let own: Vec<&str> = running.shown().into_iter().filter(is_own).collect();
     running.look_at(&own, Scope::All)
 }
 
-/// Puts together what nodes show; `earlier` makes rates.
-pub(super) fn put_together(running: &Running, seen: NodeSurveys, earlier: Option<&Sample>, said: &Said) -> Sample {
+/// Merges the nodes' reports; `earlier` is the base of rates.
+pub(super) fn put_together(
+    running: &Running,
+    seen: NodeSurveys,
+    earlier: Option<&Sample>,
+    said: &ErrorCauses,
+) -> Sample {
     let (mut surveys, mut silent) = (Vec::new(), Vec::new());
     for seen in seen {
         match seen {

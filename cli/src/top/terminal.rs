@@ -1,4 +1,4 @@
-//! The terminal while it is ours: opened, read, and given back as it was.
+//! The terminal in raw mode: opened, read, and restored.
 
 use crate::terminal::Failure;
 use ratatui::DefaultTerminal;
@@ -8,20 +8,20 @@ use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, d
 use ratatui::crossterm::{cursor, execute};
 use std::sync::mpsc::Receiver;
 
-/// The terminal while it is ours; given back as it was, whatever ends us.
-pub(super) struct Opened(pub(super) DefaultTerminal);
+/// The terminal in raw mode; restored however the program ends.
+pub(super) struct RawTerminal(pub(super) DefaultTerminal);
 
-impl Opened {
+impl RawTerminal {
     pub(super) fn new() -> Result<Self, Failure> {
         let hook = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
-            // First, so that what it says is to be read.
+            // First, so that the panic's message is visible.
             give_back();
             hook(panic);
         }));
         Self::draw().map_err(|error| {
             give_back();
-            format!("this terminal cannot be drawn on: {error}; say `top --once`").into()
+            format!("cannot draw on this terminal: {error}; use `top --once`").into()
         })
     }
 
@@ -32,20 +32,20 @@ impl Opened {
     }
 }
 
-impl Drop for Opened {
+impl Drop for RawTerminal {
     fn drop(&mut self) {
         give_back();
     }
 }
 
-/// A terminal that is gone cannot be given back, and that is no error.
+/// A terminal that is gone cannot be restored; that is no error.
 fn give_back() {
     let _ = disable_raw_mode();
     let _ = execute!(std::io::stdout(), LeaveAlternateScreen, cursor::Show);
 }
 
-/// What the terminal says, from a thread of its own: reading from a terminal that was closed never returns (crossterm takes
-/// its end for an interruption), and must not keep us from ending.
+/// Terminal events from a separate thread: reading from a closed terminal never returns (crossterm takes
+/// its end for an interruption), and must not keep the program from ending.
 pub(super) fn keyboard() -> Result<Receiver<Event>, Failure> {
     let (sender, receiver) = std::sync::mpsc::channel();
     let read = move || {

@@ -12,10 +12,10 @@ pub(super) fn date(time_ns: u64) -> String {
     format!("{} UTC", text.split('.').next().unwrap_or_default())
 }
 
-/// A line in pieces of at most so many characters, broken at blanks where there are any; what follows the first is indented
-/// as the line itself is, and a little more.
+/// A line in pieces of at most this many characters, broken at blanks where possible; the later pieces are indented
+/// like the line itself, and a little more.
 pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
-    // A module may say anything; on the screen a line is a line.
+    // A module may print anything; on the screen a line stays one line.
     let text = plain::line(text);
     let indent = (text.chars().take_while(|letter| *letter == ' ').count() + 2).min(width / 3);
     let mut pieces = Vec::new();
@@ -24,7 +24,7 @@ pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
     while rest.len() + before > width && width > before {
         let room = width - before;
         let blank = rest[..=room.min(rest.len() - 1)].iter().rposition(|letter| *letter == ' ');
-        // A blank in the indentation, or too far to the left, is none to break at.
+        // A blank in the indentation, or too far to the left, is no place to break.
         let at = blank.filter(|at| *at > room / 2).unwrap_or(room);
         let piece: String = rest.drain(..at).collect();
         pieces.push(" ".repeat(before) + piece.trim_end());
@@ -38,7 +38,7 @@ pub(super) fn wrap(text: &str, width: usize) -> Vec<String> {
     pieces
 }
 
-/// Everything as plain text, for `--once`.
+/// The whole output as plain text, for `--once`.
 pub(super) fn table(model: &Model) -> String {
     let several = model.nodes.len() > 1;
     let columns = || Column::ALL.into_iter().filter(|column| several || *column != Column::Node);
@@ -83,18 +83,19 @@ const KEYS: [(&str, &str); 12] = [
     ("Enter", "details of the module; Esc goes back"),
     ("o", "switch it on"),
     ("f", "switch it off: its safe state"),
-    ("r", "restart it, once you have said y"),
+    ("r", "restart it, after y"),
     ("s", "sort by the next column, S the other way round"),
-    ("/", "only modules whose name holds what you type; Esc: all"),
-    ("l", "output of the selected module alone, or of all"),
-    ("L", "which output: info, debug, trace, error, warn and above"),
+    ("/", "only modules with the typed text in their name; Esc: all"),
+    ("l", "output of the selected module only, or of all"),
+    ("L", "lowest level of output: info, debug, trace, error, warn"),
     ("p", "pause: the screen stays as it is; p goes on"),
     ("?", "this help"),
     ("q, Ctrl-C", "end"),
 ];
 
 const WHAT: &str = "  Rates and waiting times are those of the last interval. They are read from shared memory, which \
-    disturbs nobody; launches of other nodes show theirs. For its new lines the collector of output is asked once an interval.";
+    disturbs nobody; launches of other nodes report theirs. The collector of output is asked for new lines once an \
+    interval.";
 
 /// All keys and all columns.
 pub(super) fn help() -> Vec<String> {
@@ -102,7 +103,7 @@ pub(super) fn help() -> Vec<String> {
     lines.extend(KEYS.iter().map(|(key, text)| format!("  {key:<12} {text}")));
     lines.extend(["".into(), "columns; narrow terminals have fewer".into()]);
     lines.extend(Column::ALL.iter().map(|column| format!("  {:<12} {}", column.head(), column.text())));
-    lines.extend(["".into(), "what is shown".into(), WHAT.into()]);
+    lines.extend(["".into(), "contents".into(), WHAT.into()]);
     lines
 }
 
@@ -111,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_lines_are_broken_at_blanks_and_nothing_is_lost() {
+    fn long_lines_are_broken_at_blanks_without_loss() {
         assert_eq!(wrap("one two three", 8), ["one two", "  three"]);
         assert_eq!(wrap("  one two three", 10), ["  one two", "   three"]);
         assert_eq!(wrap("abcdefghij", 4), ["abcd", " efg", " hij"]);

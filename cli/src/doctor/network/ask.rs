@@ -1,4 +1,4 @@
-//! Asks this computer how it is joined to the other nodes. Each peer is sent one empty datagram, which a router takes for nobody's.
+//! Probes how this computer is connected to the other nodes. Each peer gets one empty datagram, which a router ignores.
 
 use crate::doctor::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use nix::errno::Errno;
@@ -14,13 +14,13 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::os::fd::AsRawFd;
 use std::time::{Duration, Instant};
 
-/// Whoever has not answered by then is silent.
+/// A peer without an answer after this time is silent.
 const PATIENCE: Duration = Duration::from_secs(1);
 const LOOK: Duration = Duration::from_millis(10);
-/// An entry of the neighbour table is complete.
+/// Flag of a complete entry in the neighbour table.
 const ATF_COM: u32 = 0x2;
 
-/// What of the configuration's network this computer sees, as this node; none with one node only.
+/// The configuration's network as this computer sees it in the role of this node; none with only one node.
 pub(in crate::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> Option<LanView> {
     let (network, address) = (installation.network?, node.address?);
     let is_here = UdpSocket::bind((address, 0)).is_ok();
@@ -69,14 +69,14 @@ fn addresses() -> Vec<(String, IpAddr)> {
     found.filter_map(|entry| Some((entry.interface_name, entry.address.and_then(ip).filter(usable)?))).collect()
 }
 
-/// A question to a peer that is under way.
+/// A probe to a peer that is under way.
 struct Probe {
     name: String,
     to: IpAddr,
     socket: Option<UdpSocket>,
     mtu: Option<u32>,
     reach: Option<Reach>,
-    /// Whether the kernel takes the option, and then whether it told when the datagram left.
+    /// Whether the kernel accepts the option, and later whether it reported the transmit time.
     stamps: Result<bool, String>,
 }
 
@@ -101,7 +101,7 @@ impl Probe {
         probe
     }
 
-    /// Looks once; false when there is nothing more to wait for.
+    /// Checks once; false when there is nothing more to wait for.
     fn look(&mut self) -> bool {
         let Some(socket) = &self.socket else { return false };
         if let Ok(told) = &mut self.stamps {
@@ -124,7 +124,7 @@ fn flags() -> TimestampingFlag {
         | TimestampingFlag::SOF_TIMESTAMPING_SOFTWARE
 }
 
-/// Whether the kernel has told when a datagram left.
+/// Whether the kernel has reported a datagram's transmit time.
 fn left_at(socket: &UdpSocket) -> bool {
     let (mut buffer, mut control) = ([0; 64], vec![0; 512]);
     let mut parts = [IoSliceMut::new(&mut buffer)];
@@ -134,9 +134,9 @@ fn left_at(socket: &UdpSocket) -> bool {
     message.cmsgs().is_ok_and(|mut parts| parts.any(|part| matches!(part, ControlMessageOwned::ScmTimestampsns(_))))
 }
 
-/// The largest packet on the way, as far as this computer knows.
+/// The path MTU, as far as this computer knows.
 fn way(socket: &UdpSocket, to: IpAddr) -> Option<u32> {
-    // The same question for IPv6 is not among those that nix knows.
+    // nix does not have the corresponding option of IPv6.
     let mtu = to.is_ipv4().then(|| getsockopt(socket, sockopt::IpMtu).ok())??;
     u32::try_from(mtu).ok()
 }
@@ -149,7 +149,8 @@ fn refused(error: &std::io::Error) -> Reach {
     }
 }
 
-/// Whether the neighbour table knows who has the address: it has answered on the wire, whatever a firewall does above.
+/// Whether the neighbour table has a MAC for the address: then the computer answered ARP, whatever its firewall does
+/// above.
 fn is_neighbour(address: IpAddr) -> bool {
     let text = std::fs::read_to_string("/proc/self/net/arp").unwrap_or_default();
     let complete = |line: &str| {
@@ -163,7 +164,7 @@ fn is_neighbour(address: IpAddr) -> bool {
 
 fn wait(mut probes: Vec<Probe>) -> (Vec<PeerNode>, Stamps) {
     let deadline = Instant::now() + PATIENCE;
-    // All are looked at each time, not only up to the first that still waits.
+    // No short circuit: all are checked each time.
     while probes.iter_mut().fold(false, |waits, probe| probe.look() | waits) && Instant::now() < deadline {
         std::thread::sleep(LOOK);
     }
@@ -179,7 +180,7 @@ fn wait(mut probes: Vec<Probe>) -> (Vec<PeerNode>, Stamps) {
         name: probe.name,
         address: probe.to,
         mtu: probe.mtu,
-        // Nothing said no: there is a router that keeps silent, a firewall, or nobody.
+        // No refusal came: there is a router that does not answer, a firewall, or no computer.
         reach: probe.reach.unwrap_or(if is_neighbour(probe.to) { Reach::Neighbour } else { Reach::Silent }),
     };
     (probes.into_iter().map(peer).collect(), stamps)

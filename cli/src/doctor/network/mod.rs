@@ -8,9 +8,9 @@ use super::finding::{Finding, Grade};
 use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
 use super::machine::{Machine, Needs};
 
-/// What a router asks the kernel for, to hold what comes while nobody reads.
+/// The receive buffer that a router requests, for datagrams that arrive while it does not read.
 const RECEIVE_BYTES: u64 = 8 << 20;
-/// Below it, a burst of one large package from each of a few nodes is lost.
+/// With a smaller buffer, a burst of one large package from each of a few nodes is lost.
 const RECEIVE_BYTES_LEAST: u64 = 1 << 20;
 
 pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
@@ -28,7 +28,7 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
 }
 
 fn address(lan: &LanView, from: &str) -> Finding {
-    let (what, why) = ("node address", "other nodes send to it, and take nothing from any other");
+    let (what, why) = ("node address", "other nodes send to it, and accept datagrams only from it");
     if lan.is_here {
         let device = lan.addresses.iter().find(|(_, address)| *address == lan.address);
         let device = device.map_or(String::new(), |(device, _)| format!(", device {device}"));
@@ -42,8 +42,8 @@ fn address(lan: &LanView, from: &str) -> Finding {
         format!("{} is not one of this computer, which has {others}", lan.address),
         why,
         format!(
-            "run it on node {}'s own computer, or `--node` with the name of this one; or correct `address` in {from}; or give this \
-             computer the address: sudo ip address add {}/24 dev DEVICE",
+            "run it on node {}'s own computer, or `--node` with the name of this one; or correct `address` in {from}; \
+             or give this computer the address: sudo ip address add {}/24 dev DEVICE",
             lan.node, lan.address
         ),
     )
@@ -66,7 +66,8 @@ fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
             format!("UDP {number}, another program has it"),
             why,
             format!(
-                "`ss -ulpn sport = {number}` names the program: stop it, or write another `port` into [network] of {from}, the same on all nodes"
+                "`ss -ulpn sport = {number}` names the program: stop it, or write another `port` into [network] of \
+                 {from}, the same on all nodes"
             ),
         ),
         PortState::Unknown => Finding::not(
@@ -74,7 +75,7 @@ fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
             what,
             format!("UDP {number}, not tried"),
             why,
-            "first the node's address, then this again",
+            "fix the node's address first, then check again",
         ),
         PortState::Refused(error) => Finding::not(
             Grade::Bad,
@@ -89,10 +90,10 @@ fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
 fn buffers(machine: &Machine) -> Option<Finding> {
     let (what, why) = (
         "socket buffers",
-        "they hold what comes in while the router's thread waits for a core; what finds no room is lost",
+        "they hold datagrams that arrive while the router's thread waits for a core; without room, datagrams are lost",
     );
     let limit = machine.number("/proc/sys/net/core/rmem_max")?;
-    let is = format!("at most {} KiB for who is not root", limit >> 10);
+    let is = format!("at most {} KiB without root rights", limit >> 10);
     Some(if limit >= RECEIVE_BYTES_LEAST {
         Finding::ok(what, is, why)
     } else {
@@ -103,9 +104,10 @@ fn buffers(machine: &Machine) -> Option<Finding> {
 fn stamps(lan: &LanView) -> Option<Finding> {
     let (what, why) = (
         "time stamps",
-        "clocks of nodes are compared by when the kernel sent and received; else by when a thread came to run",
+        "the kernel's time stamps of sending and reception compare the nodes' clocks; else a thread's less exact ones",
     );
-    let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and software-receive";
+    let fix = "another network device, or its newer driver: `ethtool -T DEVICE` must say software-transmit and \
+        software-receive";
     Some(match &lan.stamps {
         Stamps::Both => Finding::ok(what, "sending and receiving", why),
         Stamps::NoSent => Finding::not(Grade::Warn, what, "receiving only", why, fix),
@@ -143,7 +145,7 @@ fn reach(peer: &PeerNode, lan: &LanView) -> Finding {
 }
 
 fn mtu(peer: &PeerNode, lan: &LanView, from: &str) -> Option<Finding> {
-    let (what, why) = ("packet size", "a datagram that does not fit on the way is lost, or refused by the kernel");
+    let (what, why) = ("packet size", "a datagram larger than the path's MTU is lost, or refused by the kernel");
     let way = peer.mtu?;
     Some(if way >= lan.mtu.into() {
         Finding::ok(what, format!("{} B of the {way} B that go to {}", lan.mtu, peer.name), why)

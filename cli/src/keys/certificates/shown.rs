@@ -1,4 +1,4 @@
-//! What there is of certificates, for people, and for how long it holds.
+//! The existing certificates and their remaining validity, as text.
 
 use super::{AUTHORITY, DAY, HolderState, files, folder, holders, is_pair, state};
 use rcgen::date_time_ymd;
@@ -8,11 +8,11 @@ use rohrpost_routers::tcp::{Authority, Holder, holds_until_s};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Whoever holds for less should be renewed.
+/// A certificate that is valid for less should be renewed.
 const SOON_DAYS: u64 = 30;
 const MAKES: &str = "`rohrpost keys new` makes it";
 
-/// What there is of each who needs one, and of the authority.
+/// The files of each holder, and of the authority.
 pub(in crate::keys) fn show(installation: &Installation) -> Vec<String> {
     let Some(folder) = folder(installation) else { return Vec::new() };
     let [certificate, secret] = files(&folder, AUTHORITY);
@@ -23,7 +23,7 @@ pub(in crate::keys) fn show(installation: &Installation) -> Vec<String> {
         Ok(_) => format!("{}: is there{}", certificate.display(), lasts(&certificate, "keys rotate --authority")),
     }];
     lines.push(match &known {
-        _ if !secret.exists() => format!("{}: is not here; whoever makes certificates needs it", secret.display()),
+        _ if !secret.exists() => format!("{}: is not here; it is needed to make certificates", secret.display()),
         Ok(_) if !is_pair(&certificate, &secret) => {
             format!("{}: is not the key of {}", secret.display(), certificate.display())
         }
@@ -36,7 +36,7 @@ pub(in crate::keys) fn show(installation: &Installation) -> Vec<String> {
     lines
 }
 
-/// What the programs of a node lack of what sessions with the TCP router take; empty if all of it is there and holds.
+/// The files that a node lacks for sessions with the TCP router; empty if all exist and are valid.
 pub(crate) fn lacking(installation: &Installation, node: &str) -> Vec<String> {
     let Some(folder) = folder(installation) else { return Vec::new() };
     let [certificate, _] = files(&folder, AUTHORITY);
@@ -49,7 +49,7 @@ pub(crate) fn lacking(installation: &Installation, node: &str) -> Vec<String> {
     };
     for holder in holders(installation).filter(is_its) {
         let state = state(&folder, known.as_ref().ok(), &holder);
-        // Without the authority nothing can be said of who has signed.
+        // Without the authority the signature cannot be checked.
         if state == HolderState::Holds || (state == HolderState::Unsigned && known.is_err()) {
             continue;
         }
@@ -60,7 +60,7 @@ pub(crate) fn lacking(installation: &Installation, node: &str) -> Vec<String> {
     lines
 }
 
-/// One of the two files of a holder.
+/// One of a holder's two files.
 fn line(file: &Path, state: HolderState) -> String {
     match state {
         HolderState::Holds => format!("{}: is there{}", file.display(), lasts(file, "keys rotate")),
@@ -68,14 +68,14 @@ fn line(file: &Path, state: HolderState) -> String {
             format!("{}: is there without the other file; {MAKES}", file.display())
         }
         HolderState::Missing => format!("{}: is missing; {MAKES}", file.display()),
-        HolderState::NoPair => format!("{}: certificate and key do not fit; {MAKES} anew", file.display()),
+        HolderState::NoPair => format!("{}: certificate and key do not match; {MAKES} anew", file.display()),
         HolderState::Unsigned => {
             format!("{}: has expired, or `{AUTHORITY}.pem` has not signed it; {MAKES} anew", file.display())
         }
     }
 }
 
-/// For how long a certificate holds that holds now, and what `renews` it; nothing of what is no certificate.
+/// The remaining validity of a valid certificate, and the command that renews it; none if the text is no certificate.
 fn lasts(file: &Path, renews: &str) -> String {
     let now_s = realtime_ns() / 1_000_000_000;
     holds_until_s(file)
@@ -85,9 +85,9 @@ fn lasts(file: &Path, renews: &str) -> String {
 fn text(until_s: u64, days: u64, renews: &str) -> String {
     let until = date_time_ymd(1970, 1, 1) + Duration::from_secs(until_s);
     let left = if days == 1 { "1 day".into() } else { format!("{days} days") };
-    let warning = format!("; soon it does not: `rohrpost {renews}` makes new ones");
+    let warning = format!("; renew it soon: `rohrpost {renews}` makes new ones");
     let warning = if days < SOON_DAYS { warning } else { String::new() };
-    format!(", holds for {left}, until {}{warning}", until.date())
+    format!(", valid for {left}, until {}{warning}", until.date())
 }
 
 #[cfg(test)]
@@ -95,12 +95,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_ends_within_thirty_days_is_warned_of() {
+    fn expiry_within_thirty_days_gives_a_warning() {
         const UNTIL_S: u64 = 1_795_252_380;
-        assert_eq!(text(UNTIL_S, 30, "keys rotate"), ", holds for 30 days, until 2026-11-21");
+        assert_eq!(text(UNTIL_S, 30, "keys rotate"), ", valid for 30 days, until 2026-11-21");
         assert_eq!(
             text(UNTIL_S, 1, "keys rotate"),
-            ", holds for 1 day, until 2026-11-21; soon it does not: `rohrpost keys rotate` makes new ones"
+            ", valid for 1 day, until 2026-11-21; renew it soon: `rohrpost keys rotate` makes new ones"
         );
     }
 }

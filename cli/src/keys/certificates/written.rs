@@ -1,4 +1,4 @@
-//! Files that belong together: all are whole on the disk before the first has its name.
+//! Writes files that belong together: all are completely on the disk before the first gets its name.
 
 use super::error::CertificateError;
 use std::fs::{self, File, OpenOptions};
@@ -6,20 +6,20 @@ use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
-/// Who may read what.
+/// Permissions of a file.
 pub(super) const SECRET: u32 = 0o600;
 pub(super) const PUBLIC: u32 = 0o644;
 
-/// A file to be.
+/// A file that will be written.
 pub(super) struct Written {
     pub(super) path: PathBuf,
     pub(super) text: String,
-    /// Who may read it.
+    /// Its permissions.
     pub(super) mode: u32,
 }
 
 impl Written {
-    /// Where it is until all are.
+    /// Its temporary name.
     fn beside(&self) -> PathBuf {
         let mut beside = self.path.clone().into_os_string();
         beside.push(".new");
@@ -27,7 +27,7 @@ impl Written {
     }
 
     fn write(&self) -> io::Result<()> {
-        // One that a crash has left is nobody's.
+        // A temporary file from a crash belongs to no process.
         let _ = fs::remove_file(self.beside());
         let mut file = OpenOptions::new().write(true).create_new(true).mode(self.mode).open(self.beside())?;
         file.write_all(self.text.as_bytes())?;
@@ -35,7 +35,8 @@ impl Written {
     }
 }
 
-/// Puts them into the folder in this order, after `before`, in place of older ones. If they cannot be written, all stays as it was.
+/// Moves the files into the folder in this order, after `before`; they replace older ones. If they cannot be written,
+/// nothing changes.
 pub(super) fn put(
     folder: &Path,
     files: &[Written],
@@ -58,6 +59,6 @@ pub(super) fn put(
     for file in files {
         fs::rename(file.beside(), &file.path).map_err(failed(&file.path))?;
     }
-    // Else names may be lost if the computer stops now.
+    // Otherwise a crash of the computer may lose the names.
     File::open(folder).and_then(|folder| folder.sync_all()).map_err(failed(folder))
 }

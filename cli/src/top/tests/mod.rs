@@ -1,6 +1,6 @@
-//! The screen as a person sees it, word for word, and what keys do.
+//! The screen as a user sees it, word for word, and the effects of keys.
 //!
-//! `UPDATE_GOLDEN=1 cargo test --bin rohrpost top` writes the expected screens anew; read the difference before you commit.
+//! `UPDATE_GOLDEN=1 cargo test --bin rohrpost top` rewrites the expected screens; read the diff before you commit.
 
 mod robot;
 
@@ -42,7 +42,7 @@ fn order(app: &App, robot: &Robot) -> Vec<String> {
 }
 
 #[test]
-fn screens_are_drawn_word_for_word() {
+fn screens_match_their_golden_files() {
     let robot = Robot::new();
     let mut app = App::new();
     press(&mut app, &robot, "v");
@@ -57,7 +57,7 @@ fn screens_are_drawn_word_for_word() {
 }
 
 #[test]
-fn json_says_what_the_screen_says() {
+fn json_has_the_content_of_the_screen() {
     let robot = Robot::new();
     let json = serde_json::to_value(&robot.model).unwrap();
     assert_eq!(
@@ -85,7 +85,7 @@ fn json_says_what_the_screen_says() {
 }
 
 #[test]
-fn the_first_look_has_no_rates() {
+fn the_first_observation_has_no_rates() {
     let robot = Robot::new();
     let model = super::Model::new(&robot.installation, "main", &["main"], &robot.earlier, None);
     assert_eq!((model.interval_s, model.received_per_s), (None, None));
@@ -128,7 +128,7 @@ fn arrows_and_letters_select() {
 }
 
 #[test]
-fn sorting_brings_what_deserves_a_look_and_the_selection_stays() {
+fn sorting_puts_problems_first_and_keeps_the_selection() {
     let robot = Robot::new();
     let mut app = App::new();
     app.columns = Column::ALL.to_vec();
@@ -162,7 +162,7 @@ fn sorting_brings_what_deserves_a_look_and_the_selection_stays() {
 }
 
 #[test]
-fn a_filter_is_typed_kept_taken_back_and_cleared() {
+fn a_filter_is_typed_kept_restored_and_cleared() {
     let robot = Robot::new();
     let mut app = App::new();
     press(&mut app, &robot, "/odom");
@@ -183,7 +183,7 @@ fn a_filter_is_typed_kept_taken_back_and_cleared() {
 }
 
 #[test]
-fn keys_ask_for_what_they_say() {
+fn keys_request_their_actions() {
     let robot = Robot::new();
     let (motor, pilot) = (robot.name("motor.0"), robot.name("pilot.0"));
     let mut app = App::new();

@@ -1,4 +1,4 @@
-//! The demo's robot as two looks at it, a second apart, with numbers that are easy to follow.
+//! The demo's robot as two observations, a second apart, with simple numbers.
 
 use super::super::details;
 use super::super::draw::{OutputText, ScreenModel};
@@ -30,13 +30,13 @@ pub(super) struct Robot {
     pub(super) model: Model,
 }
 
-/// When the newer look was taken, on the node's clock.
+/// When the newer observation was taken, on the node's clock.
 const AT_NS: u64 = 3_725_000_000_000;
 
-/// The module whose mailbox keeps the newest package only.
+/// The module that keeps only the newest package in its mailbox.
 const LATEST: &str = "motor.0";
 
-/// A module at a moment: what it has received, lost, sent, and how much of a processor it took, ms.
+/// A module's counters at a moment: received, lost, sent, and processor time, ms.
 struct Counts {
     module: &'static str,
     state: Option<ModuleState>,
@@ -258,6 +258,6 @@ fn flow(module: &ModuleSurvey, to: Name, packages: u64) -> FlowInfo {
 }
 
 fn line(counts: &Counts, line: ModuleLine) -> ModuleLine {
-    // As after a second in which the others counted this.
+    // The other modules' counters a second later.
     ModuleLine { received_per_s: Some(counts.received as f64 / 10.0), ..line }
 }
