@@ -1,7 +1,7 @@
 //! What runs on all nodes. The own node is read directly; launch reports the others. Nothing here waits.
 
-use rohrpost::launcher::{Look, launcher_of};
-use rohrpost::survey::{Distant, Scope, Seen, Survey};
+use rohrpost::launcher::{SnapshotRequest, launcher_of};
+use rohrpost::survey::{Distant, Scope, Snapshot, Survey};
 use rohrpost::{Class, Context, Name};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Latency, Node, NodeError, local};
@@ -80,7 +80,7 @@ impl Nodes {
         self.own.take(Survey::new(&self.node, context.installation(), &self.own.node)?);
         let count = self.others.len();
         for other in &mut self.others {
-            let what = Look::Survey(Scope::Mailboxes);
+            let what = SnapshotRequest::Survey(Scope::Mailboxes);
             other.look.get_or_insert_with(|| Distant::new(other.launcher, what, PATIENCE, count));
         }
         self.collect(context);
@@ -94,7 +94,7 @@ impl Nodes {
             let Some(seen) = other.look.as_mut().and_then(|look| look.poll(&mut link)) else { continue };
             other.look = None;
             other.silent = true;
-            if let Ok(Seen::Survey(survey)) = seen {
+            if let Ok(Snapshot::Survey(survey)) = seen {
                 other.looks.take(*survey);
                 other.silent = false;
             }

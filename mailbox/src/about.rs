@@ -37,8 +37,8 @@ pub(crate) fn set(node: &Node, name: Name, words: &[u8]) -> Result<(), NodeError
 }
 
 impl Node {
-    /// What the owner of a mailbox said of it, if it said something. An owner that has just begun may say something else
-    /// than the one before it; another process wrote it, so check it.
+    /// What the owner of a mailbox said of it, if it said something. An owner that has just begun may say something
+    /// else than the one before it; another process wrote it, so check it.
     pub fn about(&self, name: Name) -> Option<Vec<u8>> {
         let mut words = Vec::new();
         let file = open_to_read(&path_of(self.path(), name)).ok()?;

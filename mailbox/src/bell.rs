@@ -4,11 +4,11 @@
 //! sleeper:  seen = rings │ (F) last look │ polling = 1 │ (I) │ rings == seen? ──▶ poll(pipe, …) │ polling = 0
 //! ringer:   rings += 1 │ (H) │ polling? ──▶ a byte into the pipe
 //! ```
-//! Who sleeps on mailboxes alone sleeps on the word `rings` itself, and the kernel compares it. Who sleeps on file descriptors
-//! too sleeps in `poll`, which knows no words; so the sleeper compares, and a ringer that comes later writes into a pipe. Of
-//! a sleeper and a ringer at least one sees the other. Each ringer that sees the mark writes, whoever wrote before: so
-//! one that dies before it writes takes away no wake-up but its own. Nothing here makes a system call (see `doorbell`),
-//! so that loom can check it as it stands.
+//! Who sleeps on mailboxes alone sleeps on the word `rings` itself, and the kernel compares it. Who sleeps on file
+//! descriptors too sleeps in `poll`, which knows no words; so the sleeper compares, and a ringer that comes later
+//! writes into a pipe. Of a sleeper and a ringer at least one sees the other. Each ringer that sees the mark writes,
+//! whoever wrote before: so one that dies before it writes takes away no wake-up but its own. Nothing here makes a
+//! system call (see `doorbell`), so that loom can check it as it stands.
 
 use crate::step::step;
 use crate::sync::{AtomicU32, Ordering, fence};
@@ -38,7 +38,8 @@ impl Bell<'_> {
         self.polling.load(Ordering::Relaxed) != 0
     }
 
-    /// Says that the sleeper goes to sleep in `poll`; false when somebody has rung since `seen`. Then, [`Bell::polled`].
+    /// Says that the sleeper goes to sleep in `poll`; false when somebody has rung since `seen`. Then,
+    /// [`Bell::polled`].
     pub(crate) fn may_poll(&self, seen: u32) -> bool {
         self.polling.store(1, Ordering::Relaxed);
         // ORDERING (I): `polling` before the last look at the rings. Pairs with (H).

@@ -1,16 +1,17 @@
-//! Single-writer cells: one writer changes a few atomic words, and any number of readers, in any process, see them whole.
+//! Single-writer cells: one writer changes a few atomic words, and any number of readers, in any process, see them
+//! whole.
 //!
 //! | type | the words exist | a write costs, besides the words | a writer that dies in the middle leaves |
 //! | --- | --- | --- | --- |
 //! | [`SeqCount`] | once, changed in place | two stores | nothing to read, until a successor writes all words |
 //! | [`SeqLatch`] | twice, in two places | one store | the previous value |
 //!
-//! These are `seqcount_t` and `seqcount_latch_t` of the Linux kernel. The words are the caller's, all of them atomics, so
-//! that a read that races with a write is no undefined behaviour; the caller loads and stores them Relaxed. A write takes a
-//! bounded number of steps and waits for nobody. A read never waits: it gives up when a write is in its way.
+//! These are `seqcount_t` and `seqcount_latch_t` of the Linux kernel. The words are the caller's, all of them atomics,
+//! so that a read that races with a write is no undefined behaviour; the caller loads and stores them Relaxed. A write
+//! takes a bounded number of steps and waits for nobody. A read never waits: it gives up when a write is in its way.
 //!
-//! Who the one writer is, the caller decides: by a lock, a claim or a single thread. Nothing here maps memory or sleeps, so
-//! that loom checks this file as it is.
+//! Who the one writer is, the caller decides: by a lock, a claim or a single thread. Nothing here maps memory or
+//! sleeps, so that loom checks this file as it is.
 
 use crate::step::step;
 use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
@@ -33,8 +34,8 @@ use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
 pub struct SeqCount(AtomicU32);
 
 impl SeqCount {
-    /// Changes the words; readers see all of the change or none. For the one writer alone. A successor of a writer that died
-    /// inside must store all words.
+    /// Changes the words; readers see all of the change or none. For the one writer alone. A successor of a writer that
+    /// died inside must store all words.
     #[inline]
     pub fn write(&self, change: impl FnOnce()) {
         // Already odd if the last writer died inside.
@@ -48,8 +49,8 @@ impl SeqCount {
         self.0.store(inside.wrapping_add(1), Ordering::Release);
     }
 
-    /// What `look` returns, and the version that it saw. None while the writer is inside, or if it died inside: the caller
-    /// keeps what it had, or tries again a bounded number of times.
+    /// What `look` returns, and the version that it saw. None while the writer is inside, or if it died inside: the
+    /// caller keeps what it had, or tries again a bounded number of times.
     #[inline]
     pub fn read<T>(&self, look: impl FnOnce() -> T) -> Option<(u32, T)> {
         // ORDERING: Acquire (D); pairs with (C).
@@ -63,15 +64,16 @@ impl SeqCount {
         (self.0.load(Ordering::Relaxed) == version).then_some((version, seen))
     }
 
-    /// Changes with each write. Says whether a read would find anything new; orders nothing. 0: nothing was written yet.
+    /// Changes with each write. Says whether a read would find anything new; orders nothing. 0: nothing was written
+    /// yet.
     #[inline]
     pub fn version(&self) -> u32 {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Says which of two places has the valid value: place `index % 2`, where the index counts the values. 0: none yet. The writer
-/// fills the other place, then publishes it.
+/// Says which of two places has the valid value: place `index % 2`, where the index counts the values. 0: none yet. The
+/// writer fills the other place, then publishes it.
 #[derive(Debug, Default)]
 #[repr(transparent)]
 pub(crate) struct SeqLatch(AtomicU64);
@@ -90,8 +92,8 @@ impl SeqLatch {
     /// [`SeqLatch::publish`], and must store all words.
     pub(crate) fn fill(&self, store: impl FnOnce(usize)) {
         let next = self.next();
-        // ORDERING (E): the index of the last value before the words of this one: a reader of the place that is filled now sees
-        // that the index has changed. Pairs with (F).
+        // ORDERING (E): the index of the last value before the words of this one: a reader of the place that is filled
+        // now sees that the index has changed. Pairs with (F).
         fence(Ordering::Release);
         store((next % 2) as usize);
     }
@@ -104,8 +106,8 @@ impl SeqLatch {
         step!("cell: published");
     }
 
-    /// What `look` returns for the valid place. None before the first value, or if the writer published twice during each of
-    /// so many tries.
+    /// What `look` returns for the valid place. None before the first value, or if the writer published twice during
+    /// each of so many tries.
     pub(crate) fn read<T>(&self, tries: usize, look: impl Fn(usize) -> T) -> Option<T> {
         for _ in 0..tries {
             // ORDERING: Acquire (H); pairs with (G): the value that the index names is whole.
@@ -114,8 +116,8 @@ impl SeqLatch {
                 return None;
             }
             let seen = look((index % 2) as usize);
-            // ORDERING (F): the words before the second look at the index. Pairs with (E): as long as the index stays, the
-            // writer is at most in the other place.
+            // ORDERING (F): the words before the second look at the index. Pairs with (E): as long as the index stays,
+            // the writer is at most in the other place.
             fence(Ordering::Acquire);
             if self.0.load(Ordering::Relaxed) == index {
                 return Some(seen);

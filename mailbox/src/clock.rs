@@ -7,7 +7,8 @@
 //! | [`slept_ns`] | alone then | no | no | to see that the computer slept |
 //! | [`realtime_ns`] | yes | yes | yes | the beginning of system time |
 
-/// Nanoseconds that passed since this computer was started, also those for which it slept; the same for all its processes.
+/// Nanoseconds that passed since this computer was started, also those for which it slept; the same for all its
+/// processes.
 #[inline]
 pub fn monotonic_ns() -> u64 {
     now_ns(libc::CLOCK_BOOTTIME)
@@ -22,7 +23,8 @@ pub fn unslewed_ns() -> u64 {
 /// Readings of two clocks are compared if there was so little between them.
 const READ_TRIES: usize = 4;
 
-/// For how long this computer has slept since it was started, ns; at most a few microseconds off, unless this thread is held up each time that it looks.
+/// For how long this computer has slept since it was started, ns; at most a few microseconds off, unless this thread is
+/// held up each time that it looks.
 pub fn slept_ns() -> u64 {
     let look = || {
         let before_ns = now_ns(libc::CLOCK_MONOTONIC);
@@ -33,7 +35,8 @@ pub fn slept_ns() -> u64 {
     (0..READ_TRIES).map(|_| look()).min().map_or(0, |(_, slept_ns)| slept_ns)
 }
 
-/// For how long it has slept at least, ns; quicker to tell than [`slept_ns`]. `passed_ns`: a reading of [`monotonic_ns`] just before.
+/// For how long it has slept at least, ns; quicker to tell than [`slept_ns`]. `passed_ns`: a reading of
+/// [`monotonic_ns`] just before.
 #[inline]
 pub(crate) fn slept_ns_min(passed_ns: u64) -> u64 {
     passed_ns.saturating_sub(now_ns(libc::CLOCK_MONOTONIC))
@@ -47,8 +50,8 @@ pub fn realtime_ns() -> u64 {
 #[inline]
 fn now_ns(clock: libc::clockid_t) -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: writes the time, which lives here. All of these clocks exist on every Linux that has what mailboxes need, so this cannot fail; 0 would be
-    // the year 1970.
+    // SAFETY: writes the time, which lives here. All of these clocks exist on every Linux that has what mailboxes need,
+    // so this cannot fail; 0 would be the year 1970.
     unsafe { libc::clock_gettime(clock, &raw mut time) };
     (time.tv_sec as u64).wrapping_mul(1_000_000_000).wrapping_add(time.tv_nsec as u64)
 }

@@ -7,8 +7,8 @@
 //! The receiver reads the bell before it says that it sleeps; so a ring after its last look changes the word it would
 //! sleep on. One bell serves all mailboxes of a participant, so waiting on several is waiting on one.
 //!
-//! Who waits for file descriptors too sleeps in `poll` and has a named pipe `bell.N` in the node's directory, N its place in the
-//! table. Only then anybody opens it (see `bell`).
+//! Who waits for file descriptors too sleeps in `poll` and has a named pipe `bell.N` in the node's directory, N its
+//! place in the table. Only then anybody opens it (see `bell`).
 
 use crate::node::Node;
 use crate::step::step;
@@ -60,9 +60,9 @@ pub(crate) fn ring(node: &Node, participant: u16) {
     }
 }
 
-/// What can go wrong does no harm: the sleeper is dead, its pipe gone, or so full that it will not sleep. Or we, or the system,
-/// have no descriptor or memory left to open it with: then the sleeper sees the ring a little later by itself (`PIPE_TRUSTED` in
-/// `watch`).
+/// What can go wrong does no harm: the sleeper is dead, its pipe gone, or so full that it will not sleep. Or we, or the
+/// system, have no descriptor or memory left to open it with: then the sleeper sees the ring a little later by itself
+/// (`PIPE_TRUSTED` in `watch`).
 #[cold]
 fn write_to_pipe(node: &Node, participant: u16) {
     step!("ring: before pipe");
@@ -72,8 +72,8 @@ fn write_to_pipe(node: &Node, participant: u16) {
     step!("ring: piped");
 }
 
-/// For reading and writing, both sides: so the sleeper is never told that the last writer has gone, and a ringer gets no SIGPIPE
-/// for a sleeper that has.
+/// For reading and writing, both sides: so the sleeper is never told that the last writer has gone, and a ringer gets
+/// no SIGPIPE for a sleeper that has.
 fn open_pipe(node: &Node, participant: u16) -> nix::Result<OwnedFd> {
     let flags = OFlag::O_RDWR | OFlag::O_NONBLOCK | OFlag::O_CLOEXEC | OFlag::O_NOFOLLOW;
     // By the directory's descriptor and on the stack: ringing takes nothing from the heap.
@@ -106,8 +106,8 @@ fn with_name<T>(participant: u16, then: impl FnOnce(&CStr) -> T) -> T {
     then(CStr::from_bytes_until_nul(&name).unwrap_or_default())
 }
 
-/// Takes the bytes out that woke the sleeper, for a poller that was stopped under load up to a pipe full, 64 KiB. What does not
-/// fit wakes it once more.
+/// Takes the bytes out that woke the sleeper, for a poller that was stopped under load up to a pipe full, 64 KiB. What
+/// does not fit wakes it once more.
 pub(crate) fn drain(pipe: &impl AsFd) {
     let _ = nix::unistd::read(pipe, &mut [0; 4096]);
 }

@@ -6,7 +6,8 @@ use std::io::{self, IoSlice, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 
-/// Opens a file of the node's directory, never through a link. A new file may be used by whom the directory's mode lets in.
+/// Opens a file of the node's directory, never through a link. A new file may be used by whom the directory's mode lets
+/// in.
 pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).write(true).mode(0o600).custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW);
@@ -25,7 +26,8 @@ pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
     }
 }
 
-/// The folder of this path, or the nearest around it that is there: what a person can look at when a node could not be made.
+/// The folder of this path, or the nearest around it that is there: what a person can look at when a node could not be
+/// made.
 pub(crate) fn existing(path: &Path) -> &Path {
     path.ancestors().find(|folder| folder.exists()).unwrap_or(path)
 }
@@ -36,8 +38,9 @@ pub(crate) fn open_to_read(path: &Path) -> io::Result<File> {
     OpenOptions::new().read(true).custom_flags(flags).open(path)
 }
 
-/// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later. Written, since memory that is only
-/// reserved (fallocate) is cleared page by page when it is mapped, which takes half as long again. Its position is its beginning.
+/// Gives a file its memory now: a full /dev/shm is an error here, not a bus error later. Written, since memory that is
+/// only reserved (fallocate) is cleared page by page when it is mapped, which takes half as long again. Its position is
+/// its beginning.
 pub(crate) fn allocate(mut file: &File, bytes: usize) -> io::Result<()> {
     /// Pages that one call writes.
     const AT_ONCE: usize = 64;
@@ -56,7 +59,8 @@ pub(crate) fn allocate(mut file: &File, bytes: usize) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether it is about memory, and not about names, rights or descriptors. A limit of file sizes looks like a full file system.
+/// Whether it is about memory, and not about names, rights or descriptors. A limit of file sizes looks like a full file
+/// system.
 pub(crate) fn is_lack_of_memory(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, OutOfMemory, QuotaExceeded, StorageFull};
     matches!(error.kind(), FileTooLarge | OutOfMemory | QuotaExceeded | StorageFull)

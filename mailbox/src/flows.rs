@@ -11,14 +11,15 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// A row is changed within nanoseconds, unless its writer was just put aside: then it gets time to go on. So many naps are for
-/// all rows of all participants together, since launch looks too and must not be held up by those who were stopped in there, nor
-/// by a damaged table.
+/// A row is changed within nanoseconds, unless its writer was just put aside: then it gets time to go on. So many naps
+/// are for all rows of all participants together, since launch looks too and must not be held up by those who were
+/// stopped in there, nor by a damaged table.
 const TRIES_AT_ONCE: usize = 8;
 const NAPS: u32 = 24;
 const NAP: Duration = Duration::from_micros(100);
 
-/// Packages of one type that one participant sends from one name to one mailbox, or values of one kind that it publishes.
+/// Packages of one type that one participant sends from one name to one mailbox, or values of one kind that it
+/// publishes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlowInfo {
     /// The process that sends.
@@ -57,7 +58,8 @@ pub struct FlowInfo {
 pub struct FlowSecond {
     /// Which second of the monotonic clock.
     pub second: u64,
-    /// Shortest and longest time to a package of this second from the one before, ns; none when it was the first of all.
+    /// Shortest and longest time to a package of this second from the one before, ns; none when it was the first of
+    /// all.
     pub interval_ns: Option<(u64, u64)>,
     /// Smallest and largest body.
     pub bytes: (u32, u32),
@@ -69,8 +71,8 @@ impl FlowInfo {
         self.to == Name::NONE && self.kind != Type(0)
     }
 
-    /// Whether `other` is the same flow at another time, so that counts can be subtracted. One that lost its row to others and came
-    /// back is not: it counts from 0 again, and its first package is another.
+    /// Whether `other` is the same flow at another time, so that counts can be subtracted. One that lost its row to
+    /// others and came back is not: it counts from 0 again, and its first package is another.
     pub fn is_same(&self, other: &Self) -> bool {
         let none_yet = self.packages == 0 || other.packages == 0;
         self.is_like(other) && (none_yet || self.first_ns == other.first_ns)
@@ -80,8 +82,8 @@ impl FlowInfo {
         (self.incarnation, self.to, self.from, self.kind) == (other.incarnation, other.to, other.from, other.kind)
     }
 
-    /// Packages a second between the last package that `earlier` saw and the last of all: exact, whenever one looks. None
-    /// when there was no package since. Without `earlier`, or with one of another first package, since the first.
+    /// Packages a second between the last package that `earlier` saw and the last of all: exact, whenever one looks.
+    /// None when there was no package since. Without `earlier`, or with one of another first package, since the first.
     pub fn rate_since(&self, earlier: Option<&Self>) -> Option<f64> {
         let (packages, from_ns) =
             match earlier.filter(|earlier| earlier.packages > 0 && earlier.first_ns == self.first_ns) {
@@ -92,7 +94,8 @@ impl FlowInfo {
         (packages > 0 && ns > 0).then(|| packages as f64 * 1e9 / ns as f64)
     }
 
-    /// Adds what another sender of the same participant sends to the same place. Another process wrote it, so it may be anything.
+    /// Adds what another sender of the same participant sends to the same place. Another process wrote it, so it may be
+    /// anything.
     fn add(&mut self, other: Self) {
         self.packages = self.packages.saturating_add(other.packages);
         self.bytes = self.bytes.saturating_add(other.bytes);

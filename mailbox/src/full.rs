@@ -6,13 +6,13 @@ pub enum OverflowPolicy {
     /// It takes the place of the newest of the least important packages, if it is more important; else it is refused.
     #[default]
     Displace = 0,
-    /// For state, of which only the newest counts. A package replaces the older one of the same sender, type and id that
-    /// still waits, whether or not the mailbox is full, and takes its place in the order: the older one is counted as
-    /// replaced. One that has nothing to replace and finds no free slot displaces as above.
+    /// For state, of which only the newest counts. A package replaces the older one of the same sender, type and id
+    /// that still waits, whether or not the mailbox is full, and takes its place in the order: the older one is counted
+    /// as replaced. One that has nothing to replace and finds no free slot displaces as above.
     ///
     /// Commands are never replaced, since each has an id of its own. A sender knows what it sent itself, through this
-    /// [`Sender`](crate::Sender): what it sent before it was started again is received as well, before the newer. Between
-    /// different states of one sender there is no order when one of them has replaced an older package.
+    /// [`Sender`](crate::Sender): what it sent before it was started again is received as well, before the newer.
+    /// Between different states of one sender there is no order when one of them has replaced an older package.
     Latest = 2,
     /// It is refused (seed 002, 3.2).
     Reject = 1,

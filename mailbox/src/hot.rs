@@ -1,7 +1,8 @@
-//! What senders and receiver tell each other besides the slots' words: tickets, hints, whether to ring, whether to alert.
+//! What senders and receiver tell each other besides the slots' words: tickets, hints, whether to ring, whether to
+//! alert.
 //!
-//! None of it is the truth about a package; that is its word alone. All of it may be lost with a process that dies before it says
-//! it, and is then found by looking at the words (see the table in `slots`).
+//! None of it is the truth about a package; that is its word alone. All of it may be lost with a process that dies
+//! before it says it, and is then found by looking at the words (see the table in `slots`).
 
 use crate::name::Priority;
 use crate::slots::{SLOTS_MAX, Slots};
@@ -16,20 +17,20 @@ pub(crate) const HINT_WORDS: usize = SLOTS_MAX / 64;
 #[repr(C, align(128))]
 pub(crate) struct CacheLine<T>(pub(crate) T);
 
-/// What senders and receiver touch with every package, each part in lines of its own: what counts is how often a line goes from
-/// one processor to the other.
+/// What senders and receiver touch with every package, each part in lines of its own: what counts is how often a line
+/// goes from one processor to the other.
 #[derive(Default)]
 #[repr(C)]
 pub(crate) struct Hot {
-    /// Senders': the next ticket, that is, the order of publishing. Also the count of packages ever accepted here (one too many
-    /// for each sender that was killed between its ticket and its word).
+    /// Senders': the next ticket, that is, the order of publishing. Also the count of packages ever accepted here (one
+    /// too many for each sender that was killed between its ticket and its word).
     pub(crate) ticket: CacheLine<AtomicU64>,
     /// Slots that may have become ready. Hints: each is set after its word changed, and may be late or stale.
     pub(crate) ready: CacheLine<[AtomicU64; HINT_WORDS]>,
     /// Written by the receiver and seldom, read by senders with every package.
     pub(crate) receiver: CacheLine<ReceiverSays>,
-    /// Not 0: a sender has published something above the level. Written by senders seldom, read by the receiver with every
-    /// package.
+    /// Not 0: a sender has published something above the level. Written by senders seldom, read by the receiver with
+    /// every package.
     pub(crate) alert: CacheLine<AtomicU32>,
 }
 
@@ -39,14 +40,15 @@ pub(crate) struct Hot {
 pub(crate) struct ReceiverSays {
     /// Not 0: it sleeps or is about to; see [`rings`].
     pub(crate) sleeping: AtomicU32,
-    /// It has looked at all hints, and receives packages of this priority without looking again: who sends a more important one
-    /// says so by `alert`.
+    /// It has looked at all hints, and receives packages of this priority without looking again: who sends a more
+    /// important one says so by `alert`.
     pub(crate) level: AtomicU32,
     /// Not 0: this mailbox has been given up; what is sent here is not received.
     pub(crate) retired: AtomicU32,
 }
 
-/// `sleeping` of a receiver that wakes up for every package; for those above a priority alone, it is more by one and the priority.
+/// `sleeping` of a receiver that wakes up for every package; for those above a priority alone, it is more by one and
+/// the priority.
 const FOR_ALL: u32 = 1;
 
 /// Whether a package of this priority is to ring the bell of a receiver that says this of its sleep.
@@ -57,7 +59,8 @@ pub(crate) fn rings(sleeping: u32, priority: Priority) -> bool {
 impl Slots<'_> {
     /// Says that a slot became ready.
     pub(crate) fn hint(&self, slot: usize) {
-        // ORDERING: Release; pairs with the receiver's swap, which then sees the word this hint speaks of. SeqCst for (E).
+        // ORDERING: Release; pairs with the receiver's swap, which then sees the word this hint speaks of. SeqCst for
+        // (E).
         self.hot.ready.0[slot / 64].fetch_or(1 << (slot % 64), Ordering::SeqCst);
     }
 
@@ -79,7 +82,8 @@ impl Slots<'_> {
     }
 
     fn drowsy_until(&self, sleeping: u32) {
-        // ORDERING: Release, at least; who sees this owner asleep sees whose bell to ring. Pairs with the load in `publish`.
+        // ORDERING: Release, at least; who sees this owner asleep sees whose bell to ring. Pairs with the load in
+        // `publish`.
         self.hot.receiver.0.sleeping.store(sleeping, Ordering::SeqCst);
         // ORDERING (F): `sleeping` before the last look at the hints. Pairs with (E).
         seq_cst_accesses();
@@ -90,8 +94,8 @@ impl Slots<'_> {
         self.hot.receiver.0.sleeping.store(0, Ordering::Relaxed);
     }
 
-    /// Has the line of the hints come here to be written, as it will be: looked at first, it would come twice. Who looks again and
-    /// again keeps it, and nothing moves until a sender takes it.
+    /// Has the line of the hints come here to be written, as it will be: looked at first, it would come twice. Who
+    /// looks again and again keeps it, and nothing moves until a sender takes it.
     pub(crate) fn expect_hints(&self) {
         prefetch_to_write(&raw const self.hot.ready);
     }
@@ -108,13 +112,13 @@ impl Slots<'_> {
 
     /// Clears the alert. Look at the hints after this.
     pub(crate) fn heed(&self) {
-        // ORDERING: Acquire; whatever this clears, its hint is seen. Pairs with the swap in `publish`. Release, so that a swap after
-        // this one still hands on what came before.
+        // ORDERING: Acquire; whatever this clears, its hint is seen. Pairs with the swap in `publish`. Release, so that
+        // a swap after this one still hands on what came before.
         self.hot.alert.0.swap(0, Ordering::AcqRel);
     }
 
-    /// From now on whoever sends something above this alerts. Raised: who has read the old level alerts for nothing, and Relaxed will
-    /// do: the next lowering is ordered against all who read this.
+    /// From now on whoever sends something above this alerts. Raised: who has read the old level alerts for nothing,
+    /// and Relaxed will do: the next lowering is ordered against all who read this.
     pub(crate) fn raise_level(&self, level: Priority) {
         self.hot.receiver.0.level.store(level.0.into(), Ordering::Relaxed);
     }
@@ -122,8 +126,8 @@ impl Slots<'_> {
     /// The same, when the level sinks: then look at the hints once more.
     pub(crate) fn lower_level(&self, level: Priority) {
         self.hot.receiver.0.level.store(level.0.into(), Ordering::SeqCst);
-        // ORDERING (J): the level before the look at the hints. Pairs with (E): who has read the higher level, and therefore did
-        // not alert, is seen by that look.
+        // ORDERING (J): the level before the look at the hints. Pairs with (E): who has read the higher level, and
+        // therefore did not alert, is seen by that look.
         seq_cst_accesses();
         step!("level: lowered");
     }

@@ -1,5 +1,5 @@
-//! Mailboxes seen from outside: which there are, and what each says of itself. Looking changes nothing, asks nobody and needs
-//! no lock; so what is seen is a moment, and its parts are of moments that lie a little apart.
+//! Mailboxes seen from outside: which there are, and what each says of itself. Looking changes nothing, asks nobody and
+//! needs no lock; so what is seen is a moment, and its parts are of moments that lie a little apart.
 
 use crate::counters::ClassTraffic;
 use crate::layout::Shape;

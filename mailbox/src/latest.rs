@@ -1,8 +1,8 @@
 //! What a sender remembers of its own packages in a `latest` mailbox, so that the next of the same state replaces them.
 //!
-//! Two packages of one sender are of the same state if `from`, `kind` and `id` of their heads are the same. A subscription's
-//! data have one id, so the newer replaces the older; commands each have their own, so none is ever replaced: whoever
-//! called waits for the answer.
+//! Two packages of one sender are of the same state if `from`, `kind` and `id` of their heads are the same. A
+//! subscription's data have one id, so the newer replaces the older; commands each have their own, so none is ever
+//! replaced: whoever called waits for the answer.
 
 use crate::full::OverflowPolicy;
 use crate::layout::Shape;
@@ -11,7 +11,8 @@ use crate::package::Type;
 use crate::sender::Label;
 use crate::slots::{Posted, Slots};
 
-/// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word says.
+/// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word
+/// says.
 pub(crate) struct Posts {
     posts: Vec<(LatestState, Posted)>,
     /// One for each slot; 0 when the mailbox is not `latest`.

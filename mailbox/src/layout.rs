@@ -167,8 +167,8 @@ impl Identity {
         version.filter(|version| *version != VERSION)
     }
 
-    /// What the segment claims to be; none when that cannot be. Another process wrote it, so everything is checked here,
-    /// once; afterwards only the result is used.
+    /// What the segment claims to be; none when that cannot be. Another process wrote it, so everything is checked
+    /// here, once; afterwards only the result is used.
     pub(crate) fn read(&self) -> Option<(Name, Shape)> {
         use std::sync::atomic::Ordering::{Acquire, Relaxed};
         if self.magic.load(Acquire) != MAGIC || self.version.load(Relaxed) != VERSION {

@@ -1,7 +1,8 @@
 //! Open-file-description locks: they tell which processes live.
 //!
-//! Not POSIX record locks, which vanish when any descriptor of the file closes. Files are opened close-on-exec, so a started
-//! program does not keep them; a forked child without exec does, and then counts as alive. (fcntl(2), F_OFD_SETLK)
+//! Not POSIX record locks, which vanish when any descriptor of the file closes. Files are opened close-on-exec, so a
+//! started program does not keep them; a forked child without exec does, and then counts as alive. (fcntl(2),
+//! F_OFD_SETLK)
 
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, fcntl};
@@ -34,8 +35,8 @@ pub(crate) fn is_locked(file: &File, byte: u64) -> io::Result<bool> {
     Ok(i32::from(answer.l_type) != libc::F_UNLCK)
 }
 
-/// One byte of an open file, locked until this drops. Given back by name: closing the file alone would leave it locked while
-/// a child that another thread is just starting still has a copy of the descriptor.
+/// One byte of an open file, locked until this drops. Given back by name: closing the file alone would leave it locked
+/// while a child that another thread is just starting still has a copy of the descriptor.
 pub(crate) struct Held {
     pub(crate) file: File,
     byte: u64,

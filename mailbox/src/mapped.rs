@@ -1,5 +1,5 @@
-//! Mailboxes that this process has mapped to send to them: each once. A router's, into which all goes that is for other nodes, would else be mapped
-//! for each mailbox there.
+//! Mailboxes that this process has mapped to send to them: each once. A router's, into which all goes that is for other
+//! nodes, would else be mapped for each mailbox there.
 
 use crate::memory::{Mapping, Region, Use};
 use std::fs::File;

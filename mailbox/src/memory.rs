@@ -20,8 +20,8 @@ unsafe impl Shared for AtomicU32 {}
 // SAFETY: an atomic; all bit patterns are numbers.
 unsafe impl Shared for AtomicU64 {}
 
-/// A shared mapping of a file's beginning, or one of several users of it in this process. Truncating the file afterwards is outside our contract: all processes of a user
-/// trust each other's memory.
+/// A shared mapping of a file's beginning, or one of several users of it in this process. Truncating the file
+/// afterwards is outside our contract: all processes of a user trust each other's memory.
 #[derive(Clone)]
 pub(crate) struct Mapping {
     /// As in the region, which it keeps: reached without another look.
@@ -52,8 +52,8 @@ pub(crate) enum Use {
     Look,
     /// To read and write.
     Share,
-    /// The same, and the kernel is asked to keep the pages in memory. If the memlock limit does not allow it they are present
-    /// all the same, as long as memory is not short.
+    /// The same, and the kernel is asked to keep the pages in memory. If the memlock limit does not allow it they are
+    /// present all the same, as long as memory is not short.
     Keep,
 }
 
@@ -106,8 +106,8 @@ impl Mapping {
     pub(crate) fn slice<T: Shared>(&self, offset: usize, count: usize) -> &[T] {
         let first = self.bytes_at(offset, count * size_of::<T>()).cast::<T>();
         assert!(first.is_aligned());
-        // SAFETY: inside the mapping and aligned (both asserted); any bits are a `T` and others write only atomics of it
-        // (`Shared`); the borrow of `self` keeps the mapping.
+        // SAFETY: inside the mapping and aligned (both asserted); any bits are a `T` and others write only atomics of
+        // it (`Shared`); the borrow of `self` keeps the mapping.
         unsafe { std::slice::from_raw_parts(first.as_ptr(), count) }
     }
 

@@ -12,7 +12,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Importance of a package or a module, 0..=255; 255 is the most urgent. It is the class id, there is no other key for it.
+/// Importance of a package or a module, 0..=255; 255 is the most urgent. It is the class id, there is no other key for
+/// it.
 ///
 /// ```
 /// use rohrpost_mailbox::Priority;

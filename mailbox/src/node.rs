@@ -13,8 +13,8 @@
 //!     01c80000.about what its owner says of it (see `about`)
 //! ```
 //!
-//! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the file
-//! `node`: the kernel drops that lock with the process, whatever killed it.
+//! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the
+//! file `node`: the kernel drops that lock with the process, whatever killed it.
 
 use crate::doorbell;
 use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
@@ -74,7 +74,8 @@ pub enum NodeError {
     Foreign(PathBuf, u32),
     /// Another version's layout.
     #[error(
-        "node {0} was made by another version of Rohrpost (layout {1}, this program has {VERSION}); use the `rohrpost` that \
+        "node {0} was made by another version of Rohrpost (layout {1}, this program has {VERSION}); use the \
+        `rohrpost` that \
          launched it, or stop what runs there and remove the directory"
     )]
     Version(PathBuf, u32),
@@ -88,7 +89,8 @@ pub enum NodeError {
     },
     /// As many files are open as may be.
     #[error(
-        "node {0}: this process, or the computer, has no file descriptor left; raise the limit (ulimit -n, or LimitNOFILE= \
+        "node {0}: this process, or the computer, has no file descriptor left; raise the limit (ulimit -n, or \
+        LimitNOFILE= \
          of a service)"
     )]
     Descriptors(PathBuf),
@@ -122,7 +124,8 @@ pub fn base_directory() -> PathBuf {
     }
 }
 
-/// Removes the directory around this user's nodes if it is empty and our own to choose; one that `$ROHRPOST_DIR` names stays.
+/// Removes the directory around this user's nodes if it is empty and our own to choose; one that `$ROHRPOST_DIR` names
+/// stays.
 pub fn remove_base_if_empty() {
     if std::env::var_os("ROHRPOST_DIR").is_none() {
         // Refused when something is in it, as it should be.
@@ -261,9 +264,10 @@ impl Node {
         !same() || !lock::is_locked(&self.file, u64::from(who.participant)).unwrap_or(true)
     }
 
-    /// A number that is later than all that this node gave out before; they count upwards, wrap, and are never 0. Participants
-    /// have one each, from when they joined. That says nothing of the order in which they then have a name, so whoever must be
-    /// told from earlier owners of a name asks for one of its own, when the name's mailbox is its own.
+    /// A number that is later than all that this node gave out before; they count upwards, wrap, and are never 0.
+    /// Participants have one each, from when they joined. That says nothing of the order in which they then have a
+    /// name, so whoever must be told from earlier owners of a name asks for one of its own, when the name's mailbox is
+    /// its own.
     pub fn next_incarnation(&self) -> u32 {
         self.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1)
     }
@@ -276,10 +280,11 @@ impl Node {
         (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| doorbell::ring(self, index));
     }
 
-    /// Changes with every new, taken over and gone mailbox. One that was not there when the number, read *before* looking,
-    /// was this is still not there while it is the same: one load, and no system call.
+    /// Changes with every new, taken over and gone mailbox. One that was not there when the number, read *before*
+    /// looking, was this is still not there while it is the same: one load, and no system call.
     pub fn registry_epoch(&self) -> u32 {
-        // ORDERING: Acquire; who sees the number raised finds the file. Pairs with the raise after it was renamed or unlinked.
+        // ORDERING: Acquire; who sees the number raised finds the file. Pairs with the raise after it was renamed or
+        // unlinked.
         self.page().registry_epoch.load(Ordering::Acquire)
     }
 
@@ -294,8 +299,8 @@ impl Node {
 
     /// The same, with their places in the table.
     pub(crate) fn living(&self) -> impl Iterator<Item = (Claimant, ParticipantInfo)> + '_ {
-        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group. Asked
-        // first, and once more with the lock seen held: the lock is a system call, and most places are empty.
+        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group.
+        // Asked first, and once more with the lock seen held: the lock is a system call, and most places are empty.
         let used = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
         let alive = |index: &u16| lock::is_locked(&self.file, u64::from(*index)).unwrap_or(false);
         let all = (0..PARTICIPANTS_MAX as u16).filter(used).filter(alive);
@@ -303,8 +308,8 @@ impl Node {
         here.map(|(index, found)| (Claimant { participant: index, incarnation: found.incarnation }, found))
     }
 
-    /// The last that this process said of what it does as this module, also if it has died since; none when it has left in
-    /// order, or another has taken its place in the table.
+    /// The last that this process said of what it does as this module, also if it has died since; none when it has left
+    /// in order, or another has taken its place in the table.
     pub fn last_word_of(&self, module: Name, pid: u32) -> Option<ParticipantInfo> {
         let all = self.page().entries.iter().map(Entry::read);
         // An earlier process may have had the number.
@@ -337,8 +342,8 @@ impl Node {
         Ok(LaunchLock { _held: held })
     }
 
-    /// Whether `file`, just opened by its path, is the one that this node has mapped: the directory may have been removed.
-    /// Asked when its lock is held; until then somebody may be removing it.
+    /// Whether `file`, just opened by its path, is the one that this node has mapped: the directory may have been
+    /// removed. Asked when its lock is held; until then somebody may be removing it.
     pub(crate) fn check_present(&self, file: &File) -> Result<(), NodeError> {
         let failed = |error| NodeError::of(&self.path, error);
         let there = file.metadata().map_err(failed)?;
@@ -346,12 +351,13 @@ impl Node {
         if present { Ok(()) } else { Err(NodeError::Missing(self.path.clone())) }
     }
 
-    /// Takes the launch's place and every participant's; none when somebody has one of them. So nobody can join or launch
-    /// until the result is dropped.
+    /// Takes the launch's place and every participant's; none when somebody has one of them. So nobody can join or
+    /// launch until the result is dropped.
     pub(crate) fn keep_all_out(&self) -> Result<Option<AllHeld>, NodeError> {
         let failed = |error| NodeError::of(&self.path, error);
         let held = AllHeld(open_shared(&self.path.join("node"), false).map_err(failed)?);
-        // The launch's first: on a node that runs nothing else is taken, not even for a moment in which somebody wants to join.
+        // The launch's first: on a node that runs nothing else is taken, not even for a moment in which somebody wants
+        // to join.
         for byte in std::iter::once(LAUNCH_BYTE).chain(0..PARTICIPANTS_MAX as u64) {
             if !lock::try_lock(&held.0, byte).map_err(failed)? {
                 return Ok(None);
@@ -399,8 +405,8 @@ impl Drop for RegistryLock {
     }
 }
 
-/// Whether a node's file is finished; false when it was just begun, or its maker died. Every version begins its files with
-/// the magic number, which is written last, and its version.
+/// Whether a node's file is finished; false when it was just begun, or its maker died. Every version begins its files
+/// with the magic number, which is written last, and its version.
 fn is_whole(path: &Path, file: &File) -> Result<bool, NodeError> {
     let failed = |error| NodeError::of(path, error);
     let (there, mut magic, mut version) = (file.metadata().map_err(failed)?, [0; 8], [0; 4]);

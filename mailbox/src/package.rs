@@ -83,14 +83,15 @@ pub struct Options(pub u8);
 impl Options {
     /// The head's fields are big-endian.
     pub const BIG_ENDIAN: Self = Self(1);
-    /// The body's first 8 bytes are the system time of its making, nanoseconds since 1970, little-endian; counted in `len`.
+    /// The body's first 8 bytes are the system time of its making, nanoseconds since 1970, little-endian; counted in
+    /// `len`.
     pub const STAMPED: Self = Self(2);
     /// The body is a fault, not the answer that was asked for.
     pub const ERROR: Self = Self(4);
     /// Its receiver died while it had this package; it is handed out a second and last time.
     pub const REDELIVERED: Self = Self(8);
-    /// Of data: of one sender, receiver, type and id only the newest counts, so a newer package may replace this one on its way. Of the command
-    /// that subscribes: the data are to be such.
+    /// Of data: of one sender, receiver, type and id only the newest counts, so a newer package may replace this one on
+    /// its way. Of the command that subscribes: the data are to be such.
     pub const NEWEST: Self = Self(16);
 
     /// Whether all bits of `other` are set.
@@ -156,7 +157,8 @@ impl Head {
     /// Reads a head of either byte order. The order bit of the result is clear: the fields are this machine's now.
     ///
     /// # Errors
-    /// [`Short`] when there are fewer than 16 bytes. Any 16 bytes are a head; whether its length fits is the caller's to check.
+    /// [`Short`] when there are fewer than 16 bytes. Any 16 bytes are a head; whether its length fits is the caller's
+    /// to check.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Short> {
         let Some(b) = bytes.first_chunk::<HEAD_BYTES>() else {
             return Err(Short { have: bytes.len(), need: HEAD_BYTES });

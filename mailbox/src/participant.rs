@@ -63,7 +63,8 @@ impl Participant {
             entry.incarnation.store(incarnation, Ordering::Release);
             step!("join: incarnation");
             if died {
-                // From our lock until the new incarnation the dead one looked alive; who searched then missed what it left.
+                // From our lock until the new incarnation the dead one looked alive; who searched then missed what it
+                // left.
                 node.announce_death();
             }
             entry.pid.store(std::process::id(), Ordering::Relaxed);
@@ -80,8 +81,8 @@ impl Participant {
         &self.node
     }
 
-    /// Tells this use of the name from all earlier ones on this node; also from those before its directory was last made, on
-    /// a computer whose clock runs on while it is off.
+    /// Tells this use of the name from all earlier ones on this node; also from those before its directory was last
+    /// made, on a computer whose clock runs on while it is off.
     pub fn incarnation(&self) -> u32 {
         self.me.incarnation
     }
@@ -101,7 +102,8 @@ impl Participant {
         self.entry().restarts.store(restarts, Ordering::Relaxed);
     }
 
-    /// Says that this part of the module's own code runs from now on, for everyone to read. One store; by one thread alone.
+    /// Says that this part of the module's own code runs from now on, for everyone to read. One store; by one thread
+    /// alone.
     pub fn begin_work(&self, work: Work) {
         self.entry().mark.begin(work);
     }
@@ -141,8 +143,8 @@ impl Participant {
 }
 
 impl Participant {
-    /// Takes its name and its process id out of the table: it ends in order, and is not to be mourned. Dropping it does the
-    /// same; this is for processes whose threads keep it until they end.
+    /// Takes its name and its process id out of the table: it ends in order, and is not to be mourned. Dropping it does
+    /// the same; this is for processes whose threads keep it until they end.
     pub fn leave(&self) {
         let entry = self.entry();
         doorbell::remove_pipe(&self.node, self.me.participant);

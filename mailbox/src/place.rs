@@ -4,9 +4,9 @@ use crate::word::Claimant;
 
 /// Where a sender looks for a free slot first.
 ///
-/// As long as the receiver keeps up, in few slots by turns: their lines are still in the caches of both, and the next can be
-/// fetched while the receiver reads the last. When these are in use, onwards through all, so that a long queue is not searched
-/// for each package anew.
+/// As long as the receiver keeps up, in few slots by turns: their lines are still in the caches of both, and the next
+/// can be fetched while the receiver reads the last. When these are in use, onwards through all, so that a long queue
+/// is not searched for each package anew.
 pub(crate) struct Place {
     /// The slot that the next search begins with, if it is not for the home.
     cursor: usize,

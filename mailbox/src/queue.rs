@@ -1,7 +1,7 @@
 //! The receiver's private view of a mailbox: which ready slot comes first.
 //!
-//! Holds hints only, one entry a slot: the word is asked again, by compare-and-swap, when a package is taken. Everything
-//! is allocated at the start.
+//! Holds hints only, one entry a slot: the word is asked again, by compare-and-swap, when a package is taken.
+//! Everything is allocated at the start.
 
 use crate::hot::HINT_WORDS;
 use crate::name::Priority;
@@ -9,8 +9,8 @@ use crate::slots::{Slots, Taken};
 use crate::sync::Ordering;
 use crate::word::Word;
 
-/// Every so many receives one word in turn is marked for the next look, hint or no hint: a sender may have died between publishing
-/// and setting it.
+/// Every so many receives one word in turn is marked for the next look, hint or no hint: a sender may have died between
+/// publishing and setting it.
 const RESCAN_EVERY: u32 = 16;
 const ABSENT: u16 = u16::MAX;
 
@@ -23,8 +23,8 @@ pub(crate) struct Queue {
     heap: Vec<(Word, u16)>,
     /// Where in the heap a slot stands.
     place: Vec<u16>,
-    /// Slots to be looked at next time without a hint: those seen with a ticket younger than the look, else a sender's second
-    /// package could pass its first; and those that are rescanned.
+    /// Slots to be looked at next time without a hint: those seen with a ticket younger than the look, else a sender's
+    /// second package could pass its first; and those that are rescanned.
     deferred: [u64; HINT_WORDS],
     receives: u32,
     /// What senders were told: who sends something above this alerts.
@@ -59,8 +59,8 @@ impl Queue {
             self.defer((self.receives / RESCAN_EVERY) as usize % slots.count());
         }
         let mut known = self.knows_the_first(slots);
-        // Each turn but the last drops an entry whose package was displaced or replaced since it was seen; that as often as there are
-        // slots is more bad luck than going on forever for.
+        // Each turn but the last drops an entry whose package was displaced or replaced since it was seen; that as
+        // often as there are slots is more bad luck than going on forever for.
         for _ in 0..=slots.count() {
             if !known {
                 self.look_for_the_first(slots);
@@ -130,22 +130,22 @@ impl Queue {
     /// Moves what the hints speak of into the heap: with a package all that its sender published before it.
     pub(crate) fn look(&mut self, slots: &Slots<'_>) {
         self.collect(slots, u64::MAX);
-        // ORDERING: the words were read with Acquire. Who published one of them had hinted its earlier ones before; those hints
-        // were among the swapped ones, or are seen here.
+        // ORDERING: the words were read with Acquire. Who published one of them had hinted its earlier ones before;
+        // those hints were among the swapped ones, or are seen here.
         if !slots.any_hint() {
             return;
         }
-        // Senders are quick, and going on until nothing new comes would have no bound. Of what comes now, only what was published
-        // before this.
-        // ORDERING: Acquire; pairs with the fetch_add of `publish`: all that a sender hinted before its package T is seen below.
+        // Senders are quick, and going on until nothing new comes would have no bound. Of what comes now, only what was
+        // published before this. ORDERING: Acquire; pairs with the fetch_add of `publish`: all that a sender hinted
+        // before its package T is seen below.
         let horizon = slots.hot.ticket.0.load(Ordering::Acquire);
         self.collect(slots, horizon);
     }
 
     fn collect(&mut self, slots: &Slots<'_>, horizon: u64) {
         for (i, hints) in slots.hot.ready.0[..slots.count().div_ceil(64)].iter().enumerate() {
-            // Looked at before it is swapped, so that a hint word without hints is not written. SeqCst for (J): the look after the
-            // level sank.
+            // Looked at before it is swapped, so that a hint word without hints is not written. SeqCst for (J): the
+            // look after the level sank.
             let fresh = if hints.load(Ordering::SeqCst) == 0 { 0 } else { hints.swap(0, Ordering::AcqRel) };
             let mut bits = fresh | std::mem::take(&mut self.deferred[i]);
             while bits != 0 {

@@ -1,4 +1,5 @@
-//! The receiving side of a mailbox: read a package in place, most important first. A receiver that finds none sleeps in `waiting`.
+//! The receiving side of a mailbox: read a package in place, most important first. A receiver that finds none sleeps in
+//! `waiting`.
 
 use crate::about;
 use crate::clock::monotonic_ns;
@@ -20,7 +21,8 @@ use std::sync::atomic::Ordering;
 /// When a slot was still being filled at the last search, the next one comes after so many receives and waits.
 const SEARCH_AGAIN: u32 = 64;
 
-/// The one receiver of a mailbox. Dropped, the mailbox stays, and with it what was accepted: the next owner adopts it. See
+/// The one receiver of a mailbox. Dropped, the mailbox stays, and with it what was accepted: the next owner adopts it.
+/// See
 /// [`Receiver::close`] to remove it.
 pub struct Receiver {
     participant: Arc<Participant>,
@@ -70,7 +72,8 @@ impl Receiver {
         Some(self.hand_out(in_hand))
     }
 
-    /// How many packages wait, and how important the first is: all stay where they are. One that gave way just now may still be counted.
+    /// How many packages wait, and how important the first is: all stay where they are. One that gave way just now may
+    /// still be counted.
     pub fn waits(&mut self) -> (usize, Option<Priority>) {
         self.settle();
         (self.queue.len(), self.queue.first())
@@ -94,8 +97,8 @@ impl Receiver {
         let slots = self.segment.slots();
         slots.retire();
         step!("close: retired");
-        // If it cannot be removed (the registry stays locked, the directory is gone), it is retired all the same: nobody
-        // sends there any more, and the next receiver replaces it.
+        // If it cannot be removed (the registry stays locked, the directory is gone), it is retired all the same:
+        // nobody sends there any more, and the next receiver replaces it.
         let _ = unlink::remove(self.participant.node(), self.name());
         // After the fence of `retire` a sender either sees it and takes its package back, or its package is seen here.
         self.queue.rescan(&slots);

@@ -1,7 +1,8 @@
-//! Making, adopting, replacing and removing mailboxes (`inspect` looks at them): the files of a node's directory are the registry.
+//! Making, adopting, replacing and removing mailboxes (`inspect` looks at them): the files of a node's directory are
+//! the registry.
 //!
-//! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A file
-//! gets its name last, whole; so nobody ever opens half a mailbox.
+//! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A
+//! file gets its name last, whole; so nobody ever opens half a mailbox.
 
 use crate::counters::Loss;
 use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
@@ -57,7 +58,8 @@ pub enum CreateError {
     },
     /// As many files are open as may be.
     #[error(
-        "mailbox {0}: this process, or the computer, has no file descriptor left, and each mailbox that a process receives \
+        "mailbox {0}: this process, or the computer, has no file descriptor left, and each mailbox that a process \
+         receives \
          from takes one; raise the limit (ulimit -n, or LimitNOFILE= of a service), or use several processes"
     )]
     Descriptors(Name),
@@ -85,8 +87,8 @@ impl CreateError {
 }
 
 impl Participant {
-    /// Makes this participant the receiver of a mailbox. What an earlier receiver left there is adopted if the shape is the
-    /// same; else the old mailbox is given up and replaced.
+    /// Makes this participant the receiver of a mailbox. What an earlier receiver left there is adopted if the shape is
+    /// the same; else the old mailbox is given up and replaced.
     ///
     /// # Errors
     /// See [`CreateError`].
@@ -142,12 +144,13 @@ impl Participant {
         Ok(Predecessor::Same(old, lock))
     }
 
-    /// Makes the file, whole, then gives it its name. The old mailbox is given up only when the new one is whole: without
-    /// memory for that, what the old one holds stays.
+    /// Makes the file, whole, then gives it its name. The old mailbox is given up only when the new one is whole:
+    /// without memory for that, what the old one holds stays.
     fn make(&self, name: Name, shape: Shape, old: Option<&Segment>) -> Result<(Segment, Held), CreateError> {
         let node = self.node();
         let path = path_of(node.path(), name);
-        // One maker at a time (the registry's lock), so one temporary name will do; a dead maker's leftover is overwritten.
+        // One maker at a time (the registry's lock), so one temporary name will do; a dead maker's leftover is
+        // overwritten.
         let unfinished = node.path().join("unfinished");
         let made = || {
             let _ = fs::remove_file(&unfinished);

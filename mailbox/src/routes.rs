@@ -5,8 +5,8 @@
 //!            via: 1.250.0.3    1.200.0.0 ..= 1.200.0.255 | …
 //! ```
 //!
-//! This crate does not know why: the router of the node works it out from the configuration. The file appears whole. It is read
-//! only for a name that has no mailbox here, when a [`Sender`](crate::Sender) is opened.
+//! This crate does not know why: the router of the node works it out from the configuration. The file appears whole. It
+//! is read only for a name that has no mailbox here, when a [`Sender`](crate::Sender) is opened.
 
 use crate::files::{open_shared, open_to_read};
 use crate::layout::{MAGIC, VERSION};
@@ -26,8 +26,8 @@ const FILE: &str = "routes";
 const BEYOND: &str = "routes.beyond";
 
 impl Node {
-    /// Says that packages for these names (first and last of each range) go to the mailbox `via`, if they have no mailbox
-    /// here. What was said before is forgotten. Without ranges, nothing goes anywhere.
+    /// Says that packages for these names (first and last of each range) go to the mailbox `via`, if they have no
+    /// mailbox here. What was said before is forgotten. Without ranges, nothing goes anywhere.
     ///
     /// # Errors
     /// When the file cannot be written; what was said before stays.
@@ -39,8 +39,8 @@ impl Node {
         self.write_routes(FILE, via, ranges)
     }
 
-    /// The same for names that have no mailbox here and for which [`set_routes`](Self::set_routes) names no range: what is beyond the nodes
-    /// that the router knows.
+    /// The same for names that have no mailbox here and for which [`set_routes`](Self::set_routes) names no range: what
+    /// is beyond the nodes that the router knows.
     ///
     /// # Errors
     /// As there.
@@ -94,8 +94,8 @@ impl Node {
         Ok(())
     }
 
-    /// The mailbox of the router that takes packages for this name to another node; none if it has no route. A name with a
-    /// mailbox on this node may have one too: nobody follows it.
+    /// The mailbox of the router that takes packages for this name to another node; none if it has no route. A name
+    /// with a mailbox on this node may have one too: nobody follows it.
     pub fn route(&self, name: Name) -> Option<Name> {
         find(self.path(), name).ok().flatten()
     }

@@ -139,8 +139,8 @@ impl Segment {
     /// The body of a claimed slot, to write.
     pub(crate) fn body_mut<'a>(&'a self, claim: &'a mut Claim) -> &'a mut [u8] {
         let (slot, len) = (self.slot(claim.slot(), claim.segment()), usize::from(self.shape.body_bytes_max));
-        // SAFETY: `slot` gives room for prefix and body, and the borrow of `self` keeps the map. The claim is of this segment
-        // (`slot`), the only one of its slot (see `slots`), and borrowed: nothing else reaches these bytes.
+        // SAFETY: `slot` gives room for prefix and body, and the borrow of `self` keeps the map. The claim is of this
+        // segment (`slot`), the only one of its slot (see `slots`), and borrowed: nothing else reaches these bytes.
         unsafe { std::slice::from_raw_parts_mut(slot.add(SLOT_PREFIX).as_ptr(), len) }
     }
 
@@ -172,8 +172,8 @@ impl Segment {
     #[inline]
     pub(crate) fn body<'a>(&'a self, taken: &'a Taken, len: u16) -> &'a [u8] {
         let (slot, len) = (self.slot(taken.slot(), taken.segment()), len.min(self.shape.body_bytes_max));
-        // SAFETY: `len` stays inside the slot. Taken, and of this segment (`slot`), so nobody writes it; it is borrowed, so it is
-        // not released while the result lives.
+        // SAFETY: `len` stays inside the slot. Taken, and of this segment (`slot`), so nobody writes it; it is
+        // borrowed, so it is not released while the result lives.
         unsafe { std::slice::from_raw_parts(slot.add(SLOT_PREFIX).as_ptr(), usize::from(len)) }
     }
 }

@@ -107,9 +107,9 @@ pub struct Sender {
 }
 
 impl Participant {
-    /// Opens a mailbox for sending: one of this node; else, if the node's routes lead to it ([`Node::set_routes`]), the mailbox of
-    /// the router that takes packages there, which then keep this name as their receiver. One map; afterwards sending needs no
-    /// system call unless the receiver sleeps, no heap and no lock.
+    /// Opens a mailbox for sending: one of this node; else, if the node's routes lead to it ([`Node::set_routes`]), the
+    /// mailbox of the router that takes packages there, which then keep this name as their receiver. One map;
+    /// afterwards sending needs no system call unless the receiver sleeps, no heap and no lock.
     ///
     /// [`Node::set_routes`]: crate::Node::set_routes
     ///
@@ -120,8 +120,8 @@ impl Participant {
         self.sender_within(name, Reach::Routes)
     }
 
-    /// Opens a mailbox of this node for sending, whatever routes there are: for who brings packages from other nodes, which must
-    /// not go back there.
+    /// Opens a mailbox of this node for sending, whatever routes there are: for who brings packages from other nodes,
+    /// which must not go back there.
     ///
     /// # Errors
     /// As for [`Participant::sender`], but for [`SendError::NoRouter`].
@@ -184,8 +184,8 @@ impl Sender {
         self.to
     }
 
-    /// From now on packages are for another name, by the same way: for who sends by a router to names that others choose, and must not search
-    /// for each of them. Whether a router leads there is the caller's to know.
+    /// From now on packages are for another name, by the same way: for who sends by a router to names that others
+    /// choose, and must not search for each of them. Whether a router leads there is the caller's to know.
     pub fn readdress(&mut self, to: Name) {
         self.to = to;
     }
@@ -212,8 +212,8 @@ impl Sender {
         loan.send(label, len)
     }
 
-    /// Borrows a slot to write a package in place. Dropped unsent, the slot is free again. What it will replace in a `latest`
-    /// mailbox is known only when it is sent; so in a full one it needs somebody to displace.
+    /// Borrows a slot to write a package in place. Dropped unsent, the slot is free again. What it will replace in a
+    /// `latest` mailbox is known only when it is sent; so in a full one it needs somebody to displace.
     ///
     /// # Errors
     /// [`SendError::Full`], or what reopening a replaced mailbox brings.
@@ -259,8 +259,8 @@ impl Sender {
         self.segment.name != self.to
     }
 
-    /// Looks whether the mailbox is on this node by now, or another router leads to it: what is here goes before any route. As long as
-    /// there is nothing better, it goes on as before.
+    /// Looks whether the mailbox is on this node by now, or another router leads to it: what is here goes before any
+    /// route. As long as there is nothing better, it goes on as before.
     #[cold]
     fn look_again(&mut self) -> Result<(), SendError> {
         let epoch = self.participant.node().registry_epoch();

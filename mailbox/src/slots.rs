@@ -22,7 +22,8 @@
 //! | owner, giving up | `retired`, and packages | the next receiver of this name, who replaces it and counts them |
 //!
 //! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
-//! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G) and (J).
+//! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G)
+//! and (J).
 
 use crate::full::{NoSlot, OverflowPolicy};
 use crate::hot::{Hot, rings};
@@ -37,8 +38,9 @@ pub const SLOTS_MAX: usize = 1024;
 /// is owed to another process that was quicker, and n looks at n slots would be n².
 const DISPLACE_LOOKS_MAX: usize = 4;
 
-/// A slot being filled; its owner alone may write the body. It is the only one of its slot: it cannot be copied, nothing else
-/// makes one, and [`Slots::publish`] and [`Slots::abandon`] consume it. Dropped, it stays claimed until its participant dies.
+/// A slot being filled; its owner alone may write the body. It is the only one of its slot: it cannot be copied,
+/// nothing else makes one, and [`Slots::publish`] and [`Slots::abandon`] consume it. Dropped, it stays claimed until
+/// its participant dies.
 #[must_use = "the slot stays claimed until this is published or abandoned"]
 #[derive(Debug)]
 pub(crate) struct Claim {
@@ -74,10 +76,11 @@ impl Claim {
     }
 }
 
-/// A published package, as its sender remembers it. Whether it still waits, only a compare-and-swap tells. No two senders have the
-/// same ticket, so no other sender's package has this word. This sender's may have it once more: A, then B in another slot, then
-/// C where A was, all in A's place of the order. C is of the same state as A and newer, and its word is swapped in after its body
-/// was written; so whoever remembers A's word, and comes late, gets C whole (loom: `a_word_comes_back_with_the_newer_package`).
+/// A published package, as its sender remembers it. Whether it still waits, only a compare-and-swap tells. No two
+/// senders have the same ticket, so no other sender's package has this word. This sender's may have it once more: A,
+/// then B in another slot, then C where A was, all in A's place of the order. C is of the same state as A and newer,
+/// and its word is swapped in after its body was written; so whoever remembers A's word, and comes late, gets C whole
+/// (loom: `a_word_comes_back_with_the_newer_package`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Posted {
     pub(crate) slot: usize,
@@ -101,7 +104,8 @@ pub(crate) enum Published {
     Reclaimed,
 }
 
-/// A taken package; its receiver alone may read the body. The only one of its slot, like a [`Claim`], until it is released.
+/// A taken package; its receiver alone may read the body. The only one of its slot, like a [`Claim`], until it is
+/// released.
 #[must_use = "the slot stays taken until this is released"]
 #[derive(Debug)]
 pub(crate) struct Taken {
@@ -162,14 +166,14 @@ impl<'a> Slots<'a> {
         &self.words[slot * self.stride]
     }
 
-    /// ORDERING: Acquire (B), for who takes what this sees, and for `Queue::look`: all that the package's sender hinted before is
-    /// seen after this.
+    /// ORDERING: Acquire (B), for who takes what this sees, and for `Queue::look`: all that the package's sender hinted
+    /// before is seen after this.
     pub(crate) fn load(&self, slot: usize) -> Word {
         Word(self.word(slot).load(Ordering::Acquire))
     }
 
-    /// ORDERING: Acquire and Release at once, (A) to (D): every change both takes over what the last one left and hands on.
-    /// SeqCst for (E), of the changes to Ready and by `displace`; one that fails has ordered nothing.
+    /// ORDERING: Acquire and Release at once, (A) to (D): every change both takes over what the last one left and hands
+    /// on. SeqCst for (E), of the changes to Ready and by `displace`; one that fails has ordered nothing.
     fn change(&self, slot: usize, from: Word, to: Word) -> bool {
         self.word(slot).compare_exchange(from.0, to.0, Ordering::SeqCst, Ordering::Relaxed).is_ok()
     }
@@ -181,8 +185,8 @@ impl<'a> Slots<'a> {
 
     // ---- senders ----
 
-    /// A slot to fill. `cursor` is the sender's own: the search goes on where the last one ended. `old` is what the package
-    /// would replace, if it is known by now.
+    /// A slot to fill. `cursor` is the sender's own: the search goes on where the last one ended. `old` is what the
+    /// package would replace, if it is known by now.
     pub(crate) fn claim(
         &self,
         by: Claimant,
@@ -227,8 +231,8 @@ impl<'a> Slots<'a> {
             step!("displace: chosen");
             if self.change(slot, last, word) {
                 step!("displace: claimed");
-                // ORDERING (E): the mark before the look. Pairs with (G): the owner, who settles after it gave the mailbox up, sees the
-                // victim, or this is seen here.
+                // ORDERING (E): the mark before the look. Pairs with (G): the owner, who settles after it gave the
+                // mailbox up, sees the victim, or this is seen here.
                 seq_cst_accesses();
                 let late = victim.is_some() && self.hot.receiver.0.retired.load(Ordering::SeqCst) != 0;
                 return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });
@@ -248,8 +252,9 @@ impl<'a> Slots<'a> {
         reused.then_some(Claim { slot: old.slot, segment, word, place: Some(old.word), late: false })
     }
 
-    /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the order:
-    /// with a new ticket each time, a sender that is faster than its receiver would never be received. False: it no longer waits.
+    /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the
+    /// order: with a new ticket each time, a sender that is faster than its receiver would never be received. False: it
+    /// no longer waits.
     ///
     /// If `claim` has a victim, its loss has been counted. That of the old one is to be counted after this.
     pub(crate) fn replace(&self, claim: &mut Claim, old: Posted) -> bool {
@@ -259,8 +264,9 @@ impl<'a> Slots<'a> {
             return false;
         }
         let State::Filling { by, .. } = claim.word.state() else { return false };
-        // First the loss goes into a word that outlives us, then the package. The old one's slot is freed by one step and not
-        // claimed for it: nobody may hold two slots, since mailboxes are as large as one for each sender asks for.
+        // First the loss goes into a word that outlives us, then the package. The old one's slot is freed by one step
+        // and not claimed for it: nobody may hold two slots, since mailboxes are as large as one for each sender asks
+        // for.
         let marked = Word::filling(by, Some(old.as_victim()));
         if !self.change(claim.slot, claim.word, marked) {
             // Given up meanwhile, or we are held for dead: `publish` finds out.
@@ -283,11 +289,12 @@ impl<'a> Slots<'a> {
     pub(crate) fn publish(&self, claim: Claim, priority: Priority) -> Published {
         self.is_of_this(claim.segment);
         let slot = claim.slot;
-        // ORDERING: AcqRel, so that whoever reads the counter sees what came before the tickets it counts. A receiver that
-        // reads T sees the hints of all packages that one sender published before its package T.
+        // ORDERING: AcqRel, so that whoever reads the counter sees what came before the tickets it counts. A receiver
+        // that reads T sees the hints of all packages that one sender published before its package T.
         let ticket = self.hot.ticket.0.fetch_add(1, Ordering::AcqRel);
         step!("publish: ticket");
-        // A ticket is taken in any case, since they count the packages. What replaces an older one stands where that one stood.
+        // A ticket is taken in any case, since they count the packages. What replaces an older one stands where that
+        // one stood.
         let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));
         if !self.change(slot, claim.word, word) {
             // ORDERING: Acquire; pairs with the Release of the change that was in the way: if it was `settle`'s, then
@@ -298,23 +305,23 @@ impl<'a> Slots<'a> {
         step!("publish: ready");
         self.hint(slot);
         step!("publish: hint");
-        // ORDERING (E): the word and the hint before the looks at what the receiver says. All are SeqCst, so they stand in this
-        // order in the one order of all such accesses. Pairs with (F): of a sender and a receiver that goes to sleep at least
-        // one sees the other; with (G): of a sender and a new owner likewise; and with (J): of a sender and a receiver that
-        // turns to less important packages likewise.
+        // ORDERING (E): the word and the hint before the looks at what the receiver says. All are SeqCst, so they stand
+        // in this order in the one order of all such accesses. Pairs with (F): of a sender and a receiver that goes to
+        // sleep at least one sees the other; with (G): of a sender and a new owner likewise; and with (J): of a sender
+        // and a receiver that turns to less important packages likewise.
         seq_cst_accesses();
         let receiver = &self.hot.receiver.0;
         if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {
             step!("publish: taken back");
             return Published::Retired(claim);
         }
-        // A retired mailbox, and the word is no longer ours: the package was received before, or displaced by a sender that counts
-        // it. So it was accepted.
-        // With another priority than what it replaces, and of the level, it may stand before what the receiver knows of the level.
+        // A retired mailbox, and the word is no longer ours: the package was received before, or displaced by a sender
+        // that counts it. So it was accepted. With another priority than what it replaces, and of the level, it may
+        // stand before what the receiver knows of the level.
         let moved = claim.place.is_some_and(|old| old.priority() != priority);
         if u32::from(priority.0) + u32::from(moved) > receiver.level.load(Ordering::SeqCst) {
-            // ORDERING: Release; pairs with the swap in `heed`, which then sees the hint. No plain store: that of one sender would
-            // hide that of another, with the hint it was for.
+            // ORDERING: Release; pairs with the swap in `heed`, which then sees the hint. No plain store: that of one
+            // sender would hide that of another, with the hint it was for.
             self.hot.alert.0.swap(1, Ordering::Release);
             step!("publish: alert");
         }
@@ -408,8 +415,8 @@ impl<'a> Slots<'a> {
         }
     }
 
-    /// Of a mailbox given up: tells `lost` the victims of those who still fill, since they could only count them here, where
-    /// nobody looks any more. They find their claim changed, and go on as after any other retirement.
+    /// Of a mailbox given up: tells `lost` the victims of those who still fill, since they could only count them here,
+    /// where nobody looks any more. They find their claim changed, and go on as after any other retirement.
     pub(crate) fn settle(&self, mut lost: impl FnMut(Victim)) {
         for slot in 0..self.count {
             let word = self.load(slot);

@@ -3,9 +3,9 @@
 
 pub(crate) use core::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 
-/// Stands where SeqCst accesses before and SeqCst loads after must keep their order. The accesses do that by themselves, and on
-/// x86-64 for nothing, where a fence costs as much as all other steps of publishing. The model checker knows that order of
-/// fences alone, and has one here.
+/// Stands where SeqCst accesses before and SeqCst loads after must keep their order. The accesses do that by
+/// themselves, and on x86-64 for nothing, where a fence costs as much as all other steps of publishing. The model
+/// checker knows that order of fences alone, and has one here.
 #[inline(always)]
 pub(crate) fn seq_cst_accesses() {}
 

@@ -1,4 +1,5 @@
-//! What the kernel is asked for a process: its scheduling, its memory, a device for IP packets. A refusal is told, not fatal.
+//! What the kernel is asked for a process: its scheduling, its memory, a device for IP packets. A refusal is told, not
+//! fatal.
 
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use nix::sys::mman::{MlockAllFlags, mlockall};
@@ -24,9 +25,11 @@ pub enum Scheduling {
 /// Time of a processor that a thread needs again and again, for SCHED_DEADLINE.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reservation {
-    /// So much of it in each period, ns. Who uses it up stands still until the next period, unless nobody has reserved the rest. From 1024 on.
+    /// So much of it in each period, ns. Who uses it up stands still until the next period, unless nobody has reserved
+    /// the rest. From 1024 on.
     pub runtime_ns: u64,
-    /// It has got it so long after it has become ready to run, at the latest, ns; at least the runtime, at most the period.
+    /// It has got it so long after it has become ready to run, at the latest, ns; at least the runtime, at most the
+    /// period.
     pub deadline_ns: u64,
     /// The period, ns; at most four seconds.
     pub period_ns: u64,
@@ -38,7 +41,8 @@ pub enum ReservationError {
     /// The user has no right to.
     #[error(
         "SCHED_DEADLINE needs CAP_SYS_NICE, which no limit of users brings: `setcap cap_sys_nice+ep` on the program, \
-         `AmbientCapabilities=CAP_SYS_NICE` in its unit, or `--cap-add=SYS_NICE` for its container; nor is it given to who is bound to some of the \
+         `AmbientCapabilities=CAP_SYS_NICE` in its unit, or `--cap-add=SYS_NICE` for its container; nor is it given \
+         to who is bound to some of the \
          processors"
     )]
     NotAllowed,
@@ -86,14 +90,15 @@ const _: () = {
     assert!(std::mem::offset_of!(libc::sched_attr, sched_period) == 40);
 };
 
-/// Reserves time of a processor for the calling thread: it goes before all others, and on whichever processor is free. The threads
-/// that it starts run as ordinary ones.
+/// Reserves time of a processor for the calling thread: it goes before all others, and on whichever processor is free.
+/// The threads that it starts run as ordinary ones.
 ///
 /// # Errors
 /// [`ReservationError`]
 pub fn reserve(reservation: Reservation) -> Result<(), ReservationError> {
-    // Interrupts and the hypervisor take the processor from a thread that runs, and the kernel counts that as the thread's. Whoever exceeds
-    // its reservation by that stands still for as many periods as make up for it, unless it counts what nobody has reserved as well.
+    // Interrupts and the hypervisor take the processor from a thread that runs, and the kernel counts that as the
+    // thread's. Whoever exceeds its reservation by that stands still for as many periods as make up for it, unless it
+    // counts what nobody has reserved as well.
     let flags = libc::SCHED_FLAG_RESET_ON_FORK | libc::SCHED_FLAG_RECLAIM;
     let attributes = libc::sched_attr {
         size: size_of::<libc::sched_attr>() as u32,
@@ -105,8 +110,8 @@ pub fn reserve(reservation: Reservation) -> Result<(), ReservationError> {
         sched_deadline: reservation.deadline_ns,
         sched_period: reservation.period_ns,
     };
-    // SAFETY: reads as many bytes of the attributes, which live here, as these say of themselves; 0 is the calling thread, and there
-    // are no flags.
+    // SAFETY: reads as many bytes of the attributes, which live here, as these say of themselves; 0 is the calling
+    // thread, and there are no flags.
     let result = unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) };
     if result == 0 {
         return Ok(());
@@ -178,8 +183,9 @@ pub fn room(path: &Path) -> io::Result<Room> {
     Ok(Room { bytes: told.blocks() * told.fragment_size(), free: told.blocks_available() * told.fragment_size() })
 }
 
-/// Makes a TUN device in the network of the calling thread; `%d` in its name becomes a number that is free. Each read brings one IP packet
-/// that the kernel sends by it, each write hands the kernel one that has come. It vanishes with the last descriptor.
+/// Makes a TUN device in the network of the calling thread; `%d` in its name becomes a number that is free. Each read
+/// brings one IP packet that the kernel sends by it, each write hands the kernel one that has come. It vanishes with
+/// the last descriptor.
 ///
 /// # Errors
 /// Mostly EPERM: it needs CAP_NET_ADMIN; ENOENT: the kernel has no `tun`, or a container no `/dev/net/tun`.
@@ -206,8 +212,8 @@ fn check(result: i32) -> io::Result<()> {
 /// Numbers of the descriptors that were handed on to this process, with commas.
 const HANDED_ON: &str = "ROHRPOST_HANDED_ON";
 
-/// Has a process that is to be started keep copies of these descriptors: see [`handed_on`]. In this process they stay close-on-exec, so no other one that is
-/// started meanwhile has them; the mark is cleared in that process alone.
+/// Has a process that is to be started keep copies of these descriptors: see [`handed_on`]. In this process they stay
+/// close-on-exec, so no other one that is started meanwhile has them; the mark is cleared in that process alone.
 ///
 /// # Errors
 /// When there can be no further descriptors.
@@ -221,7 +227,8 @@ pub fn hand_on(command: &mut Command, descriptors: &[OwnedFd]) -> io::Result<()>
         }
         Ok(())
     };
-    // SAFETY: between fork and exec the closure makes system calls that are safe there (signal-safety(7)), and takes no lock and no memory.
+    // SAFETY: between fork and exec the closure makes system calls that are safe there (signal-safety(7)), and takes no
+    // lock and no memory.
     unsafe { command.pre_exec(keep) };
     Ok(())
 }
@@ -231,8 +238,8 @@ pub fn hand_nothing_on(command: &mut Command) {
     command.env_remove(HANDED_ON);
 }
 
-/// Takes over the descriptors that whoever started this process has [handed on](hand_on), in their order; up to the first that is not there. Once: asked again,
-/// there are none.
+/// Takes over the descriptors that whoever started this process has [handed on](hand_on), in their order; up to the
+/// first that is not there. Once: asked again, there are none.
 pub fn handed_on() -> Vec<OwnedFd> {
     static WERE_TAKEN: AtomicBool = AtomicBool::new(false);
     if WERE_TAKEN.swap(true, Ordering::Relaxed) {
@@ -242,7 +249,8 @@ pub fn handed_on() -> Vec<OwnedFd> {
     numbers.split(',').map_while(|number| adopt(number.parse().ok()?).ok()).collect()
 }
 
-/// Takes over a descriptor under this number. From then on it is closed in processes that this one starts, as all that this one has opened itself.
+/// Takes over a descriptor under this number. From then on it is closed in processes that this one starts, as all that
+/// this one has opened itself.
 fn adopt(number: RawFd) -> io::Result<OwnedFd> {
     if number < 0 {
         return Err(io::ErrorKind::InvalidInput.into());
@@ -254,8 +262,9 @@ fn adopt(number: RawFd) -> io::Result<OwnedFd> {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("descriptor {number} was not handed on")));
     }
     fcntl(descriptor, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC))?;
-    // SAFETY: it is open, whoever started this process says that it is ours, and nobody else in this process has taken it: each number is asked for once, and what
-    // this process has opened itself is marked to be closed in further ones, which this one was not.
+    // SAFETY: it is open, whoever started this process says that it is ours, and nobody else in this process has taken
+    // it: each number is asked for once, and what this process has opened itself is marked to be closed in further
+    // ones, which this one was not.
     Ok(unsafe { OwnedFd::from_raw_fd(number) })
 }
 
@@ -272,7 +281,8 @@ mod tests {
             // SAFETY: numbers only, for which 0 is a value.
             let mut said: libc::sched_attr = unsafe { std::mem::zeroed() };
             let bytes = size_of::<libc::sched_attr>();
-            // SAFETY: writes as many bytes as it is told, to attributes that live here; 0 is the calling thread, and there are no flags.
+            // SAFETY: writes as many bytes as it is told, to attributes that live here; 0 is the calling thread, and
+            // there are no flags.
             assert_eq!(unsafe { libc::syscall(libc::SYS_sched_getattr, 0, &raw mut said, bytes, 0) }, 0);
             Ok(said)
         };

@@ -1,9 +1,9 @@
 //! System time: what every node of a system takes for now, and how sure it is (seed 002, 2.2.3).
 //!
-//! The page has two records and an index. Its writer fills the record that the index does not name, then turns the index:
-//! readers always find a whole record, also when the writer died at any line. System time is nanoseconds since 1970. Within
-//! an *epoch* it only moves forward; a step is a new epoch, which readers can see. Timeouts and leases never use it: they
-//! are measured by the monotonic clock.
+//! The page has two records and an index. Its writer fills the record that the index does not name, then turns the
+//! index: readers always find a whole record, also when the writer died at any line. System time is nanoseconds since
+//! 1970. Within an *epoch* it only moves forward; a step is a new epoch, which readers can see. Timeouts and leases
+//! never use it: they are measured by the monotonic clock.
 
 use crate::cell::SeqLatch;
 use crate::clock::{monotonic_ns, realtime_ns, slept_ns, slept_ns_min};
@@ -16,10 +16,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// A reader that was overtaken twice by the writer tries again, so often: the writer writes at most some thousand times a
-/// second, a reading takes less than a microsecond.
+/// A reader that was overtaken twice by the writer tries again, so often: the writer writes at most some thousand times
+/// a second, a reading takes less than a microsecond.
 const READ_TRIES: usize = 8;
-/// A slower pace begins so far ahead: longer than writing a record takes. A writer that was held up tries again, so often.
+/// A slower pace begins so far ahead: longer than writing a record takes. A writer that was held up tries again, so
+/// often.
 const SLOWER_LEAD_NS: u64 = 1_000_000;
 const WRITE_TRIES: usize = 8;
 /// The error bound of who does not know the time: 292 years.
@@ -80,15 +81,16 @@ pub struct TimeRecord {
 }
 
 impl TimeRecord {
-    /// The same if the computer has slept for so long since it was written: its clocks count how long it slept, some of them in seconds, so nobody
-    /// knows how far off its master's time is.
+    /// The same if the computer has slept for so long since it was written: its clocks count how long it slept, some of
+    /// them in seconds, so nobody knows how far off its master's time is.
     #[must_use]
     pub fn after_sleep(self, slept_ns: u64) -> Self {
         let is_known = self.source != TimeSource::Master || slept_ns < SLEPT_NS_MIN;
         if is_known { self } else { Self { error_ns: ERROR_UNKNOWN_NS, drift_ns_s: 0, ..self } }
     }
 
-    /// System time at this moment of the monotonic clock. Another process wrote the record: whatever it says, this is a time.
+    /// System time at this moment of the monotonic clock. Another process wrote the record: whatever it says, this is a
+    /// time.
     pub fn at(&self, monotonic_ns: u64) -> SystemTime {
         let since = i128::from(monotonic_ns) - i128::from(self.monotonic_ns);
         let system = i128::from(self.system_ns) + since.saturating_mul(self.pace_ppb.into()) / BILLION;
@@ -103,7 +105,8 @@ impl TimeRecord {
     }
 }
 
-/// What was seen last of the computer's clocks by whoever writes a node's time: its next incarnation sees what they did while nobody watched.
+/// What was seen last of the computer's clocks by whoever writes a node's time: its next incarnation sees what they did
+/// while nobody watched.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Watched {
     /// The clock of the page, [`monotonic_ns`].
@@ -170,8 +173,8 @@ pub(crate) struct TimePage {
     index: SeqLatch,
     writer_pid: AtomicU32,
     padding: AtomicU32,
-    /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which its next incarnation takes for a clock that
-    /// is not to be believed.
+    /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which
+    /// its next incarnation takes for a clock that is not to be believed.
     watched: [AtomicU64; 6],
     records: [SharedRecord; 2],
 }
@@ -254,8 +257,8 @@ impl SystemClock {
 
     /// System time now. No system call, lock or heap.
     pub fn now(&self) -> SystemTime {
-        // The clock is read while the record is valid. By an older record it could be later, and by a newer one earlier,
-        // than what the next reading says.
+        // The clock is read while the record is valid. By an older record it could be later, and by a newer one
+        // earlier, than what the next reading says.
         match self.mapping.as_ref().and_then(|mapping| mapping.at::<TimePage>(0).read_while(monotonic_ns)) {
             Some((written, now)) => written.read(slept_ns_min(now)).at(now),
             None => self.at(monotonic_ns()),
@@ -274,7 +277,8 @@ impl SystemClock {
         }
     }
 
-    /// What the page says; none without one. If the computer has slept since it was written, nobody knows how far off that is.
+    /// What the page says; none without one. If the computer has slept since it was written, nobody knows how far off
+    /// that is.
     pub fn record(&self) -> Option<TimeRecord> {
         let written = self.mapping.as_ref()?.at::<TimePage>(0).read()?;
         Some(written.read(slept_ns_min(monotonic_ns())))
@@ -312,8 +316,8 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
-    /// Opens the page of a node that is to have the master's time. What it has of it stays. Else there is the wall clock, with a bound
-    /// that says that nobody knows, until the node's router has heard a master.
+    /// Opens the page of a node that is to have the master's time. What it has of it stays. Else there is the wall
+    /// clock, with a bound that says that nobody knows, until the node's router has heard a master.
     ///
     /// # Errors
     /// When the page cannot be made.
@@ -346,7 +350,8 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
-    /// What the page says; none if nobody wrote it yet. If the computer has slept since, nobody knows how far off that is.
+    /// What the page says; none if nobody wrote it yet. If the computer has slept since, nobody knows how far off that
+    /// is.
     pub fn record(&self) -> Option<TimeRecord> {
         let page: &TimePage = self.mapping.at(0);
         Some(page.read()?.read(slept_ns()))
@@ -361,8 +366,8 @@ impl TimeKeeper {
         (local_ns > 0).then_some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns })
     }
 
-    /// Notes what was seen, for the next incarnation of whoever writes here. Records that are written from then on are of this moment: if the computer sleeps before
-    /// one is written, its readers see that.
+    /// Notes what was seen, for the next incarnation of whoever writes here. Records that are written from then on are
+    /// of this moment: if the computer sleeps before one is written, its readers see that.
     pub fn note_watched(&mut self, watched: &Watched) {
         if self.watched.replace(*watched) == Some(*watched) {
             return;
@@ -376,8 +381,8 @@ impl TimeKeeper {
         }
     }
 
-    /// Makes this the page's record. False, and the page stays as it was, if time would go back within its epoch just now: because the
-    /// record is of a slower pace, and this thread was held up until it was too late for it.
+    /// Makes this the page's record. False, and the page stays as it was, if time would go back within its epoch just
+    /// now: because the record is of a slower pace, and this thread was held up until it was too late for it.
     pub fn write(&mut self, record: &TimeRecord) -> bool {
         let page: &TimePage = self.mapping.at(0);
         let last = page.read().map(|last| last.record).filter(|last| last.epoch == record.epoch);
@@ -391,8 +396,8 @@ impl TimeKeeper {
         goes_on
     }
 
-    /// Goes on in the same epoch with another pace, never back. False when the pace stays as it was: this thread was held up
-    /// each time it tried.
+    /// Goes on in the same epoch with another pace, never back. False when the pace stays as it was: this thread was
+    /// held up each time it tried.
     pub fn set_pace(&mut self, pace: f64) -> bool {
         let page: &TimePage = self.mapping.at(0);
         let Some(Written { record: last, slept_ns }) = page.read() else { return false };
@@ -405,7 +410,8 @@ impl TimeKeeper {
             let system_ns = last.at(begin_ns).ns;
             let record = TimeRecord { monotonic_ns: begin_ns, system_ns, pace_ppb, ..last };
             page.fill(&Written { record, slept_ns });
-            // From here to the turn are nanoseconds; a thread held up just there for longer than the lead would be late.
+            // From here to the turn are nanoseconds; a thread held up just there for longer than the lead would be
+            // late.
             if lead_ns == 0 || monotonic_ns() < begin_ns {
                 page.index.publish();
                 return true;

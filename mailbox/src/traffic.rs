@@ -1,5 +1,5 @@
-//! What a participant sends, in memory that anyone may read: who to, from which name, which type, how much and how often.
-//! Looking at it sends nothing and asks nobody, so it changes nothing.
+//! What a participant sends, in memory that anyone may read: who to, from which name, which type, how much and how
+//! often. Looking at it sends nothing and asks nobody, so it changes nothing.
 //!
 //! ```text
 //! traffic.N  =  header (64 B)  +  128 rows (256 B each), one for each receiver, sender's name and type of package
@@ -7,10 +7,10 @@
 //!            a Sender owns a row ─┘ └─ who sent the same before it left the row idle, counts and all
 //! ```
 //!
-//! A row has one writer, which loads and stores: sending to where it sent before costs no read-modify-write, no lock and no
-//! search. The last row takes packages that find no other, from all of the participant's senders; it counts, and tells no times.
-//! A value published that finds none is not counted, since it is no package; those that carry it to subscribers are.
-//! A new participant of the same index makes a new file: readers of the old one are not confused.
+//! A row has one writer, which loads and stores: sending to where it sent before costs no read-modify-write, no lock
+//! and no search. The last row takes packages that find no other, from all of the participant's senders; it counts, and
+//! tells no times. A value published that finds none is not counted, since it is no package; those that carry it to
+//! subscribers are. A new participant of the same index makes a new file: readers of the old one are not confused.
 
 use crate::cell::SeqCount;
 use crate::files::{allocate, open_shared, open_to_read};
@@ -76,8 +76,8 @@ pub(crate) struct FlowRow {
     pub(crate) refused: AtomicU64,
     pub(crate) first_ns: AtomicU64,
     pub(crate) last_ns: AtomicU64,
-    /// Sum of the squares of the intervals, ns²: the lower and the upper half. Exact, so that what came before a window can be
-    /// subtracted, also after an hour of silence.
+    /// Sum of the squares of the intervals, ns²: the lower and the upper half. Exact, so that what came before a window
+    /// can be subtracted, also after an hour of silence.
     pub(crate) squares: [AtomicU64; 2],
     /// Publications: sum of the ages that values had.
     pub(crate) age_ns: AtomicU64,
@@ -126,7 +126,8 @@ pub(crate) fn path_of(node: &Path, participant: u16) -> PathBuf {
 }
 
 impl Table {
-    /// Makes the file, whole, in place of what an earlier participant of this index left. The caller holds the index's lock.
+    /// Makes the file, whole, in place of what an earlier participant of this index left. The caller holds the index's
+    /// lock.
     pub(crate) fn make(node: &Node, me: Claimant) -> Result<Self, NodeError> {
         let path = path_of(node.path(), me.participant);
         let unfinished = path.with_extension(format!("{}.new", me.participant));
@@ -167,12 +168,14 @@ impl Table {
 
     /// One that counts in rows of its own.
     pub(crate) fn writer(&self) -> Writer {
-        // Neither of the two that mean something else; a number that comes round again finds its row's old writer long gone.
+        // Neither of the two that mean something else; a number that comes round again finds its row's old writer long
+        // gone.
         let me = self.writers.fetch_add(1, Ordering::Relaxed) % (IDLE - 1) + 1;
         Writer { me, recent: [None; RECENT], next: 0 }
     }
 
-    /// A row for this key: the one that an earlier writer of the same left, a new one, the idlest of others, or the last.
+    /// A row for this key: the one that an earlier writer of the same left, a new one, the idlest of others, or the
+    /// last.
     #[cold]
     fn claim(&self, me: u32, key: Key) -> usize {
         let rows = &self.rows()[..REST];
@@ -206,8 +209,9 @@ impl Table {
         }
     }
 
-    /// What a row has counted goes to the rest, so that sums stay what they are. While the row is being written, so that who sees
-    /// it empty, and then looks at the rest, finds it there; who saw it full a moment before sees it twice, never not at all.
+    /// What a row has counted goes to the rest, so that sums stay what they are. While the row is being written, so
+    /// that who sees it empty, and then looks at the rest, finds it there; who saw it full a moment before sees it
+    /// twice, never not at all.
     fn add_to_rest(&self, row: &FlowRow) {
         let rest = &self.rows()[REST];
         let pairs = [(&row.packages, &rest.packages), (&row.bytes, &rest.bytes), (&row.refused, &rest.refused)];

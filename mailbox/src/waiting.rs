@@ -11,21 +11,23 @@ use std::time::{Duration, Instant};
 /// Reading the clock takes as long as so many looks at a mailbox.
 const LOOKS_A_CLOCK: usize = 16;
 
-/// Who was rung on its way to sleep looks for so long before it goes that way again: its sender is about as quick as it is, and
-/// would pay for a wake-up with each package, it for a sleep. The first real sleep ends it. Measured with packages of 4 KiB sent as
-/// fast as they go, against a ring with a futex (`rohrpost-bench local --only rate-blocking`): 0.8 times as many without, 2.5
-/// times as many with it.
+/// Who was rung on its way to sleep looks for so long before it goes that way again: its sender is about as quick as it
+/// is, and would pay for a wake-up with each package, it for a sleep. The first real sleep ends it. Measured with
+/// packages of 4 KiB sent as fast as they go, against a ring with a futex (`rohrpost-bench local --only
+/// rate-blocking`): 0.8 times as many without, 2.5 times as many with it.
 const EAGER: Duration = Duration::from_micros(2);
 
-/// How to wait. By default: asleep, for ever (after two microseconds awake when the last package came on the way to sleep). A [`Duration`] is a timeout from now on, an `Option<Instant>` a deadline.
+/// How to wait. By default: asleep, for ever (after two microseconds awake when the last package came on the way to
+/// sleep). A [`Duration`] is a timeout from now on, an `Option<Instant>` a deadline.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Waiting {
-    /// Before sleeping, look again and again for so long. A sender that finds its receiver awake makes no system call, and the
-    /// receiver has the package sooner by the time that waking takes (some microseconds, more from a deep sleep of the
-    /// processor). It costs a whole processor meanwhile, so give it some ten microseconds, where a package is mostly about to
-    /// come; with one processor, or more threads that spin than processors, it only keeps others from working. A real-time thread
-    /// (SCHED_FIFO) must not spin for long: it keeps everything below it out, and the kernel, which gives ordinary
-    /// threads their share by its fair server (or by throttling, before Linux 6.12), then stops it when it matters.
+    /// Before sleeping, look again and again for so long. A sender that finds its receiver awake makes no system call,
+    /// and the receiver has the package sooner by the time that waking takes (some microseconds, more from a deep sleep
+    /// of the processor). It costs a whole processor meanwhile, so give it some ten microseconds, where a package is
+    /// mostly about to come; with one processor, or more threads that spin than processors, it only keeps others from
+    /// working. A real-time thread (SCHED_FIFO) must not spin for long: it keeps everything below it out, and the
+    /// kernel, which gives ordinary threads their share by its fair server (or by throttling, before Linux 6.12), then
+    /// stops it when it matters.
     pub spin: Duration,
     /// When to give up; none: never.
     pub deadline: Option<Instant>,
@@ -74,13 +76,13 @@ impl Waiting {
 }
 
 /// Waits until one of these mailboxes has a package, `other` says that there is something else to do, or the deadline
-/// has passed. May return early for no reason. Says how long it slept, that is, left the processor to others. All must be of
-/// one participant, whose bell it is that wakes.
+/// has passed. May return early for no reason. Says how long it slept, that is, left the processor to others. All must
+/// be of one participant, whose bell it is that wakes.
 ///
 /// Whoever makes `other` true from outside calls [`Participant::ring`](crate::Participant::ring) afterwards.
 ///
-/// Without a mailbox there is no bell to sleep on: then this returns at once, whatever `waiting` and `other` say, and a loop
-/// around it would spin. Who has no mailbox waits by other means.
+/// Without a mailbox there is no bell to sleep on: then this returns at once, whatever `waiting` and `other` say, and a
+/// loop around it would spin. Who has no mailbox waits by other means.
 ///
 /// # Panics
 /// When the mailboxes are of different participants: their bells are different words.
@@ -90,9 +92,9 @@ pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, ot
     slept
 }
 
-/// Waits until this mailbox has a package that is more important than `priority`, `other` says that there is something else to do, or the
-/// deadline has passed. Others may wait there all the while: for who cannot use them yet. May return early for no reason. Says how long it
-/// slept.
+/// Waits until this mailbox has a package that is more important than `priority`, `other` says that there is something
+/// else to do, or the deadline has passed. Others may wait there all the while: for who cannot use them yet. May return
+/// early for no reason. Says how long it slept.
 ///
 /// What is not above `priority` rings no bell meanwhile: its sender makes no system call, and this thread sleeps on.
 pub fn wait_above(
@@ -131,7 +133,8 @@ impl Receiver {
         }
     }
 
-    /// The most important package; waits until there is one, at most for a timeout ([`Duration`](std::time::Duration)) or as a [`Waiting`] says.
+    /// The most important package; waits until there is one, at most for a timeout ([`Duration`](std::time::Duration))
+    /// or as a [`Waiting`] says.
     pub fn receive_timeout(&mut self, waiting: impl Into<Waiting>) -> Option<Package<'_>> {
         let waiting = waiting.into();
         loop {
@@ -151,8 +154,8 @@ impl Receiver {
 }
 
 impl Watches {
-    /// Sleeps as [`wait_any`](crate::wait_any) does, also until one of the descriptors is ready; [`Watches::next_ready`] tells
-    /// which. They are looked at before this returns, also when it did not sleep.
+    /// Sleeps as [`wait_any`](crate::wait_any) does, also until one of the descriptors is ready;
+    /// [`Watches::next_ready`] tells which. They are looked at before this returns, also when it did not sleep.
     ///
     /// # Panics
     /// When a mailbox is not of the participant that watches.
@@ -175,7 +178,8 @@ fn timed(sleep: impl FnOnce()) -> Duration {
     began.elapsed()
 }
 
-/// Waits. To sleep it calls `asleep`, which calls what it is given; the clock is read by who wants to know how long that was.
+/// Waits. To sleep it calls `asleep`, which calls what it is given; the clock is read by who wants to know how long
+/// that was.
 fn wait(
     receivers: &mut [&mut Receiver],
     watches: Option<&mut Watches>,

@@ -1,4 +1,5 @@
-//! Waiting for file descriptors and mailboxes at once, by one thread: for drivers of serial ports, sockets and the like.
+//! Waiting for file descriptors and mailboxes at once, by one thread: for drivers of serial ports, sockets and the
+//! like.
 
 use crate::bell::Bell;
 use crate::doorbell;
@@ -11,9 +12,9 @@ use std::time::{Duration, Instant};
 /// Most descriptors that one participant watches.
 pub const WATCHES_MAX: usize = 64;
 
-/// How long a sleeper believes that its pipe would wake it. Who rings must open the pipe, and cannot when its process, or the
-/// system, has no descriptor left; but it has changed the bell before, and that the sleeper sees after so long. Costs ten
-/// looks at one word a second, and only who watches descriptors.
+/// How long a sleeper believes that its pipe would wake it. Who rings must open the pipe, and cannot when its process,
+/// or the system, has no descriptor left; but it has changed the bell before, and that the sleeper sees after so long.
+/// Costs ten looks at one word a second, and only who watches descriptors.
 const PIPE_TRUSTED: Duration = Duration::from_millis(100);
 
 /// One watched descriptor.
@@ -61,8 +62,9 @@ enum Polled {
     Something,
 }
 
-/// The descriptors that a participant waits for besides its mailboxes. It sleeps in `poll` then, and senders wake it through a named
-/// pipe; they pay for that only while it does. Without a descriptor it sleeps as if this were not there.
+/// The descriptors that a participant waits for besides its mailboxes. It sleeps in `poll` then, and senders wake it
+/// through a named pipe; they pay for that only while it does. Without a descriptor it sleeps as if this were not
+/// there.
 pub struct Watches {
     participant: Arc<Participant>,
     /// The pipe, then one for each of `polls` but the first.
@@ -77,8 +79,8 @@ impl Watches {
     /// Makes the participant's pipe.
     ///
     /// # Errors
-    /// [`io::ErrorKind::AlreadyExists`] when the participant has some already: one thread sleeps for it. Otherwise what the
-    /// system says of the pipe.
+    /// [`io::ErrorKind::AlreadyExists`] when the participant has some already: one thread sleeps for it. Otherwise what
+    /// the system says of the pipe.
     pub fn new(participant: &Arc<Participant>) -> io::Result<Self> {
         let mut claim = participant.watching();
         if *claim {
@@ -93,8 +95,8 @@ impl Watches {
         Ok(Self { participant: participant.clone(), pipe, watched: Vec::with_capacity(WATCHES_MAX), polls, next: 0 })
     }
 
-    /// Watches a descriptor, until [`Watches::remove`]. A duplicate is kept: the other end sees it closed only when it is
-    /// removed here too.
+    /// Watches a descriptor, until [`Watches::remove`]. A duplicate is kept: the other end sees it closed only when it
+    /// is removed here too.
     ///
     /// # Errors
     /// When there are [`WATCHES_MAX`], or the process has no descriptor left.

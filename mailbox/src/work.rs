@@ -1,5 +1,5 @@
-//! What a module has in hand: one word that it writes at each turn and anyone may read, so that a handler which does not come
-//! back is seen from outside. Writing it is one store, without system call, lock or thread.
+//! What a module has in hand: one word that it writes at each turn and anyone may read, so that a handler which does
+//! not come back is seen from outside. Writing it is one store, without system call, lock or thread.
 //!
 //! ```text
 //!  63      56 55          40 39                                    0

@@ -1,5 +1,5 @@
-//! What `docs/src/shared-memory.md` says lies where it says: read from the files by number alone. The numbers of what every package
-//! touches are read from the page itself.
+//! What `docs/src/shared-memory.md` says lies where it says: read from the files by number alone. The numbers of what
+//! every package touches are read from the page itself.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

@@ -1,5 +1,5 @@
-//! A class of no importance keeps the mailbox full, or its senders are stopped with slots in hand: what is urgent gets through
-//! as its policy says, others go on, and all is accounted for to the last package.
+//! A class of no importance keeps the mailbox full, or its senders are stopped with slots in hand: what is urgent gets
+//! through as its policy says, others go on, and all is accounted for to the last package.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -76,8 +76,8 @@ fn low_sender(board: Board, ground: &Ground, full: OverflowPolicy) {
     }
 }
 
-/// One each millisecond, when the one before was received: what waits is never more than one. Every second one finds the mailbox
-/// full.
+/// One each millisecond, when the one before was received: what waits is never more than one. Every second one finds
+/// the mailbox full.
 fn urgent_sender(board: Board, ground: &Ground, full: OverflowPolicy) {
     let (mut sender, mut number) = (ground.sender(), 1);
     for round in 0..ROUNDS {

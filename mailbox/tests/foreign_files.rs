@@ -1,5 +1,5 @@
-//! Files that are cut off, damaged, of another version or not ours at all, wherever a node keeps one: each is told or passed
-//! over, and stops nobody. Those of mailboxes are in `registry`.
+//! Files that are cut off, damaged, of another version or not ours at all, wherever a node keeps one: each is told or
+//! passed over, and stops nobody. Those of mailboxes are in `registry`.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

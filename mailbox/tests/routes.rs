@@ -1,4 +1,5 @@
-//! Names on other nodes: what is here goes before any route, and what is not goes to the router's mailbox, address and all.
+//! Names on other nodes: what is here goes before any route, and what is not goes to the router's mailbox, address and
+//! all.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -67,7 +68,8 @@ fn a_routed_package_comes_to_the_router_as_it_was_sent() {
     assert!(flows.iter().all(|flow| flow.to == FAR) && !flows.is_empty());
 }
 
-/// A module that sends to each mailbox of another node has the router's mailbox in its memory once, and each of its own node's once.
+/// A module that sends to each mailbox of another node has the router's mailbox in its memory once, and each of its own
+/// node's once.
 #[test]
 fn a_mailbox_is_mapped_once_however_many_send_there() {
     let ground = routed();

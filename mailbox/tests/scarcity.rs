@@ -35,8 +35,8 @@ fn role() {
     }
 }
 
-/// A mailbox, made as soon as it is this process's turn: on a busy computer another one may change the registry for longer than anybody
-/// waits, and is said to.
+/// A mailbox, made as soon as it is this process's turn: on a busy computer another one may change the registry for
+/// longer than anybody waits, and is said to.
 fn made(me: &Arc<Participant>, name: Name) -> Receiver {
     let give_up = Instant::now() + common::PATIENCE;
     loop {

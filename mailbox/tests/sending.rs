@@ -213,7 +213,8 @@ fn no_loss_is_hidden_while_a_mailbox_is_replaced_again_and_again() {
     let info = ground.look();
     assert_eq!((received(&info), info.depth), (count, 0));
     assert_eq!(info.sent, accounted(&info), "a new mailbox begins with accounts that are even");
-    // A sender that had counted what it displaced, and not yet published, when the old mailbox was given up: once too often.
+    // A sender that had counted what it displaced, and not yet published, when the old mailbox was given up: once too
+    // often.
     let too_many = info.sent.checked_sub(accepted).expect("a loss is hidden");
     assert!(too_many <= 30, "{too_many} of {accepted}");
 }

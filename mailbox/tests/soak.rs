@@ -1,10 +1,11 @@
-//! Eight senders, processes and threads, at random for a long time: order, sums of bodies, and accounts that agree exactly.
+//! Eight senders, processes and threads, at random for a long time: order, sums of bodies, and accounts that agree
+//! exactly.
 //!
 //! The full run takes ten minutes:
 //! `ROHRPOST_SOAK_SECONDS=600 cargo test -p rohrpost-mailbox --test soak -- --nocapture`
 //!
-//! Nobody is killed here, so nothing is uncertain: of each class, sent = received + counted losses, and refusals that senders
-//! were told = refusals counted.
+//! Nobody is killed here, so nothing is uncertain: of each class, sent = received + counted losses, and refusals that
+//! senders were told = refusals counted.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -149,7 +150,8 @@ fn check(info: &MailboxInfo, tally: &Tally) {
     assert!(info.shape.full != OverflowPolicy::Reject || lost(info, Loss::Displaced) == 0);
 }
 
-/// What the senders' own tables say is the same. A loan that was asked for and not lent had no type yet; they do not count it.
+/// What the senders' own tables say is the same. A loan that was asked for and not lent had no type yet; they do not
+/// count it.
 fn check_traffic(ground: &Ground, tally: &Tally) {
     let flows = ground.node().traffic();
     let here = flows.iter().filter(|flow| flow.to == MAILBOXES[0]);

@@ -1,5 +1,5 @@
-//! Who is stopped in the middle of an operation holds nobody up: there is no lock, and nothing spins on another process. Stopped at
-//! random moments, and after each single instruction; and killed after some of them, or after each:
+//! Who is stopped in the middle of an operation holds nobody up: there is no lock, and nothing spins on another
+//! process. Stopped at random moments, and after each single instruction; and killed after some of them, or after each:
 //! `ROHRPOST_INSTRUCTION_KILLS=1000000 cargo test -p rohrpost-mailbox --test stops -- --nocapture instruction`
 
 #![cfg(target_os = "linux")]
@@ -44,7 +44,8 @@ fn who_is_stopped_at_random_holds_nobody_up() {
     OverflowPolicy::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), full.name()));
 }
 
-// Other processors may have atomics of two instructions, of which the second fails when the process was stopped after the first.
+// Other processors may have atomics of two instructions, of which the second fails when the process was stopped after
+// the first.
 #[cfg(target_arch = "x86_64")]
 #[test]
 fn who_is_stopped_after_any_instruction_holds_nobody_up() {
@@ -151,7 +152,8 @@ const OPERATIONS: &[Operation] = &[
 fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
     ptrace::traceme().unwrap();
     let stop = || raise(Signal::SIGSTOP).unwrap();
-    // Full: it may look at each slot just while that one is in use, since the others act between any two of its instructions.
+    // Full: it may look at each slot just while that one is in use, since the others act between any two of its
+    // instructions.
     let told = |sent| match sent {
         Ok(()) => DONE,
         Err(SendError::Full(_)) => REFUSED,
@@ -252,7 +254,8 @@ impl Operation {
         ));
     }
 
-    /// Leads a process through it, for so many instructions at most, then kills it. Returns how many there were, and how it ended.
+    /// Leads a process through it, for so many instructions at most, then kills it. Returns how many there were, and
+    /// how it ended.
     fn lead(&self, ground: &Ground, most: u64, mut meanwhile: impl FnMut(&mut Others, &str)) -> (u64, u32) {
         drop(ground.join().receiver(MAILBOX, self.shape()).unwrap());
         let done = shared();

@@ -4,8 +4,8 @@
 //! `ROHRPOST_STORM_KILLS=10000 cargo test -p rohrpost-mailbox --test storm -- --nocapture`
 //!
 //! What a kill may cost is exactly one package in the accounts, and only of a process that was inside an operation (see
-//! `common/board.rs`). Besides, each sender that had counted what it displaced when its mailbox was replaced by one of another
-//! shape counts it a second time.
+//! `common/board.rs`). Besides, each sender that had counted what it displaced when its mailbox was replaced by one of
+//! another shape counts it a second time.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -265,8 +265,9 @@ impl Storm {
         assert_eq!(self.look()[mailbox].depth, u32::from(shape.slots));
     }
 
-    /// Nothing waits. What was accepted was received or counted as lost, each package of it; and too much was counted at most
-    /// once for each process killed in flight, and for each sender when a mailbox was replaced. Returns how much it was.
+    /// Nothing waits. What was accepted was received or counted as lost, each package of it; and too much was counted
+    /// at most once for each process killed in flight, and for each sender when a mailbox was replaced. Returns how
+    /// much it was.
     fn check_accounts(&self) -> u64 {
         let (mut too_many, mut off) = (0, 0);
         for (mailbox, info) in self.look().into_iter().enumerate() {
@@ -298,7 +299,8 @@ impl Storm {
         let [unfinished, poison] = [Loss::Unfinished, Loss::Poison].map(lost);
         let (cause, too_many) = (cause.word(), self.check_accounts());
         tell(format_args!(
-            "{self}, {adoptions} adoptions since the last: {received} received, {gone} {cause}, {unfinished} unfinished, {poison} \
+            "{self}, {adoptions} adoptions since the last: {received} received, {gone} {cause}, {unfinished} \
+            unfinished, {poison} \
              poison; {too_many} counted too many"
         ));
         assert!(received > kills && gone > kills / 10 && self.in_flight > kills / 10, "too quiet to prove anything");

@@ -224,7 +224,8 @@ pub struct DescriptionPart {
 pub struct ParameterPage {
     /// Parameters of the module.
     pub total: u16,
-    /// Times that parameters were set in this incarnation of the module: pages with different ones do not belong together.
+    /// Times that parameters were set in this incarnation of the module: pages with different ones do not belong
+    /// together.
     pub changes: u32,
     /// Those from the index that was asked for.
     pub parameters: Vec<Parameter>,
@@ -260,8 +261,8 @@ pub struct DataHead {
     pub sequence: u32,
     /// Periods so far in which nothing could be delivered, and packages that found the mailbox full.
     pub missed: u32,
-    /// Of the subscriber, as the envelope of its request had it: a later incarnation of the subscriber takes no data that an
-    /// earlier one asked for. 0 for data that nobody asked for, such as lines of output.
+    /// Of the subscriber, as the envelope of its request had it: a later incarnation of the subscriber takes no data
+    /// that an earlier one asked for. 0 for data that nobody asked for, such as lines of output.
     pub incarnation: u32,
 }
 

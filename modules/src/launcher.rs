@@ -98,7 +98,8 @@ pub struct Children {
 pub enum ControlError {
     /// Not one of its modules.
     #[error(
-        "launch watches over no module `{0}` on this node: it is on another one, left out since its program is missing, \
+        "launch watches over no module `{0}` on this node: it is on another one, left out since its program is \
+         missing, \
          or not in the configuration; `rohrpost list` shows which there are"
     )]
     NoModule(String),
@@ -160,7 +161,8 @@ pub struct LookPage {
 pub enum LookError {
     /// Reader and launch are of different versions.
     #[error(
-        "its launch shows nodes in another form ({0:#010x}) than this program reads: use the same version of Rohrpost on all \
+        "its launch shows nodes in another form ({0:#010x}) than this program reads: use the same version of Rohrpost \
+        on all \
          nodes (`rohrpost version`)"
     )]
     Form(u32),

@@ -1,7 +1,7 @@
 //! Values as the bytes that travel in packages: postcard, as `docs/src/wire.md` describes it.
 //!
-//! Proxies and [`Context`](crate::runtime::Context) encode and decode by themselves. This is for tools that call functions
-//! by number and read values themselves.
+//! Proxies and [`Context`](crate::runtime::Context) encode and decode by themselves. This is for tools that call
+//! functions by number and read values themselves.
 //!
 //! ```
 //! # use rohrpost_modules as rohrpost;

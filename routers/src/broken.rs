@@ -1,4 +1,5 @@
-//! Mistakes that can be switched on, one at a time and for one thread: tests and the simulation must notice each of them.
+//! Mistakes that can be switched on, one at a time and for one thread: tests and the simulation must notice each of
+//! them.
 //!
 //! In a build without the feature `broken-variants` nothing of this is there.
 

@@ -1,7 +1,8 @@
-//! Counts, packages by class, losses by cause, and datagrams: the parts of what a router counts ([`stats`](crate::stats)).
+//! Counts, packages by class, losses by cause, and datagrams: the parts of what a router counts
+//! ([`stats`](crate::stats)).
 //!
-//! One thread writes each counter (`out`: the one that sends; `inn`: the one that receives), any thread reads: so a count is a load
-//! and a store, no locked instruction. Accounts balance, by class:
+//! One thread writes each counter (`out`: the one that sends; `inn`: the one that receives), any thread reads: so a
+//! count is a load and a store, no locked instruction. Accounts balance, by class:
 //!
 //! ```text
 //! out.packages  =  out.passed + out.lost, all causes  + those that wait

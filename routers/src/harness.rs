@@ -1,4 +1,5 @@
-//! What the tests of the cores have in common: settings from plain values, a log of all that is told, and a router without sockets.
+//! What the tests of the cores have in common: settings from plain values, a log of all that is told, and a router
+//! without sockets.
 
 use crate::admission::Admission;
 use crate::broken::{Broken, with};

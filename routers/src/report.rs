@@ -11,8 +11,8 @@ pub const BEGINNING_BYTES: usize = rohrpost_network::KEPT_IN_BYTES as usize;
 
 /// Learns of each package that is lost here, once. It may answer its sender; counted it is already.
 pub trait Report {
-    /// `peer` is where it was to go, or came from; none if nobody knows. `body` is the beginning of its body, [`BEGINNING_BYTES`] of it at
-    /// least; less only if it is shorter, or if its first part never came.
+    /// `peer` is where it was to go, or came from; none if nobody knows. `body` is the beginning of its body,
+    /// [`BEGINNING_BYTES`] of it at least; less only if it is shorter, or if its first part never came.
     fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause);
 }
 

@@ -1,6 +1,7 @@
 //! What a router counts, for whoever wants to know: packages by class, losses by cause, peers.
 //!
-//! What is not real time has threads of its own ([`Stats::of_rest`]): they count its classes in the same places, and datagrams in their own.
+//! What is not real time has threads of its own ([`Stats::of_rest`]): they count its classes in the same places, and
+//! datagrams in their own.
 
 use crate::counts::{Count, PeerReceived, PeerSent, Side};
 use crate::flows::Flows;
@@ -49,9 +50,9 @@ pub struct Stats {
 
 /// After so long the wire holds no duplicate any more of what a router's incarnation before took.
 ///
-/// Whether there was such an incarnation nobody can tell: a launch that ends takes the node's directory along, transit mailbox and all, and the
-/// next may begin at once, with no restart counted. So the first incarnation of a router is held to be young as well; what that costs is the
-/// wait for a caller's next try.
+/// Whether there was such an incarnation nobody can tell: a launch that ends takes the node's directory along, transit
+/// mailbox and all, and the next may begin at once, with no restart counted. So the first incarnation of a router is
+/// held to be young as well; what that costs is the wait for a caller's next try.
 pub(crate) const YOUNG_NS: u64 = 500_000_000;
 
 impl Stats {
@@ -103,7 +104,8 @@ impl Stats {
         self.knows.as_deref().unwrap_or(self).peer(peer).link.state(self.started_ns, now_ns)
     }
 
-    /// Whether an incarnation of a peer is another than the one that is heard at the port of what is real time, where that is found out.
+    /// Whether an incarnation of a peer is another than the one that is heard at the port of what is real time, where
+    /// that is found out.
     pub(crate) fn is_other_incarnation(&self, peer: NodeIndex, incarnation: u64) -> bool {
         self.knows.as_ref().is_some_and(|all| {
             let known = all.peer(peer).link.incarnation.get();
@@ -116,7 +118,8 @@ impl Stats {
         self.knows.as_ref().is_some_and(|all| all.peer(peer).link.incarnation.get() == incarnation)
     }
 
-    /// Whether the router has just begun: what comes may be a copy of what its incarnation before took, so nothing is said of its fate.
+    /// Whether the router has just begun: what comes may be a copy of what its incarnation before took, so nothing is
+    /// said of its fate.
     pub fn is_young(&self, now_ns: u64) -> bool {
         now_ns.saturating_sub(self.started_ns) < YOUNG_NS
     }

@@ -172,7 +172,8 @@ fn late_percent(segment: &Segment, what: &str, mut is_done: impl FnMut() -> bool
         let mut latencies: Vec<_> = seen.iter().map(|(latency_ns, _)| *latency_ns as f64 / 1e6).collect();
         latencies.sort_by(f64::total_cmp);
         println!(
-            "{what}, flow {flow}: {} packages, p50 {:.2} ms, at most {:.2} ms; bound {:.2} ms, later {}, of these {late_in_kept} \
+            "{what}, flow {flow}: {} packages, p50 {:.2} ms, at most {:.2} ms; bound {:.2} ms, later {}, of these \
+            {late_in_kept} \
              in slots that were kept",
             seen.len(),
             latencies[seen.len() / 2],

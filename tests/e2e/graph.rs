@@ -87,6 +87,6 @@ fn graph_shows_senders_receivers_and_data() {
     robot.tool(PATIENCE).close();
     assert_eq!(
         place.say(&["graph", "--seconds", "0.1"]).ok(),
-        "nobody sent anything within 0.1 s; --silent shows who did before\n"
+        "no package was sent within 0.1 s; --silent shows earlier senders\n"
     );
 }

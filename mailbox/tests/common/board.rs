@@ -1,8 +1,8 @@
 //! What the processes of a test write down for each other: what was accepted and what was received, package by package.
 //!
-//! It lies in memory that forked processes share, and outlives each of them: a package is written down as accepted after its
-//! sender was told so, and as received while its receiver has it in hand. So of a process killed at any instruction, at most the
-//! one package that it was busy with is unknown.
+//! It lies in memory that forked processes share, and outlives each of them: a package is written down as accepted
+//! after its sender was told so, and as received while its receiver has it in hand. So of a process killed at any
+//! instruction, at most the one package that it was busy with is unknown.
 
 use super::random::sum;
 use nix::sys::mman::{MapFlags, ProtFlags, mmap_anonymous};
@@ -15,7 +15,8 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::SeqCst};
 /// Mailboxes that a test sends to.
 pub(crate) const MAILBOXES: [Name; 2] = [super::MAILBOX, super::OTHER];
 pub(crate) const PRIORITIES: [Priority; 4] = [Priority(10), Priority(20), Priority(30), Priority(40)];
-/// What of one sender stays in order: its packages of a priority, or, where only the newest of a state counts, of a state.
+/// What of one sender stays in order: its packages of a priority, or, where only the newest of a state counts, of a
+/// state.
 pub(crate) const KEYS: usize = 4;
 /// Processes and threads at a time.
 pub(crate) const SEATS: usize = 10;
@@ -73,15 +74,15 @@ struct Run {
     /// By mailbox and priority.
     accepted: [[AtomicU32; PRIORITIES.len()]; MAILBOXES.len()],
     refused: [[AtomicU32; PRIORITIES.len()]; MAILBOXES.len()],
-    /// By mailbox and key: how many different ones were received, and the number of the last; in one word, so that a receiver
-    /// that is killed writes both or none.
+    /// By mailbox and key: how many different ones were received, and the number of the last; in one word, so that a
+    /// receiver that is killed writes both or none.
     received: [[AtomicU64; KEYS]; MAILBOXES.len()],
 }
 
 #[repr(C)]
 struct Front {
-    /// Odd: all senders are asked to hold still. Each time has a number of its own, so that who is slow to go on after one is not
-    /// taken for still in the next.
+    /// Odd: all senders are asked to hold still. Each time has a number of its own, so that who is slow to go on after
+    /// one is not taken for still in the next.
     hold: AtomicU32,
     end: AtomicU32,
     seats: [Seat; SEATS],

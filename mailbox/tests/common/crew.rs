@@ -1,7 +1,8 @@
 //! Processes made by forking, a hundred times as cheap as starting a program: for tests that kill thousands of them.
 //!
-//! A fork has one thread only, whatever its parent has, and is only sound while no other thread of the parent holds a lock of
-//! some library. So such a test runs in a process of its own with one thread, a *master*: see [`alone`] and [`master`].
+//! A fork has one thread only, whatever its parent has, and is only sound while no other thread of the parent holds a
+//! lock of some library. So such a test runs in a process of its own with one thread, a *master*: see [`alone`] and
+//! [`master`].
 
 use super::board::shared;
 use super::{Ground, PATIENCE};
@@ -12,8 +13,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
 
-/// Not 0: one of those that this process forked has panicked; in memory that they share. It tells also of one that was killed
-/// before it had said why.
+/// Not 0: one of those that this process forked has panicked; in memory that they share. It tells also of one that was
+/// killed before it had said why.
 static ALARM: OnceLock<&'static AtomicU32> = OnceLock::new();
 
 fn assert_no_alarm() {
@@ -34,7 +35,8 @@ impl Actor {
     pub(crate) fn new(act: impl FnOnce()) -> Self {
         let alarm = ALARM.get_or_init(shared);
         let parent = nix::unistd::getpid();
-        // SAFETY: no other thread holds a lock of any library: there is none, or it is the harness's, which waits (`master`).
+        // SAFETY: no other thread holds a lock of any library: there is none, or it is the harness's, which waits
+        // (`master`).
         match unsafe { fork() }.unwrap() {
             ForkResult::Parent { child } => Self { pid: child, ended: false },
             ForkResult::Child => {
@@ -112,8 +114,8 @@ impl Drop for Actor {
     }
 }
 
-/// In a role: does `act` with one thread, so that it may fork, and comes back when it is done. The test harness has a thread
-/// besides the role's, which only waits for that.
+/// In a role: does `act` with one thread, so that it may fork, and comes back when it is done. The test harness has a
+/// thread besides the role's, which only waits for that.
 pub(crate) fn master(act: impl FnOnce()) {
     let threads = || std::fs::read_dir("/proc/self/task").unwrap().count();
     assert_eq!(threads(), 2, "only the harness's thread and ours: it was started with --test-threads=1");
@@ -132,8 +134,8 @@ pub(crate) fn is_asleep(pid: Pid) -> bool {
     stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('S'))
 }
 
-/// Runs a role of this test binary as a master and waits for its end. It has to [`tell`](super::tell) something now and then, and
-/// `done` when all is well: one that says nothing for a long time hangs, and what it forked dies with it.
+/// Runs a role of this test binary as a master and waits for its end. It has to [`tell`](super::tell) something now and
+/// then, and `done` when all is well: one that says nothing for a long time hangs, and what it forked dies with it.
 pub(crate) fn alone(ground: &Ground, role: &str) {
     let master = ground.start(role);
     loop {

@@ -1,5 +1,5 @@
-//! Every hot path of sending and receiving, with other processes to wake and to be woken by. What an operation must not do, the
-//! tests say that have it done: take from the heap (`hot_path`), or call the kernel (`system_calls`).
+//! Every hot path of sending and receiving, with other processes to wake and to be woken by. What an operation must not
+//! do, the tests say that have it done: take from the heap (`hot_path`), or call the kernel (`system_calls`).
 
 use super::board::{Board, shared};
 use super::crew::{Actor, is_asleep};
@@ -129,8 +129,8 @@ pub(crate) const OPERATIONS: &[Operation] = &[
 
 fn nothing(_: &mut Hands) {}
 
-/// Does all [`OPERATIONS`] in a process of its own, in which `start` is called first, then `around` each time with the index of an
-/// operation and what does it. `look` gets the process and waits for its end. In a master only.
+/// Does all [`OPERATIONS`] in a process of its own, in which `start` is called first, then `around` each time with the
+/// index of an operation and what does it. `look` gets the process and waits for its end. In a master only.
 pub(crate) fn do_all(
     ground: &Ground,
     start: impl FnOnce(),

@@ -10,7 +10,8 @@ use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Sends to the first mailboxes of [`MAILBOXES`] at random: priorities, sizes, copies and loans, loans never sent, pauses.
+/// Sends to the first mailboxes of [`MAILBOXES`] at random: priorities, sizes, copies and loans, loans never sent,
+/// pauses.
 pub(crate) struct Talker {
     board: Board,
     seat: &'static Seat,
@@ -27,8 +28,9 @@ pub(crate) struct Talker {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Weather {
     Calm,
-    /// Receivers are killed. A mailbox may be gone between two owners of different shapes. And a state keeps its priority: what was
-    /// in a dead receiver's hand cannot be replaced, so a more important one of the same state would pass it.
+    /// Receivers are killed. A mailbox may be gone between two owners of different shapes. And a state keeps its
+    /// priority: what was in a dead receiver's hand cannot be replaced, so a more important one of the same state would
+    /// pass it.
     Stormy,
 }
 

@@ -1,4 +1,5 @@
-//! A process is followed from one system call to the next. What it does it marks, so that each call belongs to an operation.
+//! A process is followed from one system call to the next. What it does it marks, so that each call belongs to an
+//! operation.
 
 use crate::common::crew::{Actor, master};
 use crate::common::hands::{OPERATIONS, do_all};
@@ -114,11 +115,13 @@ fn name(number: libc::c_long, arguments: [u64; 6]) -> String {
 
 fn check(all: &[Traced]) {
     assert!(CALLS.iter().all(|(name, _)| OPERATIONS.iter().any(|operation| operation.name == *name)));
-    // On a machine whose clock source cannot be read without the kernel, every look at the clock is a call: not ours to fix.
+    // On a machine whose clock source cannot be read without the kernel, every look at the clock is a call: not ours to
+    // fix.
     let slow_clock = all.iter().any(|(at, calls)| *at == 0 && calls.iter().any(|call| call == CLOCK));
     if slow_clock {
         tell(
-            "the kernel is asked for each look at the clock here (see .../clocksource0/current_clocksource); not counted",
+            "the kernel is asked for each look at the clock here (see .../clocksource0/current_clocksource); not \
+            counted",
         );
     }
     let mut naps_more = 0;
@@ -129,7 +132,8 @@ fn check(all: &[Traced]) {
         for (time, (_, calls)) in here.into_iter().enumerate() {
             let mut calls: Vec<&str> =
                 calls.iter().map(String::as_str).filter(|call| !slow_clock || *call != CLOCK).collect();
-            // A nap in `poll` ends after a tenth of a second. For so long a busy computer may keep the answer back, now and then.
+            // A nap in `poll` ends after a tenth of a second. For so long a busy computer may keep the answer back, now
+            // and then.
             let before = calls.len();
             calls.dedup_by(|next, call| next == call && *call == "poll");
             naps_more += before - calls.len();

@@ -18,9 +18,10 @@ use quote::quote;
 /// (what a module names as its interface; its constants are the data) and `MotorProxy` (its functions look like local
 /// calls).
 ///
-/// * `#[command(16)]` before a function gives its number, 16 or more; `#[command(17, idempotent)]` says that running it twice
-///   does no harm. Functions take `&mut self` and owned arguments, at most eight.
-/// * `#[data(1)] fn scan() -> LaserScan;` declares data. The trait's implementor does not see it; the module publishes it.
+/// * `#[command(16)]` before a function gives its number, 16 or more; `#[command(17, idempotent)]` says that running it
+///   twice does no harm. Functions take `&mut self` and owned arguments, at most eight.
+/// * `#[data(1)] fn scan() -> LaserScan;` declares data. The trait's implementor does not see it; the module publishes
+///   it.
 ///
 /// Doc comments become the texts that tools show. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before an argument,
 /// or under `#[data(1)]`, says what values mean; all its keys are optional.
@@ -48,10 +49,12 @@ pub fn data(_attributes: TokenStream, item: TokenStream) -> TokenStream {
 
 /// Describes a struct or enum, so that tools and other languages can read it.
 ///
-/// * Doc comments become texts. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before a field says what its values mean; all
-///   its keys are optional. The compiler checks bounds against the type and each other; values are not checked.
+/// * Doc comments become texts. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before a field says what its values
+///   mean; all its keys are optional. The compiler checks bounds against the type and each other; values are not
+///   checked.
 /// * `#[schema(name = "rohrpost.Pose")]` before the item gives it a name that stays when the code is moved or renamed;
-///   without it the name is Rust's, or that of serde's `rename`. Names and units count in an interface's hash, texts and bounds do not.
+///   without it the name is Rust's, or that of serde's `rename`. Names and units count in an interface's hash, texts
+///   and bounds do not.
 #[proc_macro_derive(Schema, attributes(schema))]
 pub fn schema(item: TokenStream) -> TokenStream {
     schema::expand(item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
@@ -69,11 +72,12 @@ pub fn schema(item: TokenStream) -> TokenStream {
 /// }
 /// ```
 ///
-/// * It derives `Deserialize`; names are in kebab-case, as in the configuration (`cruise-m-s`), and unknown keys are refused.
-/// * A field with `#[parameter]` may change. All its keys are optional. Its doc comment is the text that tools show. Its
-///   type is `bool`, an integer of at most 64 bits, `f32`, `f64`, `String`, or an enum with `#[rohrpost::choice]`.
-/// * `min`, `max` and `default` are checked by the compiler against the type and each other; values in the configuration
-///   when they are read. Numbers with a fraction are always finite.
+/// * It derives `Deserialize`; names are in kebab-case, as in the configuration (`cruise-m-s`), and unknown keys are
+///   refused.
+/// * A field with `#[parameter]` may change. All its keys are optional. Its doc comment is the text that tools show.
+///   Its type is `bool`, an integer of at most 64 bits, `f32`, `f64`, `String`, or an enum with `#[rohrpost::choice]`.
+/// * `min`, `max` and `default` are checked by the compiler against the type and each other; values in the
+///   configuration when they are read. Numbers with a fraction are always finite.
 /// * The other fields are settings as ever, with serde's attributes.
 #[proc_macro_attribute]
 pub fn parameters(attributes: TokenStream, item: TokenStream) -> TokenStream {

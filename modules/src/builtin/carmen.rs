@@ -128,7 +128,8 @@ impl Carmen {
         let Progress { scans, odometries, .. } = self.progress;
         let counters = self.playback.counters();
         tracing::info!(
-            "the log is over: {scans} scans and {odometries} odometries played, {} discarded for their stamps, {} broken",
+            "the log is over: {scans} scans and {odometries} odometries played, {} discarded for their stamps, {} \
+            broken",
             counters.discarded,
             counters.malformed
         );

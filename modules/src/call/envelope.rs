@@ -13,7 +13,8 @@ use std::time::Duration;
 pub struct CallEnvelope {
     /// Hash of the interface that the caller was compiled with.
     pub interface: u32,
-    /// Tells this incarnation of the caller from earlier ones: later than that of the previous owner of its reply mailbox.
+    /// Tells this incarnation of the caller from earlier ones: later than that of the previous owner of its reply
+    /// mailbox.
     pub incarnation: u32,
     /// Counts this incarnation's calls. A repeat carries the number of the first try.
     pub sequence: u32,

@@ -42,7 +42,8 @@ pub enum Fault {
     Expired,
     /// There is no place for another caller or subscription of its sender. It was not run.
     #[error(
-        "the server has no place for another caller or subscription from there: its share is used up, or all are taken; end some, try again \
+        "the server has no place for another caller or subscription from there: its share is used up, or all are \
+         taken; end some, try again \
          later, or name the server in the caller's `calls`, which keeps places for it"
     )]
     Busy,
@@ -104,7 +105,8 @@ pub enum Fault {
     Delayed,
     /// A router or the module itself: the caller's class may not command this one.
     #[error(
-        "node {} refuses it: {}, [access], lists the classes that may command this one, and the caller's is not among them",
+        "node {} refuses it: {}, [access], lists the classes that may command this one, and the caller's is not among \
+         them",
         line(.node), line(.rule)
     )]
     NotAllowed {
@@ -116,7 +118,8 @@ pub enum Fault {
     /// A later incarnation of the caller has called this server, so this command is of one that is over, or seems so.
     /// This try was not run.
     #[error(
-        "a later incarnation of this caller has called it already: two programs have this name, or the computer's clock was set back \
+        "a later incarnation of this caller has called it already: two programs have this name, or the computer's \
+         clock was set back \
          before the node was launched; this passes {} s after the later one's last call was over",
         super::deduplicator::TRANSIT_MAX.as_secs()
     )]
@@ -169,12 +172,14 @@ impl Fault {
 fn differs(server: u32) -> String {
     if server <= u16::MAX.into() {
         return format!(
-            "the module has common functions of version {server}, this program has {HASH}: run programs of the same version of \
+            "the module has common functions of version {server}, this program has {HASH}: run programs of the same \
+             version of \
              Rohrpost (`rohrpost version`)"
         );
     }
     format!(
-        "interface differs: the module has {server:#010x}; build caller and module from the same version of the interface \
+        "interface differs: the module has {server:#010x}; build caller and module from the same version of the \
+         interface \
          and of Rohrpost (`rohrpost version`)"
     )
 }

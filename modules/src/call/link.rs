@@ -85,8 +85,8 @@ impl Link {
             participant: participant.clone(),
             me,
             // Not the participant's: of two that join, the first may have the name after the other, and the server of
-            // that other would take these calls for those of an earlier incarnation. The mailbox is ours, so all earlier
-            // owners have theirs.
+            // that other would take these calls for those of an earlier incarnation. The mailbox is ours, so all
+            // earlier owners have theirs.
             incarnation: participant.node().next_incarnation(),
             replies,
             senders: Vec::new(),

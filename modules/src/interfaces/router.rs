@@ -57,7 +57,8 @@ pub struct LinkCounters {
     /// Datagrams from the peer that were changed on the way; dropped.
     #[schema(unit = "datagrams")]
     pub damaged: u64,
-    /// Datagrams from the peer's address of another version or configuration, or of another incarnation of its router; dropped.
+    /// Datagrams from the peer's address of another version or configuration, or of another incarnation of its router;
+    /// dropped.
     #[schema(unit = "datagrams")]
     pub refused: u64,
     /// Datagrams to the peer that this computer did not send.
@@ -156,7 +157,8 @@ pub struct Links {
     pub waiting_bytes: u64,
     /// Classes that did something, the most urgent first.
     pub classes: Vec<ClassCarried>,
-    /// Datagrams from addresses of no node, for which the router's socket had no room, or that are nothing of Rohrpost's.
+    /// Datagrams from addresses of no node, for which the router's socket had no room, or that are nothing of
+    /// Rohrpost's.
     pub foreign: u64,
     /// What this computer said when it was to send a datagram, and how often.
     pub failures: Vec<SocketFailure>,
@@ -258,9 +260,11 @@ pub struct SlotState {
     pub synchronisations_missed: u64,
     /// Synchronisations that it left out as the master because it woke up too late for them.
     pub synchronisations_late: u64,
-    /// Datagrams that were made and missed the end of their slot, since the router stood still just then: they waited for the next one.
+    /// Datagrams that were made and missed the end of their slot, since the router stood still just then: they waited
+    /// for the next one.
     pub held: u64,
-    /// Hellos that it said, having no time of its own, by the time of who had not shown that it lives: who repeats what was said brings about some.
+    /// Hellos that it said, having no time of its own, by the time of who had not shown that it lives: who repeats what
+    /// was said brings about some.
     pub unproven: u64,
     /// Changes of role: slave, master.
     pub roles: u64,
@@ -306,7 +310,8 @@ pub struct SlotUse {
     pub datagrams: u64,
 }
 
-/// Declared flows that leave a node, in their order in the configuration. Counts are since its router began, and only grow.
+/// Declared flows that leave a node, in their order in the configuration. Counts are since its router began, and only
+/// grow.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct FlowStates {
     /// The node.
@@ -315,17 +320,20 @@ pub struct FlowStates {
     pub flows: Vec<FlowState>,
 }
 
-/// How late packages of a declared flow were. Measured by the router that sends: from publishing to the arrival of the last bit at the other
-/// computer, the link's time reckoned as bounds have it; where there are no time slots, until the package is handed to the kernel.
+/// How late packages of a declared flow were. Measured by the router that sends: from publishing to the arrival of the
+/// last bit at the other computer, the link's time reckoned as bounds have it; where there are no time slots, until the
+/// package is handed to the kernel.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct FlowState {
     /// The module that sends.
     pub from: String,
     /// The module that receives.
     pub to: String,
-    /// What it carries, as declared: `data 1`, `reply`. By this, flows between the same modules are told apart. Empty: the file does not say so.
+    /// What it carries, as declared: `data 1`, `reply`. By this, flows between the same modules are told apart. Empty:
+    /// the file does not say so.
     pub carries: String,
-    /// Bytes of a body at most, as declared: flows between the same modules that do not say what they carry are told apart by it.
+    /// Bytes of a body at most, as declared: flows between the same modules that do not say what they carry are told
+    /// apart by it.
     pub size: u32,
     /// Packages sent.
     pub packages: u64,
@@ -339,7 +347,8 @@ pub struct FlowState {
     pub bound_ns: Option<u64>,
     /// The deadline, ns.
     pub deadline_ns: u64,
-    /// The slowest of those since whose publishing no slot of the node was left out or cut short, ns: the bound is about these. 0 without any.
+    /// The slowest of those since whose publishing no slot of the node was left out or cut short, ns: the bound is
+    /// about these. 0 without any.
     pub kept_worst_ns: u64,
     /// Packages slower than the bound.
     pub over_bound: u64,

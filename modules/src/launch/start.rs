@@ -125,7 +125,8 @@ impl Launch {
         let ordinary: Vec<&str> = self.children.iter().filter(is_ordinary).map(Child::text).collect();
         (!ordinary.is_empty()).then(|| {
             format!(
-                "no real time: {} run{} like ordinary programs, and late when the computer is busy; allow it with a limit \
+                "no real time: {} run{} like ordinary programs, and late when the computer is busy; allow it with a \
+                limit \
                  `rtprio` for this user (limits.conf) or CAP_SYS_NICE (`rohrpost doctor` says what is missing)",
                 ordinary.join(", "),
                 if ordinary.len() == 1 { "s" } else { "" }

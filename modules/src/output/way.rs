@@ -35,7 +35,8 @@ thread_local! {
     static PANICS: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Each has an allowance and a queue of its own, so that no flood of one hides another. In the order of their importance.
+/// Each has an allowance and a queue of its own, so that no flood of one hides another. In the order of their
+/// importance.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Lane {
     Panic,
@@ -85,8 +86,8 @@ pub(super) struct Output {
     suppressed: AtomicU64,
     out: Arc<Out>,
     print: Print,
-    /// Whether the configuration has a collector, on whichever node: routers lead there. Where there is none, nothing waits for it:
-    /// what is said is counted as lost, and errors are printed.
+    /// Whether the configuration has a collector, on whichever node: routers lead there. Where there is none, nothing
+    /// waits for it: what is said is counted as lost, and errors are printed.
     collected: bool,
 }
 
@@ -103,7 +104,8 @@ pub(crate) fn install_quiet(
     launched: bool,
     quiet: Duration,
 ) {
-    // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard error.
+    // By hand, the person at the terminal is told; launched, only what launch may have to repeat goes to standard
+    // error.
     let print = if launched { Print::Errors } else { Print::All };
     if let Some(output) = Output::new(participant, installation, me, me, Arc::new(Out::quiet(quiet)), print)
         && OUTPUT.set(output).is_ok()
@@ -150,8 +152,8 @@ impl Output {
     }
 }
 
-/// A panic that this thread survived does not make the next one its last. (In the hook itself a thread always panics, so that
-/// it cannot be told there whether one was unwinding already.)
+/// A panic that this thread survived does not make the next one its last. (In the hook itself a thread always panics,
+/// so that it cannot be told there whether one was unwinding already.)
 fn forget_panics() {
     if !std::thread::panicking() {
         // Fails only while the thread ends.
@@ -212,8 +214,9 @@ pub fn drain() {
     }
 }
 
-/// Sends the lines that wait. For a process that ends: it tells of all that was suppressed, and gives a collector that is not
-/// there or has no room a moment, at most half a second. What is left then is lost; errors are printed for launch to pass on.
+/// Sends the lines that wait. For a process that ends: it tells of all that was suppressed, and gives a collector that
+/// is not there or has no room a moment, at most half a second. What is left then is lost; errors are printed for
+/// launch to pass on.
 pub fn flush() {
     if let Some(output) = installed() {
         output.tell(|excess, _| excess.tell_all());
@@ -238,7 +241,8 @@ impl Output {
         let now = Instant::now();
         let retry = (!self.is_idle()).then(|| now + RETRY_FULL.max(self.patience()));
         let now_ns = monotonic_ns();
-        // Where there is no room for it, it is told when there is; until then its time would have passed again and again.
+        // Where there is no room for it, it is told when there is; until then its time would have passed again and
+        // again.
         let room = self.lanes.iter().filter(|lane| !lane.queue.is_full());
         let due_ns = room.filter_map(|lane| lane.excess.due_ns()).min();
         let due = due_ns.map(|due_ns| now + Duration::from_nanos(due_ns.saturating_sub(now_ns)));

@@ -2,12 +2,13 @@
 //!
 //! Stamps of a log are not to be trusted alone:
 //!
-//! - More than [`BEHIND_MAX_S`] behind the largest stamp so far: the record is discarded and counted. The Intel log has an
-//!   ODOM line after each scan whose stamp is next to 0.
-//! - Behind by less: the record is kept where the file has it, with its own stamp (the writers of a log take turns as they
-//!   please; the Intel log has 1709 such). Only its due time is held at the largest so far: due times never go back.
-//! - More than [`GAP_MAX_S`] ahead: discarded too, since believing one wrong stamp would cost the rest of the log. If the
-//!   next stamp agrees with it, it was a pause, which is played as one of `GAP_MAX_S`.
+//! - More than [`BEHIND_MAX_S`] behind the largest stamp so far: the record is discarded and counted. The Intel log has
+//!   an ODOM line after each scan whose stamp is next to 0.
+//! - Behind by less: the record is kept where the file has it, with its own stamp (the writers of a log take turns as
+//!   they please; the Intel log has 1709 such). Only its due time is held at the largest so far: due times never go
+//!   back.
+//! - More than [`GAP_MAX_S`] ahead: discarded too, since believing one wrong stamp would cost the rest of the log. If
+//!   the next stamp agrees with it, it was a pause, which is played as one of `GAP_MAX_S`.
 
 use super::carmen::{LogError, Reader, Record};
 use std::io::BufRead;

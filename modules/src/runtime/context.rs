@@ -392,7 +392,8 @@ fn deliver(
             if !to.told {
                 let (data, subscriber) = (newest.name, classes.format(asked.to.module()));
                 tracing::error!(
-                    "`{data}` cannot be delivered to {subscriber}: it has {len} bytes, and the data mailbox there takes \
+                    "`{data}` cannot be delivered to {subscriber}: it has {len} bytes, and the data mailbox there \
+                     takes \
                      {max}; raise `size` in [module.mailbox.data] of {subscriber}"
                 );
             }

@@ -193,9 +193,9 @@ impl Followings {
     /// is what newer ones replaced, there or on the way, and no loss.
     ///
     /// A subscription is told by its id and by the incarnation of this incarnation, which nothing before it has had: so
-    /// whoever still sends what an earlier incarnation asked for, in whatever order that subscribed, is not taken for another.
-    /// The publisher and the number are compared besides, since both numbers are no secret; a router lets nobody send
-    /// in the name of another node's module.
+    /// whoever still sends what an earlier incarnation asked for, in whatever order that subscribed, is not taken for
+    /// another. The publisher and the number are compared besides, since both numbers are no secret; a router lets
+    /// nobody send in the name of another node's module.
     pub(crate) fn admit(
         &mut self,
         (mailbox, latest): (u8, bool),

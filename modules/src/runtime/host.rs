@@ -37,7 +37,8 @@ pub enum ClientError {
     Mailbox(#[from] CreateError),
     /// All instances of class `tool` that programs run by hand may take are in use.
     #[error(
-        "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, or \
+        "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, \
+        or \
          widen `tools` in the configuration"
     )]
     Crowded(usize, String),

@@ -31,8 +31,8 @@ pub(crate) enum Cause {
 }
 
 impl Cause {
-    /// What is told of it. Nothing where it happens to all: after a restart, what the incarnation before asked for still comes
-    /// for a while.
+    /// What is told of it. Nothing where it happens to all: after a restart, what the incarnation before asked for
+    /// still comes for a while.
     fn words(self) -> Option<&'static str> {
         match self {
             Self::NotAllowed => Some("[access] does not let that class command this one"),
@@ -42,8 +42,10 @@ impl Cause {
             Self::OtherPublisher => Some("the subscription follows another module"),
             Self::OtherNumber => Some("the subscription is to other data of that module"),
             Self::EarlierIncarnation => Some(
-                "a later incarnation of it has called before. If this goes on, either two programs have that name: end one of them. Or its \
-                 computer's clock was set back before its node was launched: set the clock right, and launch that node again",
+                "a later incarnation of it has called before. If this goes on, either two programs have that name: \
+                end one of them. Or its \
+                 computer's clock was set back before its node was launched: set the clock right, and launch that \
+                 node again",
             ),
             Self::PreviousIncarnation => None,
         }

@@ -32,7 +32,8 @@ pub enum LookFailure {
     Silent(Duration),
 }
 
-/// A look at another node, under way. SnapshotRequest after it with [`Distant::poll`]; give it up with [`Distant::forget`].
+/// A look at another node, under way. SnapshotRequest after it with [`Distant::poll`]; give it up with
+/// [`Distant::forget`].
 pub struct Distant {
     launcher: Name,
     what: SnapshotRequest,

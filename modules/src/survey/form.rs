@@ -1,7 +1,7 @@
 //! A look at a node as it travels from that node's launch to a tool elsewhere: postcard of forms of its types.
 //!
-//! Those of `rohrpost-mailbox` know no serialization, so `travels!` makes a form of each, field by field. What arrives is
-//! a claim of another process: whatever the bytes are, reading them gives a look or an error.
+//! Those of `rohrpost-mailbox` know no serialization, so `travels!` makes a form of each, field by field. What arrives
+//! is a claim of another process: whatever the bytes are, reading them gives a look or an error.
 
 #[cfg(test)]
 mod tests;

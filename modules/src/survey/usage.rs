@@ -58,7 +58,8 @@ mod tests {
     #[test]
     fn memory_is_told_in_bytes() {
         let status = "Name:\tx\nVmRSS:\t    2048 kB\nRssAnon:\t1 kB\n";
-        let rollup = "5630-7ffc ---p 0 00:00 0 [rollup]\nRss:          999424 kB\nPss:             7168 kB\nPss_Dirty:       12 kB\n";
+        let rollup = "5630-7ffc ---p 0 00:00 0 [rollup]\nRss:          999424 kB\nPss:             7168 \
+            kB\nPss_Dirty:       12 kB\n";
         let of = |rollup: Option<&str>, status: &str| {
             memory(|file| if file == "status" { Some(status.into()) } else { rollup.map(str::to_owned) })
         };

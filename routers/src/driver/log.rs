@@ -11,8 +11,8 @@ pub const WINDOWS: usize = 16;
 pub struct Used {
     /// Which, in system time.
     pub window: Window,
-    /// The first datagram was on the wire so long after the beginning, ns: by the kernel's stamp where there is one, else when it was
-    /// handed over and the usual lead. Less than 0: too early.
+    /// The first datagram was on the wire so long after the beginning, ns: by the kernel's stamp where there is one,
+    /// else when it was handed over and the usual lead. Less than 0: too early.
     pub off_ns: i64,
     /// Whether it was the kernel's stamp.
     pub by_kernel: bool,
@@ -32,7 +32,8 @@ pub struct WindowLog {
 }
 
 impl WindowLog {
-    /// A window is over. Its first datagram was handed over so that it was on the wire at `first_ns`, local, by the usual lead.
+    /// A window is over. Its first datagram was handed over so that it was on the wire at `first_ns`, local, by the
+    /// usual lead.
     pub(super) fn used(&mut self, tx_window: &TransmitWindow, first_ns: u64) {
         self.windows.rotate_left(1);
         self.windows[WINDOWS - 1] = Some(Used {

@@ -35,7 +35,8 @@ pub trait Platform {
     fn send(&mut self, now_ns: u64, to: NodeIndex, buffer: &mut [u8], bytes: usize) -> Result<(), NotSent>;
     /// Hands over a datagram of time.
     fn send_time(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]);
-    /// Sends the next refusal or hello if it fits, a hello to the node `first` before others; as how many bytes slots count it.
+    /// Sends the next refusal or hello if it fits, a hello to the node `first` before others; as how many bytes slots
+    /// count it.
     fn answer(&mut self, tx_window: &TransmitWindow, first: Option<NodeIndex>) -> Option<usize>;
     /// Hands the clock what came: stamps of what `left`, then at most so many datagrams of time.
     fn take_time(&mut self, most: usize, left: impl FnMut(SentId, Stamp));

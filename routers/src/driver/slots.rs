@@ -158,8 +158,8 @@ impl SlotDriver {
         }
     }
 
-    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is silent waits for datagrams of
-    /// time; others read them once a cycle at least.
+    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is silent waits
+    /// for datagrams of time; others read them once a cycle at least.
     fn between(&mut self, on: &mut impl Platform, is_silent: bool, wake_ns: u64) {
         let now_ns = on.monotonic_ns();
         self.tidied_ns = now_ns;
@@ -204,8 +204,8 @@ impl SlotDriver {
         }
     }
 
-    /// Takes what the slot has room for, and what still comes, until shortly before the call. When there is something to do again, unless
-    /// packages come; none: it is time for the call.
+    /// Takes what the slot has room for, and what still comes, until shortly before the call. When there is something
+    /// to do again, unless packages come; none: it is time for the call.
     fn spin(&mut self, on: &mut impl Platform, planned: &Planned, mut looks: bool) -> Option<u64> {
         loop {
             let left_ns = planned.call_ns.saturating_sub(on.local_ns());
@@ -293,7 +293,8 @@ impl SlotDriver {
         }
     }
 
-    /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread stands still meanwhile.
+    /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread
+    /// stands still meanwhile.
     fn next_datagram(&mut self, on: &mut impl Platform, tx_window: &TransmitWindow) -> Option<Held> {
         if let Some(held) = self.held.take() {
             return Some(held);
@@ -312,8 +313,8 @@ impl SlotDriver {
         Some(Held { to, bytes, made_ns })
     }
 
-    /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time: then it would keep
-    /// up what is, and is lost.
+    /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time:
+    /// then it would keep up what is, and is lost.
     fn missed(&mut self, on: &mut impl Platform, made: Held) {
         let datagram = &self.datagram[..made.bytes];
         let held = held::is_real_time(datagram, &self.network);
@@ -326,7 +327,8 @@ impl SlotDriver {
         }
     }
 
-    /// What was made and found no slot for long is lost: whoever sent it counts on that nothing arrives that is much older than it may be.
+    /// What was made and found no slot for long is lost: whoever sent it counts on that nothing arrives that is much
+    /// older than it may be.
     fn drop_if_old(&mut self, on: &mut impl Platform) {
         let now_ns = on.monotonic_ns();
         if let Some(held) = self.held.take_if(|held| held.is_old(now_ns)) {

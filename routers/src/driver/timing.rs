@@ -2,8 +2,8 @@
 
 use rohrpost_network::TRANSIT_LOOK;
 
-/// The thread wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both processors busy: it
-/// wakes up 50 µs late on average, and to read takes 30 µs.
+/// The thread wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both
+/// processors busy: it wakes up 50 µs late on average, and to read takes 30 µs.
 const SPIN_NS_MAX: u64 = 150_000;
 /// Of the cycle, at most this part for each window: short cycles leave less time for it.
 const SPIN_CYCLES: u64 = 20;
@@ -11,8 +11,8 @@ const SPIN_CYCLES: u64 = 20;
 pub(super) const LAST_LOOK_NS: u64 = 50_000;
 /// Whether the mailbox is full is looked at this often: half of it has room for a burst of 32 packages.
 pub(super) const NAP_NS: u64 = 1_000_000;
-/// With less than this until it has to wake up it sleeps on: each look at the mailbox keeps a processor from another thread, perhaps one that
-/// is about to send.
+/// With less than this until it has to wake up it sleeps on: each look at the mailbox keeps a processor from another
+/// thread, perhaps one that is about to send.
 pub(super) const SLEEP_NS_MAX: u64 = NAP_NS + NAP_NS / 4;
 const _: () = assert!(
     (SLEEP_NS_MAX + SPIN_NS_MAX) as u128 <= TRANSIT_LOOK.as_nanos(),

@@ -59,8 +59,8 @@ pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
 /// Writes the answers to commands that go no further: what a fault looks like is not the routers' business.
 pub trait Answers {
-    /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for. False:
-    /// it gets none.
+    /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for.
+    /// False: it gets none.
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
 }
 

@@ -6,7 +6,8 @@ use std::path::Path;
 use x509_cert::Certificate;
 use x509_cert::der::Decode;
 
-/// The last second since 1970 in which a certificate holds, regardless of its signature; none if the file is no certificate.
+/// The last second since 1970 in which a certificate holds, regardless of its signature; none if the file is no
+/// certificate.
 pub fn holds_until_s(path: &Path) -> Option<u64> {
     let der = CertificateDer::from_pem_file(path).ok()?;
     let certificate = Certificate::from_der(&der).ok()?;

@@ -1,5 +1,5 @@
-//! Hundreds of simulated networks, and the same with a mistake switched on: `ROHRPOST_SIM_SEEDS=10000` for more of them, from
-//! `ROHRPOST_SIM_FIRST=n` on; `ROHRPOST_SIM_SEED=n` to see one line by line.
+//! Hundreds of simulated networks, and the same with a mistake switched on: `ROHRPOST_SIM_SEEDS=10000` for more of
+//! them, from `ROHRPOST_SIM_FIRST=n` on; `ROHRPOST_SIM_SEED=n` to see one line by line.
 
 #[path = "simulated/rare.rs"]
 mod rare;
@@ -31,7 +31,8 @@ const ROUGH_SEEDS: u64 = 6;
 const MISTAKE_SEEDS: u64 = 20;
 /// Cycles of a network in which a master might be taken for dead.
 const LOSSY_CYCLES: u64 = 1000;
-/// Of networks with time slots, those in which each promise must be broken first by some mistake: most mistakes break another before it.
+/// Of networks with time slots, those in which each promise must be broken first by some mistake: most mistakes break
+/// another before it.
 const PROMISE_SEEDS: u64 = 300;
 /// The test of all promises.
 const NETWORKS: &str = "a_hundred_networks";
@@ -43,16 +44,16 @@ const SLOTTED: &str = "networks_with_time_slots";
 const SEALED_SLOTTED: &str = "sealed_networks_with_time_slots";
 /// Those in which all goes wrong: a tenth as many.
 const ROUGH_SLOTTED: &str = "rough_slotted_networks";
-/// Mistakes that cannot show here, since each has something else before it; the tests of `fragment` see them. Heads in this simulation are
-/// never the same twice, and copies of a part are dropped as datagrams. Who waits for the pace though it is urgent breaks no promise but that
-/// of speed.
+/// Mistakes that cannot show here, since each has something else before it; the tests of `fragment` see them. Heads in
+/// this simulation are never the same twice, and copies of a part are dropped as datagrams. Who waits for the pace
+/// though it is urgent breaks no promise but that of speed.
 const UNSEEN: [Mistake; 3] = [
     Mistake::Packages(Broken::MixesPackages),
     Mistake::Packages(Broken::CountsPartsTwice),
     Mistake::Packages(Broken::NeverInAdvance),
 ];
-/// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them. What has another digest is of an incarnation that
-/// is doubted anyway.
+/// Mistakes that show in too few networks to be looked for each time; the cores' own tests see them. What has another
+/// digest is of an incarnation that is doubted anyway.
 const SELDOM: [Mistake; 5] = [
     Mistake::Packages(Broken::TakesOtherDigests),
     Mistake::Packages(Broken::KeepsOwnTime),
@@ -103,7 +104,8 @@ fn told(test: &str, seed: u64, problem: &Problem) -> String {
     let Problem { promise, at_ns, text } = problem;
     let at_ms = at_ns / 1_000_000;
     format!(
-        "seed {seed}, at {at_ms} ms, {promise:?}: {text}\nreplay: ROHRPOST_SIM_SEED={seed} cargo test -p rohrpost-testbed --test simulation {test} -- --nocapture"
+        "seed {seed}, at {at_ms} ms, {promise:?}: {text}\nreplay: ROHRPOST_SIM_SEED={seed} cargo test -p \
+         rohrpost-testbed --test simulation {test} -- --nocapture"
     )
 }
 
@@ -247,7 +249,8 @@ fn every_mistake_of_unsteady_clocks_is_noticed() {
     worlds.into_iter().for_each(|plan| all_are_noticed(&Broken::UNSTEADY.map(Mistake::Packages), plan));
 }
 
-/// Routers that are started from edited files, each field in turn: nodes of several tables on one wire. Half as many networks; sealed ones by turns.
+/// Routers that are started from edited files, each field in turn: nodes of several tables on one wire. Half as many
+/// networks; sealed ones by turns.
 #[test]
 fn networks_with_edited_files_keep_their_promises() {
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {
@@ -302,8 +305,8 @@ fn rough_slotted_networks_keep_their_promises() {
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED_ROUGH_SLOTTED);
 }
 
-/// A network whose master does not die keeps it: at most one change in 100 000 cycles, where up to one datagram of 20 is lost. A quarter as many
-/// networks.
+/// A network whose master does not die keeps it: at most one change in 100 000 cycles, where up to one datagram of 20
+/// is lost. A quarter as many networks.
 #[test]
 fn losses_and_late_wake_ups_change_no_master() {
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {
@@ -358,7 +361,8 @@ fn what_a_router_could_have_sent_parts_no_nodes_and_loses_nothing() {
     for lost in ["stale", "silent", "refused", "late", "lost on the wire"] {
         assert_eq!(seen.get(lost), None, "{lost}");
     }
-    // To their quotas, and in parts before a receiver had begun, some of these networks lose packages anyway: no more than without.
+    // To their quotas, and in parts before a receiver had begun, some of these networks lose packages anyway: no more
+    // than without.
     let calm = for_all(seeds, |seed| run(Plan::calm(seed), guard, false).seen);
     for lost in ["quota", "incomplete"] {
         let anyway = calm.iter().filter_map(|seen| seen.get(lost)).sum::<u64>();
@@ -409,7 +413,8 @@ fn every_mistake_of_a_core_is_noticed() {
     all_are_noticed(&mistakes, Plan::rough);
 }
 
-/// In networks with somebody who writes what it likes in its heads, and whose router lets it, each mistake of admission is seen as what it is.
+/// In networks with somebody who writes what it likes in its heads, and whose router lets it, each mistake of admission
+/// is seen as what it is.
 #[test]
 fn every_mistake_of_admission_is_noticed_by_what_an_intruder_gets() {
     let broken = Broken::ADMISSION.map(|broken| (Mistake::Packages(broken), Promise::Admission));
@@ -437,7 +442,8 @@ fn every_promise_of_time_slots_can_be_broken() {
     each_is_called_what_it_is(&broken, Plan::slotted);
 }
 
-/// So is each where datagrams are sealed. What is believed that nobody vouches for, and who waits for ever, the core's own tests see.
+/// So is each where datagrams are sealed. What is believed that nobody vouches for, and who waits for ever, the core's
+/// own tests see.
 #[test]
 fn every_promise_of_sealed_time_slots_can_be_broken() {
     let broken = [

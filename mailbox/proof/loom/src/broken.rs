@@ -99,21 +99,23 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[edit(
             "slots",
             "if !self.change(slot, claim.word, word) {",
-            "if self.word(slot).compare_exchange(claim.word.0, word.0, Ordering::Acquire, Ordering::Relaxed).is_err() {",
+            "if self.word(slot).compare_exchange(claim.word.0, word.0, Ordering::Acquire, Ordering::Relaxed).is_err() \
+             {",
         )],
         caught_by: "who_is_displaced_is_counted_and_not_received",
         says: RACE,
     },
-    // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All of them must
-    // go for a race on the body: the hint's Acquire or the ticket counter's, which are there for other reasons, hands
-    // the body over as well as the word's.
+    // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All of them
+    // must go for a race on the body: the hint's Acquire or the ticket counter's, which are there for other reasons,
+    // hands the body over as well as the word's.
     Broken {
         name: "receiver_without_acquire",
         edits: &[
             edit(
                 "slots",
                 "self.change(slot, seen, word).then_some",
-                "self.word(slot).compare_exchange(seen.0, word.0, Ordering::Release, Ordering::Relaxed).is_ok().then_some",
+                "self.word(slot).compare_exchange(seen.0, word.0, Ordering::Release, \
+                 Ordering::Relaxed).is_ok().then_some",
             ),
             edit(
                 "slots",
@@ -134,7 +136,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[edit(
             "slots",
             "        self.change(taken.slot, taken.word, FREE);\n",
-            "        let _ = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, Ordering::Relaxed);\n",
+            "        let _ = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, \
+             Ordering::Relaxed);\n",
         )],
         caught_by: "a_body_is_handed_over_whole",
         says: RACE,
@@ -170,7 +173,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit(
                 "slots",
                 "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n",
-                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n        self.hint(slot);\n",
+                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n        \
+                 self.hint(slot);\n",
             ),
         ],
         caught_by: "everything_arrives_once_and_in_order",
@@ -202,7 +206,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit(
                 "queue",
                 "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            }\n",
-                "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            }\n            if fresh != 0 { hints.swap(0, Ordering::AcqRel); }\n",
+                "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            \
+                 }\n            if fresh != 0 { hints.swap(0, Ordering::AcqRel); }\n",
             ),
         ],
         caught_by: "everything_arrives_once_and_in_order",
@@ -262,12 +267,14 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit(
                 "slots",
                 "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false });",
-                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false, ticket: \
+                 self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
                 "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });",
-                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late, ticket: self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late, ticket: \
+                 self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
@@ -344,7 +351,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[edit(
             "queue",
             LOWER,
-            "            self.look(slots);\n            slots.lower_level(first);\n            self.level = first.0.into();\n",
+            "            self.look(slots);\n            slots.lower_level(first);\n            self.level = \
+             first.0.into();\n",
         )],
         caught_by: "what_comes_as_the_level_sinks_is_next",
         says: WRONG,
@@ -372,7 +380,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "a_new_owner_says_its_own_level",
         says: WRONG,
     },
-    // One alert in place of the other, and the hint that it was for is not seen. Only a sender that overwrites what it has not read.
+    // One alert in place of the other, and the hint that it was for is not seen. Only a sender that overwrites what it
+    // has not read.
     Broken {
         name: "alerts_by_a_store",
         edits: &[edit(
@@ -500,12 +509,14 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[edit(
             "slots",
             "        let State::Filling { by, .. } = claim.word.state() else { return false };",
-            "        let State::Filling { by, .. } = claim.word.state() else { return false };\n        if true { return false; }",
+            "        let State::Filling { by, .. } = claim.word.state() else { return false };\n        if true { \
+             return false; }",
         )],
         caught_by: "the_newest_keeps_its_place",
         says: WRONG,
     },
-    // In a hurry: published beside the older one, in the same place of the order, and which of them goes first is chance.
+    // In a hurry: published beside the older one, in the same place of the order, and which of them goes first is
+    // chance.
     Broken {
         name: "replaced_after_publishing",
         edits: &[
@@ -518,7 +529,11 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit(
                 "rig",
                 "                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);",
-                "                if let Some(old) = late {\n                    if slots.take(old.slot, old.word).map(|old| slots.release(old)).is_some() {\n                        self.mailbox.count(Victim { priority: Priority(priority), replaced: true });\n                    }\n                }\n                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);",
+                "                if let Some(old) = late {\n                    if slots.take(old.slot, \
+                 old.word).map(|old| slots.release(old)).is_some() {\n                        \
+                 self.mailbox.count(Victim { priority: Priority(priority), replaced: true });\n                    \
+                 }\n                }\n                self.last = (self.full == \
+                 OverflowPolicy::Latest).then_some(posted);",
             ),
         ],
         caught_by: "the_newest_replaces_what_waits",
@@ -652,7 +667,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit(
                 "bell",
                 "        self.polling.store(1, Ordering::Relaxed);\n",
-                "        let quiet = self.rings.load(Ordering::Relaxed) == seen;\n        self.polling.store(1, Ordering::Relaxed);\n",
+                "        let quiet = self.rings.load(Ordering::Relaxed) == seen;\n        self.polling.store(1, \
+                 Ordering::Relaxed);\n",
             ),
             edit("bell", "self.rings.load(Ordering::Relaxed) == seen\n    }", "quiet\n    }"),
         ],
@@ -672,7 +688,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[edit(
             "bell",
             "step!(\"bell: rung\");\n        self.polling.load(Ordering::Relaxed) != 0",
-            "let polling = self.polling.swap(0, Ordering::Relaxed) != 0;\n        step!(\"bell: rung\");\n        polling",
+            "let polling = self.polling.swap(0, Ordering::Relaxed) != 0;\n        step!(\"bell: rung\");\n        \
+             polling",
         )],
         caught_by: "a_dead_ringer_takes_no_wake_up_along",
         says: ENDLESS,
@@ -730,7 +747,8 @@ pub(crate) const BROKEN: &[Broken] = &[
         edits: &[edit(
             "slots",
             "if receiver.retired.load(Ordering::SeqCst) != 0 && self.change(slot, word, claim.word) {",
-            "if receiver.retired.load(Ordering::SeqCst) != 0 && { self.word(slot).swap(claim.word.0, Ordering::AcqRel); true } {",
+            "if receiver.retired.load(Ordering::SeqCst) != 0 && { self.word(slot).swap(claim.word.0, \
+             Ordering::AcqRel); true } {",
         )],
         caught_by: "a_retired_mailbox_keeps_nothing",
         says: WRONG,
@@ -868,7 +886,8 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
     },
     Mirrored {
         file: "slots",
-        what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it weakened",
+        what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it \
+            weakened",
         lines: &[
             "compare_exchange(from.0, to.0, Ordering::SeqCst, Ordering::Relaxed)",
             "self.hot.receiver.0.retired.load(Ordering::SeqCst)",
@@ -880,7 +899,8 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
     },
     Mirrored {
         file: "hot",
-        what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it weakened",
+        what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it \
+            weakened",
         lines: &[
             "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
             "sleeping.store(sleeping, Ordering::SeqCst)",
@@ -890,7 +910,8 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
     },
     Mirrored {
         file: "queue",
-        what: "SeqCst stands for the fence that the models have before it (seq_cst_accesses), and no model would see it weakened",
+        what: "SeqCst stands for the fence that the models have before it (seq_cst_accesses), and no model would see \
+            it weakened",
         lines: &["hints.load(Ordering::SeqCst)"],
     },
     Mirrored {

@@ -13,8 +13,8 @@
 //!   edit must find its text exactly once, so that a variant cannot rot: the build fails and names it.
 //! - `step.rs`: the core's crash points, here places to switch threads and to die.
 //! - `cell_models.rs`, `cell_broken.rs`: the same for the single-writer cells of `cell.rs`.
-//! - `build.rs`: puts them together with loom's atomics. It also compares what the models had to write again (what is asked of the
-//!   kernel, waiting, sending, giving up) with the lines that the mailbox has.
+//! - `build.rs`: puts them together with loom's atomics. It also compares what the models had to write again (what is
+//!   asked of the kernel, waiting, sending, giving up) with the lines that the mailbox has.
 //!
 //! Plain `cargo test -p rohrpost-proof-loom` runs all. Each model bounds how often loom takes the processor away from a
 //! thread that could go on; most mistakes need one or two such preemptions. Deeper, one model at a time, over night:
@@ -27,10 +27,12 @@
 //! What this does not show:
 //!
 //! - Loom lets a load read old values, but each read-modify-write reads the newest, and failing compare-and-swaps too.
-//! - Its SeqCst fences order more than C11's: all are one lock, in the order of execution. SeqCst accesses are no more than AcqRel
-//!   to it, so where the core relies on their one order (`seq_cst_accesses`), the models have a fence in the same place.
-//! - It switches threads where two meet in an atomic, but remembers only the last access to each, and so overlooks orders:
-//!   without the ticks of `step.rs` it passed a claim without Acquire. Between two steps it may overlook some still.
+//! - Its SeqCst fences order more than C11's: all are one lock, in the order of execution. SeqCst accesses are no more
+//!   than AcqRel to it, so where the core relies on their one order (`seq_cst_accesses`), the models have a fence in
+//!   the same place.
+//! - It switches threads where two meet in an atomic, but remembers only the last access to each, and so overlooks
+//!   orders: without the ticks of `step.rs` it passed a claim without Acquire. Between two steps it may overlook some
+//!   still.
 //! - Some orderings are there twice, and one alone can be dropped unseen: a taken body is handed over by word, hint and
 //!   ticket counter; a ticket's Release is also in fence (E) of the package before.
 //! - A displaced package may be counted twice if its displacer dies between counting it and publishing.

@@ -1,4 +1,5 @@
-//! The models: small programs that loom runs in every order of their threads' steps, with the real and each broken core.
+//! The models: small programs that loom runs in every order of their threads' steps, with the real and each broken
+//! core.
 
 use crate::full::OverflowPolicy;
 use crate::name::Priority;
@@ -37,8 +38,8 @@ pub(crate) fn everything_arrives_once_and_in_order() {
     assert_eq!(sorted(received), [1, 2, 3]);
 }
 
-/// The receiver looks at slots that it was not told of, and meets the second package before it could see the first. It knows
-/// the level: what it finds it takes, without another look.
+/// The receiver looks at slots that it was not told of, and meets the second package before it could see the first. It
+/// knows the level: what it finds it takes, without another look.
 pub(crate) fn a_second_package_never_passes_the_first() {
     let (mailbox, queue) = one_received(&[(10, 9)]);
     let sender = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
@@ -96,7 +97,8 @@ fn one_received(packages: &[(u8, u8)]) -> (Arc<Mailbox>, Queue) {
     (mailbox, queue)
 }
 
-/// A more important package comes while the receiver works off less important ones that it knows: once sent, it is next.
+/// A more important package comes while the receiver works off less important ones that it knows: once sent, it is
+/// next.
 pub(crate) fn the_urgent_passes_what_is_known() {
     let (mailbox, queue) = one_received(&[(10, 1), (10, 2), (10, 3)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
@@ -136,7 +138,8 @@ pub(crate) fn no_alert_is_lost() {
     assert_eq!(rest, expected);
 }
 
-/// The receiver dies, and what it said of the level stays. Its successor knows nothing yet, and says so before it relies on it.
+/// The receiver dies, and what it said of the level stays. Its successor knows nothing yet, and says so before it
+/// relies on it.
 pub(crate) fn a_new_owner_says_its_own_level() {
     let (mailbox, _dead) = one_received(&[(30, 1), (10, 2), (10, 3)]);
     let between = mailbox.send_from(1, OverflowPolicy::Displace, &[(20, 9)]);
@@ -160,8 +163,8 @@ pub(crate) fn who_dies_before_it_alerts_is_heard() {
     assert_eq!(receiver.drain(), expected);
 }
 
-/// Two of one priority above the level alert one after the other, and the receiver, which has seen one of them by chance, heeds once:
-/// both go before what it knows.
+/// Two of one priority above the level alert one after the other, and the receiver, which has seen one of them by
+/// chance, heeds once: both go before what it knows.
 pub(crate) fn two_alerts_are_two() {
     let (mailbox, queue) = one_received(&[(20, 1), (20, 2), (20, 3)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
@@ -176,7 +179,8 @@ pub(crate) fn two_alerts_are_two() {
     assert!(rest.is_sorted_by_key(|body| *body <= 3), "passed: {before:?}, then {rest:?}");
 }
 
-/// A state that waited below the level is sent anew as important as the level, in its old place: before all that is known of it.
+/// A state that waited below the level is sent anew as important as the level, in its old place: before all that is
+/// known of it.
 pub(crate) fn a_state_raised_to_the_level_is_found() {
     let mailbox = Mailbox::new(5);
     let mut state = mailbox.sender(1, OverflowPolicy::Latest);
@@ -188,7 +192,8 @@ pub(crate) fn a_state_raised_to_the_level_is_found() {
     assert_eq!(receiver.drain(), [2, 8, 9]);
 }
 
-/// A state that the receiver knows is sent anew: the newer one is received in the place of the older, not after all that is known.
+/// A state that the receiver knows is sent anew: the newer one is received in the place of the older, not after all
+/// that is known.
 pub(crate) fn the_newest_is_found_in_its_place() {
     let mailbox = Mailbox::new(4);
     assert_eq!(mailbox.sender(2, OverflowPolicy::Reject).send(10, 5), Sent::Accepted);
@@ -263,7 +268,8 @@ pub(crate) fn two_displace_two() {
 
 // ---- only the newest ----
 
-/// One sender, one receiver: what is received never goes back and ends with the newest; the rest is counted as replaced.
+/// One sender, one receiver: what is received never goes back and ends with the newest; the rest is counted as
+/// replaced.
 fn only_the_newest(slots: usize, packages: &'static [(u8, u8)]) {
     let mailbox = Mailbox::new(slots);
     let sender = mailbox.send_from(1, OverflowPolicy::Latest, packages);
@@ -302,8 +308,8 @@ pub(crate) fn the_newest_keeps_its_place() {
     assert!(mailbox.all_free());
 }
 
-/// 1 in one slot, 2 in the other, then 3 where 1 was and in its place of the order: the word of 3 is that of 1. Who saw 1 and
-/// comes late takes 3, whole; and nobody misses anything.
+/// 1 in one slot, 2 in the other, then 3 where 1 was and in its place of the order: the word of 3 is that of 1. Who saw
+/// 1 and comes late takes 3, whole; and nobody misses anything.
 pub(crate) fn a_word_comes_back_with_the_newer_package() {
     let mailbox = Mailbox::new(2);
     let mut first = mailbox.sender(1, OverflowPolicy::Latest);
@@ -502,8 +508,8 @@ pub(crate) fn a_retired_mailbox_counts_the_displaced() {
     assert!(mailbox.all_free());
 }
 
-/// The same, when the counters go on elsewhere: what is counted by the time the owner has settled is all that anyone will
-/// ever see of this mailbox, so the victim must be in hand or counted by then.
+/// The same, when the counters go on elsewhere: what is counted by the time the owner has settled is all that anyone
+/// will ever see of this mailbox, so the victim must be in hand or counted by then.
 pub(crate) fn a_replaced_mailbox_hides_no_loss() {
     let mailbox = Mailbox::new(1);
     mailbox.sender(1, OverflowPolicy::Displace).send(10, 10);
@@ -519,8 +525,8 @@ pub(crate) fn a_replaced_mailbox_hides_no_loss() {
     assert!(seen.contains(&10), "hidden");
 }
 
-/// As before, with a package that is published and displaced while the owner looks for the last time: its sender holds it for
-/// accepted, so it is found by the owner, or counted by who displaced it, where it goes on.
+/// As before, with a package that is published and displaced while the owner looks for the last time: its sender holds
+/// it for accepted, so it is found by the owner, or counted by who displaced it, where it goes on.
 pub(crate) fn a_replaced_mailbox_hides_no_late_loss() {
     let mailbox = Mailbox::new(1);
     let low = mailbox.send_from(1, OverflowPolicy::Displace, &[(10, 10)]);
@@ -595,8 +601,8 @@ pub(crate) fn a_displacer_dies() {
     assert!(mailbox.all_free());
 }
 
-/// A sender dies on the way from the older package of a state to the newer. The older is received or counted, here or there, and
-/// the newer is received if it was published; both slots are usable again.
+/// A sender dies on the way from the older package of a state to the newer. The older is received or counted, here or
+/// there, and the newer is received if it was published; both slots are usable again.
 fn a_replacer_dies(slots: usize, step: &'static str) {
     let mailbox = Mailbox::new(slots);
     let dead = mailbox.dies_sending(1, OverflowPolicy::Latest, step, &[(10, 1), (10, 2)]);

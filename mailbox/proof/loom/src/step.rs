@@ -33,8 +33,8 @@ pub(crate) fn reached(what: &'static str) {
     }
 }
 
-/// Does `incarnation` up to the step `fatal`, as SIGKILL would cut it: nothing after the step happens, and the slot core has no
-/// destructors that would tidy up. Says whether the step was reached.
+/// Does `incarnation` up to the step `fatal`, as SIGKILL would cut it: nothing after the step happens, and the slot
+/// core has no destructors that would tidy up. Says whether the step was reached.
 pub(crate) fn dies_at(fatal: &'static str, life: impl FnOnce()) -> bool {
     FATAL.with(|step| step.set(Some(fatal)));
     let end: Result<(), Box<dyn Any + Send>> = catch_unwind(AssertUnwindSafe(life));

@@ -1,5 +1,5 @@
-//! Mistakes of the models' table that ThreadSanitizer must see, each with the run that shows it: those by which two threads touch one
-//! body with nothing between them that orders it.
+//! Mistakes of the models' table that ThreadSanitizer must see, each with the run that shows it: those by which two
+//! threads touch one body with nothing between them that orders it.
 
 /// Names of the variant and of the run.
 pub(crate) const CAUGHT: &[(&str, &str)] = &[

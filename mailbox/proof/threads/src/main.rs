@@ -1,5 +1,5 @@
-//! The slot core of the mailbox under ThreadSanitizer: its very source, with the processor's atomics and real threads in one
-//! address space, since two mappings of one file are two memories to ThreadSanitizer.
+//! The slot core of the mailbox under ThreadSanitizer: its very source, with the processor's atomics and real threads
+//! in one address space, since two mappings of one file are two memories to ThreadSanitizer.
 //!
 //! ```text
 //!  mailbox/src/{word,slots,…,cell}.rs ─────┬── unchanged ──▶ every run ends, and nothing is reported
@@ -7,11 +7,11 @@
 //!  ../loom/src/broken.rs, one edit each ───┴── edited ─────▶ a data race is reported (src/caught.rs says in which run)
 //! ```
 //!
-//! `cargo xtask tsan` builds and runs this. Each run is a process of its own. The standard library is not instrumented: of it
-//! threads are used alone (ThreadSanitizer sees them begin and end), and no body passes through it.
+//! `cargo xtask tsan` builds and runs this. Each run is a process of its own. The standard library is not instrumented:
+//! of it threads are used alone (ThreadSanitizer sees them begin and end), and no body passes through it.
 //!
-//! What this does not show: an order that no thread took, and what fences do, which ThreadSanitizer does not know. That is
-//! what the models are for.
+//! What this does not show: an order that no thread took, and what fences do, which ThreadSanitizer does not know. That
+//! is what the models are for.
 
 #[allow(unused, unreachable_pub)]
 mod name {

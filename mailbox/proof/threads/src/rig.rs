@@ -1,7 +1,8 @@
 //! What the runs are made of: a small mailbox around the real slot core, its senders and its receiver, as threads.
 //!
-//! Bodies are plain memory, so that ThreadSanitizer judges every access to them. All else is atomics. ThreadSanitizer knows
-//! no fences: what a body's hand-over rested on a fence for would be reported here, though it were right. None does.
+//! Bodies are plain memory, so that ThreadSanitizer judges every access to them. All else is atomics. ThreadSanitizer
+//! knows no fences: what a body's hand-over rested on a fence for would be reported here, though it were right. None
+//! does.
 
 use super::bell::Bell;
 use super::full::{NoSlot, OverflowPolicy};
@@ -55,8 +56,8 @@ pub(crate) struct Mailbox {
     pub(crate) counts: Counts,
 }
 
-// SAFETY: the bodies are the only part that is not Sync by itself. Whether the slot core keeps two threads from one body is
-// what is tested here, and ThreadSanitizer is the validate.
+// SAFETY: the bodies are the only part that is not Sync by itself. Whether the slot core keeps two threads from one
+// body is what is tested here, and ThreadSanitizer is the validate.
 unsafe impl Sync for Mailbox {}
 
 impl Mailbox {
@@ -155,7 +156,8 @@ impl Mailbox {
     pub(crate) fn hides_no_loss(&self) {
         let (accepted, known) = self.accepted_and_known();
         assert!(accepted <= known, "{accepted} were accepted, of {known} it is known what became of them");
-        // A claim whose victim was settled stays: it is no longer what its sender knows, and nobody claims here any more.
+        // A claim whose victim was settled stays: it is no longer what its sender knows, and nobody claims here any
+        // more.
         let waits = |slot: &usize| !matches!(self.slots().load(*slot).state(), State::Free | State::Filling { .. });
         assert_eq!((0..self.words.len()).find(waits), None, "a slot still holds a package");
         self.is_true();

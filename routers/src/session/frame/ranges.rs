@@ -160,7 +160,8 @@ impl std::fmt::Display for Verdict<'_> {
             }
             Some(Objection::NotOwn) => write!(
                 f,
-                "{range} is no range of names of this client's system, or of its node, if the file of the TCP router has that; \
+                "{range} is no range of names of this client's system, or of its node, if the file of the TCP router \
+                has that; \
                  start it from that file, or take other names"
             ),
             Some(Objection::TooMany) => {

@@ -1,8 +1,9 @@
 //! The monotonic clock, and the kernel's stamps by it.
 //!
-//! The kernel stamps frames by CLOCK_REALTIME. That is the monotonic clock (CLOCK_BOOTTIME) and a difference, which changes only when somebody sets the
-//! clock: both are slewed alike, and both run on while the computer sleeps. So the difference is bounded ever more narrowly by reading one clock between two readings of the other.
-//! When a reading contradicts what was known, the clock was set, and stamps from before are not used.
+//! The kernel stamps frames by CLOCK_REALTIME. That is the monotonic clock (CLOCK_BOOTTIME) and a difference, which
+//! changes only when somebody sets the clock: both are slewed alike, and both run on while the computer sleeps. So the
+//! difference is bounded ever more narrowly by reading one clock between two readings of the other. When a reading
+//! contradicts what was known, the clock was set, and stamps from before are not used.
 
 use crate::time::{Looked, Stamp};
 use rohrpost_mailbox::{monotonic_ns, realtime_ns, slept_ns, unslewed_ns};
@@ -79,7 +80,8 @@ impl LocalClock {
         steady
     }
 
-    /// A stamp of the kernel. None if CLOCK_REALTIME was set since the last comparison, or if it is not of the last ten seconds.
+    /// A stamp of the kernel. None if CLOCK_REALTIME was set since the last comparison, or if it is not of the last ten
+    /// seconds.
     pub(super) fn stamp(&mut self, realtime_ns: u64) -> Option<Stamp> {
         if !self.compare() {
             return None;

@@ -6,8 +6,9 @@
 //!         ◀── datagrams ────────── └───────┘
 //! ```
 //!
-//! The thread sleeps in one system call until a datagram, a stamp or its time comes. It takes nothing from the heap for a datagram. What strangers send is
-//! dropped in the kernel; whatever comes with a node's address, it works for a [share](share) of the time at most.
+//! The thread sleeps in one system call until a datagram, a stamp or its time comes. It takes nothing from the heap for
+//! a datagram. What strangers send is dropped in the kernel; whatever comes with a node's address, it works for a
+//! [share](share) of the time at most.
 
 mod local;
 mod share;
@@ -39,8 +40,8 @@ use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Above all else: a stamp of our own, where the kernel has none, is as good as this thread is quick. Also of the thread that sends
-/// in time slots, if it gets no reservation.
+/// Above all else: a stamp of our own, where the kernel has none, is as good as this thread is quick. Also of the
+/// thread that sends in time slots, if it gets no reservation.
 pub(super) const FIFO: u8 = FIFO_MAX + 11;
 
 /// However long nothing comes: so often it looks whether the computer has slept, or its clock is slewed.
@@ -110,7 +111,8 @@ pub struct ClockService {
 }
 
 impl ClockService {
-    /// Binds the socket and starts the thread. What an earlier incarnation of this router wrote in the node's page goes on.
+    /// Binds the socket and starts the thread. What an earlier incarnation of this router wrote in the node's page goes
+    /// on.
     ///
     /// # Errors
     /// [`ClockError`]
@@ -184,7 +186,8 @@ impl Worker {
         }
     }
 
-    /// Sleeps until then, or until there is something to take; only until it has rested, and whatever comes, if it has to. True when the clock is to end.
+    /// Sleeps until then, or until there is something to take; only until it has rested, and whatever comes, if it has
+    /// to. True when the clock is to end.
     fn sleep(&mut self, until_ns: u64, rest: Option<Duration>) -> bool {
         let wait = Duration::from_nanos(until_ns.saturating_sub(self.works.now_ns())).min(LOOKS_EVERY);
         let mut fds =

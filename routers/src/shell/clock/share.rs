@@ -1,4 +1,5 @@
-//! How much of a processor the clock's thread may use: it stands above all others, and whoever writes a node's address on what it sends is read by it.
+//! How much of a processor the clock's thread may use: it stands above all others, and whoever writes a node's address
+//! on what it sends is read by it.
 
 /// Of so much time it may use one part.
 const PARTS: u64 = 10;

@@ -1,7 +1,7 @@
 //! The socket of time: what it sends and takes is stamped by the kernel, where that can.
 //!
-//! The stamp of a datagram that left comes back by the socket's queue of errors, with the datagram itself: so which one it is needs no
-//! counting.
+//! The stamp of a datagram that left comes back by the socket's queue of errors, with the datagram itself: so which one
+//! it is needs no counting.
 
 use crate::frame::{FrameHead, NodeIndex};
 use crate::security::TAG_BYTES;
@@ -89,8 +89,8 @@ impl TimeSocket {
         self.addresses.get(usize::from(node)) == Some(&source)
     }
 
-    /// Hands a datagram to the kernel. One that it does not take is lost, as on the wire; an error that an earlier one brought
-    /// back is not in its way.
+    /// Hands a datagram to the kernel. One that it does not take is lost, as on the wire; an error that an earlier one
+    /// brought back is not in its way.
     pub(super) fn send(&self, to: NodeIndex, datagram: &[u8]) -> bool {
         let Some(peer) = self.peers.get(usize::from(to)) else { return false };
         let send = || sendto(self.socket.as_raw_fd(), datagram, peer, MsgFlags::MSG_DONTWAIT);

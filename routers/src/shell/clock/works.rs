@@ -1,5 +1,5 @@
-//! A clock's core and what it has of the system: its socket, the kernel's stamps, the node's page, and what others may look at. Whose
-//! thread it is, and when that sends, is its owner's business.
+//! A clock's core and what it has of the system: its socket, the kernel's stamps, the node's page, and what others may
+//! look at. Whose thread it is, and when that sends, is its owner's business.
 
 use super::local::LocalClock;
 use super::socket::{Came, TimeSocket};
@@ -62,8 +62,8 @@ enum Heard<'a> {
 }
 
 impl Seals {
-    /// What was sealed to this node; all else is counted, and told of once a second at most. `overhears`: whether it helps if its sender may not
-    /// live any more.
+    /// What was sealed to this node; all else is counted, and told of once a second at most. `overhears`: whether it
+    /// helps if its sender may not live any more.
     fn open<'a>(
         &mut self,
         now_ns: u64,
@@ -173,8 +173,8 @@ impl Works {
         seals.sealing.close(&mut sealed).is_ok() && self.socket.send(to, &sealed)
     }
 
-    /// Takes what came, `most` datagrams of it, without waiting: stamps of what `left`, then datagrams; when the impairment has more. When each left is known before an
-    /// answer to it is read.
+    /// Takes what came, `most` datagrams of it, without waiting: stamps of what `left`, then datagrams; when the
+    /// impairment has more. When each left is known before an answer to it is read.
     pub(in crate::shell) fn take(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) -> u64 {
         self.look_at_clocks();
         self.take_stamps(left);

@@ -16,7 +16,8 @@ const REFUSE_EVERY_NS: u64 = 50_000_000;
 
 /// Room for the longest refusal.
 pub(in crate::shell) const REFUSAL_BYTES: usize = 128;
-/// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a second later.
+/// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a
+/// second later.
 pub(in crate::shell) const ANSWERS: usize = 32;
 
 /// What the thread that receives wants to have sent.
@@ -63,7 +64,8 @@ impl AnswerQueue {
         }
     }
 
-    /// Somebody without a number here says what time it is by another configuration. It is told once in a while; sealed, it could not believe it.
+    /// Somebody without a number here says what time it is by another configuration. It is told once in a while;
+    /// sealed, it could not believe it.
     pub(super) fn refuse(&mut self, now_ns: u64, to: IpAddr) {
         if self.refusal.is_none() && self.hellos.is_none() && self.refused_ns + REFUSE_EVERY_NS <= now_ns {
             self.refused_ns = now_ns;
@@ -78,7 +80,8 @@ impl AnswerQueue {
         speech::parted(&self.settings, others)
     }
 
-    /// Sends the next that the window carries and that fits, a hello to this node before others; as how many bytes slots count it.
+    /// Sends the next that the window carries and that fits, a hello to this node before others; as how many bytes
+    /// slots count it.
     pub(super) fn answer(
         &mut self,
         now_ns: u64,

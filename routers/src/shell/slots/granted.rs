@@ -30,8 +30,8 @@ pub enum Granted {
 }
 
 impl Granted {
-    /// Asks for the calling thread; what is refused is told once. Never bound to a processor: where another thread stands in the way it goes
-    /// to the next.
+    /// Asks for the calling thread; what is refused is told once. Never bound to a processor: where another thread
+    /// stands in the way it goes to the next.
     pub(super) fn ask(table: &Table) -> Self {
         let wanted = Wanted::new(table);
         let refused = match reserve(wanted.reservation()) {
@@ -50,7 +50,8 @@ impl Granted {
             }
             Err(error) => {
                 tracing::warn!(
-                    "time slots are kept by an ordinary thread, and missed whenever others work: {refused}; SCHED_FIFO: {error}, \
+                    "time slots are kept by an ordinary thread, and missed whenever others work: {refused}; \
+                    SCHED_FIFO: {error}, \
                      which a limit `rtprio` of {FIFO} for this user (limits.conf) allows"
                 );
                 Self::Ordinary
@@ -96,8 +97,10 @@ impl Wanted {
         let [needed, granted, period] = [self.needed_ns, self.granted_ns(), self.period_ns].map(text);
         (self.needed_ns > self.granted_ns()).then(|| {
             format!(
-                "full time slots of this node take {needed} of {period} of a processor, and {granted} are reserved, so that others can work: \
-                 when much is to be sent it is stopped in the middle of a slot; give its [[slot]]s a shorter `length`, or leave \
+                "full time slots of this node take {needed} of {period} of a processor, and {granted} are reserved, \
+                so that others can work: \
+                 when much is to be sent it is stopped in the middle of a slot; give its [[slot]]s a shorter \
+                 `length`, or leave \
                  more time between them"
             )
         })
@@ -128,7 +131,8 @@ mod tests {
     const US: u64 = 1_000;
     const MS: u64 = 1_000_000;
 
-    /// Slots of node 0, each with its length in µs and its period; guards of 100 µs, and a window of 300 µs for the master's synchronisation.
+    /// Slots of node 0, each with its length in µs and its period; guards of 100 µs, and a window of 300 µs for the
+    /// master's synchronisation.
     fn wanted(cycle_us: u64, slots: &[(u64, u32)]) -> Wanted {
         let mut offset = Duration::from_micros(300);
         let slot = |(length_us, period): &(u64, u32)| {
@@ -150,7 +154,8 @@ mod tests {
 
     #[test]
     fn a_reservation_has_room_for_each_window_and_leaves_room_for_others() {
-        // Of each window what it sends, 100 µs around it, and of the cycle a twentieth for spinning, at most 150 µs; 50 µs for each millisecond.
+        // Of each window what it sends, 100 µs around it, and of the cycle a twentieth for spinning, at most 150 µs; 50
+        // µs for each millisecond.
         let synchronisation_ns = (200 + 100 + 150) * US;
         for (cycle_us, slots, needed_ns, period_ns, why) in [
             (5000, &[(250, 1)][..], synchronisation_ns + 400 * US + 250 * US, 5 * MS, "as short as slots are"),
@@ -180,8 +185,10 @@ mod tests {
         let warning = wanted(5000, &[(3000, 1)]).warning().unwrap();
         assert_eq!(
             warning,
-            "full time slots of this node take 3.85 ms of 5 ms of a processor, and 3 ms are reserved, so that others can work: when much is \
-             to be sent it is stopped in the middle of a slot; give its [[slot]]s a shorter `length`, or leave more time between them"
+            "full time slots of this node take 3.85 ms of 5 ms of a processor, and 3 ms are reserved, so that others \
+            can work: when much is \
+             to be sent it is stopped in the middle of a slot; give its [[slot]]s a shorter `length`, or leave more \
+             time between them"
         );
     }
 }

@@ -1,7 +1,8 @@
-//! The thread that sends in time slots: it has the router's mailbox, its queue, all sockets that send, and the clock. What it does with them,
-//! and when, says the [driver](crate::driver).
+//! The thread that sends in time slots: it has the router's mailbox, its queue, all sockets that send, and the clock.
+//! What it does with them, and when, says the [driver](crate::driver).
 //!
-//! It is never rung: who publishes a package makes no system call, and waits for a slot anyway. It takes nothing from the heap.
+//! It is never rung: who publishes a package makes no system call, and waits for a slot anyway. It takes nothing from
+//! the heap.
 
 mod alarm;
 mod answer_queue;

@@ -13,7 +13,8 @@ pub(super) fn tell_change(before: Option<Silent>, now: Option<Silent>, parted: i
         None => tracing::info!("sends in its time slots"),
         Some(why @ Silent::BoundTooLarge { .. }) => {
             tracing::warn!(
-                "sends nothing, lest it disturbs others: {why}; is a master of time running, and does the network reach it?"
+                "sends nothing, lest it disturbs others: {why}; is a master of time running, and does the network \
+                reach it?"
             );
         }
         Some(Silent::OtherTable { .. }) => tracing::warn!("sends nothing, lest it disturbs others: {}", parted()),
@@ -30,7 +31,8 @@ pub(super) fn parted(settings: &Settings, by: impl Iterator<Item = (Option<NodeI
     let others: Vec<String> = by.map(|(other, digest)| format!("{} by {digest:016x}", node(other))).collect();
     let own = settings.nodes.get(usize::from(settings.own)).map_or("", |own| own.name.as_str());
     format!(
-        "nodes go by other configurations, and so by other time slots: {}, this node ({own}) by {:016x}; copy one file to all of them \
+        "nodes go by other configurations, and so by other time slots: {}, this node ({own}) by {:016x}; copy one \
+        file to all of them \
          (`rohrpost check FILE` shows its digest) and type `rohrpost launch FILE --node NAME` on each",
         others.join(", "),
         settings.digest

@@ -74,7 +74,8 @@ pub struct Call {
     runs: Vec<u32>,
     /// Server's incarnation that ran it last.
     life: Option<u32>,
-    /// Run twice where no server could have known: a first try, still on its way while a server ran its repeat and died.
+    /// Run twice where no server could have known: a first try, still on its way while a server ran its repeat and
+    /// died.
     unknowable: bool,
 }
 
@@ -164,8 +165,8 @@ impl Calls {
         self.all[call].valid_for_ns / TRIES
     }
 
-    /// A server takes the next command from its mailbox: the answer to give, if any, and what was taken. With `dies` it dies
-    /// at some step of it, and the command stays.
+    /// A server takes the next command from its mailbox: the answer to give, if any, and what was taken. With `dies` it
+    /// dies at some step of it, and the command stays.
     pub fn serve(
         &mut self,
         oracle: &mut Oracle,

@@ -1,4 +1,5 @@
-//! The clocks of a simulated computer: a monotonic one that runs a little fast or slow, and CLOCK_REALTIME, which may be set.
+//! The clocks of a simulated computer: a monotonic one that runs a little fast or slow, and CLOCK_REALTIME, which may
+//! be set.
 
 /// Both clocks at one moment, and the truth, which no core may see.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -55,7 +56,8 @@ impl Clock {
         let wait = i128::from(monotonic_ns.saturating_sub(self.at(true_ns).monotonic_ns));
         let fast_ppb = i128::from(self.rate_ppb + self.slewed_ppb);
         let slow = -wait * fast_ppb / BILLION;
-        // Two roundings are less than 2 ns; the square of the rate is less than a millionth of the wait, unless somebody slews.
+        // Two roundings are less than 2 ns; the square of the rate is less than a millionth of the wait, unless
+        // somebody slews.
         let square = wait * fast_ppb / BILLION * fast_ppb / BILLION;
         let rounding = if wait > 0 { 2 + square.max(wait / 1_000_000) } else { 0 };
         u64::try_from(i128::from(true_ns) + wait + slow + rounding).unwrap_or(u64::MAX)

@@ -1,4 +1,5 @@
-//! Networks with time slots in which nothing goes wrong, and flows are as they were declared: no package may be later than was computed.
+//! Networks with time slots in which nothing goes wrong, and flows are as they were declared: no package may be later
+//! than was computed.
 
 use super::chance::Chance;
 use super::divided::Divisions;
@@ -100,8 +101,8 @@ impl Plan {
         }
     }
 
-    /// In most networks all declared flows come at once, as often as the slots of each node carry them. They drift against the cycle, so that
-    /// they meet slots in all ways.
+    /// In most networks all declared flows come at once, as often as the slots of each node carry them. They drift
+    /// against the cycle, so that they meet slots in all ways.
     fn draw_moments(&mut self, chance: &mut Chance) {
         let Some(slots) = self.slots.as_ref().filter(|_| chance.percent(70)) else { return };
         let cycle_ns = slots.table.cycle.as_nanos() as u64;

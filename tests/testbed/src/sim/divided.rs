@@ -1,14 +1,17 @@
-//! Which faults divide a network with time slots, whom they part, and for how long that excuses two nodes that transmit at once.
+//! Which faults divide a network with time slots, whom they part, and for how long that excuses two nodes that transmit
+//! at once.
 
 use super::fault::{Fault, Planned};
 use super::spans::MS;
 use super::transmission::{Basis, Transmission};
 
-/// A fault that divides the network for longer than this may leave it with two times: two masters that do not hear each other.
+/// A fault that divides the network for longer than this may leave it with two times: two masters that do not hear each
+/// other.
 pub const HOLDOVER_NS: u64 = 100 * MS;
 /// So many cycles after such a fault no two nodes transmit at once any more.
 pub const HEALED_CYCLES: u64 = 16;
-/// So many cycles after the later of two began a time their Syncs meet no more: by then one has heard the other, and yields.
+/// So many cycles after the later of two began a time their Syncs meet no more: by then one has heard the other, and
+/// yields.
 pub const BEGINNERS_CYCLES: u64 = 4;
 
 /// A fault because of which nodes do not hear each other, or too late.
@@ -29,8 +32,8 @@ pub enum Parts {
     Cut(usize, usize),
     /// Those whose bit is set from all others.
     Split(u64),
-    /// This one from all others, which hear nothing of it meanwhile: it stands still, or has not begun. Only of those who go by other configurations:
-    /// all others know its slots.
+    /// This one from all others, which hear nothing of it meanwhile: it stands still, or has not begun. Only of those
+    /// who go by other configurations: all others know its slots.
     Still(usize),
 }
 
@@ -60,8 +63,8 @@ impl Parts {
 pub struct Divisions {
     all: Vec<Division>,
     cycle_ns: u64,
-    /// Who is divided from another that began anew meanwhile must ask it before it goes by its time: where slots are rare, that takes so much
-    /// longer, ns.
+    /// Who is divided from another that began anew meanwhile must ask it before it goes by its time: where slots are
+    /// rare, that takes so much longer, ns.
     pub(super) asks_ns: u64,
 }
 
@@ -79,8 +82,8 @@ impl Divisions {
 
     /// Whether two nodes may not be blamed for transmitting at once. `began_ns`: when the times by which they go began.
     ///
-    /// Nodes that go by one time never are excused, unless one of them only asks, by frames all of which were on their way for too long. Else a fault
-    /// must part one from the other, or from a master of theirs, and that
+    /// Nodes that go by one time never are excused, unless one of them only asks, by frames all of which were on their
+    /// way for too long. Else a fault must part one from the other, or from a master of theirs, and that
     /// - for longer than [`HOLDOVER_NS`], or since before the times by which they go began; and
     /// - not have been over for [`HEALED_CYCLES`], or longer where slots are rare.
     ///

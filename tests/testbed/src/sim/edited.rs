@@ -1,4 +1,5 @@
-//! Networks with time slots on whose wire are nodes with other tables: routers that were started anew from a file that somebody has edited.
+//! Networks with time slots on whose wire are nodes with other tables: routers that were started anew from a file that
+//! somebody has edited.
 
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
@@ -112,8 +113,8 @@ impl Edit {
 }
 
 impl Plan {
-    /// A network with time slots some of whose routers are started from edited files, one after the other or many at once; in the end all have the
-    /// right one.
+    /// A network with time slots some of whose routers are started from edited files, one after the other or many at
+    /// once; in the end all have the right one.
     pub fn edited(seed: u64) -> Self {
         let mut plan = Self::slotted_of(seed, (3, 6), 3);
         let mut chance = Chance::new(seed ^ 0xed_17);

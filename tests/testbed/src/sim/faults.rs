@@ -101,8 +101,8 @@ impl World<'_> {
             Fault::Replay { to, count } => {
                 for _ in 0..count.min(self.old.len() as u64) {
                     let (whose, life, arrived) = self.chance.pick_ref(&self.old).clone();
-                    // To whom it was for, mostly. A router that began since cannot know it from one that is new: that the wire keeps
-                    // nothing for long is relied on.
+                    // To whom it was for, mostly. A router that began since cannot know it from one that is new: that
+                    // the wire keeps nothing for long is relied on.
                     let is_same = self.stations[whose].router.as_ref().is_some_and(|router| router.life == life);
                     let to = if is_same && self.chance.percent(80) { whose } else { to };
                     if to == whose && !is_same && !self.plan.sealed {
@@ -219,7 +219,8 @@ impl World<'_> {
         self.post(node, Head { to, from, len, kind, priority, ..Head::default() }, Role::Intruder);
     }
 
-    /// Something that a router could have sent, if it had been started anew, had sent far more than it has, or had another configuration.
+    /// Something that a router could have sent, if it had been started anew, had sent far more than it has, or had
+    /// another configuration.
     fn forged(&mut self, from: usize, to: usize) -> Rc<[u8]> {
         let life = self.stations[from].router.as_ref().map_or(0, |router| router.life);
         let chance = &mut self.chance;
@@ -254,7 +255,8 @@ impl World<'_> {
         Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat())
     }
 
-    /// Something that no router of this installation sends: noise, or a frame of another version, installation or system.
+    /// Something that no router of this installation sends: noise, or a frame of another version, installation or
+    /// system.
     fn foreign(&mut self, to: usize) -> Rc<[u8]> {
         let chance = &mut self.chance;
         let mut noise = vec![0; chance.below(200) as usize];

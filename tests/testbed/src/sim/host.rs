@@ -1,5 +1,5 @@
-//! What a computer has besides its router: the router's transit mailbox, and the mailboxes of its modules. A router's death
-//! touches none of it.
+//! What a computer has besides its router: the router's transit mailbox, and the mailboxes of its modules. A router's
+//! death touches none of it.
 
 use rohrpost_mailbox::{Head, Name, Options, Priority};
 use std::collections::BTreeMap;

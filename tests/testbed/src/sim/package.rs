@@ -33,12 +33,14 @@ pub enum Role {
         /// What it says.
         answer: Answer,
     },
-    /// A router's answer to a command that it could not deliver. It has no place among those of the module for which it speaks.
+    /// A router's answer to a command that it could not deliver. It has no place among those of the module for which it
+    /// speaks.
     Report {
         /// Which call.
         call: usize,
     },
-    /// What nobody needs, from who wants to do harm: a program that writes what it likes in its heads, and whose router caps no priority.
+    /// What nobody needs, from who wants to do harm: a program that writes what it likes in its heads, and whose router
+    /// caps no priority.
     Intruder,
 }
 

@@ -1,4 +1,5 @@
-//! Networks that seal and in which joining is hard: slots that come seldom, and many nodes of which one alone may be master.
+//! Networks that seal and in which joining is hard: slots that come seldom, and many nodes of which one alone may be
+//! master.
 
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
@@ -14,8 +15,9 @@ const ANSWERED_NS: u64 = 2 * S;
 /// Six nodes.
 const MANY: (u64, u64) = (6, 6);
 
-/// Two times that a division brought about may both go on for so many rare slots after it: their masters say that they are followed for four after
-/// they were asked last, and who is divided from one waits for four before it turns to the other.
+/// Two times that a division brought about may both go on for so many rare slots after it: their masters say that they
+/// are followed for four after they were asked last, and who is divided from one waits for four before it turns to the
+/// other.
 const DIVIDED_SLOTS: u64 = 8;
 
 fn is_rare(seed: u64) -> bool {
@@ -40,7 +42,8 @@ impl Plan {
         plan
     }
 
-    /// The same, and nothing goes wrong but that each router is killed once, long after the one before: each is back as soon as is promised.
+    /// The same, and nothing goes wrong but that each router is killed once, long after the one before: each is back as
+    /// soon as is promised.
     pub fn rare_joining(seed: u64) -> Self {
         let mut plan = Self::hard(seed).sealed();
         let mut chance = Chance::new(seed ^ 0x5e_1d);
@@ -88,7 +91,8 @@ impl Plan {
         }
     }
 
-    /// So long a router needs at most from its beginning until it sends, however rare the slots are: see the oracle, Security.
+    /// So long a router needs at most from its beginning until it sends, however rare the slots are: see the oracle,
+    /// Security.
     fn joins_ns(&self) -> u64 {
         let Some(slots) = &self.slots else { return 0 };
         let rarest = slots.table.slots.iter().map(|slot| slot.period).max().unwrap_or(1).max(4);

@@ -11,8 +11,9 @@ use rohrpost_routers::frame::{Frame, NodeIndex};
 use rohrpost_routers::inbound::{REORDER_MAX, WINDOW};
 
 impl Oracle {
-    /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was the last
-    /// part that was missing. `first`: where datagrams are sealed, the sequence from which on its incarnation is heard.
+    /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was
+    /// the last part that was missing. `first`: where datagrams are sealed, the sequence from which on its incarnation
+    /// is heard.
     pub fn took(&mut self, now: Now, life: u32, (datagram, first): (&[u8], Option<u64>), digest: u64) {
         let Ok((head, frame)) = Frame::parse(datagram) else {
             return self.broken(now, Promise::Unchanged, "a datagram that is no frame was taken".into());
@@ -119,8 +120,8 @@ impl Oracle {
         self.broken(now, Promise::Admission, text);
     }
 
-    /// A mailbox took it. `lives`: incarnation of the router that sent the datagram, not of the one that has the package by now (it may
-    /// have found it again when it began), and incarnation of the one that delivers.
+    /// A mailbox took it. `lives`: incarnation of the router that sent the datagram, not of the one that has the
+    /// package by now (it may have found it again when it began), and incarnation of the one that delivers.
     pub fn delivered(&mut self, now: Now, lives: (u64, u32), number: u32, redelivered: bool) {
         let (_, life) = lives;
         self.receipt(life, number).ended = true;
@@ -149,7 +150,8 @@ impl Oracle {
         }
     }
 
-    /// How many datagrams of a peer never came, as an incarnation of a router should have counted by now; none if that is not clear.
+    /// How many datagrams of a peer never came, as an incarnation of a router should have counted by now; none if that
+    /// is not clear.
     pub fn missing(&self, life: u32, from: NodeIndex) -> Option<u64> {
         let lives = || self.receiving.get(&life).into_iter().flat_map(|its| its.taken.values());
         let lives = || lives().filter(|taken| taken.from == from);

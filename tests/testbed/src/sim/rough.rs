@@ -24,7 +24,8 @@ const QUALITY: Quality = Quality {
 };
 
 impl Plan {
-    /// Three nodes. The first is master until it dies; the third does not hear the second for longer than that stays unnoticed.
+    /// Three nodes. The first is master until it dies; the third does not hear the second for longer than that stays
+    /// unnoticed.
     pub fn rough(seed: u64) -> Self {
         let mut chance = Chance::new(seed);
         let mut plan = Self::new(seed);
@@ -90,9 +91,10 @@ impl Plan {
         fault(at_ms + 1700, at_ms + 3400, Fault::Freeze { node: 1, whole: false });
     }
 
-    /// With time slots: frames are lost, copied and overtaken all the time, threads wake too late again and again, every router stands still
-    /// and dies, and what the first master says comes too late. After so much two nodes may transmit at once only where the plan says that
-    /// the network is divided; all else that is promised holds at any time.
+    /// With time slots: frames are lost, copied and overtaken all the time, threads wake too late again and again,
+    /// every router stands still and dies, and what the first master says comes too late. After so much two nodes may
+    /// transmit at once only where the plan says that the network is divided; all else that is promised holds at any
+    /// time.
     pub fn rough_slotted(seed: u64) -> Self {
         let mut plan = Self::slotted(seed);
         let mut chance = Chance::new(seed ^ 0x10_06);

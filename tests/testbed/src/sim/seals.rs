@@ -68,8 +68,8 @@ impl TimeSeals {
         Self { sealing, opening: Opening::new(all, Port::Time) }
     }
 
-    /// The datagram as it was before it was sealed, if it was sealed to this node, and whether by an incarnation that is known to live. `overhears`: whether
-    /// others are of any use.
+    /// The datagram as it was before it was sealed, if it was sealed to this node, and whether by an incarnation that
+    /// is known to live. `overhears`: whether others are of any use.
     pub(super) fn open(&mut self, datagram: &[u8], overhears: bool) -> Option<(Rc<[u8]>, bool)> {
         let mut bytes = datagram.to_vec();
         if overhears && self.opening.is_strange(&bytes) {

@@ -145,8 +145,8 @@ impl Oracle {
         }
     }
 
-    /// In time slots nothing leaves while something more important waits, whoever it is for and however large: of those that something can be
-    /// sealed to. `behind`: the first that waits in the mailbox.
+    /// In time slots nothing leaves while something more important waits, whoever it is for and however large: of those
+    /// that something can be sealed to. `behind`: the first that waits in the mailbox.
     pub fn is_strict(
         &mut self,
         now: Now,
@@ -205,7 +205,8 @@ impl Oracle {
         }
     }
 
-    /// A datagram that left the queue and no router is lost: what was complete in it waits as before, for as long as it takes to lose it.
+    /// A datagram that left the queue and no router is lost: what was complete in it waits as before, for as long as it
+    /// takes to lose it.
     pub fn comes_back(&mut self, life: u32, datagram: &[u8]) {
         let number = |body: &[u8]| super::oracle::number_of(body);
         match Frame::parse(datagram) {

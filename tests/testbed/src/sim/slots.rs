@@ -34,7 +34,8 @@ pub struct Slots {
     pub oversleeps_percent: u64,
     /// The faults that divide the network.
     pub divisions: Divisions,
-    /// A router has system time and may send so long after it began, where nothing goes wrong but that others begin too; none: it is not asked.
+    /// A router has system time and may send so long after it began, where nothing goes wrong but that others begin
+    /// too; none: it is not asked.
     pub joins_ns: Option<u64>,
 }
 
@@ -49,7 +50,8 @@ impl Slots {
         self.masters.get(usize::from(term.rank())).map(|master| usize::from(*master)).filter(|_| !term.is_none())
     }
 
-    /// The window of a node in which a moment of system time is, from its beginning to its guard, system ns; and how late it may be begun.
+    /// The window of a node in which a moment of system time is, from its beginning to its guard, system ns; and how
+    /// late it may be begun.
     pub fn window(&self, node: usize, system_ns: u64) -> Option<(Range<u64>, u64)> {
         let ns = |duration: Duration| duration.as_nanos() as u64;
         let table = &self.table;
@@ -66,8 +68,8 @@ impl Slots {
         Some((begin_ns..begin_ns + length_ns - ns(table.guard), late_ns))
     }
 
-    /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not so late nor so often
-    /// that others take over from a master: not again before it `has_rested`.
+    /// How late a timing thread wakes: it sleeps to shortly before its time, then spins. When the faults are over, not
+    /// so late nor so often that others take over from a master: not again before it `has_rested`.
     pub fn late_ns(&self, fixed: bool, has_rested: bool, chance: &mut Chance) -> u64 {
         if chance.per_million(if fixed { self.late_ppm.min(LATE_PPM) } else { self.late_ppm }) {
             let late_ns = chance.scale(50 * US, LATE_NS_MAX);
@@ -85,7 +87,8 @@ impl Slots {
         if !fixed && chance.per_million(self.still_ppm) { chance.scale(50 * US, STILL_NS_MAX) } else { 0 }
     }
 
-    /// A thread that woke too late does so again no sooner than after this, when the faults are over: a master then misses one Sync of four.
+    /// A thread that woke too late does so again no sooner than after this, when the faults are over: a master then
+    /// misses one Sync of four.
     pub fn rest_ns(&self) -> u64 {
         4 * self.table.cycle.as_nanos() as u64
     }

@@ -1,5 +1,5 @@
-//! The layer of a router with time slots: the driver of the shell, which has packages and time in the hands of one thread, on a simulated
-//! platform, and watched.
+//! The layer of a router with time slots: the driver of the shell, which has packages and time in the hands of one
+//! thread, on a simulated platform, and watched.
 
 use super::clock::Now;
 use super::packages::{Hands, Packages};
@@ -190,7 +190,8 @@ impl Ground<'_, '_> {
         }
     }
 
-    /// By what this node sends now: by its own time if that may be off by half of the guard at most, as it says; else by what it heard.
+    /// By what this node sends now: by its own time if that may be off by half of the guard at most, as it says; else
+    /// by what it heard.
     fn says(&self, carries: Carries) -> Says {
         let (io, now_ns, allowed_ns) = (&*self.io, self.io.now.monotonic_ns, self.watch.allowance_ns);
         let clock = self.time.core();
@@ -314,7 +315,8 @@ impl Layer for Slotted {
         let off_ns = io.oracle.times.off_ns(io.now, io.node, (clock.digest(), clock.term()));
         let masters = clock.master().and_then(|master| io.oracle.times.page(io.now, master.into()));
         let is_of_later_epoch = masters.is_some_and(|page| page.epoch < clock.record().epoch);
-        // Who is further off than it may be says nothing, and slews for up to five seconds, or waits until a master begins an epoch, see
+        // Who is further off than it may be says nothing, and slews for up to five seconds, or waits until a master
+        // begins an epoch, see
         // [`EPOCH_PAUSE_NS`](super::spans::EPOCH_PAUSE_NS).
         let waits = is_of_later_epoch || off_ns.is_some_and(|off_ns| off_ns > self.watch.allowance_ns);
         if waits && io.now.true_ns < io.plan.stepped_ns {

@@ -1,8 +1,8 @@
 //! One computer of a simulated network: clocks, modules, and the layers that its router is made of.
 //!
-//! A [`Layer`] is one protocol with one socket, packages or time, or all that one thread does with both. It sees what a real one sees:
-//! its own clocks, the datagrams of its sockets, the mailboxes of its computer. When its router dies, all layers are dropped, and made
-//! anew.
+//! A [`Layer`] is one protocol with one socket, packages or time, or all that one thread does with both. It sees what a
+//! real one sees: its own clocks, the datagrams of its sockets, the mailboxes of its computer. When its router dies,
+//! all layers are dropped, and made anew.
 
 use super::chance::Chance;
 use super::clock::{Clock, Now};

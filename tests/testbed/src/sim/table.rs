@@ -6,7 +6,8 @@ use std::hash::{BuildHasherDefault, Hasher};
 pub(super) type Table<K, V> = HashMap<K, V, BuildHasherDefault<Mix>>;
 pub(super) type Group<K> = HashSet<K, BuildHasherDefault<Mix>>;
 
-/// Hashes what nobody chooses in order to do harm: numbers, a few at a time. The usual one takes a sixth of a simulation's time.
+/// Hashes what nobody chooses in order to do harm: numbers, a few at a time. The usual one takes a sixth of a
+/// simulation's time.
 #[derive(Default)]
 pub(super) struct Mix(u64);
 

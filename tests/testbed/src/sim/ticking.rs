@@ -21,7 +21,8 @@ use std::time::Duration;
 
 /// The socket of time.
 pub const PORT: Port = 1;
-/// How far off a kernel's stamp is at most, ns; the kernel stamps CLOCK_REALTIME, and the other clock is read around it.
+/// How far off a kernel's stamp is at most, ns; the kernel stamps CLOCK_REALTIME, and the other clock is read around
+/// it.
 const DOUBT_NS: u32 = 100;
 /// Two clocks are read one after the other.
 const APART_NS: u64 = 300;
@@ -52,7 +53,8 @@ struct TimeFrame {
     term: Term,
     /// It is of another configuration, and so of another table.
     is_other: bool,
-    /// How long it was on its way, from where it was handed over, ns; none where nobody knows what time it is by its term.
+    /// How long it was on its way, from where it was handed over, ns; none where nobody knows what time it is by its
+    /// term.
     way_ns: Option<u64>,
     /// When it came, true ns.
     came_ns: u64,
@@ -113,7 +115,8 @@ pub struct Ticking {
 }
 
 impl Ticking {
-    /// An incarnation that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its own.
+    /// An incarnation that begins now; `page` is what the node's page says. Without kernel stamps it makes do with its
+    /// own.
     pub fn new(settings: TimeSettings, now: Now, left: Left, has_stamps: bool) -> Self {
         let mut clock = Clock::new(settings, now.monotonic_ns, now.realtime_ns, left.record)
             .watching(now.monotonic_ns, left.watched);
@@ -192,13 +195,14 @@ impl Ticking {
         self.told.back().map_or(Term::NONE, |told| told.term)
     }
 
-    /// Whether all of the last frames that told the time were on their way for longer than `way_ns`, with what clocks may have drifted since:
-    /// who asks relies on one that was not.
+    /// Whether all of the last frames that told the time were on their way for longer than `way_ns`, with what clocks
+    /// may have drifted since: who asks relies on one that was not.
     pub(super) fn is_misled(&self, now: Now, way_ns: u64) -> bool {
         are_late(&self.told, now, way_ns)
     }
 
-    /// By what this node would say a hello that knows no time: whom it hears, by which term, and whether it [is misled](Self::is_misled).
+    /// By what this node would say a hello that knows no time: whom it hears, by which term, and whether it [is
+    /// misled](Self::is_misled).
     pub(super) fn overheard(&self, now: Now, way_ns: u64) -> Option<UnverifiedPeer> {
         let (from, estimate) = self.clock.overheard(now.monotonic_ns)?;
         // Of several incarnations of a node it does not say by which: then any of them may mislead it.

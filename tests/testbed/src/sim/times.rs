@@ -1,7 +1,8 @@
 //! What system time is, by the simulation's own clock: the time of each term, and what every node's page says of it.
 //!
-//! The time of a term is its master's line, as it stood when the master began to reign, shifted so that it goes on from the time that
-//! this node had followed before. A page's bound must contain its distance from the time of the term that it follows.
+//! The time of a term is its master's line, as it stood when the master began to reign, shifted so that it goes on from
+//! the time that this node had followed before. A page's bound must contain its distance from the time of the term that
+//! it follows.
 
 use super::clock::{Clock, Now};
 use super::promise::{Problem, Promise};
@@ -9,7 +10,8 @@ use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, Watched};
 use rohrpost_routers::time::{Clock as Core, Role, Term};
 use std::collections::BTreeMap;
 
-/// After so long a node knows that its clock does what bounds exclude: it looks once a cycle, or ten times a second, and its thread may wake late.
+/// After so long a node knows that its clock does what bounds exclude: it looks once a cycle, or ten times a second,
+/// and its thread may wake late.
 const NOTICED_NS: u64 = 120_000_000;
 
 /// The line of a term.
@@ -95,7 +97,8 @@ impl Times {
         Some(self.of_line_ns(line, now.true_ns))
     }
 
-    /// A node's clock does what bounds exclude. What time it is by those terms in which it is master, nobody can say any more.
+    /// A node's clock does what bounds exclude. What time it is by those terms in which it is master, nobody can say
+    /// any more.
     pub fn changes(&mut self, clock: &Clock, node: usize) {
         self.clocks[node] = clock.clone();
         let page = &mut self.pages[node];

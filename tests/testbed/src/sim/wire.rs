@@ -50,7 +50,8 @@ impl Wire {
         self.says[node] = Says { basis: if goes_on { before } else { says.basis }, ..says };
     }
 
-    /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its node.
+    /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its
+    /// node.
     pub fn window(&self, node: usize, bytes: usize, slots: &Slots, local_ns: [u64; 2]) -> Option<String> {
         let Some(estimate) = self.says[node].estimate else {
             return Some(format!("node {node}, {bytes} bytes, by no time"));
@@ -68,8 +69,8 @@ impl Wire {
         (!is_well).then(told)
     }
 
-    /// A node hands over a datagram that will reach its interface then; `bytes` with all heads. What comes of it, and whether it meets
-    /// another.
+    /// A node hands over a datagram that will reach its interface then; `bytes` with all heads. What comes of it, and
+    /// whether it meets another.
     pub fn transmit(
         &mut self,
         node: usize,

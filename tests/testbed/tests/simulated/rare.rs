@@ -1,4 +1,5 @@
-//! Sealed networks in which it is hard to join: slots that come each half second, and six nodes of which one may be master.
+//! Sealed networks in which it is hard to join: slots that come each half second, and six nodes of which one may be
+//! master.
 
 use super::{guard, keep_promises, replay, saw_enough, told};
 use crate::simulated::{for_all, number};
@@ -27,7 +28,8 @@ fn sealed_networks_of_rare_slots_and_of_one_master_keep_their_promises() {
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED);
 }
 
-/// 21 has shown masters that took over from each other all the time, since who asks in rare slots is answered seldom; so has 3.
+/// 21 has shown masters that took over from each other all the time, since who asks in rare slots is answered seldom;
+/// so has 3.
 #[test]
 fn who_begins_in_a_sealed_network_of_rare_slots_joins_in_time() {
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {

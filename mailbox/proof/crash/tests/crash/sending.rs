@@ -30,8 +30,8 @@ fn a_sender_dies_sending() {
     });
 }
 
-/// The receiver works off less important packages that it knows, and looks at nothing else unless somebody alerts. Who dies
-/// before it alerts has left a package that is found when the death is noticed, and then it is first.
+/// The receiver works off less important packages that it knows, and looks at nothing else unless somebody alerts. Who
+/// dies before it alerts has left a package that is found when the death is noticed, and then it is first.
 #[test]
 fn a_sender_dies_above_the_level() {
     let scene = |ground: &Ground| {
@@ -67,7 +67,8 @@ fn a_sender_dies_displacing() {
     });
 }
 
-/// What waited is received or counted as replaced, whatever step its sender died at, and never comes after the newer one.
+/// What waited is received or counted as replaced, whatever step its sender died at, and never comes after the newer
+/// one.
 fn a_sender_dies_replacing(others: u32, steps_min: u64) {
     let scene = |ground: &Ground| {
         let receiver = ground.join().receiver(MAILBOX, LATEST).unwrap();

@@ -1,4 +1,5 @@
-//! What must hold of a router's packages at any moment: accounts, bounds, what it says of its peers, and that all is well again.
+//! What must hold of a router's packages at any moment: accounts, bounds, what it says of its peers, and that all is
+//! well again.
 
 use super::{Packages, STILL_NS};
 use crate::sim::promise::Promise;

@@ -1,4 +1,5 @@
-//! The layer that carries packages: `Outbound` and `Inbound`, called as the threads of the shell call them, and watched.
+//! The layer that carries packages: `Outbound` and `Inbound`, called as the threads of the shell call them, and
+//! watched.
 //!
 //! Here: what a router does as packages come. What differs with time slots is in `slotted`, what must hold in `checks`.
 

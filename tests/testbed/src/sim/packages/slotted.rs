@@ -78,7 +78,8 @@ impl Packages {
         io.oracle.comes_back(io.life, &checked(datagram));
     }
 
-    /// With time slots: sends in one what must be said besides packages, where all is sealed a hello, to this node before others; its bytes.
+    /// With time slots: sends in one what must be said besides packages, where all is sealed a hello, to this node
+    /// before others; its bytes.
     pub(in crate::sim) fn answer(
         &mut self,
         io: &mut Io<'_>,

@@ -49,7 +49,8 @@ impl Report for Watch<'_, '_> {
         } else {
             io.oracle.lost_behind(io.now, io.life, head)
         };
-        // One that was handed out before may have been delivered then; so may the copy that a router finds on the wire when it begins.
+        // One that was handed out before may have been delivered then; so may the copy that a router finds on the wire
+        // when it begins.
         let is_first = !head.options.has(Options::REDELIVERED) && (self.is_out || !self.is_young);
         // Of these the caller's next try comes through, or brings another answer.
         let is_final = !matches!(cause, Cause::Socket | Cause::Late | Cause::Incomplete);

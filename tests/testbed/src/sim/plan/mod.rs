@@ -236,7 +236,8 @@ impl Plan {
         plan
     }
 
-    /// A network in which nothing goes wrong: from one node to another hundreds of flows pass a package in many parts, which is less urgent.
+    /// A network in which nothing goes wrong: from one node to another hundreds of flows pass a package in many parts,
+    /// which is less urgent.
     pub fn crowded(seed: u64) -> Self {
         let mut plan = Self::calm(seed);
         let mut chance = Chance::new(seed ^ 0xc_04d);

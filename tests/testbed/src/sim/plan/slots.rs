@@ -63,7 +63,8 @@ impl Plan {
         plan
     }
 
-    /// A network with time slots in which nothing goes wrong but that datagrams are lost and threads wake late, for so many cycles.
+    /// A network with time slots in which nothing goes wrong but that datagrams are lost and threads wake late, for so
+    /// many cycles.
     pub fn lossy_slotted(seed: u64, cycles: u64) -> Self {
         let mut plan = Self::slotted(seed);
         plan.faults.clear();
@@ -76,7 +77,8 @@ impl Plan {
         plan
     }
 
-    /// When all must be well, and when it ends. Nobody is let off: the run goes on until who needs an epoch has had it, and then all must be well.
+    /// When all must be well, and when it ends. Nobody is let off: the run goes on until who needs an epoch has had it,
+    /// and then all must be well.
     pub(in crate::sim) fn time_slots(&mut self) {
         self.time();
         // Who joins hears some Syncs before it asks, and so long a master is given to answer.
@@ -115,8 +117,8 @@ impl Plan {
         }
     }
 
-    /// What slots carry well: a large package is through long before it is too old. Commands that wait behind it come all at once: no more
-    /// of them than fit in a mailbox, else some are lost though all is well.
+    /// What slots carry well: a large package is through long before it is too old. Commands that wait behind it come
+    /// all at once: no more of them than fit in a mailbox, else some are lost though all is well.
     pub(in crate::sim) fn fit_traffic(&mut self) {
         let most_bytes = self.shape.rate_bytes_s / 4;
         for flow in &mut self.flows {
@@ -143,14 +145,16 @@ impl Plan {
     }
 }
 
-/// A table in which every node has a slot, in any order and with gaps; its cycle is as short as drawn, or as long as the slots need.
+/// A table in which every node has a slot, in any order and with gaps; its cycle is as short as drawn, or as long as
+/// the slots need.
 fn table(plan: &Plan, link_bytes_s: u64, chance: &mut Chance) -> Tdma {
     let others = plan.nodes.len() as u64 - 1;
     let datagram_ns = takes_ns(plan.shape.datagram_bytes_max + AROUND_BYTES, link_bytes_s);
     let time_ns = takes_ns(TIME_WIRE_BYTES, link_bytes_s).max(HAND_OVER.as_nanos() as u64);
     // What `check` accepts: over two links a frame of time is on its way for a quarter of the guard at most.
     let guard_ns = (chance.between(100, 250) * US).max(8 * takes_ns(TIME_WIRE_BYTES, link_bytes_s));
-    // For each slave a synchronisation; or a warm-up, too; or a reply, too. Without it replies go in the slots of the master.
+    // For each slave a synchronisation; or a warm-up, too; or a reply, too. Without it replies go in the slots of the
+    // master.
     let frames = chance.pick(&[1, 2, 3, 3]) * others;
     let frames_in_slot = others.max(2).max(plan.masters.len() as u64);
     let synchronisation_ns = guard_ns + frames * time_ns + chance.between(60, 120) * US;

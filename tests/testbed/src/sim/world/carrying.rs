@@ -1,4 +1,5 @@
-//! Datagrams on their way from router to router: handed to the kernel, put on the wire, passed by a link, taken at the other end.
+//! Datagrams on their way from router to router: handed to the kernel, put on the wire, passed by a link, taken at the
+//! other end.
 
 use super::{Event, OLD_MAX, World};
 use crate::sim::clock::Now;
@@ -10,7 +11,8 @@ use crate::sim::wire::LEAD_NS;
 use std::rc::Rc;
 
 impl World<'_> {
-    /// Lets the layers of a node do something, if that incarnation of its router still runs, and carries away what comes of it.
+    /// Lets the layers of a node do something, if that incarnation of its router still runs, and carries away what
+    /// comes of it.
     pub(in crate::sim) fn with_router(&mut self, node: usize, life: u32, what: impl FnOnce(&mut Router, &mut Io<'_>)) {
         let station = &mut self.stations[node];
         let now = station.clock.at(self.now_ns);

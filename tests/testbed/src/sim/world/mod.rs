@@ -1,8 +1,8 @@
-//! A network of simulated computers in virtual time: events in their order, datagrams on their links, layers called as their threads
-//! would be.
+//! A network of simulated computers in virtual time: events in their order, datagrams on their links, layers called as
+//! their threads would be.
 //!
-//! Here: what a world is made of, and the loop over its events. What happens at them is in `routers` and `carrying`, and beside in
-//! `sim/faults` and `sim/modules`.
+//! Here: what a world is made of, and the loop over its events. What happens at them is in `routers` and `carrying`,
+//! and beside in `sim/faults` and `sim/modules`.
 
 mod carrying;
 mod event;
@@ -31,8 +31,8 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
 
-/// Makes the layers of a router that begins to live: node, which edition of the configuration it has, incarnation, its clocks, what its page of system
-/// time says.
+/// Makes the layers of a router that begins to live: node, which edition of the configuration it has, incarnation, its
+/// clocks, what its page of system time says.
 pub type NewLayers<'a> = Box<dyn FnMut(usize, usize, u32, Now, Left) -> Vec<Box<dyn Layer>> + 'a>;
 
 /// One run.
