@@ -6,7 +6,7 @@ use rohrpost_mailbox::Head;
 use rohrpost_network::{LEVEL_NOT_REAL_TIME, Network};
 
 /// It waits for another slot at most so long.
-const HELD_NS_MAX: u64 = 100_000_000;
+pub const HELD_NS_MAX: u64 = 100_000_000;
 
 /// For whom it is, and where it lies in the buffer: at its beginning.
 #[derive(Clone, Copy)]

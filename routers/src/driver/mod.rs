@@ -14,6 +14,7 @@ mod platform;
 mod slots;
 mod timing;
 
+pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
 pub use platform::{NotSent, Platform, SlotEvent};
 pub use slots::{SlotDriver, SlotStep};

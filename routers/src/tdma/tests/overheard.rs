@@ -123,6 +123,14 @@ pub(super) fn a_hello_leaves_in_one_of_four_cycles_and_nothing_else() {
     }
 }
 
+#[test]
+fn a_frame_that_is_read_before_the_clock_first_runs_delays_no_longer_than_any_other() {
+    let mut ear = Ear::new(1);
+    ear.overhears_hello_of(0).unwrap();
+    let begins = ear.begins_within(SECOND, |ear| ear.pass(CYCLE));
+    assert!(begins.is_some_and(|begins| begins.abs_diff(LISTENS) <= 3 * CYCLE), "{begins:?}");
+}
+
 pub(super) fn a_node_that_hears_unverified_frames_begins_no_time_for_a_while() {
     let begins = Ear::new(1).begins_within(SECOND, |ear| ear.pass(CYCLE));
     assert!(begins.is_some_and(|begins| begins.abs_diff(LISTENS) <= 2 * CYCLE), "in silence: {begins:?}");

@@ -136,6 +136,7 @@ impl Ground<'_, '_> {
 
     /// To make a datagram takes its time; and the thread may stand still before it hands it over.
     fn made(&mut self) {
+        self.packages.makes(self.io.now);
         self.io.works(MAKING_NS);
         let is_mended = self.io.now.true_ns >= self.io.plan.fixed_ns;
         if let Some(slots) = &self.io.plan.slots {

@@ -11,6 +11,7 @@ mod watch;
 pub(super) use settings::{ROUTER_CLASS, digest};
 pub use settings::{address, settings};
 pub(super) use slotted::Hands;
+use slotted::still_fresh;
 
 use super::clock::Now;
 use super::host::{Parcel, TRANSIT_AGE_MAX_NS};
@@ -68,8 +69,10 @@ pub struct Packages {
     /// What the receiving half wants to be sent.
     refusals: VecDeque<Sent>,
     seals: Option<PackageSeals>,
-    /// A datagram waits for the next slot that has left the queue.
-    holds: bool,
+    /// With time slots: when the datagram was made that has not been handed over yet.
+    made: Option<Now>,
+    /// A datagram waits for the next slot that has left the queue, since then, ns.
+    held_since_ns: Option<u64>,
     /// Commands that could not be delivered here; their callers are to be told.
     undelivered: Vec<Head>,
 }
@@ -93,7 +96,8 @@ impl Packages {
             refusals: VecDeque::new(),
             seals: None,
             undelivered: Vec::new(),
-            holds: false,
+            made: None,
+            held_since_ns: None,
             steady_since_ns: now_ns,
             polled_ns: now_ns,
             heard_ns: vec![now_ns; settings.nodes.len()],
@@ -167,26 +171,28 @@ impl Packages {
             None => (Rc::from(bytes), Rc::from(bytes)),
             Some(seals) => (sealed(&mut seals.sealing, bytes).ok_or(NotSent)?, checked(bytes)),
         };
-        if !std::mem::take(&mut self.holds) {
-            self.leaves(io, &bytes);
+        match self.held_since_ns.take() {
+            None => self.leaves(io, &bytes),
+            Some(since_ns) => still_fresh(io, since_ns),
         }
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
         io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed, handed: io.now });
         Ok(())
     }
 
-    /// A datagram leaves the queue.
-    fn leaves(&self, io: &mut Io<'_>, bytes: &[u8]) {
-        io.oracle.leaves(io.now, io.life, bytes);
+    /// A datagram leaves the queue; with time slots when it is made, however long the thread stands still with it.
+    fn leaves(&mut self, io: &mut Io<'_>, bytes: &[u8]) {
+        let now = self.made.take().unwrap_or(io.now);
+        io.oracle.leaves(now, io.life, bytes);
         if io.plan.slots.is_some() {
             let reaches = |to| self.seals.as_ref().is_none_or(|seals| seals.knows(to));
             // Of those that hurry more than they may, only a few are taken before a datagram.
             let first = io.host.transit.first().filter(|first| !hurries(&first.head));
             let first = first.filter(|first| self.settings.node_of(first.head.to).is_some_and(reaches));
             let behind = first.map(|first| first.number);
-            io.oracle.is_strict(io.now, io.life, bytes, behind, reaches);
+            io.oracle.is_strict(now, io.life, bytes, behind, reaches);
         } else {
-            io.oracle.paces(io.now, io.life, bytes, &io.plan.shape, self.settings.overhead_bytes());
+            io.oracle.paces(now, io.life, bytes, &io.plan.shape, self.settings.overhead_bytes());
         }
     }
 

@@ -4,10 +4,12 @@
 
 use super::watch::Watch;
 use super::{PORT, Packages, checked};
+use crate::sim::clock::Now;
 use crate::sim::host::TRANSIT_SLOTS;
+use crate::sim::promise::Promise;
 use crate::sim::station::{Io, Sent};
 use rohrpost_mailbox::{Head, Priority};
-use rohrpost_routers::driver::NotSent;
+use rohrpost_routers::driver::{HELD_NS_MAX, NotSent};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::intake::{TAKING_NS, Transit};
 use rohrpost_routers::outbound::{Accepted, Outbound};
@@ -60,21 +62,27 @@ impl Packages {
     /// With time slots: sends a datagram in one.
     pub(in crate::sim) fn send_in(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: &[u8]) -> Result<(), NotSent> {
         let sent = self.hand_over(io, to, bytes);
-        if sent.is_err() && self.holds {
+        if sent.is_err() && self.held_since_ns.is_some() {
             self.drops_held(io, bytes);
         }
         sent
     }
 
-    /// A datagram that was made waits for the next slot: it has left the queue.
+    /// The queue has made a datagram.
+    pub(in crate::sim) fn makes(&mut self, now: Now) {
+        self.made = Some(now);
+    }
+
+    /// A datagram that was made waits for the next slot: it has left the queue, unless it missed another slot before.
     pub(in crate::sim) fn holds(&mut self, io: &mut Io<'_>, datagram: &[u8]) {
+        let Some(made) = self.made else { return };
         self.leaves(io, &checked(datagram));
-        self.holds = true;
+        self.held_since_ns = Some(made.monotonic_ns);
     }
 
     /// It is lost: what is in it is as if it had never left.
     pub(in crate::sim) fn drops_held(&mut self, io: &mut Io<'_>, datagram: &[u8]) {
-        self.holds = false;
+        self.held_since_ns = None;
         io.oracle.comes_back(io.life, &checked(datagram));
     }
 
@@ -106,5 +114,12 @@ impl Packages {
         let until_ns = self.poll_inbound(io);
         self.answer_callers(io);
         until_ns
+    }
+}
+
+/// What missed its slot leaves soon, or is lost.
+pub(super) fn still_fresh(io: &mut Io<'_>, since_ns: u64) {
+    if io.now.monotonic_ns - since_ns > HELD_NS_MAX {
+        io.oracle.broken(io.now, Promise::Fresh, format!("a datagram leaves that was made at {since_ns} ns"));
     }
 }
