@@ -67,7 +67,7 @@ fn the_manager_hears_that_it_is_ready_alive_and_stopping() {
         let mut manager = Manager::new(socket);
         let slow = probe("probe.1", "slow-ms = 300", "");
         let mut launch = launch(&place, &[&probe("probe.0", "", ""), &slow], &text, 400);
-        wait("it is starting", || manager.has("STATUS=starts the modules of node main").then_some(()));
+        wait("it is starting", || manager.has("STATUS=starting the modules of node main").then_some(()));
         wait("it is ready", || {
             launch.assert_runs();
             manager.has("READY=1").then_some(())

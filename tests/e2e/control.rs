@@ -82,7 +82,7 @@ fn one_that_hangs_on_its_way_out_keeps_nobody_waiting_and_a_second_word_ends_it(
     let (mut launch, robot) =
         place.launched(&[&probe("probe.0", "", "stop-within = \"20 min\""), &probe("probe.1", "", "")]);
     halt(robot.pid("probe.0"));
-    assert_eq!(place.say(&["restart", "probe.0", "--no-wait"]).ok(), "probe.0 is to be started\n");
+    assert_eq!(place.say(&["restart", "probe.0", "--no-wait"]).ok(), "probe.0 is being started\n");
     assert_eq!(child(&robot, "probe.0").phase, Phase::Stopping);
     let pid = robot.pid("probe.1");
     signal(pid, Signal::SIGKILL);
