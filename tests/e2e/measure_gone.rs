@@ -21,7 +21,7 @@ fn hz_tells_what_is_silent_and_what_does_not_exist() {
         (&["hz", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
         (&["bw", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
         (&["delay", "probe.7"], "the configuration has no module `probe.7`; there are probe.0\n"),
-        (&["hz", "probe.0", "--window", "0"], "a window of 0 s holds nothing; try --window 1\n"),
+        (&["hz", "probe.0", "--window", "0"], "a window of 0 s is empty; try --window 1\n"),
     ] {
         assert_eq!(place.say(arguments).fails(), error);
     }

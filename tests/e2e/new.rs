@@ -56,7 +56,7 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
     assert!(place.say(&["log"]).ok().contains("counts 10 times a second"));
     // Its parameter, as the README there changes it.
     let listed = place.say(&["param", "get", "wind-vane.0"]).ok();
-    assert!(listed.contains("rate-hz") && listed.contains("Hz    0.1..=1000  Counts so often."), "{listed}");
+    assert!(listed.contains("rate-hz") && listed.contains("Hz    0.1..=1000  Counts a second."), "{listed}");
     let set = place.say(&["param", "set", "wind-vane.0", "rate-hz", "200"]).ok();
     assert_eq!(set, "wind-vane.0 rate-hz: 10 -> 200 Hz\n");
     let refused = place.say(&["param", "set", "wind-vane.0", "rate-hz", "0"]).fails();

@@ -144,7 +144,7 @@ fn a_follower_survives_the_collector_and_says_so() {
         robot.wait_restarted("output.0", pid);
         say("after its death");
         follower.wait_for("main/probe.0: after its death\n");
-        assert!(follower.out().contains("… output.0 was started again; lines"), "{}", follower.out());
+        assert!(follower.out().contains("… output.0 was started again; the lines"), "{}", follower.out());
 
         // It hangs; that is told once.
         let times = |what: &str| follower.out().matches(what).count();

@@ -135,8 +135,8 @@ fn mistakes_are_told_with_what_would_be_right() {
         (&["send", "--timeout", "1e19", "probe.0", "count", "1"], &["s is no time to wait"]),
         (&["ping", "--interval", "nan", "probe.0"], &["NaN s is no time to wait"]),
         (&["demo", "--seconds", "1e19", "--no-gui"], &["s is no time to wait"]),
-        (&["hz", "probe.0", "--window=-5"], &["a window of -5 s holds nothing; try --window 1"]),
-        (&["hz", "probe.0", "--window", "nan"], &["a window of NaN s holds nothing; try --window 1"]),
+        (&["hz", "probe.0", "--window=-5"], &["a window of -5 s is empty; try --window 1"]),
+        (&["hz", "probe.0", "--window", "nan"], &["a window of NaN s is empty; try --window 1"]),
         (&["list", "--config", "nowhere.toml"], &["nowhere.toml"]),
     ] {
         let said = place.say(arguments);

@@ -32,7 +32,7 @@ enum ParamCommand {
     /// Show the parameters of a module, or one of them.
     Get(Get),
     /// Change a parameter of a running module.
-    ParamAssignment(ParamAssignment),
+    Set(ParamAssignment),
     /// Write present values into a file.
     Save(Save),
     /// Set the values of a file: for each module all of them, or none.
@@ -115,7 +115,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         ParamCommand::Get(get) => {
             at_work(&get.common, |session| show::get(session, &get.name, get.parameter.as_deref(), get.json))
         }
-        ParamCommand::ParamAssignment(set) => {
+        ParamCommand::Set(set) => {
             at_work(&set.common, |session| set::run(session, &set.name, &set.parameter, &set.value))
         }
         ParamCommand::Save(save) => {
