@@ -190,7 +190,7 @@ fn tools_say_what_to_do_while_nothing_runs() {
     }
     let config = place.config(&[OUTPUT]);
     let told = place.say(&["list", "--config", config.to_str().unwrap()]).fails();
-    assert!(told.contains("is the node launched?"), "{told}");
+    assert!(told.contains("is it launched?"), "{told}");
     let said = place.say(&["run", "output"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     assert!(said.err.contains("--config FILE --name CLASS.INSTANCE"), "{said:?}");
