@@ -183,7 +183,7 @@ fn a_follower_is_told_what_the_ring_no_longer_has() {
     wait("the last one", || shown(&place, &[]).contains(&"probe.0: flood 49".to_owned()).then_some(()));
     signal(follower.pid(), Signal::SIGCONT);
     follower.wait_for("flood 49");
-    wait("it is told", || follower.err().contains("lines are gone: output.0 keeps fewer").then_some(()));
+    wait("it is told", || follower.err().contains("lines are lost: output.0 keeps fewer").then_some(()));
     assert!(follower.out().lines().all(|line| line.starts_with('{')), "programs read lines alone");
     drop(robot);
     follower.stop();
