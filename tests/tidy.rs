@@ -94,7 +94,7 @@ const WORDS_LEFT: &[(&str, usize)] = &[
     ("modules/tests", 4),
     ("routers/src", 182),
     ("routers/tests", 17),
-    ("tests", 2),
+    ("tests", 1),
     ("tests/e2e", 2),
     ("tests/testbed", 114),
 ];
@@ -124,7 +124,7 @@ const LONG: &[(&str, usize)] = &[
     ("routers/src/session/client/mod.rs", 419),
     ("routers/src/shell/socket.rs", 428),
     ("routers/src/time/clock.rs", 420),
-    ("routers/src/time/clock/slots.rs", 436),
+    ("routers/src/time/clock/slots.rs", 437),
     ("routers/src/time/election.rs", 408),
     ("routers/tests/shell.rs", 419),
     ("tests/testbed/tests/simulation.rs", 466),
@@ -228,8 +228,8 @@ fn lines_fit_and_words_are_the_fields() {
     assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
 }
 
-/// Folders with more mistakes than are left to be fixed there, each mistake in a line; and those with fewer, whose number
-/// is to be lowered.
+/// Folders with more mistakes than are left to be fixed there, each mistake in a line; and those with fewer, whose
+/// number is to be lowered.
 fn beyond(left: &[(&str, usize)], found: &BTreeMap<String, Vec<String>>) -> Vec<String> {
     let folders: BTreeSet<&str> =
         left.iter().map(|(folder, _)| *folder).chain(found.keys().map(String::as_str)).collect();

@@ -68,7 +68,11 @@ impl Wifi {
         let config = place.path("robot.toml");
         let modules = [
             probe("probe.0", BLOB, "node = \"base\""),
-            probe("screen.0", "watches = \"probe.0\"", "node = \"far\"\naliases = [\"probe.1\"]\ncalls = [\"probe.0\"]"),
+            probe(
+                "screen.0",
+                "watches = \"probe.0\"",
+                "node = \"far\"\naliases = [\"probe.1\"]\ncalls = [\"probe.0\"]",
+            ),
         ];
         std::fs::write(&config, format!("{CONFIG}{}", modules.concat())).unwrap();
         let mut wifi = Self { nodes: Vec::new(), place, config, lab };

@@ -121,7 +121,8 @@ impl Clock {
             next: 0,
             is_warm: false,
             beginning: 0,
-            // Frames may be read before the first call: a stall lasts since the clock began, not since the computer did.
+            // Frames may be read before the first call: a stall lasts since the clock began, not since the computer
+            // did.
             advanced_ns: self.hello_ns,
         }));
         self.forget();

@@ -11,7 +11,7 @@ mod watch;
 pub(super) use settings::{ROUTER_CLASS, digest};
 pub use settings::{address, settings};
 pub(super) use slotted::Hands;
-use slotted::still_fresh;
+use watch::still_fresh;
 
 use super::clock::Now;
 use super::host::{Parcel, TRANSIT_AGE_MAX_NS};

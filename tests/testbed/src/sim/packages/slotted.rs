@@ -6,10 +6,9 @@ use super::watch::Watch;
 use super::{PORT, Packages, checked};
 use crate::sim::clock::Now;
 use crate::sim::host::TRANSIT_SLOTS;
-use crate::sim::promise::Promise;
 use crate::sim::station::{Io, Sent};
 use rohrpost_mailbox::{Head, Priority};
-use rohrpost_routers::driver::{HELD_NS_MAX, NotSent};
+use rohrpost_routers::driver::NotSent;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::intake::{TAKING_NS, Transit};
 use rohrpost_routers::outbound::{Accepted, Outbound};
@@ -114,12 +113,5 @@ impl Packages {
         let until_ns = self.poll_inbound(io);
         self.answer_callers(io);
         until_ns
-    }
-}
-
-/// What missed its slot leaves soon, or is lost.
-pub(super) fn still_fresh(io: &mut Io<'_>, since_ns: u64) {
-    if io.now.monotonic_ns - since_ns > HELD_NS_MAX {
-        io.oracle.broken(io.now, Promise::Fresh, format!("a datagram leaves that was made at {since_ns} ns"));
     }
 }

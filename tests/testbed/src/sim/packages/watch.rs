@@ -5,6 +5,7 @@ use crate::sim::promise::Promise;
 use crate::sim::station::Io;
 use rohrpost_mailbox::{Head, Kind, Options};
 use rohrpost_routers::counts::Cause;
+use rohrpost_routers::driver::HELD_NS_MAX;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
@@ -88,5 +89,12 @@ impl Deliver for Watch<'_, '_> {
 
     fn event(&mut self, event: Event) {
         self.io.line(|| format!("{event:?}"));
+    }
+}
+
+/// What missed its slot leaves soon, or is lost.
+pub(super) fn still_fresh(io: &mut Io<'_>, since_ns: u64) {
+    if io.now.monotonic_ns - since_ns > HELD_NS_MAX {
+        io.oracle.broken(io.now, Promise::Fresh, format!("a datagram leaves that was made at {since_ns} ns"));
     }
 }
