@@ -136,17 +136,17 @@ fn a_package_costs_one_call_to_send_one_to_receive_and_those_to_sleep_and_wake()
             let times = of(thread, call);
             assert!((least..=PACKAGES + spare).contains(&times), "{thread}, {call}: {times} times in {calls:?}");
         };
-        both("send", "tx_thread", PACKAGES);
-        both("sleep", "tx_thread", 1);
-        both("receive", "arrivals", PACKAGES);
+        both("send", "tx", PACKAGES);
+        both("sleep", "tx", 1);
+        both("receive", "rx", PACKAGES);
         // None, if the module was never quick enough to sleep before its package came.
-        both("wake", "arrivals", 0);
-        both("pause", "tx_thread", 0);
-        both("pause", "arrivals", 0);
+        both("wake", "rx", 0);
+        both("pause", "tx", 0);
+        both("pause", "rx", 0);
         for ((thread, call), times) in &calls {
             let known = match thread.as_str() {
-                "tx_thread" => ["send", "sleep", "pause", "clock"].contains(&call.as_str()),
-                "arrivals" => ["receive", "wake", "pause", "clock"].contains(&call.as_str()),
+                "tx" => ["send", "sleep", "pause", "clock"].contains(&call.as_str()),
+                "rx" => ["receive", "wake", "pause", "clock"].contains(&call.as_str()),
                 _ => true,
             };
             assert!(known, "{thread}: {call}, {times} times");

@@ -253,7 +253,7 @@ impl Shell {
             shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
             tx_thread.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
-            shell.begin("tx_thread", move || {
+            shell.begin("tx", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                     tracing::warn!(
                         "the router's threads run as modules do, and not before them: {error}; allow it with a limit \
@@ -264,7 +264,7 @@ impl Shell {
                 tx_thread.run();
             })?;
         }
-        shell.begin("rx_thread", move || {
+        shell.begin("rx", move || {
             // A refusal was reported by the other.
             let _ = threads::schedule(threads::ARRIVALS_FIFO);
             rx_thread.run();
