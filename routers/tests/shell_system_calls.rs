@@ -18,12 +18,17 @@ use rohrpost_mailbox::Shape;
 use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
+use std::time::Instant;
 
 const PACKAGES: u64 = 200;
 /// Marks are system calls too: questions about a process that cannot be. Between the first and the second it is
 /// counted.
 const MARK: u64 = 0x4000_0000;
 const ROLE: &str = "ROHRPOST_TEST_TRACED";
+/// What is not done for a package: hellos, and looking every tenth of a second at what time has brought about.
+const OTHERS_PER_SECOND: f64 = 40.0;
+/// So many more may fall into the shortest run. One call more for each package would be 200.
+const OTHERS_ALWAYS: u64 = PACKAGES / 10;
 
 /// In a process of its own: packages go from one node to the other, one after the other.
 #[test]
@@ -55,16 +60,22 @@ fn role() {
 /// How often each thread made each system call, by the names of both.
 type Calls = BTreeMap<(String, String), u64>;
 
+/// What was traced between the two marks.
+struct Traced {
+    calls: Calls,
+    seconds: f64,
+}
+
 /// Follows all threads of the process that this one has started, from the first stop of the first to the end of all.
-fn trace() -> Calls {
+fn trace() -> Traced {
     let options = ptrace::Options::PTRACE_O_TRACESYSGOOD
         | ptrace::Options::PTRACE_O_EXITKILL
         | ptrace::Options::PTRACE_O_TRACECLONE;
-    let (mut calls, mut marks, mut first) = (Calls::new(), 0, None);
+    let (mut calls, mut marks, mut first, mut exit_code) = (Calls::new(), Vec::new(), None, None);
     loop {
         let status = match waitpid(None, Some(WaitPidFlag::__WALL)) {
             Ok(status) => status,
-            Err(Errno::ECHILD) => return calls,
+            Err(Errno::ECHILD) => break,
             Err(error) => panic!("{error}"),
         };
         let (thread, signal) = match status {
@@ -80,19 +91,26 @@ fn trace() -> Calls {
             WaitStatus::PtraceEvent(thread, ..) => (thread, None),
             WaitStatus::PtraceSyscall(thread) => {
                 match entered(thread) {
-                    Some((libc::SYS_getpgid, [MARK, ..])) => marks += 1,
-                    Some((number, arguments)) if marks == 1 => {
+                    Some((libc::SYS_getpgid, [MARK, ..])) => marks.push(Instant::now()),
+                    Some((number, arguments)) if marks.len() == 1 => {
                         *calls.entry((thread_name(thread), call_name(number, arguments))).or_default() += 1;
                     }
                     _ => {}
                 }
                 (thread, None)
             }
+            WaitStatus::Exited(thread, code) => {
+                exit_code = if Some(thread) == first { Some(code) } else { exit_code };
+                continue;
+            }
             _ => continue,
         };
         // It may have ended meanwhile, with its process.
         let _ = ptrace::syscall(thread, signal);
     }
+    assert_eq!(exit_code, Some(0), "the traced process failed; calls until then: {calls:?}");
+    assert_eq!(marks.len(), 2, "no call was counted");
+    Traced { calls, seconds: (marks[1] - marks[0]).as_secs_f64() }
 }
 
 /// The system call that a thread is about to make; none when it comes back from one.
@@ -127,14 +145,14 @@ fn a_package_costs_one_call_to_send_one_to_receive_and_those_to_sleep_and_wake()
         let mut child = Command::new(std::env::current_exe().unwrap());
         child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, "1");
         let child = child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-        let calls = trace();
+        let Traced { calls, seconds } = trace();
         drop(child);
+        let others = OTHERS_ALWAYS + (OTHERS_PER_SECOND * seconds) as u64;
         let of = |thread: &str, call: &str| calls.get(&(thread.to_owned(), call.to_owned())).copied().unwrap_or(0);
-        // Each node now and then says that it is still there, and looks at what time has brought about.
-        let spare = PACKAGES / 2;
         let both = |call: &str, thread: &str, least: u64| {
             let times = of(thread, call);
-            assert!((least..=PACKAGES + spare).contains(&times), "{thread}, {call}: {times} times in {calls:?}");
+            let most = PACKAGES + others;
+            assert!((least..=most).contains(&times), "{thread}, {call}: not {least} to {most} times: {calls:?}");
         };
         both("send", "tx", PACKAGES);
         both("sleep", "tx", 1);
@@ -143,13 +161,14 @@ fn a_package_costs_one_call_to_send_one_to_receive_and_those_to_sleep_and_wake()
         both("wake", "rx", 0);
         both("pause", "tx", 0);
         both("pause", "rx", 0);
-        for ((thread, call), times) in &calls {
-            let known = match thread.as_str() {
-                "tx" => ["send", "sleep", "pause", "clock"].contains(&call.as_str()),
-                "rx" => ["receive", "wake", "pause", "clock"].contains(&call.as_str()),
-                _ => true,
-            };
-            assert!(known, "{thread}: {call}, {times} times");
-        }
+        let known = |thread: &str, call: &str| match thread {
+            "tx" => ["send", "sleep", "pause", "clock"].contains(&call),
+            "rx" => ["receive", "wake", "pause", "clock"].contains(&call),
+            _ => true,
+        };
+        // With a hello the two threads hand over to each other by a channel, where one may wait for the other.
+        let unknown: u64 =
+            calls.iter().filter(|((thread, call), _)| !known(thread, call)).map(|(_, times)| times).sum();
+        assert!(unknown <= others, "{unknown} calls that no package needs, at most {others} are right: {calls:?}");
     });
 }
