@@ -1,21 +1,29 @@
-//! Sends in time slots: the whole logic of the thread that does, without thread, clock, mailbox and socket.
+//! The whole logic of the threads that send, without thread, clock, mailbox and socket.
 //!
 //! ```text
-//!            Platform: clocks, mailbox, sockets, Clock             SlotDriver: when to wake, what to take, make, hand over
-//!  shell ──▶ real ones, one thread: poll, sleep, poll …     ──▶    the same code
+//!            platform: clocks, mailbox, sockets                  driver: when to wake, what to take, make, hand over
+//!  shell ──▶ real ones, one thread: poll, sleep, poll …     ──▶  the same code
 //!  sim   ──▶ virtual ones, events: poll, plan a wake-up …   ──▶
 //! ```
 //!
-//! It is compiled for each platform, and takes nothing from the heap once it runs.
+//! [`SlotDriver`] sends in time slots. Without them [`FreeDriver`] sends what is real time, and [`RestDriver`] the rest.
+//!
+//! They are compiled for each platform, and take nothing from the heap once they run.
 
+mod free;
 mod held;
 mod log;
+mod outlet;
 mod platform;
+mod rest;
 mod slots;
 mod timing;
 
+pub use free::{FreeDriver, FreeStep, Handover, Inlet, Nowhere, RealTimeOutlet, Wakes};
 pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
+pub use outlet::Outlet;
 pub use platform::{NotSent, Platform, SlotEvent};
+pub use rest::{RestDriver, RestInlet, RestStep};
 pub use slots::{SlotDriver, SlotStep};
 pub use timing::spin_ns;

@@ -81,14 +81,14 @@ struct First {
 }
 
 impl SlotDriver {
-    /// Of a router that begins at `now_ns`. `datagram`: room for the largest, and its seal.
-    pub fn new(network: Network, nodes: usize, scheduler: SlotScheduler, datagram: Box<[u8]>, now_ns: u64) -> Self {
+    /// Of a router that begins at `now_ns`.
+    pub fn new(network: Network, nodes: usize, scheduler: SlotScheduler, now_ns: u64) -> Self {
         Self {
             network,
             nodes,
             scheduler,
             intake: Intake::new(now_ns),
-            datagram,
+            datagram: vec![0; network.datagram_bytes_max + network.security.tag_bytes()].into(),
             held: None,
             phase: Phase::Plans,
             looked_ns: 0,

@@ -11,6 +11,7 @@
 //! with real-time packages.
 
 use super::threads::Shared;
+use crate::driver::Handover;
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES, Head};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -65,9 +66,8 @@ pub(super) fn handover(shared: &Arc<Shared>) -> (Giver, Taker) {
     (giver, Taker { full: filled, empty, reading: None, room, shared: shared.clone() })
 }
 
-impl Giver {
-    /// Whether it takes a package.
-    pub(super) fn takes(&mut self) -> bool {
+impl Handover for Giver {
+    fn takes(&mut self) -> bool {
         if self.filling.is_none()
             && let Ok(batch) = self.empty.try_recv()
         {
@@ -77,8 +77,7 @@ impl Giver {
         self.filling.is_some()
     }
 
-    /// Hands a package over, with what fits into its batch; only if it takes one.
-    pub(super) fn give(&mut self, head: &Head, published_ns: u64, body: &[u8]) {
+    fn give(&mut self, head: &Head, published_ns: u64, body: &[u8]) {
         let Some(batch) = &mut self.filling else { return };
         batch.extend_from_slice(&head.to_bytes());
         batch.extend_from_slice(&published_ns.to_le_bytes());
@@ -88,23 +87,20 @@ impl Giver {
         }
     }
 
-    /// No more packages for the moment.
-    pub(super) fn finish(&mut self) {
+    fn finish(&mut self) {
         if let Some(batch) = self.filling.take_if(|batch| !batch.is_empty()) {
             // There is room for all; a missing taker is noticed by the thread watch.
             let _ = self.full.try_send(batch);
         }
     }
 
-    /// From now on its bell is rung when it may take again.
-    pub(super) fn wants_room(&self) {
+    fn wants_room(&self) {
         // ORDERING: SeqCst, before the load of `empty`. At least one side sees the other: this one, or the one that
         // returns a batch.
         self.room.wanted.store(true, Ordering::SeqCst);
     }
 
-    /// Whether it might take.
-    pub(super) fn has_room(&self) -> bool {
+    fn has_room(&self) -> bool {
         self.filling.is_some() || self.room.empty.load(Ordering::SeqCst) > 0
     }
 }

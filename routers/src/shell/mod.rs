@@ -43,7 +43,7 @@ pub use failure::{Failure, Failures};
 pub use news::difference;
 pub use socket::{SocketError, listen};
 
-use crate::driver::spin_ns;
+use crate::driver::{FreeDriver, spin_ns};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
@@ -68,7 +68,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use threads::Shared;
-use tx_thread::TxThread;
+use tx_thread::{TransitInlet, TxThread};
 use wire::Wire;
 
 /// Why a router did not start.
@@ -205,13 +205,11 @@ impl Shell {
         let sealing = all.as_ref().map(|all| Sealing::new(all, Port::Packages));
         let sending = Sending {
             outbound,
-            stats: stats.clone(),
             answers: answers(&sender),
             wire: Wire::new(&settings, settings.network.port, sealing, impair, &failures),
-            datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
+            rest: None,
         };
-        let mut tx_thread =
-            TxThread { shared: shared.clone(), transit, sending, settings: settings.clone(), rest: None };
+        let mut inlet = TransitInlet { transit, sending };
         let mut rx_thread = RxThread {
             shared: shared.clone(),
             socket: socket.clone(),
@@ -246,13 +244,14 @@ impl Shell {
             peer_sessions: all,
         };
         if shell.settings.tdma.is_some() {
-            rx_thread.answers = Some(shell.send_in_slots(name, tx_thread, clock.ok_or(ShellError::NoTime)?)?);
+            rx_thread.answers = Some(shell.send_in_slots(name, inlet, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
             let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.peer_sessions.as_ref()));
             shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
-            tx_thread.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
+            inlet.sending.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
+            let tx_thread = TxThread { shared: shell.shared.clone(), driver: FreeDriver::new(&shell.settings), inlet };
             shell.begin("tx", move || {
                 if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
                     tracing::warn!(
@@ -276,7 +275,7 @@ impl Shell {
     fn send_in_slots(
         &mut self,
         name: Name,
-        tx_thread: TxThread,
+        inlet: TransitInlet,
         clock: ClockParts,
     ) -> Result<SyncSender<slots::Answer>, ShellError> {
         let settings = self.settings.clone();
@@ -290,7 +289,8 @@ impl Shell {
         let line = slots::AnswerQueue::new(waiting, hellos, self.sockets[0].clone(), settings.clone());
         let scheduler = SlotScheduler::new(table, spin_ns);
         let own = slots::Own { router: name, nodes: settings.nodes.len(), network: settings.network };
-        let slots = Slots::new(own, tx_thread, works, scheduler, line);
+        let counted = (self.shared.clone(), self.stats.clone());
+        let slots = Slots::new(own, counted, inlet, works, scheduler, line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(answers)

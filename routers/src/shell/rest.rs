@@ -1,6 +1,6 @@
 //! The thread that sends what is not real time: scheduled like the modules that it serves, below all real-time threads.
 //!
-//! It has a queue, sockets and a port of its own. It shares the wire's rate with real time, which goes first. A second
+//! It has a queue, sockets and a port of its own. What it sends, and when, says the [driver](crate::driver). It shares the wire's rate with real time, which goes first. A second
 //! thread receives at that port. So the kernel separates both kinds before any thread runs, and a flood of one takes no
 //! room or time from the other.
 
@@ -13,58 +13,57 @@ use super::socket::{InSocket, REST_BYTES};
 use super::threads::{Shared, schedule_below};
 use super::wire::Wire;
 use super::{Shell, ShellError, transit};
+use crate::driver::{RestDriver, RestInlet, RestStep};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::{Outbound, Package};
 use crate::security::{Gate, Port, Sealing};
 use crate::stats::Stats;
-use rohrpost_mailbox::{Name, Node, Participant, monotonic_ns};
+use rohrpost_mailbox::{Name, Node, Participant};
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Packages taken before the wire has its turn.
-const BURST: usize = 64;
-/// The end of the router is checked this often.
-const LOOK: Duration = Duration::from_millis(100);
-/// Packages for a peer that does not hear this incarnation yet are checked this often.
-const LOOK_AGAIN: Duration = Duration::from_millis(10);
-
 /// State of the thread.
 pub(super) struct Rest {
     pub(super) shared: Arc<Shared>,
+    pub(super) driver: RestDriver,
+    pub(super) inlet: HandoverInlet,
+}
+
+/// What the driver has of the system.
+pub(super) struct HandoverInlet {
     pub(super) taker: Taker,
     pub(super) sending: Sending,
+}
+
+impl RestInlet for HandoverInlet {
+    type Outlet = Sending;
+
+    fn outlet(&mut self) -> &mut Sending {
+        &mut self.sending
+    }
+
+    fn take(&mut self, what: impl FnOnce(&mut Sending, &Package<'_>, bool)) -> bool {
+        let Some((head, published_ns, body, is_last)) = self.taker.next() else { return false };
+        what(&mut self.sending, &Package { head, published_ns, body }, is_last);
+        true
+    }
 }
 
 impl Rest {
     /// Until the router ends.
     pub(super) fn run(mut self) {
         while !self.shared.ends() {
-            self.take();
-            let now_ns = monotonic_ns();
-            let Some(until_ns) = self.sending.step(now_ns) else { continue };
-            let until_ns = until_ns.min(self.sending.wire.deliver(now_ns));
-            let look = if self.sending.outbound.waits() { LOOK_AGAIN } else { LOOK };
-            let time = Duration::from_nanos(until_ns.saturating_sub(now_ns)).min(look);
-            if self.sending.outbound.has_plenty() {
-                // The rate limit holds the wire. More packages wait in the mailbox, where less important ones are
-                // displaced.
-                std::thread::sleep(time);
-            } else if self.taker.wait(time) == Waited::Ended {
-                return;
+            match self.driver.poll(&mut self.inlet) {
+                RestStep::Again => {}
+                RestStep::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
+                RestStep::Wait { for_ns } => {
+                    if self.inlet.taker.wait(Duration::from_nanos(for_ns)) == Waited::Ended {
+                        return;
+                    }
+                }
             }
-        }
-    }
-
-    /// Takes packages from the handover while they are of use.
-    fn take(&mut self) {
-        for _ in 0..BURST {
-            if self.sending.outbound.has_plenty() {
-                return;
-            }
-            let Some((head, published_ns, body, alone)) = self.taker.next() else { return };
-            self.sending.accept(&Package { head, published_ns, body }, alone);
         }
     }
 }
@@ -99,10 +98,9 @@ impl Shell {
         let sealing = all.map(|all| Sealing::new(all, Port::Rest));
         let sending = Sending {
             outbound,
-            stats: stats.clone(),
             answers: answers(&sender),
             wire: Wire::new(&settings, port, sealing, impair, &self.failures),
-            datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
+            rest: None,
         };
         let rx_thread = RxThread {
             shared: shared.clone(),
@@ -123,7 +121,7 @@ impl Shell {
         };
         self.sockets.push(socket);
         self.rest_stats = Some(stats);
-        let tx_thread = Rest { shared, taker, sending };
+        let tx_thread = Rest { shared, driver: RestDriver::new(&settings), inlet: HandoverInlet { taker, sending } };
         self.begin("rest-out", move || {
             schedule_below();
             tx_thread.run();

@@ -14,14 +14,11 @@ mod state;
 pub use granted::Granted;
 pub use state::{Snapshot, State};
 
-use super::answers::Answers;
 use super::clock::{ClockState, Works};
-use super::failure::Failure;
 use super::sending::Sending;
 use super::threads::Shared;
-use super::tx_thread::TxThread;
-use super::wire::Wire;
-use crate::driver::{NotSent, Platform, SlotDriver, SlotStep, WindowLog};
+use super::tx_thread::TransitInlet;
+use crate::driver::{NotSent, Outlet, Platform, SlotDriver, SlotStep, WindowLog};
 use crate::frame::NodeIndex;
 use crate::intake::Transit;
 use crate::outbound::Outbound;
@@ -58,9 +55,7 @@ struct System {
     stats: Arc<Stats>,
     works: Works,
     transit: Receiver,
-    outbound: Outbound,
-    answers: Answers,
-    wire: Wire,
+    sending: Sending,
     line: AnswerQueue,
     router: Name,
     snapshot: Snapshot,
@@ -71,18 +66,18 @@ impl Slots {
     /// From what would send as packages come.
     pub(super) fn new(
         own: Own,
-        tx_thread: TxThread,
+        (shared, stats): (Arc<Shared>, Arc<Stats>),
+        inlet: TransitInlet,
         works: Works,
         scheduler: SlotScheduler,
         line: AnswerQueue,
     ) -> Self {
-        let TxThread { shared, transit, sending, .. } = tx_thread;
-        let Sending { outbound, answers, wire, datagram, stats } = sending;
+        let TransitInlet { transit, sending } = inlet;
         let snapshot = Snapshot::new(scheduler.silent());
         let state = Arc::new(State::new(snapshot));
-        let driver = SlotDriver::new(own.network, own.nodes, scheduler, datagram, monotonic_ns());
+        let driver = SlotDriver::new(own.network, own.nodes, scheduler, monotonic_ns());
         let router = own.router;
-        let system = System { shared, stats, works, transit, outbound, answers, wire, line, router, snapshot, state };
+        let system = System { shared, stats, works, transit, sending, line, router, snapshot, state };
         Self { driver, system }
     }
 
@@ -129,17 +124,16 @@ impl Platform for System {
     }
 
     fn transit(&mut self) -> impl Transit {
-        let Self { transit, outbound, answers: report, works, .. } = self;
+        let Self { transit, sending: Sending { outbound, answers: report, .. }, works, .. } = self;
         Hands { transit, outbound, report, local_ns: || works.now_ns() }
     }
 
     fn queue(&mut self) -> (&mut Outbound, impl Report) {
-        (&mut self.outbound, &mut self.answers)
+        Outlet::queue(&mut self.sending)
     }
 
     fn send(&mut self, now_ns: u64, to: NodeIndex, buffer: &mut [u8], bytes: usize) -> Result<(), NotSent> {
-        let sent = self.wire.send_made(now_ns, to, buffer, bytes);
-        if sent.is_err_and(Failure::is_loss) { Err(NotSent) } else { Ok(()) }
+        self.sending.send(now_ns, to, buffer, bytes)
     }
 
     fn send_time(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) {
@@ -159,7 +153,7 @@ impl Platform for System {
 
     fn tidy(&mut self, now_ns: u64) {
         self.line.look(now_ns);
-        self.wire.deliver(now_ns);
+        self.sending.deliver(now_ns);
     }
 
     fn publish(&mut self, scheduler: &SlotScheduler, log: &WindowLog) {
@@ -175,7 +169,7 @@ impl Platform for System {
 
     /// Shows how much of the tunnel's packets waits.
     fn queue_changed(&mut self) {
-        let bytes = self.outbound.waiting_bytes_of(self.router);
+        let bytes = self.sending.outbound.waiting_bytes_of(self.router);
         self.shared.tunnel_bytes.store(bytes, Ordering::Relaxed);
     }
 }

@@ -1,7 +1,7 @@
 //! One seed, from its plan to its verdict.
 
 use super::calls::NewGuard;
-use super::packages::{Packages, settings};
+use super::packages::{Free, Packages, settings};
 use super::plan::{Flow, Plan, incarnation};
 use super::promise::Problem;
 use super::seals;
@@ -79,6 +79,6 @@ fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayer
             let table = Table::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());
             return vec![Box::new(Slotted::new(packages, ticking, &settings, table, now))];
         }
-        vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]
+        vec![Box::new(Free::new(packages, &settings)) as Box<dyn Layer>, Box::new(ticking)]
     })
 }

@@ -245,8 +245,7 @@ impl Slotted {
             stood_still: false,
         };
         let (scheduler, network) = (SlotScheduler::new(table, spin_ns), settings.network);
-        let datagram = vec![0; network.datagram_bytes_max + network.security.tag_bytes()].into();
-        let driver = SlotDriver::new(network, settings.nodes.len(), scheduler, datagram, now.monotonic_ns);
+        let driver = SlotDriver::new(network, settings.nodes.len(), scheduler, now.monotonic_ns);
         Self { packages, time, driver, watch, wake_ns: 0, due_ns: 0 }
     }
 

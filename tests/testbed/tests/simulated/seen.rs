@@ -13,7 +13,7 @@ pub(crate) const SEEN_IN_A_HUNDRED: [(&str, u64); 25] = [
     ("quota", 20_000),
     ("silent", 3000),
     ("unheard", 10),
-    ("refused", 300),
+    ("refused", 50),
     ("late", 100),
     ("incomplete", 200),
     ("stale", 500),

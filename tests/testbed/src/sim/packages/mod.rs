@@ -1,13 +1,16 @@
-//! The layer that carries packages: `Outbound` and `Inbound`, called as the threads of the shell call them, and
-//! watched.
+//! The layer that carries packages: `Inbound`, called as the thread of the shell calls it, and `Outbound` in the hands of
+//! a driver of the shell; both watched.
 //!
-//! Here: what a router does as packages come. What differs with time slots is in `slotted`, what must hold in `checks`.
+//! Here: what comes in, and what a driver has to do with. Without time slots `free` runs it, with them `slotted` is what
+//! it has. What must hold is in `checks`.
 
 mod checks;
+mod free;
 mod settings;
 mod slotted;
 mod watch;
 
+pub use free::Free;
 pub(super) use settings::{ROUTER_CLASS, digest};
 pub use settings::{address, settings};
 pub(super) use slotted::Hands;
@@ -18,14 +21,14 @@ use super::host::{Parcel, TRANSIT_AGE_MAX_NS};
 use super::package::Role;
 use super::promise::Promise;
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
-use super::station::{Arrived, Io, Layer, Port, Sent};
-use crate::harm::harmful;
+use super::station::{Arrived, Io, Port, Sent};
 use rohrpost_mailbox::{Head, Options, Type};
 use rohrpost_routers::driver::NotSent;
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
 use rohrpost_routers::intake::hurries;
-use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
+use rohrpost_routers::outbound::Outbound;
+use rohrpost_routers::report::Report;
 use rohrpost_routers::security::{HELLO_DATAGRAM_BYTES, PeerSessions, Said, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
@@ -69,6 +72,8 @@ pub struct Packages {
     /// What the receiving half wants to be sent.
     refusals: VecDeque<Sent>,
     seals: Option<PackageSeals>,
+    /// The thread that receives has rung the one that sends.
+    is_rung: bool,
     /// With time slots: when the datagram was made that has not been handed over yet.
     made: Option<Now>,
     /// A datagram waits for the next slot that has left the queue, since then, ns.
@@ -96,6 +101,7 @@ impl Packages {
             refusals: VecDeque::new(),
             seals: None,
             undelivered: Vec::new(),
+            is_rung: false,
             made: None,
             held_since_ns: None,
             steady_since_ns: now_ns,
@@ -113,13 +119,8 @@ impl Packages {
         Self { outbound: self.outbound.sealed(all.clone()), seals, ..self }
     }
 
-    /// Takes all that waits in the transit mailbox.
-    fn take_in(&mut self, io: &mut Io<'_>) {
-        while self.take_one(io).is_some() {}
-    }
-
     /// Takes the most important package from the transit mailbox.
-    fn take_one(&mut self, io: &mut Io<'_>) -> Option<(Head, Accepted)> {
+    fn take_parcel(&mut self, io: &mut Io<'_>) -> Option<Parcel> {
         let parcel = loop {
             let parcel = io.host.transit.take()?;
             if io.now.monotonic_ns.saturating_sub(parcel.published_ns) <= TRANSIT_AGE_MAX_NS {
@@ -135,31 +136,18 @@ impl Packages {
         {
             io.oracle.held(parcel.number);
         }
-        let alone = io.host.transit.is_empty() && io.plan.slots.is_none();
-        let does_harm = io.oracle.packages[parcel.number as usize].role == Role::Intruder;
-        let accepted = harmful(does_harm, || self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone));
+        Some(parcel)
+    }
+
+    /// The router has done with it what it does at once.
+    fn took(&mut self, io: &mut Io<'_>, parcel: Parcel) {
         io.oracle.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
-        let head = parcel.head;
         self.in_hand = Some(parcel);
-        Some((head, accepted))
     }
 
-    fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) -> Accepted {
-        let package = Package { head, published_ns, body };
-        let mut watch = Watch::out(io, &mut self.undelivered);
-        let accepted = self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch);
-        if let Accepted::Send { to, head } = &accepted {
-            io.oracle.saw("sent at once");
-            self.send(io, *to, Rc::from([&head[..], body].concat()));
-        }
-        accepted
-    }
-
-    fn send(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: Rc<[u8]>) {
-        if self.hand_over(io, to, &bytes).is_err() {
-            let mut watch = Watch::out(io, &mut self.undelivered);
-            self.outbound.unsent(&bytes, &[], &mut watch);
-        }
+    /// The queue; and who is told of what it loses.
+    pub(super) fn queue<'a, 'b>(&'a mut self, io: &'a mut Io<'b>) -> (&'a mut Outbound, impl Report) {
+        (&mut self.outbound, Watch::out(io, &mut self.undelivered))
     }
 
     /// Hands a datagram to the kernel, sealed if it is to be.
@@ -223,11 +211,12 @@ impl Packages {
         if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
             say(io, seals, &mut self.refusals, said, &reply[..said.bytes]);
         }
-        seals.gate.begin(now_ns);
+        // Packages for this peer may leave.
+        self.is_rung |= seals.gate.begin(now_ns);
         if bytes.len() < HEAD_BYTES + TAG_BYTES { arrived.bytes.clone() } else { opened(&bytes) }
     }
 
-    /// Tells callers on other nodes of commands that were not delivered here.
+    /// Tells callers on other nodes of commands that were not delivered here, by the router's own mailbox.
     fn answer_callers(&mut self, io: &mut Io<'_>) {
         for command in std::mem::take(&mut self.undelivered) {
             let Some(number) = io.oracle.number(&command) else { continue };
@@ -244,9 +233,11 @@ impl Packages {
             };
             let role = Role::Report { call };
             let (number, head, body) = io.oracle.post(io.now, head, (io.node, to_node.into()), role);
-            io.oracle.accepted(io.life, number, io.now.monotonic_ns);
             io.oracle.saw("told a caller on another node");
-            self.accept(io, head, io.now.monotonic_ns, &body, false);
+            let published_ns = io.now.monotonic_ns;
+            if io.host.transit.post(Parcel { number, head, body, published_ns }).is_some() {
+                io.oracle.saw("no room in the transit mailbox");
+            }
         }
     }
 
@@ -288,8 +279,9 @@ impl Packages {
     }
 }
 
-impl Layer for Packages {
-    fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
+impl Packages {
+    /// A datagram came in.
+    pub(super) fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let source = arrived.source.filter(|node| *node != io.node);
         let before = self.counted(source);
         let clear = self.take(io, arrived);
@@ -320,26 +312,15 @@ impl Layer for Packages {
         self.answer_callers(io);
     }
 
-    fn left(&mut self, _: &mut Io<'_>, _: Port, _: u64, _: Now) {}
-
-    fn poll(&mut self, io: &mut Io<'_>) -> u64 {
-        self.take_in(io);
+    /// The thread that receives: does what passing time does; when to ask again.
+    pub(super) fn receive(&mut self, io: &mut Io<'_>) -> u64 {
         let until_ns = self.poll_inbound(io);
-        io.sent.extend(self.refusals.drain(..));
         self.answer_callers(io);
-        loop {
-            let mut watch = Watch::out(io, &mut self.undelivered);
-            match self.outbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
-                Output::Send { to, bytes } => {
-                    let bytes = Rc::from(&self.buffer[..bytes]);
-                    self.send(io, to, bytes);
-                }
-                Output::Wait { until_ns: then_ns } => return until_ns.min(then_ns),
-            }
-        }
+        until_ns
     }
 
-    fn dies(&mut self, io: &mut Io<'_>) {
+    /// Its router dies now.
+    pub(super) fn dies(&mut self, io: &mut Io<'_>) {
         self.check_accounts(io);
         let in_hand = self.in_hand.take().filter(|parcel| parcel.head.len <= IN_HAND_BYTES_MAX);
         if let Some(parcel) = in_hand.filter(|parcel| !parcel.head.options.has(Options::REDELIVERED))
@@ -350,7 +331,8 @@ impl Layer for Packages {
         }
     }
 
-    fn check(&mut self, io: &mut Io<'_>, well: bool) {
+    /// What must hold at any time.
+    pub(super) fn check(&mut self, io: &mut Io<'_>, well: bool) {
         self.check_accounts(io);
         self.check_links(io);
         if well {
@@ -358,7 +340,8 @@ impl Layer for Packages {
         }
     }
 
-    fn close(&mut self, io: &mut Io<'_>) {
+    /// What must hold at the end.
+    pub(super) fn close(&mut self, io: &mut Io<'_>) {
         io.oracle.close_receipts(io.now, io.life);
         self.check_losses(io);
     }

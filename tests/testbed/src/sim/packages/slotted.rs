@@ -1,18 +1,18 @@
 //! Packages where there are time slots: what the driver has of them.
 //!
-//! `sim/slotted` calls this; without slots, `poll` sends as packages come.
+//! `sim/slotted` calls this; without slots, `free` has another driver.
 
-use super::watch::Watch;
 use super::{PORT, Packages, checked};
+use crate::harm::harmful;
 use crate::sim::clock::Now;
 use crate::sim::host::TRANSIT_SLOTS;
+use crate::sim::package::Role;
 use crate::sim::station::{Io, Sent};
 use rohrpost_mailbox::{Head, Priority};
 use rohrpost_routers::driver::NotSent;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::intake::{TAKING_NS, Transit};
-use rohrpost_routers::outbound::{Accepted, Outbound};
-use rohrpost_routers::report::Report;
+use rohrpost_routers::outbound::{Accepted, Package};
 use rohrpost_routers::security::HELLO_SLOT_BYTES;
 use rohrpost_routers::tdma::TransmitWindow;
 use std::rc::Rc;
@@ -48,16 +48,20 @@ impl Transit for Hands<'_, '_> {
         if !self.io.host.transit.is_empty() {
             self.io.works(TAKING_NS);
         }
-        self.packages.take_one(self.io)
+        let Self { packages, io } = self;
+        let parcel = packages.take_parcel(io)?;
+        let head = parcel.head;
+        let does_harm = io.oracle.packages[parcel.number as usize].role == Role::Intruder;
+        let package = Package { head, published_ns: parcel.published_ns, body: &parcel.body };
+        let (now_ns, (outbound, mut report)) = (io.now.monotonic_ns, packages.queue(io));
+        let accepted = harmful(does_harm, || outbound.accept(now_ns, &package, false, &mut report));
+        drop(report);
+        packages.took(io, parcel);
+        Some((head, accepted))
     }
 }
 
 impl Packages {
-    /// The queue; and who is told of what it loses.
-    pub(in crate::sim) fn queue<'a, 'b>(&'a mut self, io: &'a mut Io<'b>) -> (&'a mut Outbound, impl Report) {
-        (&mut self.outbound, Watch::out(io, &mut self.undelivered))
-    }
-
     /// With time slots: sends a datagram in one.
     pub(in crate::sim) fn send_in(&mut self, io: &mut Io<'_>, to: NodeIndex, bytes: &[u8]) -> Result<(), NotSent> {
         let sent = self.hand_over(io, to, bytes);
@@ -106,12 +110,5 @@ impl Packages {
         io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram), handed: io.now });
         seals.waiting.left(said);
         Some(HELLO_SLOT_BYTES)
-    }
-
-    /// The thread that receives: does what passing time does; when to ask again.
-    pub(in crate::sim) fn receive(&mut self, io: &mut Io<'_>) -> u64 {
-        let until_ns = self.poll_inbound(io);
-        self.answer_callers(io);
-        until_ns
     }
 }

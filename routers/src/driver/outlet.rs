@@ -1,0 +1,99 @@
+//! What a thread that sends as packages come has of the system behind its queue, and what it does with that.
+
+use super::platform::NotSent;
+use crate::frame::NodeIndex;
+use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
+use crate::report::Report;
+use crate::settings::Settings;
+
+/// Clock, queue and sockets of such a thread.
+pub trait Outlet {
+    /// The clock by which packages are published, ns.
+    fn monotonic_ns(&self) -> u64;
+    /// The queue; and who is told of what it loses.
+    fn queue(&mut self) -> (&mut Outbound, impl Report);
+    /// Whether datagrams are sealed: [`Self::send`] does it.
+    fn seals(&self) -> bool;
+    /// Hands over the datagram in the first `bytes` of a buffer, which has room for a seal behind them.
+    ///
+    /// # Errors
+    /// [`NotSent`]; the datagram is as it was.
+    fn send(&mut self, now_ns: u64, to: NodeIndex, buffer: &mut [u8], bytes: usize) -> Result<(), NotSent>;
+    /// Hands over a datagram in two parts, where nothing is sealed.
+    ///
+    /// # Errors
+    /// [`NotSent`]
+    fn send_parts(&mut self, now_ns: u64, to: NodeIndex, head: &[u8], body: &[u8]) -> Result<(), NotSent>;
+    /// Has the sockets without room tried again, if it is due.
+    fn retry(&mut self, now_ns: u64);
+    /// The peers whose sockets have no room, one bit each, and when they are due, ns.
+    fn blocked(&self) -> (u64, u64);
+    /// Sends what an impairment delayed for long enough; when it has more, ns.
+    fn deliver(&mut self, now_ns: u64) -> u64;
+}
+
+/// Takes packages, and sends what the queue lets go.
+pub(super) struct Transmitter {
+    /// Room for the largest datagram, and its seal.
+    datagram: Box<[u8]>,
+}
+
+impl Transmitter {
+    pub(super) fn new(settings: &Settings) -> Self {
+        let bytes = settings.network.datagram_bytes_max + settings.network.security.tag_bytes();
+        Self { datagram: vec![0; bytes].into() }
+    }
+
+    /// Takes a package: sends or queues it. `alone`: see [`Outbound::accept`].
+    pub(super) fn accept(&mut self, on: &mut impl Outlet, package: &Package<'_>, alone: bool) {
+        let (now_ns, body) = (on.monotonic_ns(), package.body);
+        let (outbound, mut report) = on.queue();
+        let Accepted::Send { to, head } = outbound.accept(now_ns, package, alone, &mut report) else { return };
+        drop(report);
+        let sent = if on.seals() {
+            // The one copy that sealing needs: the body must stay unchanged.
+            self.datagram[..head.len()].copy_from_slice(&head);
+            self.datagram[head.len()..head.len() + body.len()].copy_from_slice(body);
+            on.send(now_ns, to, &mut self.datagram, head.len() + body.len())
+        } else {
+            on.send_parts(now_ns, to, &head, body)
+        };
+        settle(on, sent, &head, body);
+        pass_over_blocked(on);
+    }
+
+    /// Sends the next datagram; else returns when there is one, unless a package comes.
+    pub(super) fn step(&mut self, on: &mut impl Outlet, now_ns: u64) -> Option<u64> {
+        on.retry(now_ns);
+        pass_over_blocked(on);
+        let (outbound, mut report) = on.queue();
+        let output = outbound.poll(now_ns, &mut self.datagram, &mut report);
+        drop(report);
+        match output {
+            Output::Send { to, bytes } => {
+                let sent = on.send(on.monotonic_ns(), to, &mut self.datagram, bytes);
+                settle(on, sent, &self.datagram[..bytes], &[]);
+                None
+            }
+            Output::Wait { until_ns } => Some(until_ns.min(on.blocked().1)),
+        }
+    }
+}
+
+fn pass_over_blocked(on: &mut impl Outlet) {
+    let (blocked, _) = on.blocked();
+    on.queue().0.pass_over(blocked);
+}
+
+/// Reports the result for the last datagram, and for its body if it left without a copy.
+fn settle(on: &mut impl Outlet, sent: Result<(), NotSent>, datagram: &[u8], body: &[u8]) {
+    if let Err(NotSent) = sent {
+        let (outbound, mut report) = on.queue();
+        outbound.unsent(datagram, body, &mut report);
+    } else if on.queue().0.is_measured() {
+        let sent_ns = on.monotonic_ns();
+        on.queue().0.sent(sent_ns);
+    }
+}
+
+const _: () = assert!(DIRECT_HEAD_BYTES < 128);

@@ -1,0 +1,153 @@
+//! Packages where there are no time slots: the driver of the shell on a simulated platform.
+
+use super::{LISTEN_NS, Packages};
+use crate::harm::harmful;
+use crate::sim::clock::Now;
+use crate::sim::package::Role;
+use crate::sim::station::{Arrived, Io, Layer, Port};
+use rohrpost_mailbox::Priority;
+use rohrpost_routers::driver::{
+    FreeDriver, FreeStep, Handover, Inlet, NotSent, Nowhere, Outlet, RealTimeOutlet, Wakes,
+};
+use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::outbound::{Outbound, Package};
+use rohrpost_routers::report::Report;
+use rohrpost_routers::settings::Settings;
+use std::sync::Arc;
+
+/// One incarnation of a router that sends as packages come.
+pub struct Free {
+    packages: Packages,
+    driver: FreeDriver,
+    /// When something is due for the thread that sends, at the latest, ns of its monotonic clock.
+    due_ns: u64,
+    wakes: Wakes,
+}
+
+/// What the driver has of the simulated computer.
+struct Ground<'a, 'b> {
+    packages: &'a mut Packages,
+    io: &'a mut Io<'b>,
+}
+
+impl Outlet for Ground<'_, '_> {
+    fn monotonic_ns(&self) -> u64 {
+        self.io.now.monotonic_ns
+    }
+
+    fn queue(&mut self) -> (&mut Outbound, impl Report) {
+        self.packages.queue(self.io)
+    }
+
+    fn seals(&self) -> bool {
+        self.packages.seals.is_some()
+    }
+
+    fn send(&mut self, _: u64, to: NodeIndex, buffer: &mut [u8], bytes: usize) -> Result<(), NotSent> {
+        self.packages.hand_over(self.io, to, &buffer[..bytes])
+    }
+
+    fn send_parts(&mut self, _: u64, to: NodeIndex, head: &[u8], body: &[u8]) -> Result<(), NotSent> {
+        self.io.oracle.saw("sent at once");
+        self.packages.hand_over(self.io, to, &[head, body].concat())
+    }
+
+    fn retry(&mut self, _: u64) {}
+
+    fn blocked(&self) -> (u64, u64) {
+        (0, u64::MAX)
+    }
+
+    fn deliver(&mut self, _: u64) -> u64 {
+        u64::MAX
+    }
+}
+
+impl RealTimeOutlet for Ground<'_, '_> {
+    fn rest(&mut self) -> Option<&mut impl Handover> {
+        None::<&mut Nowhere>
+    }
+}
+
+impl Inlet for Ground<'_, '_> {
+    type Outlet = Self;
+
+    fn outlet(&mut self) -> &mut Self {
+        self
+    }
+
+    fn first(&mut self) -> Option<Priority> {
+        self.io.host.transit.waits().1
+    }
+
+    fn take<T>(&mut self, what: impl FnOnce(&mut Self, &Package<'_>, bool) -> T) -> Option<T> {
+        let parcel = self.packages.take_parcel(self.io)?;
+        let is_alone = self.io.host.transit.is_empty();
+        let does_harm = self.io.oracle.packages[parcel.number as usize].role == Role::Intruder;
+        let package = Package { head: parcel.head, published_ns: parcel.published_ns, body: &parcel.body };
+        let result = harmful(does_harm, || what(self, &package, is_alone));
+        self.packages.took(self.io, parcel);
+        Some(result)
+    }
+}
+
+impl Free {
+    /// An incarnation that begins now.
+    pub fn new(packages: Packages, settings: &Settings) -> Self {
+        let driver = FreeDriver::new(&Arc::new(settings.clone()));
+        Self { packages, driver, due_ns: 0, wakes: Wakes::Any }
+    }
+
+    /// Whether the thread that sends is awake now.
+    fn is_awake(&mut self, io: &Io<'_>) -> bool {
+        let first = io.host.transit.waits().1;
+        let is_woken = match self.wakes {
+            Wakes::Any => first.is_some(),
+            Wakes::Above(least) | Wakes::AboveOrRoom(least) => first.is_some_and(|first| first.outranks(least)),
+        };
+        let is_rung = std::mem::take(&mut self.packages.is_rung);
+        is_woken || is_rung || self.due_ns <= io.now.monotonic_ns
+    }
+
+    /// The thread that sends runs until it sleeps.
+    fn run(&mut self, io: &mut Io<'_>) {
+        let Self { packages, driver, .. } = self;
+        let (until_ns, is_exact, wakes) = loop {
+            if let FreeStep::Sleep { until_ns, is_exact, wakes } = driver.poll(&mut Ground { packages, io }) {
+                break (until_ns, is_exact, wakes);
+            }
+        };
+        // Without a timer the thread that receives wakes it, within its own period.
+        let late_ns = if is_exact { 0 } else { io.chance.below(LISTEN_NS) };
+        (self.due_ns, self.wakes) = (until_ns.saturating_add(late_ns), wakes);
+    }
+}
+
+impl Layer for Free {
+    fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
+        self.packages.handle(io, arrived);
+    }
+
+    fn left(&mut self, _: &mut Io<'_>, _: Port, _: u64, _: Now) {}
+
+    fn poll(&mut self, io: &mut Io<'_>) -> u64 {
+        let idle_ns = self.packages.receive(io);
+        io.sent.extend(self.packages.refusals.drain(..));
+        if self.is_awake(io) {
+            self.run(io);
+        }
+        self.due_ns.min(idle_ns)
+    }
+
+    fn dies(&mut self, io: &mut Io<'_>) {
+        self.packages.dies(io);
+    }
+
+    fn check(&mut self, io: &mut Io<'_>, well: bool) {
+        self.packages.check(io, well);
+    }
+
+    fn close(&mut self, io: &mut Io<'_>) {
+        self.packages.close(io);
+    }
+}
