@@ -6,7 +6,8 @@
 //!  sim   ──▶ virtual ones, events: poll, plan a wake-up …   ──▶
 //! ```
 //!
-//! [`SlotDriver`] sends in time slots. Without them [`FreeDriver`] sends what is real time, and [`RestDriver`] the rest.
+//! [`SlotDriver`] sends in time slots. Without them [`FreeDriver`] sends what is real time, and [`RestDriver`] the
+//! rest.
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 

@@ -10,7 +10,7 @@ use crate::settings::Settings;
 pub trait Outlet {
     /// The clock by which packages are published, ns.
     fn monotonic_ns(&self) -> u64;
-    /// The queue; and who is told of what it loses.
+    /// The queue, and what takes its reports of losses.
     fn queue(&mut self) -> (&mut Outbound, impl Report);
     /// Whether datagrams are sealed: [`Self::send`] does it.
     fn seals(&self) -> bool;
@@ -26,7 +26,7 @@ pub trait Outlet {
     fn send_parts(&mut self, now_ns: u64, to: NodeIndex, head: &[u8], body: &[u8]) -> Result<(), NotSent>;
     /// Has the sockets without room tried again, if it is due.
     fn retry(&mut self, now_ns: u64);
-    /// The peers whose sockets have no room, one bit each, and when they are due, ns.
+    /// The peers without room in their sockets, one bit each, and when they are due, ns.
     fn blocked(&self) -> (u64, u64);
     /// Sends what an impairment delayed for long enough; when it has more, ns.
     fn deliver(&mut self, now_ns: u64) -> u64;

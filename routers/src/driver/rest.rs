@@ -27,7 +27,8 @@ pub trait RestInlet {
 pub enum RestStep {
     /// Poll it at once.
     Again,
-    /// The rate limit holds the wire: sleep. More packages wait in the mailbox, where less important ones are displaced.
+    /// The rate limit holds the wire: sleep. More packages wait in the mailbox, where less important ones are
+    /// displaced.
     Sleep {
         /// For so long, ns.
         for_ns: u64,

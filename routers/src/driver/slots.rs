@@ -327,7 +327,7 @@ impl SlotDriver {
         }
     }
 
-    /// What was made and found no slot for long is lost: whoever sent it counts on that nothing arrives that is much
+    /// What was made and found no slot for long is lost: its sender counts on that nothing arrives that is much
     /// older than it may be.
     fn drop_if_old(&mut self, on: &mut impl Platform) {
         let now_ns = on.monotonic_ns();
@@ -372,7 +372,7 @@ impl SlotDriver {
     }
 }
 
-/// One in a slot: whoever brings refusals or hellos about must not take the slots of packages.
+/// One in a slot: refusals and hellos, however many are asked for, must not take the slots of packages.
 fn answer(on: &mut impl Platform, tx_window: &mut TransmitWindow) {
     let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
     let overheard = if asks { on.clock().overheard(now_ns) } else { None };

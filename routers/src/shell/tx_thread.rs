@@ -55,8 +55,8 @@ impl TxThread {
         }
     }
 
-    /// Sleeps until then. If that must be exact, it costs a timer of the kernel; else the receiving thread rings, within
-    /// its own period.
+    /// Sleeps until then. If that must be exact, it costs a timer of the kernel; else the receiving thread rings,
+    /// within its own period.
     fn sleep(&mut self, now_ns: u64, until_ns: u64, is_exact: bool, wakes: Wakes) -> Duration {
         let deadline = is_exact.then(|| Instant::now() + Duration::from_nanos(until_ns.saturating_sub(now_ns)));
         // Before the look at the mailbox: a thread that rings because of this time changes the bell that is slept on.

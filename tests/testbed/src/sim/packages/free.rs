@@ -25,12 +25,12 @@ pub struct Free {
 }
 
 /// What the driver has of the simulated computer.
-struct Ground<'a, 'b> {
+struct FreeSystem<'a, 'b> {
     packages: &'a mut Packages,
     io: &'a mut Io<'b>,
 }
 
-impl Outlet for Ground<'_, '_> {
+impl Outlet for FreeSystem<'_, '_> {
     fn monotonic_ns(&self) -> u64 {
         self.io.now.monotonic_ns
     }
@@ -63,13 +63,13 @@ impl Outlet for Ground<'_, '_> {
     }
 }
 
-impl RealTimeOutlet for Ground<'_, '_> {
+impl RealTimeOutlet for FreeSystem<'_, '_> {
     fn rest(&mut self) -> Option<&mut impl Handover> {
         None::<&mut Nowhere>
     }
 }
 
-impl Inlet for Ground<'_, '_> {
+impl Inlet for FreeSystem<'_, '_> {
     type Outlet = Self;
 
     fn outlet(&mut self) -> &mut Self {
@@ -113,7 +113,7 @@ impl Free {
     fn run(&mut self, io: &mut Io<'_>) {
         let Self { packages, driver, .. } = self;
         let (until_ns, is_exact, wakes) = loop {
-            if let FreeStep::Sleep { until_ns, is_exact, wakes } = driver.poll(&mut Ground { packages, io }) {
+            if let FreeStep::Sleep { until_ns, is_exact, wakes } = driver.poll(&mut FreeSystem { packages, io }) {
                 break (until_ns, is_exact, wakes);
             }
         };

@@ -1,8 +1,8 @@
-//! The layer that carries packages: `Inbound`, called as the thread of the shell calls it, and `Outbound` in the hands of
-//! a driver of the shell; both watched.
+//! The layer that carries packages: `Inbound`, called as the thread of the shell calls it, and `Outbound`, called by a
+//! driver of the shell; both watched.
 //!
-//! Here: what comes in, and what a driver has to do with. Without time slots `free` runs it, with them `slotted` is what
-//! it has. What must hold is in `checks`.
+//! Here: what comes in, and what both drivers use. Without time slots `free` runs the driver; with them `sim/slotted`
+//! does, by what is in `slotted`. What must hold is in `checks`.
 
 mod checks;
 mod free;
@@ -145,7 +145,7 @@ impl Packages {
         self.in_hand = Some(parcel);
     }
 
-    /// The queue; and who is told of what it loses.
+    /// The queue, and what takes its reports of losses.
     pub(super) fn queue<'a, 'b>(&'a mut self, io: &'a mut Io<'b>) -> (&'a mut Outbound, impl Report) {
         (&mut self.outbound, Watch::out(io, &mut self.undelivered))
     }
