@@ -11,6 +11,7 @@
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 
+mod answer_queue;
 mod free;
 mod held;
 mod log;
@@ -20,6 +21,7 @@ mod rest;
 mod slots;
 mod timing;
 
+pub use answer_queue::{ANSWER_BYTES, ANSWERS, Answer};
 pub use free::{FreeDriver, FreeStep, Handover, Inlet, Nowhere, RealTimeOutlet, Wakes};
 pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};

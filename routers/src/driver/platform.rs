@@ -1,5 +1,6 @@
 //! What a slot driver has of the system, and what it tells of itself.
 
+use super::answer_queue::Answer;
 use super::log::WindowLog;
 use crate::frame::NodeIndex;
 use crate::intake::Transit;
@@ -8,6 +9,7 @@ use crate::report::Report;
 use crate::stats::Stats;
 use crate::tdma::{Planned, SlotScheduler, TransmitWindow, Verdict};
 use crate::time::{Clock, SentId, Stamp, Step, TIME_BYTES};
+use std::net::IpAddr;
 
 /// The system took a datagram neither to send nor to keep it: its packages are lost.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
@@ -35,11 +37,14 @@ pub trait Platform {
     fn send(&mut self, now_ns: u64, to: NodeIndex, buffer: &mut [u8], bytes: usize) -> Result<(), NotSent>;
     /// Hands over a datagram of time.
     fn send_time(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]);
-    /// Sends the next refusal or hello if it fits, a hello to the node `first` before others; as how many bytes slots
-    /// count it.
-    fn answer(&mut self, tx_window: &TransmitWindow, first: Option<NodeIndex>) -> Option<usize>;
+    /// The next refusal or hello that the half that receives wants to have sent.
+    fn next_answer(&mut self) -> Option<Answer>;
+    /// Hands over a refusal or hello.
+    fn send_answer(&mut self, to: IpAddr, datagram: &[u8]);
     /// Hands the clock what came: stamps of what `left`, then at most so many datagrams of time.
     fn take_time(&mut self, most: usize, left: impl FnMut(SentId, Stamp));
+    /// An address that no node has, and that the time of another configuration came from, once.
+    fn take_stranger(&mut self) -> Option<IpAddr>;
     /// Does between windows what is due besides.
     fn tidy(&mut self, now_ns: u64);
     /// Lets others see how it stands.

@@ -8,6 +8,7 @@
 //!                                       stamps, datagrams of time ─▶ Clock
 //! ```
 
+use super::answer_queue::AnswerQueue;
 use super::held::{self, Held};
 use super::log::WindowLog;
 use super::platform::{NotSent, Platform, SlotEvent};
@@ -15,15 +16,19 @@ use super::timing::{LAST_LOOK_NS, LOOK_BURST, NAP_NS, SLEEP_NS_MAX, TIDY_NS};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::intake::{Intake, MAKING_NS, QUIET_NS, Transit};
 use crate::outbound::Outbound;
+use crate::security::PeerSessions;
+use crate::settings::Settings;
 use crate::tdma::{Carries, Kind, Next, Planned, SlotScheduler, TransmitWindow, Verdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
 use rohrpost_network::Network;
+use std::sync::Arc;
 
 /// Sends in the windows of its node. Nothing but this sends, and this only with a [`TransmitWindow`].
 pub struct SlotDriver {
     network: Network,
     /// Nodes of the network.
     nodes: usize,
+    answers: AnswerQueue,
     scheduler: SlotScheduler,
     intake: Intake,
     /// Room for the largest datagram, and its seal.
@@ -81,11 +86,18 @@ struct First {
 }
 
 impl SlotDriver {
-    /// Of a router that begins at `now_ns`.
-    pub fn new(network: Network, nodes: usize, scheduler: SlotScheduler, now_ns: u64) -> Self {
+    /// Of a router that begins at `now_ns`, with its sessions where datagrams are sealed.
+    pub fn new(
+        settings: &Arc<Settings>,
+        peer_sessions: Option<&Arc<PeerSessions>>,
+        scheduler: SlotScheduler,
+        now_ns: u64,
+    ) -> Self {
+        let network = settings.network;
         Self {
             network,
-            nodes,
+            nodes: settings.nodes.len(),
+            answers: AnswerQueue::new(settings, peer_sessions),
             scheduler,
             intake: Intake::new(now_ns),
             datagram: vec![0; network.datagram_bytes_max + network.security.tag_bytes()].into(),
@@ -169,6 +181,7 @@ impl SlotDriver {
         drop(report);
         self.intake.relieve(now_ns, &mut on.transit(), wake_ns);
         on.queue_changed();
+        self.answers.look(on, now_ns);
         on.tidy(now_ns);
         if is_silent || on.local_ns().saturating_sub(self.looked_ns) > self.scheduler.table().cycle_ns() {
             self.look(on);
@@ -177,7 +190,7 @@ impl SlotDriver {
 
     /// Hands all datagrams of time and stamps that came to the clock, and shows how it stands.
     fn look(&mut self, on: &mut impl Platform) {
-        let Self { scheduler, first, log, .. } = self;
+        let Self { scheduler, first, log, answers, .. } = self;
         // What comes with a node's address, and is none of its, must not take the time before a slot.
         let most = LOOK_BURST + self.nodes;
         on.take_time(most, |id, stamp| {
@@ -186,6 +199,9 @@ impl SlotDriver {
             log.left(begin_ns, stamp);
         });
         let (now_ns, monotonic_ns) = (on.local_ns(), on.monotonic_ns());
+        if let Some(stranger) = on.take_stranger() {
+            answers.refuse(monotonic_ns, stranger);
+        }
         let (clock, stats) = on.time();
         clock.hears_by(stats, monotonic_ns, now_ns);
         // Roles and bounds go on with time; there is nothing to be sent.
@@ -240,7 +256,7 @@ impl SlotDriver {
         self.first = None;
         self.send_time(on, &mut tx_window, called_ns);
         if tx_window.carries_hello() {
-            answer(on, &mut tx_window);
+            self.answer(on, &mut tx_window);
         }
         if tx_window.carries == Carries::All {
             self.send_packages(on, &mut tx_window);
@@ -253,6 +269,19 @@ impl SlotDriver {
         }
         on.happened(SlotEvent::Closed(&tx_window));
         self.look(on);
+    }
+
+    /// One in a slot: refusals and hellos, however many are asked for, must not take the slots of packages.
+    fn answer(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
+        let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
+        let overheard = if asks { on.clock().overheard(now_ns) } else { None };
+        if let Some(bytes) = self.answers.answer(on, tx_window, overheard.map(|(from, _)| from)) {
+            tx_window.takes(on.local_ns(), bytes);
+            if asks {
+                on.happened(SlotEvent::AnsweredOverheard(tx_window));
+                on.time().0.asked_overheard(now_ns);
+            }
+        }
     }
 
     /// `called_ns`: when the window was asked for. From there on it counts how long the first frame takes to the wire.
@@ -368,19 +397,6 @@ impl SlotDriver {
         if count != self.left_out || self.scheduler.silent().is_some() {
             self.left_out = count;
             left_out(on, on.monotonic_ns());
-        }
-    }
-}
-
-/// One in a slot: refusals and hellos, however many are asked for, must not take the slots of packages.
-fn answer(on: &mut impl Platform, tx_window: &mut TransmitWindow) {
-    let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
-    let overheard = if asks { on.clock().overheard(now_ns) } else { None };
-    if let Some(bytes) = on.answer(tx_window, overheard.map(|(from, _)| from)) {
-        tx_window.takes(on.local_ns(), bytes);
-        if asks {
-            on.happened(SlotEvent::AnsweredOverheard(tx_window));
-            on.time().0.asked_overheard(now_ns);
         }
     }
 }

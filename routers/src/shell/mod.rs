@@ -43,13 +43,11 @@ pub use failure::{Failure, Failures};
 pub use news::difference;
 pub use socket::{SocketError, listen};
 
-use crate::driver::{FreeDriver, spin_ns};
+use crate::driver::{ANSWERS, Answer, FreeDriver, spin_ns};
 use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
-use crate::security::{
-    self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing, Waiting,
-};
+use crate::security::{self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{SlotScheduler, Table};
@@ -277,20 +275,23 @@ impl Shell {
         name: Name,
         inlet: TransitInlet,
         clock: ClockParts,
-    ) -> Result<SyncSender<slots::Answer>, ShellError> {
+    ) -> Result<SyncSender<Answer>, ShellError> {
         let settings = self.settings.clone();
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
         let works = Works::new(clock)?.sealed_in_slots(self.peer_sessions.as_ref()).in_slots(table.for_clock());
         let spin_ns = spin_ns(table.cycle_ns());
-        let (answers, waiting) = sync_channel(slots::ANSWERS);
-        let hellos = self.peer_sessions.as_ref().map(Waiting::new);
-        let line = slots::AnswerQueue::new(waiting, hellos, self.sockets[0].clone(), settings.clone());
+        let (answers, waiting) = sync_channel(ANSWERS);
         let scheduler = SlotScheduler::new(table, spin_ns);
-        let own = slots::Own { router: name, nodes: settings.nodes.len(), network: settings.network };
+        let own = slots::Own {
+            router: name,
+            settings,
+            peer_sessions: self.peer_sessions.clone(),
+            answers: (waiting, self.sockets[0].clone()),
+        };
         let counted = (self.shared.clone(), self.stats.clone());
-        let slots = Slots::new(own, counted, inlet, works, scheduler, line);
+        let slots = Slots::new(own, counted, inlet, works, scheduler);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(answers)

@@ -4,14 +4,14 @@ use super::ages::Ages;
 use super::answers::Answers;
 use super::news::News;
 use super::sender_cache::SenderCache;
-use super::slots::{Answer, REFUSAL_BYTES};
 use super::socket::{InSocket, Received};
 use super::threads::{Awake, Shared};
 use crate::counts::Cause;
+use crate::driver::{ANSWER_BYTES, Answer};
 use crate::frame::NodeIndex;
 use crate::inbound::{Came, Datagram, Inbound, Output, SOCKET_MAX_NS};
 use crate::report::{Deliver, Event, NotDelivered, Report};
-use crate::security::{Gate, HELLO_DATAGRAM_BYTES, Said};
+use crate::security::{Gate, Said};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
@@ -21,8 +21,6 @@ use std::time::Duration;
 
 /// Room for the largest UDP datagram.
 const DATAGRAM_BYTES: usize = 1 << 16;
-
-const _: () = assert!(HELLO_DATAGRAM_BYTES <= REFUSAL_BYTES, "a hello leaves as a refusal does");
 
 /// The other thread is rung this often at most.
 const RING_EVERY_NS: u64 = 20_000_000;
@@ -46,7 +44,7 @@ pub(super) struct RxThread {
 impl RxThread {
     /// Until the socket is closed.
     pub(super) fn run(mut self) {
-        let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
+        let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; ANSWER_BYTES]);
         let (mut awake, mut ring_ns, mut seen_dropped) = (Awake::default(), 0, 0);
         // A socket that outlives routers may hold datagrams from before this router began. These say nothing of which
         // peers live now.
@@ -95,7 +93,7 @@ impl RxThread {
             let Came { source, arrived_ns, .. } = *came;
             return inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: datagram }, delivery);
         };
-        let mut reply = [0; REFUSAL_BYTES];
+        let mut reply = [0; ANSWER_BYTES];
         if let Some(said) = gate.take(now_ns, came, datagram, inbound, delivery, &mut reply) {
             self.say(said, reply);
         }
@@ -108,7 +106,7 @@ impl RxThread {
 
     /// Sends challenges to peers without a session or without a sign of life, where datagrams are sealed.
     fn ask(&mut self, now_ns: u64) {
-        let mut question = [0; REFUSAL_BYTES];
+        let mut question = [0; ANSWER_BYTES];
         while let Some(gate) = &mut self.guard
             && let Some(said) = gate.ask(now_ns, &self.stats, &mut question)
         {
@@ -118,7 +116,7 @@ impl RxThread {
 
     /// Sends a hello. In time slots it waits for one, and packages sealed to an incarnation that begins by it wait for
     /// the hello.
-    fn say(&self, said: Said, datagram: [u8; REFUSAL_BYTES]) {
+    fn say(&self, said: Said, datagram: [u8; ANSWER_BYTES]) {
         let Some(slots) = &self.answers else {
             return self.socket.answer(self.settings.nodes[usize::from(said.to)].address, &datagram[..said.bytes]);
         };

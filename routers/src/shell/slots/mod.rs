@@ -5,7 +5,6 @@
 //! the heap.
 
 mod alarm;
-mod answer_queue;
 mod granted;
 mod intake;
 mod speech;
@@ -16,30 +15,33 @@ pub use state::{Snapshot, State};
 
 use super::clock::{ClockState, Works};
 use super::sending::Sending;
+use super::socket::InSocket;
 use super::threads::Shared;
 use super::tx_thread::TransitInlet;
-use crate::driver::{NotSent, Outlet, Platform, SlotDriver, SlotStep, WindowLog};
+use crate::driver::{Answer, NotSent, Outlet, Platform, SlotDriver, SlotStep, WindowLog};
 use crate::frame::NodeIndex;
 use crate::intake::Transit;
 use crate::outbound::Outbound;
 use crate::report::Report;
+use crate::security::PeerSessions;
+use crate::settings::Settings;
 use crate::stats::Stats;
-use crate::tdma::{SlotScheduler, TransmitWindow};
+use crate::tdma::SlotScheduler;
 use crate::time::{Clock, SentId, Stamp, TIME_BYTES};
-pub(super) use answer_queue::{ANSWERS, Answer, AnswerQueue, REFUSAL_BYTES};
 use intake::Hands;
 use rohrpost_mailbox::{Name, Receiver, monotonic_ns};
-use rohrpost_network::Network;
-use std::sync::Arc;
+use std::net::IpAddr;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, mpsc};
 
-/// Whose thread it is.
-#[derive(Clone, Copy)]
+/// The router of the thread.
 pub(super) struct Own {
     pub(super) router: Name,
-    /// Nodes of the network.
-    pub(super) nodes: usize,
-    pub(super) network: Network,
+    pub(super) settings: Arc<Settings>,
+    /// Where datagrams are sealed.
+    pub(super) peer_sessions: Option<Arc<PeerSessions>>,
+    /// What the thread that receives wants to have sent, and the socket by which it leaves.
+    pub(super) answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
 }
 
 /// What the thread has.
@@ -56,7 +58,8 @@ struct System {
     works: Works,
     transit: Receiver,
     sending: Sending,
-    line: AnswerQueue,
+    answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
+    settings: Arc<Settings>,
     router: Name,
     snapshot: Snapshot,
     state: Arc<State>,
@@ -70,14 +73,13 @@ impl Slots {
         inlet: TransitInlet,
         works: Works,
         scheduler: SlotScheduler,
-        line: AnswerQueue,
     ) -> Self {
         let TransitInlet { transit, sending } = inlet;
         let snapshot = Snapshot::new(scheduler.silent());
         let state = Arc::new(State::new(snapshot));
-        let driver = SlotDriver::new(own.network, own.nodes, scheduler, monotonic_ns());
-        let router = own.router;
-        let system = System { shared, stats, works, transit, sending, line, router, snapshot, state };
+        let Own { router, settings, peer_sessions, answers } = own;
+        let driver = SlotDriver::new(&settings, peer_sessions.as_ref(), scheduler, monotonic_ns());
+        let system = System { shared, stats, works, transit, sending, answers, settings, router, snapshot, state };
         Self { driver, system }
     }
 
@@ -140,27 +142,31 @@ impl Platform for System {
         self.works.send(to, datagram);
     }
 
-    fn answer(&mut self, tx_window: &TransmitWindow, first: Option<NodeIndex>) -> Option<usize> {
-        self.line.answer(monotonic_ns(), first, tx_window, || self.works.now_ns())
+    fn next_answer(&mut self) -> Option<Answer> {
+        self.answers.0.try_recv().ok()
+    }
+
+    fn send_answer(&mut self, to: IpAddr, datagram: &[u8]) {
+        self.answers.1.answer(to, datagram);
     }
 
     fn take_time(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) {
         self.works.take(most, left);
-        if let Some(stranger) = self.works.refuses() {
-            self.line.refuse(monotonic_ns(), stranger);
-        }
+    }
+
+    fn take_stranger(&mut self) -> Option<IpAddr> {
+        self.works.refuses()
     }
 
     fn tidy(&mut self, now_ns: u64) {
-        self.line.look(now_ns);
         self.sending.deliver(now_ns);
     }
 
     fn publish(&mut self, scheduler: &SlotScheduler, log: &WindowLog) {
         self.works.publish();
-        let Self { works, line, snapshot, state, .. } = self;
+        let Self { works, settings, snapshot, state, .. } = self;
         let (before, silent) = (snapshot.silent, scheduler.silent());
-        speech::tell_change(before, silent, || line.parted_by(works.clock.parted_by(works.now_ns())));
+        speech::tell_change(before, silent, || speech::parted(settings, works.clock.parted_by(works.now_ns())));
         let (counts, lead_ns) = (scheduler.counts(&works.clock), scheduler.lead_ns());
         let WindowLog { held, windows } = *log;
         *snapshot = Snapshot { counts, silent, lead_ns, held, windows, ..*snapshot };

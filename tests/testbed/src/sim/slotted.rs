@@ -8,7 +8,7 @@ use super::spans::RECOVERY_NS;
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::ticking::{self, Ticking};
 use super::transmission::{Basis, Says};
-use rohrpost_routers::driver::{NotSent, Platform, SlotDriver, SlotEvent, SlotStep, WindowLog, spin_ns};
+use rohrpost_routers::driver::{Answer, NotSent, Platform, SlotDriver, SlotEvent, SlotStep, WindowLog, spin_ns};
 use rohrpost_routers::frame::{FrameHead, Kind, NodeIndex};
 use rohrpost_routers::intake::{MAKING_NS, Transit};
 use rohrpost_routers::outbound::Outbound;
@@ -17,6 +17,8 @@ use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
 use rohrpost_routers::tdma::{Carries, Planned, SlotScheduler, Table, TransmitWindow, UNPROVEN_CYCLES, Verdict};
 use rohrpost_routers::time::{Clock, SentId, Stamp, Step, TIME_BYTES};
+use std::net::IpAddr;
+use std::sync::Arc;
 
 /// One incarnation of a router's timing thread.
 pub struct Slotted {
@@ -86,12 +88,20 @@ impl Platform for Ground<'_, '_> {
         self.time.send_in(self.io, to, datagram);
     }
 
-    fn answer(&mut self, tx_window: &TransmitWindow, first: Option<NodeIndex>) -> Option<usize> {
-        self.packages.answer(self.io, first, tx_window)
+    fn next_answer(&mut self) -> Option<Answer> {
+        self.packages.next_answer()
+    }
+
+    fn send_answer(&mut self, to: IpAddr, datagram: &[u8]) {
+        self.packages.send_answer(self.io, to, datagram);
     }
 
     fn take_time(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) {
         self.time.take(self.io, most, left);
+    }
+
+    fn take_stranger(&mut self) -> Option<IpAddr> {
+        None
     }
 
     fn tidy(&mut self, _: u64) {}
@@ -244,8 +254,8 @@ impl Slotted {
             joins_since_ns: Some(now.true_ns),
             stood_still: false,
         };
-        let (scheduler, network) = (SlotScheduler::new(table, spin_ns), settings.network);
-        let driver = SlotDriver::new(network, settings.nodes.len(), scheduler, now.monotonic_ns);
+        let (scheduler, settings) = (SlotScheduler::new(table, spin_ns), Arc::new(settings.clone()));
+        let driver = SlotDriver::new(&settings, packages.peer_sessions(), scheduler, now.monotonic_ns);
         Self { packages, time, driver, watch, wake_ns: 0, due_ns: 0 }
     }
 

@@ -1,13 +1,13 @@
 //! Packages where there are no time slots: the driver of the shell on a simulated platform.
 
-use super::{LISTEN_NS, Packages};
+use super::{LISTEN_NS, Packages, address};
 use crate::harm::harmful;
 use crate::sim::clock::Now;
 use crate::sim::package::Role;
 use crate::sim::station::{Arrived, Io, Layer, Port};
 use rohrpost_mailbox::Priority;
 use rohrpost_routers::driver::{
-    FreeDriver, FreeStep, Handover, Inlet, NotSent, Nowhere, Outlet, RealTimeOutlet, Wakes,
+    Answer, FreeDriver, FreeStep, Handover, Inlet, NotSent, Nowhere, Outlet, RealTimeOutlet, Wakes,
 };
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::outbound::{Outbound, Package};
@@ -98,6 +98,17 @@ impl Free {
         Self { packages, driver, due_ns: 0, wakes: Wakes::Any }
     }
 
+    /// The thread that receives sends its refusals and hellos itself.
+    fn answer(&mut self, io: &mut Io<'_>) {
+        while let Some(answer) = self.packages.next_answer() {
+            let (to, bytes, datagram) = match answer {
+                Answer::Refusal { to, bytes, datagram } => (to, bytes, datagram),
+                Answer::Hello { said, datagram } => (address(said.to.into()), said.bytes, datagram),
+            };
+            self.packages.send_answer(io, to, &datagram[..bytes]);
+        }
+    }
+
     /// Whether the thread that sends is awake now.
     fn is_awake(&mut self, io: &Io<'_>) -> bool {
         let first = io.host.transit.waits().1;
@@ -126,13 +137,14 @@ impl Free {
 impl Layer for Free {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         self.packages.handle(io, arrived);
+        self.answer(io);
     }
 
     fn left(&mut self, _: &mut Io<'_>, _: Port, _: u64, _: Now) {}
 
     fn poll(&mut self, io: &mut Io<'_>) -> u64 {
         let idle_ns = self.packages.receive(io);
-        io.sent.extend(self.packages.refusals.drain(..));
+        self.answer(io);
         if self.is_awake(io) {
             self.run(io);
         }

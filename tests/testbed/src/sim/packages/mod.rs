@@ -23,7 +23,7 @@ use super::promise::Promise;
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Port, Sent};
 use rohrpost_mailbox::{Head, Options, Type};
-use rohrpost_routers::driver::NotSent;
+use rohrpost_routers::driver::{ANSWER_BYTES, ANSWERS, Answer, NotSent};
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
 use rohrpost_routers::intake::hurries;
@@ -69,8 +69,8 @@ pub struct Packages {
     present_since_ns: Vec<u64>,
     /// Losses when all began to be well.
     lost_before: Option<(u64, u64)>,
-    /// What the receiving half wants to be sent.
-    refusals: VecDeque<Sent>,
+    /// What the receiving half wants to have sent.
+    answers: VecDeque<Answer>,
     seals: Option<PackageSeals>,
     /// The thread that receives has rung the one that sends.
     is_rung: bool,
@@ -88,6 +88,11 @@ impl Packages {
         &self.stats
     }
 
+    /// Its sessions, where datagrams are sealed.
+    pub(super) fn peer_sessions(&self) -> Option<&Arc<PeerSessions>> {
+        self.seals.as_ref().map(|seals| &seals.all)
+    }
+
     /// An incarnation that begins now.
     pub fn new(settings: &Settings, now_ns: u64) -> Self {
         let stats = Stats::new(settings, now_ns);
@@ -98,7 +103,7 @@ impl Packages {
             queue_bytes_max: (settings.network.quota_bytes as u64 + 1024) * (settings.senders.len() as u64 + 1),
             in_hand: None,
             lost_before: None,
-            refusals: VecDeque::new(),
+            answers: VecDeque::new(),
             seals: None,
             undelivered: Vec::new(),
             is_rung: false,
@@ -189,8 +194,7 @@ impl Packages {
         let Some(seals) = &mut self.seals else { return };
         while let Some(said) = seals.gate.ask(io.now.monotonic_ns, &self.stats, &mut self.buffer) {
             io.oracle.saw("asked");
-            let to_say = &self.buffer[..said.bytes];
-            say(io, seals, &mut self.refusals, said, to_say);
+            say(io, seals, &mut self.answers, said, &self.buffer[..said.bytes]);
         }
     }
 
@@ -209,7 +213,7 @@ impl Packages {
         let (mut bytes, mut reply) = (arrived.bytes.to_vec(), [0; HELLO_DATAGRAM_BYTES]);
         let inbound = &mut self.inbound;
         if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
-            say(io, seals, &mut self.refusals, said, &reply[..said.bytes]);
+            say(io, seals, &mut self.answers, said, &reply[..said.bytes]);
         }
         // Packages for this peer may leave.
         self.is_rung |= seals.gate.begin(now_ns);
@@ -254,12 +258,10 @@ impl Packages {
             let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
                 inbound::Output::Refuse { to, bytes } => {
-                    let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
-                    if let Some(to) = node {
-                        io.oracle.saw("refused");
-                        let bytes = Rc::from(&self.buffer[..bytes]);
-                        self.refusals.push_back(Sent { port: PORT, to, bytes, handed: Now::default() });
-                    }
+                    io.oracle.saw("refused");
+                    let mut datagram = [0; ANSWER_BYTES];
+                    datagram[..bytes].copy_from_slice(&self.buffer[..bytes]);
+                    put(&mut self.answers, Answer::Refusal { to, bytes, datagram });
                 }
                 inbound::Output::Wait { until_ns } => return until_ns.min(ask_ns),
             }
@@ -363,15 +365,23 @@ fn shown(datagram: &[u8]) -> String {
     }
 }
 
-/// Says a hello, or has it wait for a slot.
-fn say(io: &Io<'_>, seals: &mut PackageSeals, line: &mut VecDeque<Sent>, said: Said, datagram: &[u8]) {
-    if io.plan.slots.is_none() {
-        let bytes = Rc::from(datagram);
-        return line.push_back(Sent { port: PORT, to: said.to.into(), bytes, handed: Now::default() });
+/// Has a hello wait for the thread that sends.
+fn say(io: &Io<'_>, seals: &PackageSeals, answers: &mut VecDeque<Answer>, said: Said, hello: &[u8]) {
+    let mut datagram = [0; ANSWER_BYTES];
+    datagram[..hello.len()].copy_from_slice(hello);
+    let answer = Answer::Hello { said, datagram };
+    if io.plan.slots.is_some() {
+        seals.gate.waits(said, || put(answers, answer));
+    } else {
+        put(answers, answer);
     }
-    let PackageSeals { gate, waiting, .. } = seals;
-    gate.waits(said, || {
-        waiting.put(io.now.monotonic_ns, said, datagram);
-        true
-    });
+}
+
+/// Whether there was room.
+fn put(answers: &mut VecDeque<Answer>, answer: Answer) -> bool {
+    let has_room = answers.len() < ANSWERS;
+    if has_room {
+        answers.push_back(answer);
+    }
+    has_room
 }

@@ -2,19 +2,18 @@
 //!
 //! `sim/slotted` calls this; without slots, `free` has another driver.
 
-use super::{PORT, Packages, checked};
+use super::{PORT, Packages, address, checked};
 use crate::harm::harmful;
 use crate::sim::clock::Now;
 use crate::sim::host::TRANSIT_SLOTS;
 use crate::sim::package::Role;
 use crate::sim::station::{Io, Sent};
 use rohrpost_mailbox::{Head, Priority};
-use rohrpost_routers::driver::NotSent;
+use rohrpost_routers::driver::{Answer, NotSent};
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::intake::{TAKING_NS, Transit};
 use rohrpost_routers::outbound::{Accepted, Package};
-use rohrpost_routers::security::HELLO_SLOT_BYTES;
-use rohrpost_routers::tdma::TransmitWindow;
+use std::net::IpAddr;
 use std::rc::Rc;
 
 /// What a package goes through when it is taken from the transit mailbox.
@@ -89,26 +88,15 @@ impl Packages {
         io.oracle.comes_back(io.life, &checked(datagram));
     }
 
-    /// With time slots: sends in one what must be said besides packages, where all is sealed a hello, to this node
-    /// before others; its bytes.
-    pub(in crate::sim) fn answer(
-        &mut self,
-        io: &mut Io<'_>,
-        first: Option<NodeIndex>,
-        tx_window: &TransmitWindow,
-    ) -> Option<usize> {
-        let now_ns = io.now.monotonic_ns;
-        let Some(seals) = &mut self.seals else {
-            let fits = |bytes| tx_window.carries_refusal() && tx_window.fits(now_ns, bytes);
-            let refusal = self.refusals.pop_front_if(|refusal| fits(refusal.bytes.len()))?;
-            let bytes = refusal.bytes.len();
-            io.sent.push(Sent { handed: io.now, ..refusal });
-            return Some(bytes);
-        };
-        let fits = tx_window.fits(now_ns, HELLO_SLOT_BYTES);
-        let (said, datagram) = fits.then(|| seals.waiting.take(now_ns, first)).flatten()?;
-        io.sent.push(Sent { port: PORT, to: said.to.into(), bytes: Rc::from(datagram), handed: io.now });
-        seals.waiting.left(said);
-        Some(HELLO_SLOT_BYTES)
+    /// The next refusal or hello that the thread that receives wants to have sent.
+    pub(in crate::sim) fn next_answer(&mut self) -> Option<Answer> {
+        self.answers.pop_front()
+    }
+
+    /// Hands it to the kernel.
+    pub(in crate::sim) fn send_answer(&mut self, io: &mut Io<'_>, to: IpAddr, datagram: &[u8]) {
+        let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
+        let Some(to) = node else { return io.oracle.saw("refused where no node is") };
+        io.sent.push(Sent { port: PORT, to, bytes: Rc::from(datagram), handed: io.now });
     }
 }

@@ -1,61 +1,65 @@
 //! What waits for a slot besides time and packages: refusals where nothing is sealed, else hellos.
 
-use super::super::socket::InSocket;
-use super::speech;
+use super::platform::Platform;
 use crate::frame::{NodeIndex, Reason};
 use crate::inbound::write_refusal;
-use crate::security::{HELLO_SLOT_BYTES, Said, Waiting};
+use crate::security::{HELLO_DATAGRAM_BYTES, HELLO_SLOT_BYTES, PeerSessions, Said, Waiting};
 use crate::settings::Settings;
 use crate::tdma::TransmitWindow;
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
 
-/// Whoever has no number here is refused so often at most.
+/// An address that no node has is refused so often at most.
 const REFUSE_EVERY_NS: u64 = 50_000_000;
 
-/// Room for the longest refusal.
-pub(in crate::shell) const REFUSAL_BYTES: usize = 128;
+/// Room for the longest refusal, and for a hello.
+pub const ANSWER_BYTES: usize = 128;
 /// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a
 /// second later.
-pub(in crate::shell) const ANSWERS: usize = 32;
+pub const ANSWERS: usize = 32;
+
+const _: () = assert!(HELLO_DATAGRAM_BYTES <= ANSWER_BYTES, "a hello leaves as a refusal does");
 
 /// What the thread that receives wants to have sent.
-pub(in crate::shell) enum Answer {
-    /// Where nothing is sealed: to whom another configuration or version is refused.
-    Refusal { to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES] },
+pub enum Answer {
+    /// Where nothing is sealed: another configuration or version is refused.
+    Refusal {
+        /// Its receiver.
+        to: IpAddr,
+        /// Length.
+        bytes: usize,
+        /// Begins with the refusal.
+        datagram: [u8; ANSWER_BYTES],
+    },
     /// Where all is sealed.
-    Hello { said: Said, datagram: [u8; REFUSAL_BYTES] },
+    Hello {
+        /// Its receiver, and what it says.
+        said: Said,
+        /// Begins with the hello.
+        datagram: [u8; ANSWER_BYTES],
+    },
 }
 
-/// In the hands of the thread that sends.
-pub(in crate::shell) struct AnswerQueue {
-    answers: Receiver<Answer>,
-    /// The refusal whose turn is next.
+/// Used by the sending thread.
+pub(super) struct AnswerQueue {
+    /// The refusal with the next turn.
     refusal: Option<Answer>,
-    /// When somebody without a number was refused last, ns.
+    /// When an address that no node has was refused last, ns.
     refused_ns: u64,
     /// Where all is sealed.
     hellos: Option<Waiting>,
-    /// By which they leave.
-    socket: Arc<InSocket>,
     settings: Arc<Settings>,
 }
 
 impl AnswerQueue {
-    pub(in crate::shell) fn new(
-        answers: Receiver<Answer>,
-        hellos: Option<Waiting>,
-        socket: Arc<InSocket>,
-        settings: Arc<Settings>,
-    ) -> Self {
-        Self { answers, refusal: None, refused_ns: 0, hellos, socket, settings }
+    pub(super) fn new(settings: &Arc<Settings>, peer_sessions: Option<&Arc<PeerSessions>>) -> Self {
+        Self { refusal: None, refused_ns: 0, hellos: peer_sessions.map(Waiting::new), settings: settings.clone() }
     }
 
     /// Of each peer the newest hellos wait; refusals wait where they are, one after the other.
-    pub(super) fn look(&mut self, now_ns: u64) {
+    pub(super) fn look(&mut self, on: &mut impl Platform, now_ns: u64) {
         while self.refusal.is_none()
-            && let Ok(answer) = self.answers.try_recv()
+            && let Some(answer) = on.next_answer()
         {
             match (answer, &mut self.hellos) {
                 (Answer::Hello { said, datagram }, Some(hellos)) => hellos.put(now_ns, said, &datagram),
@@ -64,43 +68,39 @@ impl AnswerQueue {
         }
     }
 
-    /// Somebody without a number here says what time it is by another configuration. It is told once in a while;
-    /// sealed, it could not believe it.
+    /// From an address that no node has comes the time of another configuration. That is refused once in a while; where
+    /// all is sealed, a refusal could not be believed.
     pub(super) fn refuse(&mut self, now_ns: u64, to: IpAddr) {
         if self.refusal.is_none() && self.hellos.is_none() && self.refused_ns + REFUSE_EVERY_NS <= now_ns {
             self.refused_ns = now_ns;
-            let mut datagram = [0; REFUSAL_BYTES];
+            let mut datagram = [0; ANSWER_BYTES];
             let bytes = write_refusal(&self.settings, None, Reason::Digest, &mut datagram);
             self.refusal = Some(Answer::Refusal { to, bytes, datagram });
         }
-    }
-
-    /// Whose configuration this node goes by, and whose not, in words.
-    pub(super) fn parted_by(&self, others: impl Iterator<Item = (Option<NodeIndex>, u64)>) -> String {
-        speech::parted(&self.settings, others)
     }
 
     /// Sends the next that the window carries and that fits, a hello to this node before others; as how many bytes
     /// slots count it.
     pub(super) fn answer(
         &mut self,
-        now_ns: u64,
-        first: Option<NodeIndex>,
+        on: &mut impl Platform,
         tx_window: &TransmitWindow,
-        local_ns: impl Fn() -> u64,
+        first: Option<NodeIndex>,
     ) -> Option<usize> {
-        self.look(now_ns);
+        let now_ns = on.monotonic_ns();
+        self.look(on, now_ns);
         // What was looked through before takes its time.
-        let fits = |bytes| tx_window.fits(local_ns(), bytes);
+        let local_ns = on.local_ns();
+        let fits = |bytes| tx_window.fits(local_ns, bytes);
         if let Some(hellos) = &mut self.hellos {
             let (said, datagram) = if fits(HELLO_SLOT_BYTES) { hellos.take(now_ns, first) } else { None }?;
-            self.socket.answer(self.settings.nodes[usize::from(said.to)].address, &datagram);
+            on.send_answer(self.settings.nodes[usize::from(said.to)].address, &datagram);
             hellos.left(said);
             return Some(HELLO_SLOT_BYTES);
         }
         match self.refusal.take()? {
             Answer::Refusal { to, bytes, datagram } if tx_window.carries_refusal() && fits(bytes) => {
-                self.socket.answer(to, &datagram[..bytes]);
+                on.send_answer(to, &datagram[..bytes]);
                 Some(bytes)
             }
             refusal => {
