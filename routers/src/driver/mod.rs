@@ -1,4 +1,4 @@
-//! The whole logic of the threads that send, without thread, clock, mailbox and socket.
+//! The whole logic of the threads that send and keep time, without thread, clock, mailbox and socket.
 //!
 //! ```text
 //!            platform: clocks, mailbox, sockets                  driver: when to wake, what to take, make, hand over
@@ -7,21 +7,25 @@
 //! ```
 //!
 //! [`SlotDriver`] sends in time slots. Without them [`FreeDriver`] sends what is real time, and [`RestDriver`] the
-//! rest.
+//! rest. [`ClockDriver`] keeps time.
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 
 mod answer_queue;
+mod clock;
 mod free;
 mod held;
 mod log;
 mod outlet;
 mod platform;
 mod rest;
+mod share;
 mod slots;
+mod time_platform;
 mod timing;
 
 pub use answer_queue::{ANSWER_BYTES, ANSWERS, Answer};
+pub use clock::{ClockDriver, ClockStep, TimeStart};
 pub use free::{FreeDriver, FreeStep, Handover, Inlet, Nowhere, RealTimeOutlet, Wakes};
 pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
@@ -29,4 +33,5 @@ pub use outlet::Outlet;
 pub use platform::{NotSent, Platform, SlotEvent};
 pub use rest::{RestDriver, RestInlet, RestStep};
 pub use slots::{SlotDriver, SlotStep};
+pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeSource};
 pub use timing::spin_ns;

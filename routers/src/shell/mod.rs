@@ -245,7 +245,8 @@ impl Shell {
             rx_thread.answers = Some(shell.send_in_slots(name, inlet, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
-            let works = clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.peer_sessions.as_ref()));
+            let works =
+                clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.peer_sessions.as_ref(), false));
             shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
             inlet.sending.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
@@ -280,7 +281,7 @@ impl Shell {
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
-        let works = Works::new(clock)?.sealed_in_slots(self.peer_sessions.as_ref()).in_slots(table.for_clock());
+        let works = Works::new(clock)?.sealed(self.peer_sessions.as_ref(), true).in_slots(table.for_clock());
         let spin_ns = spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(ANSWERS);
         let scheduler = SlotScheduler::new(table, spin_ns);

@@ -7,11 +7,10 @@
 //! ```
 //!
 //! The thread sleeps in one system call until a datagram, a stamp or its time comes. It takes nothing from the heap for
-//! a datagram. What strangers send is dropped in the kernel; whatever comes with a node's address, it works for a
-//! [share](share) of the time at most.
+//! a datagram. What strangers send is dropped in the kernel; whatever comes with a node's address, it works for a share
+//! of the time at most. What it does, and when, says the [driver](crate::driver).
 
 mod local;
-mod share;
 mod socket;
 mod state;
 #[cfg(test)]
@@ -23,15 +22,15 @@ pub(crate) use local::looked;
 pub use state::{ClockState, Snapshot};
 pub(super) use works::Works;
 
+use crate::driver::ClockStep;
 use crate::impair;
 use crate::settings::Settings;
-use crate::time::{Exchange, Step, TIME_BYTES, TimeSettings};
+use crate::time::{Exchange, TimeSettings};
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use rohrpost_config::{FIFO_MAX, Installation, TimeSource};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
-use rohrpost_mailbox::{Node, NodeError, monotonic_ns};
-use share::Share;
+use rohrpost_mailbox::{Node, NodeError};
 use std::io::{self, PipeReader, PipeWriter};
 use std::net::SocketAddr;
 use std::os::fd::AsFd;
@@ -43,12 +42,6 @@ use std::time::Duration;
 /// Above all else: a stamp of our own, where the kernel has none, is as good as this thread is quick. Also of the
 /// thread that sends in time slots, if it gets no reservation.
 pub(super) const FIFO: u8 = FIFO_MAX + 11;
-
-/// However long nothing comes: so often it looks whether the computer has slept, or its clock is slewed.
-const LOOKS_EVERY: Duration = Duration::from_millis(100);
-
-/// So many datagrams are taken before what is due is sent.
-const BURST: usize = 64;
 
 /// Why a clock did not start.
 #[derive(Debug, thiserror::Error)]
@@ -161,43 +154,21 @@ impl Worker {
     fn run(&mut self) {
         // The router's other threads tell when it is refused.
         self.works.runs_in_real_time(schedule(Scheduling::Fifo(FIFO)).is_ok());
-        let mut datagram = [0; TIME_BYTES];
-        let mut share = Share::new(monotonic_ns());
         loop {
-            let began_ns = monotonic_ns();
-            // Used up, what comes waits; what is due is sent all the same.
-            let rests_ns = share.rests_until_ns(began_ns);
-            let held_ns = if rests_ns.is_none() { self.works.take(BURST, |_, _| {}) } else { u64::MAX };
-            let until_ns = loop {
-                let now_ns = self.works.now_ns();
-                match self.works.clock.poll(now_ns, &mut datagram) {
-                    Step::Send { to, .. } => {
-                        self.works.send(to, &datagram);
-                    }
-                    Step::Wait { until_ns } => break until_ns,
-                }
-            };
-            self.works.publish();
-            share.uses(began_ns, monotonic_ns());
-            let rest = rests_ns.map(|rests_ns| Duration::from_nanos(rests_ns.saturating_sub(monotonic_ns())));
-            if self.sleep(until_ns.min(held_ns), rest) {
+            let ClockStep { for_ns, reads } = self.works.poll();
+            if self.sleep(Duration::from_nanos(for_ns), reads) {
                 return;
             }
         }
     }
 
-    /// Sleeps until then, or until there is something to take; only until it has rested, and whatever comes, if it has
-    /// to. True when the clock is to end.
-    fn sleep(&mut self, until_ns: u64, rest: Option<Duration>) -> bool {
-        let wait = Duration::from_nanos(until_ns.saturating_sub(self.works.now_ns())).min(LOOKS_EVERY);
+    /// Sleeps for so long; if it `reads`, only until there is something to take. True when the clock is to end.
+    fn sleep(&mut self, time: Duration, reads: bool) -> bool {
         let mut fds =
             [PollFd::new(self.ended.as_fd(), PollFlags::POLLIN), PollFd::new(self.works.as_fd(), PollFlags::POLLIN)];
-        let (watched, wait) = match rest {
-            Some(rest) => (&mut fds[..1], wait.min(rest)),
-            None => (&mut fds[..], wait),
-        };
+        let watched = if reads { &mut fds[..] } else { &mut fds[..1] };
         // Interrupted or not: the next round looks for itself.
-        let _ = ppoll(watched, Some(TimeSpec::from_duration(wait)), None);
+        let _ = ppoll(watched, Some(TimeSpec::from_duration(time)), None);
         fds[0].revents().is_some_and(|events| !events.is_empty())
     }
 }

@@ -28,7 +28,6 @@ const CONTROL_BYTES: usize = 512;
 pub(super) struct TimeSocket {
     socket: UdpSocket,
     peers: Vec<SockaddrStorage>,
-    addresses: Vec<IpAddr>,
     control: Box<[u8]>,
     /// Of a datagram of time.
     datagram_bytes: usize,
@@ -68,7 +67,6 @@ impl TimeSocket {
         Ok(Self {
             socket: socket.into(),
             peers: peers.iter().copied().map(SockaddrStorage::from).collect(),
-            addresses: peers.iter().map(SocketAddr::ip).collect(),
             control: vec![0; CONTROL_BYTES].into(),
             datagram_bytes: TIME_BYTES,
         })
@@ -77,16 +75,6 @@ impl TimeSocket {
     /// From now on its datagrams are sealed.
     pub(super) fn sealed(self) -> Self {
         Self { datagram_bytes: TIME_BYTES + TAG_BYTES, ..self }
-    }
-
-    /// The node with an address.
-    pub(super) fn node_at(&self, source: IpAddr) -> Option<NodeIndex> {
-        self.addresses.iter().position(|address| *address == source).map(|node| node as NodeIndex)
-    }
-
-    /// Whether a datagram of this node comes from its address.
-    pub(super) fn is_from(&self, node: NodeIndex, source: IpAddr) -> bool {
-        self.addresses.get(usize::from(node)) == Some(&source)
     }
 
     /// Hands a datagram to the kernel. One that it does not take is lost, as on the wire; an error that an earlier one

@@ -118,11 +118,11 @@ impl Platform for System {
     }
 
     fn clock(&self) -> &Clock {
-        &self.works.clock
+        self.works.clock()
     }
 
     fn time(&mut self) -> (&mut Clock, &Stats) {
-        (&mut self.works.clock, &self.stats)
+        (self.works.clock_mut(), &self.stats)
     }
 
     fn transit(&mut self) -> impl Transit {
@@ -155,7 +155,7 @@ impl Platform for System {
     }
 
     fn take_stranger(&mut self) -> Option<IpAddr> {
-        self.works.refuses()
+        self.works.take_stranger()
     }
 
     fn tidy(&mut self, now_ns: u64) {
@@ -166,8 +166,8 @@ impl Platform for System {
         self.works.publish();
         let Self { works, settings, snapshot, state, .. } = self;
         let (before, silent) = (snapshot.silent, scheduler.silent());
-        speech::tell_change(before, silent, || speech::parted(settings, works.clock.parted_by(works.now_ns())));
-        let (counts, lead_ns) = (scheduler.counts(&works.clock), scheduler.lead_ns());
+        speech::tell_change(before, silent, || speech::parted(settings, works.clock().parted_by(works.now_ns())));
+        let (counts, lead_ns) = (scheduler.counts(works.clock()), scheduler.lead_ns());
         let WindowLog { held, windows } = *log;
         *snapshot = Snapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
         state.show(snapshot);

@@ -3,8 +3,7 @@
 use super::chance::Chance;
 use rohrpost_routers::frame::{self, FrameHead};
 use rohrpost_routers::security::{
-    Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection, RouterIdentity,
-    Sealing, TAG_BYTES,
+    Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, PeerSessions, Port, Rejection, RouterIdentity, Sealing, TAG_BYTES,
 };
 use rohrpost_routers::settings::Settings;
 use std::num::NonZeroU8;
@@ -51,34 +50,6 @@ impl PackageSeals {
     /// Datagrams that were not taken.
     pub(super) fn rejected(&self, peer: Option<u8>) -> u64 {
         Rejection::ALL.iter().map(|why| self.all.rejections(Port::Packages).of(peer, *why)).sum()
-    }
-}
-
-/// What the layer of time has.
-pub(super) struct TimeSeals {
-    sealing: Sealing,
-    opening: Opening,
-}
-
-impl TimeSeals {
-    pub(super) fn new(all: &Arc<PeerSessions>, in_slots: bool) -> Self {
-        let sealing = if in_slots { Sealing::of_slots(all) } else { Sealing::new(all, Port::Time) };
-        Self { sealing, opening: Opening::new(all, Port::Time) }
-    }
-
-    /// The datagram as it was before it was sealed, if it was sealed to this node, and whether by an incarnation that
-    /// is known to live. `overhears`: whether others are of any use.
-    pub(super) fn open(&mut self, datagram: &[u8], overhears: bool) -> Option<(Rc<[u8]>, bool)> {
-        let mut bytes = datagram.to_vec();
-        if overhears && self.opening.is_strange(&bytes) {
-            return self.opening.overhear(&mut bytes).is_ok().then(|| (opened(&bytes), false));
-        }
-        matches!(self.opening.open(&mut bytes), Ok(Opened::Frame(..))).then(|| (opened(&bytes), true))
-    }
-
-    /// The same, sealed; none if nobody is known there.
-    pub(super) fn close(&mut self, datagram: &[u8]) -> Option<Rc<[u8]>> {
-        sealed(&mut self.sealing, datagram)
     }
 }
 

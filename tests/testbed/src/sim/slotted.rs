@@ -101,13 +101,13 @@ impl Platform for Ground<'_, '_> {
     }
 
     fn take_stranger(&mut self) -> Option<IpAddr> {
-        None
+        self.time.take_stranger()
     }
 
     fn tidy(&mut self, _: u64) {}
 
     fn publish(&mut self, _: &SlotScheduler, _: &WindowLog) {
-        self.time.look(self.io);
+        self.time.publish(self.io);
     }
 
     fn happened(&mut self, event: SlotEvent<'_>) {
@@ -264,7 +264,7 @@ impl Slotted {
         let Self { packages, time, driver, watch, .. } = self;
         if std::mem::take(&mut watch.stood_still) {
             // What came of that is seen now.
-            time.look(io);
+            time.publish(io);
         }
         let step = driver.poll(&mut Ground { packages, time, watch, io });
         let now_ns = io.now.monotonic_ns;
@@ -294,7 +294,7 @@ impl Slotted {
 impl Layer for Slotted {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         if arrived.port == ticking::PORT {
-            self.time.keep(arrived);
+            self.time.handle(io, arrived);
         } else {
             self.packages.handle(io, arrived);
         }

@@ -11,10 +11,13 @@ use super::oracle::Oracle;
 use super::plan::Plan;
 use super::trace::Trace;
 use std::collections::VecDeque;
+use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
 
 /// A socket of a router, by its place behind the configured port.
 pub type Port = usize;
+/// An address that no node has.
+pub const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
 /// Sockets of a router.
 pub const PORTS: usize = 2;
 /// A thread that is busy works for less at a time.

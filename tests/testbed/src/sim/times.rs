@@ -106,17 +106,28 @@ impl Times {
         self.lines.values_mut().filter(|line| line.node == node).for_each(|line| line.is_void = true);
     }
 
-    /// Looks at a node after its layer of time did anything: its reign, and what its page says from now on.
+    /// Looks at a node after its layer of time did anything: whether it is master.
     pub fn look(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
         if core.role() == Role::Master {
             self.reigns(now, node, core, problems);
         }
+    }
+
+    /// A node's layer of time lets others see how it stands; its page says `record` from now on.
+    pub fn publish(
+        &mut self,
+        now: Now,
+        node: usize,
+        core: &Core,
+        record: Option<TimeRecord>,
+        problems: &mut Vec<Problem>,
+    ) {
         let term = core.reading(now.monotonic_ns).term;
         let page = &mut self.pages[node];
         page.noticed_ns.get_or_insert(now.true_ns);
         page.looked_ns = now.true_ns;
         (page.slept_ns, page.watched) = (now.slept_ns, core.watched());
-        page.record = Some(*core.record());
+        page.record = record;
         if !term.is_none() {
             (page.digest, page.term) = (core.digest(), term);
         }

@@ -21,7 +21,7 @@ use super::host::{Parcel, TRANSIT_AGE_MAX_NS};
 use super::package::Role;
 use super::promise::Promise;
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
-use super::station::{Arrived, Io, Port, Sent};
+use super::station::{Arrived, Io, Port, STRANGER, Sent};
 use rohrpost_mailbox::{Head, Options, Type};
 use rohrpost_routers::driver::{ANSWER_BYTES, ANSWERS, Answer, NotSent};
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
@@ -33,7 +33,6 @@ use rohrpost_routers::security::{HELLO_DATAGRAM_BYTES, PeerSessions, Said, TAG_B
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
 use std::collections::VecDeque;
-use std::net::{IpAddr, Ipv4Addr};
 use std::rc::Rc;
 use std::sync::Arc;
 use watch::{Came, Watch};
@@ -46,8 +45,6 @@ const STILL_NS: u64 = 400_000_000;
 const LISTEN_NS: u64 = 100_000_000;
 /// A body that a router, when it dies, may have in its hand.
 const IN_HAND_BYTES_MAX: u16 = 400;
-/// An address that no node has.
-const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
 
 /// One incarnation of a router's packages.
 pub struct Packages {

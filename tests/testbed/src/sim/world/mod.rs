@@ -184,6 +184,10 @@ impl<'a> World<'a> {
                         layer.left(io, port, index, stamp);
                     }
                 });
+                // A stamp wakes the thread of a clock; that of time slots is woken by time alone.
+                if self.plan.slots.is_none() && self.stations[node].runs() {
+                    self.poll(node);
+                }
             }
             Event::Start { node } => self.start(node),
             Event::Begin { fault } => self.begin(fault),

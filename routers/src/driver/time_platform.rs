@@ -1,0 +1,118 @@
+//! What the driver of a clock has of the system, and what it tells of itself.
+
+use crate::frame::FrameHead;
+use crate::frame::NodeIndex;
+use crate::security::{Rejection, TAG_BYTES};
+use crate::time::{Clock, Exchange, Ignored, Looked, SentId, Stamp, TIME_BYTES, Unsteady};
+use rohrpost_mailbox::{TimeRecord, Watched};
+use std::net::IpAddr;
+
+/// Room for a datagram of time, and its seal.
+pub const TIME_DATAGRAM_BYTES: usize = TIME_BYTES + TAG_BYTES;
+
+/// A datagram of time that came.
+#[derive(Clone, Copy, Debug)]
+pub struct TimeArrival {
+    /// Length.
+    pub bytes: usize,
+    /// The address that it came from.
+    pub source: IpAddr,
+    /// When it came.
+    pub stamp: Stamp,
+}
+
+/// What a clock counts.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct TimeCounts {
+    /// Exchanges so far.
+    pub exchanges: u64,
+    /// Of the last exchange: whether all its stamps were the kernel's.
+    pub by_kernel: bool,
+    /// Datagrams that were not taken.
+    pub ignored: u64,
+}
+
+/// Clocks, socket and page of a node.
+pub trait TimePlatform {
+    /// The clock that is measured and corrected, ns.
+    fn local_ns(&self) -> u64;
+    /// The clock by which work is counted, ns.
+    fn monotonic_ns(&self) -> u64;
+    /// All clocks of this computer.
+    fn looked(&self) -> Looked;
+    /// The next datagram that left, and when.
+    fn next_left(&mut self) -> Option<(SentId, Stamp)>;
+    /// The next datagram that came.
+    fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> Option<TimeArrival>;
+    /// When an impairment has more, local ns.
+    fn held_ns(&self) -> u64 {
+        u64::MAX
+    }
+    /// Hands over a datagram. One that is not taken is lost, as on the wire.
+    fn send(&mut self, to: NodeIndex, datagram: &[u8]);
+    /// Writes the node's page. False: too late; time continues from what the page says.
+    fn write(&mut self, record: &TimeRecord) -> bool;
+    /// What the page says.
+    fn page(&self) -> Option<TimeRecord>;
+    /// Notes in the page what was seen last of the clocks.
+    fn note_watched(&mut self, watched: &Watched);
+    /// Lets others see how it stands; the page is written.
+    fn publish(&mut self, clock: &Clock, counts: TimeCounts);
+    /// Something happened that is told, or that a simulation watches.
+    fn happened(&mut self, clock: &Clock, event: TimeEvent<'_>);
+}
+
+/// How a frame of time is judged.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum TimeSource {
+    /// Of an incarnation that is known to live.
+    Proven,
+    /// Of one that may be over.
+    Unproven,
+    /// Of another configuration.
+    OtherTable,
+    /// From an address that is not that of its node.
+    WrongAddress,
+}
+
+/// What the driver of a clock does.
+#[derive(Clone, Copy, Debug)]
+pub enum TimeEvent<'a> {
+    /// The local clock is not one to measure by.
+    Unsteady {
+        /// Why.
+        why: Unsteady,
+        /// It was steady before.
+        is_new: bool,
+    },
+    /// A datagram was not opened. `why`: and how many of that sort, if that is to be told.
+    NotOpened {
+        /// The address that it came from.
+        source: IpAddr,
+        /// The cause, and datagrams that were not opened by it.
+        why: Option<(Rejection, u64)>,
+    },
+    /// A datagram was none of time.
+    NoFrame,
+    /// A frame is about to be handled.
+    Hears,
+    /// A frame was handled.
+    Heard {
+        /// How it is judged.
+        source: TimeSource,
+        /// Its head.
+        head: &'a FrameHead,
+        /// What is behind it.
+        rest: &'a [u8],
+        /// What became of it; none: it was dropped.
+        taken: Option<Result<(), Ignored>>,
+    },
+    /// An exchange was measured.
+    Measured(&'a Exchange),
+    /// A datagram is about to be sealed and sent.
+    Sends(&'a [u8; TIME_BYTES]),
+    /// Its receiver has no session: it is told later what time it is.
+    NoSession,
+    /// The clock was asked what is due.
+    Polled,
+}
