@@ -1,44 +1,17 @@
 //! What waits for a slot besides time and packages: refusals where nothing is sealed, else hellos.
 
-use super::platform::Platform;
+use super::answer::{ANSWER_BYTES, Answer};
+use super::platform::{Platform, SlotEvent};
 use crate::frame::{NodeIndex, Reason};
 use crate::inbound::write_refusal;
-use crate::security::{HELLO_DATAGRAM_BYTES, HELLO_SLOT_BYTES, PeerSessions, Said, Waiting};
+use crate::security::{HELLO_SLOT_BYTES, PeerSessions, Waiting};
 use crate::settings::Settings;
-use crate::tdma::TransmitWindow;
+use crate::tdma::{Carries, TransmitWindow};
 use std::net::IpAddr;
 use std::sync::Arc;
 
 /// An address that no node has is refused so often at most.
 const REFUSE_EVERY_NS: u64 = 50_000_000;
-
-/// Room for the longest refusal, and for a hello.
-pub const ANSWER_BYTES: usize = 128;
-/// Refusals that wait for a slot, and hellos that the thread has not looked at yet; more are lost, and said again a
-/// second later.
-pub const ANSWERS: usize = 32;
-
-const _: () = assert!(HELLO_DATAGRAM_BYTES <= ANSWER_BYTES, "a hello leaves as a refusal does");
-
-/// What the thread that receives wants to have sent.
-pub enum Answer {
-    /// Where nothing is sealed: another configuration or version is refused.
-    Refusal {
-        /// Its receiver.
-        to: IpAddr,
-        /// Length.
-        bytes: usize,
-        /// Begins with the refusal.
-        datagram: [u8; ANSWER_BYTES],
-    },
-    /// Where all is sealed.
-    Hello {
-        /// Its receiver, and what it says.
-        said: Said,
-        /// Begins with the hello.
-        datagram: [u8; ANSWER_BYTES],
-    },
-}
 
 /// Used by the sending thread.
 pub(super) struct AnswerQueue {
@@ -79,9 +52,22 @@ impl AnswerQueue {
         }
     }
 
-    /// Sends the next that the window carries and that fits, a hello to this node before others; as how many bytes
-    /// slots count it.
-    pub(super) fn answer(
+    /// Sends one, if it fits: refusals and hellos, however many are asked for, must not take the slots of packages.
+    pub(super) fn answer(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
+        let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
+        let overheard = if asks { on.clock().overheard(now_ns) } else { None };
+        if let Some(bytes) = self.send_next(on, tx_window, overheard.map(|(from, _)| from)) {
+            tx_window.takes(on.local_ns(), bytes);
+            if asks {
+                on.happened(SlotEvent::AnsweredOverheard(tx_window));
+                on.time().0.asked_overheard(now_ns);
+            }
+        }
+    }
+
+    /// Sends the next that the window carries and that fits, a hello to the node `first` before others; as how many
+    /// bytes slots count it.
+    fn send_next(
         &mut self,
         on: &mut impl Platform,
         tx_window: &TransmitWindow,

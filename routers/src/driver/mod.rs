@@ -11,6 +11,7 @@
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 
+mod answer;
 mod answer_queue;
 mod clock;
 mod free;
@@ -24,7 +25,7 @@ mod slots;
 mod time_platform;
 mod timing;
 
-pub use answer_queue::{ANSWER_BYTES, ANSWERS, Answer};
+pub use answer::{ANSWER_BYTES, ANSWERS, Answer};
 pub use clock::{ClockDriver, ClockStep, TimeStart};
 pub use free::{FreeDriver, FreeStep, Handover, Inlet, Nowhere, RealTimeOutlet, Wakes};
 pub use held::HELD_NS_MAX;

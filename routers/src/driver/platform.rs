@@ -1,6 +1,6 @@
 //! What a slot driver has of the system, and what it tells of itself.
 
-use super::answer_queue::Answer;
+use super::answer::Answer;
 use super::log::WindowLog;
 use crate::frame::NodeIndex;
 use crate::intake::Transit;

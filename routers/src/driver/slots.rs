@@ -256,7 +256,7 @@ impl SlotDriver {
         self.first = None;
         self.send_time(on, &mut tx_window, called_ns);
         if tx_window.carries_hello() {
-            self.answer(on, &mut tx_window);
+            self.answers.answer(on, &mut tx_window);
         }
         if tx_window.carries == Carries::All {
             self.send_packages(on, &mut tx_window);
@@ -269,19 +269,6 @@ impl SlotDriver {
         }
         on.happened(SlotEvent::Closed(&tx_window));
         self.look(on);
-    }
-
-    /// One in a slot: refusals and hellos, however many are asked for, must not take the slots of packages.
-    fn answer(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
-        let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
-        let overheard = if asks { on.clock().overheard(now_ns) } else { None };
-        if let Some(bytes) = self.answers.answer(on, tx_window, overheard.map(|(from, _)| from)) {
-            tx_window.takes(on.local_ns(), bytes);
-            if asks {
-                on.happened(SlotEvent::AnsweredOverheard(tx_window));
-                on.time().0.asked_overheard(now_ns);
-            }
-        }
     }
 
     /// `called_ns`: when the window was asked for. From there on it counts how long the first frame takes to the wire.
