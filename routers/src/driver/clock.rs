@@ -63,6 +63,11 @@ pub struct ClockDriver {
     stranger: Option<IpAddr>,
 }
 
+/// A frame, what is behind its head, and whether it is of an incarnation that is known to live.
+type OpenedFrame<'a> = (FrameHead, &'a [u8], bool);
+/// Why a datagram was not opened, and how many were not, if that is to be told.
+type Told = Option<(Rejection, u64)>;
+
 /// What seals and opens datagrams of time.
 struct Seals {
     sealing: Sealing,
@@ -255,7 +260,7 @@ impl Seals {
         node: Option<NodeIndex>,
         overhears: bool,
         datagram: &'a mut [u8],
-    ) -> Result<(FrameHead, &'a [u8], bool), Option<(Rejection, u64)>> {
+    ) -> Result<OpenedFrame<'a>, Told> {
         let is_there = |from| node == Some(from);
         let opened = if overhears && self.opening.is_strange(datagram) {
             self.opening.overhear_from(datagram, is_there).map(|(head, text)| (head, text, false))
