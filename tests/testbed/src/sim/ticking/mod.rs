@@ -8,7 +8,7 @@ use super::plan::{Plan, SYSTEM};
 use super::promise::Promise;
 use super::station::{Arrived, Io, Layer, Port, STRANGER, Sent};
 use super::times::Left;
-use rohrpost_mailbox::{TimeRecord, Watched};
+use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, Watched};
 use rohrpost_routers::driver::{
     ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeStart,
 };
@@ -267,6 +267,11 @@ impl Layer for Ticking {
         let reading = self.core().reading(io.now.monotonic_ns);
         let own = (self.core().master(), self.core().term());
         io.line(|| format!("time: {:?} of {own:?}, {reading:?}", self.core().role()));
+        let page = io.oracle.times.page(io.now, io.node);
+        if reading.synchronised && page.is_none_or(|page| page.error_ns >= ERROR_UNKNOWN_NS) {
+            let text = format!("node {} knows the time, {reading:?}, and its page says {page:?}", io.node);
+            io.oracle.broken(io.now, Promise::TimeBound, text);
+        }
         let agreed = *io.oracle.master.get_or_insert(own);
         let role = if own.0.map(usize::from) == Some(io.node) { Role::Master } else { Role::Slave };
         let has_time = (reading.synchronised && reading.term == own.1) || io.now.true_ns < io.plan.stepped_ns;
