@@ -34,6 +34,16 @@ pub trait Deliver: Report {
     fn event(&mut self, event: Event);
 }
 
+impl<D: Deliver> Deliver for &mut D {
+    fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
+        (**self).deliver(from, head, body)
+    }
+
+    fn event(&mut self, event: Event) {
+        (**self).event(event);
+    }
+}
+
 /// Why a package is not in its mailbox.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum NotDelivered {

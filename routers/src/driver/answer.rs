@@ -1,6 +1,7 @@
 //! Refusals and hellos between the thread that receives and the one that sends in time slots.
 
 use crate::security::{HELLO_DATAGRAM_BYTES, Said};
+use crate::settings::Settings;
 use std::net::IpAddr;
 
 /// Room for the longest refusal, and for a hello.
@@ -29,4 +30,22 @@ pub enum Answer {
         /// Begins with the hello.
         datagram: [u8; ANSWER_BYTES],
     },
+}
+
+impl Answer {
+    /// The address of its receiver.
+    pub fn to(&self, settings: &Settings) -> IpAddr {
+        match self {
+            Self::Refusal { to, .. } => *to,
+            Self::Hello { said, .. } => settings.nodes[usize::from(said.to)].address,
+        }
+    }
+
+    /// What is to be sent.
+    pub fn datagram(&self) -> &[u8] {
+        match self {
+            Self::Refusal { bytes, datagram, .. } => &datagram[..*bytes],
+            Self::Hello { said, datagram } => &datagram[..said.bytes],
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! The whole logic of the threads that send and keep time, without thread, clock, mailbox and socket.
+//! The whole logic of the threads that send, receive and keep time, without thread, clock, mailbox and socket.
 //!
 //! ```text
 //!            platform: clocks, mailbox, sockets                  driver: when to wake, what to take, make, hand over
@@ -7,7 +7,7 @@
 //! ```
 //!
 //! [`SlotDriver`] sends in time slots. Without them [`FreeDriver`] sends what is real time, and [`RestDriver`] the
-//! rest. [`ClockDriver`] keeps time.
+//! rest. [`RxDriver`] receives, and [`ClockDriver`] keeps time.
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 
@@ -20,6 +20,7 @@ mod log;
 mod outlet;
 mod platform;
 mod rest;
+mod rx;
 mod share;
 mod slots;
 mod time_platform;
@@ -33,6 +34,7 @@ pub use log::{Used, WINDOWS, WindowLog};
 pub use outlet::Outlet;
 pub use platform::{NotSent, Platform, SlotEvent};
 pub use rest::{RestDriver, RestInlet, RestStep};
+pub use rx::{RxDriver, RxPlatform};
 pub use slots::{SlotDriver, SlotStep};
 pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeSource};
 pub use timing::spin_ns;

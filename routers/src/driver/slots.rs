@@ -128,7 +128,7 @@ impl SlotDriver {
             Phase::Sleeps(Some(planned)) => {
                 self.look(on);
                 self.open(on, &planned);
-                // Who is to send only if a Sync is missing looks for it once more.
+                // A node that is to send only if a Sync is missing looks for it once more.
                 let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
                 let looks = !is_slot && planned.call_ns.saturating_sub(on.local_ns()) > 2 * LAST_LOOK_NS;
                 self.phase = Phase::Spins { planned, looks };
@@ -170,8 +170,8 @@ impl SlotDriver {
         }
     }
 
-    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is silent waits
-    /// for datagrams of time; others read them once a cycle at least.
+    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. A silent node
+    /// waits for datagrams of time; others read them once a cycle at least.
     fn between(&mut self, on: &mut impl Platform, is_silent: bool, wake_ns: u64) {
         let now_ns = on.monotonic_ns();
         self.tidied_ns = now_ns;

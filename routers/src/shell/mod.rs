@@ -43,9 +43,8 @@ pub use failure::{Failure, Failures};
 pub use news::difference;
 pub use socket::{SocketError, listen};
 
-use crate::driver::{ANSWERS, Answer, FreeDriver, spin_ns};
+use crate::driver::{ANSWERS, Answer, FreeDriver, RxDriver, spin_ns};
 use crate::impair;
-use crate::inbound::Inbound;
 use crate::outbound::Outbound;
 use crate::security::{self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing};
 use crate::settings::Settings;
@@ -55,7 +54,7 @@ use answers::Answers;
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
 use news::News;
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
-use rx_thread::{PackageDelivery, RxThread};
+use rx_thread::{PackageDelivery, RxSystem, RxThread};
 use sender_cache::SenderCache;
 use sending::Sending;
 use slots::Slots;
@@ -208,10 +207,11 @@ impl Shell {
             rest: None,
         };
         let mut inlet = TransitInlet { transit, sending };
-        let mut rx_thread = RxThread {
+        let gate = all.as_ref().zip(seed).map(|(all, seed)| Gate::new(all, seed));
+        let driver = RxDriver::new(&settings, &stats, gate);
+        let mut system = RxSystem {
             shared: shared.clone(),
             socket: socket.clone(),
-            inbound: Inbound::new(&settings, stats.clone()),
             delivery: PackageDelivery {
                 sender_cache: SenderCache::here(&receiver, &settings.hosts),
                 answers: answers(&receiver),
@@ -220,10 +220,7 @@ impl Shell {
                 takes_bytes: None,
             },
             settings: settings.clone(),
-            stats: stats.clone(),
-            guard: all.as_ref().zip(seed).map(|(all, seed)| Gate::new(all, seed)),
             answers: None,
-            is_rest: false,
         };
         // From here on, a failure ends the threads that have begun.
         let mut shell = Self {
@@ -242,7 +239,7 @@ impl Shell {
             peer_sessions: all,
         };
         if shell.settings.tdma.is_some() {
-            rx_thread.answers = Some(shell.send_in_slots(name, inlet, clock.ok_or(ShellError::NoTime)?)?);
+            system.answers = Some(shell.send_in_slots(name, inlet, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
             let works =
@@ -262,6 +259,7 @@ impl Shell {
                 tx_thread.run();
             })?;
         }
+        let rx_thread = RxThread { driver, system, stats: shell.stats.clone() };
         shell.begin("rx", move || {
             // A refusal was reported by the other.
             let _ = threads::schedule(threads::ARRIVALS_FIFO);

@@ -6,16 +6,15 @@
 
 use super::answers::{Answers, Faults};
 use super::handover::{Giver, Taker, Waited, handover};
-use super::rx_thread::{PackageDelivery, RxThread};
+use super::rx_thread::{PackageDelivery, RxSystem, RxThread};
 use super::sender_cache::SenderCache;
 use super::sending::Sending;
 use super::socket::{InSocket, REST_BYTES};
 use super::threads::{Shared, schedule_below};
 use super::wire::Wire;
 use super::{Shell, ShellError, transit};
-use crate::driver::{RestDriver, RestInlet, RestStep};
+use crate::driver::{RestDriver, RestInlet, RestStep, RxDriver};
 use crate::impair;
-use crate::inbound::Inbound;
 use crate::outbound::{Outbound, Package};
 use crate::security::{Gate, Port, Sealing};
 use crate::stats::Stats;
@@ -102,10 +101,9 @@ impl Shell {
             wire: Wire::new(&settings, port, sealing, impair, &self.failures),
             rest: None,
         };
-        let rx_thread = RxThread {
+        let system = RxSystem {
             shared: shared.clone(),
             socket: socket.clone(),
-            inbound: Inbound::new(&settings, stats.clone()),
             delivery: PackageDelivery {
                 sender_cache: SenderCache::here(&receiver, &settings.hosts),
                 answers: answers(&receiver),
@@ -114,11 +112,10 @@ impl Shell {
                 takes_bytes: None,
             },
             settings: settings.clone(),
-            stats: stats.clone(),
-            guard: all.map(Gate::of_rest),
             answers: None,
-            is_rest: true,
         };
+        let driver = RxDriver::new(&settings, &stats, all.map(Gate::of_rest)).of_rest();
+        let rx_thread = RxThread { driver, system, stats: stats.clone() };
         self.sockets.push(socket);
         self.rest_stats = Some(stats);
         let tx_thread = Rest { shared, driver: RestDriver::new(&settings), inlet: HandoverInlet { taker, sending } };

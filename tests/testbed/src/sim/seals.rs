@@ -23,28 +23,25 @@ pub(super) fn peer_sessions(settings: &Settings) -> Arc<PeerSessions> {
 
 /// What the layer of packages has.
 pub(super) struct PackageSeals {
-    pub(super) gate: Gate,
     pub(super) sealing: Sealing,
     pub(super) all: Arc<PeerSessions>,
 }
 
 impl PackageSeals {
-    /// Of an incarnation with this incarnation, which nobody can guess.
-    pub(super) fn new(all: &Arc<PeerSessions>, incarnation: u64) -> Self {
+    pub(super) fn new(all: &Arc<PeerSessions>) -> Self {
+        Self { sealing: Sealing::new(all, Port::Packages), all: all.clone() }
+    }
+
+    /// What opens datagrams, of an incarnation that nobody can guess.
+    pub(super) fn gate(&self, incarnation: u64) -> Gate {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
-        let (gate, sealing) = (Gate::new(all, seed), Sealing::new(all, Port::Packages));
-        Self { gate, sealing, all: all.clone() }
+        Gate::new(&self.all, seed)
     }
 
     /// Whether something can be sealed to a node.
     pub(super) fn knows(&self, node: u8) -> bool {
         self.all.reached() & 1 << node != 0
-    }
-
-    /// From which sequence on the incarnation is heard that said a datagram, as it said when it began.
-    pub(super) fn first(&self, datagram: &[u8]) -> u64 {
-        FrameHead::read(datagram).map_or(0, |(head, _)| self.gate.first(head.from))
     }
 
     /// Datagrams that were not taken.

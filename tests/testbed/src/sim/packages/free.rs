@@ -1,13 +1,13 @@
 //! Packages where there are no time slots: the driver of the shell on a simulated platform.
 
-use super::{LISTEN_NS, Packages, address};
+use super::{LISTEN_NS, Packages};
 use crate::harm::harmful;
 use crate::sim::clock::Now;
 use crate::sim::package::Role;
 use crate::sim::station::{Arrived, Io, Layer, Port};
 use rohrpost_mailbox::Priority;
 use rohrpost_routers::driver::{
-    Answer, FreeDriver, FreeStep, Handover, Inlet, NotSent, Nowhere, Outlet, RealTimeOutlet, Wakes,
+    FreeDriver, FreeStep, Handover, Inlet, NotSent, Nowhere, Outlet, RealTimeOutlet, Wakes,
 };
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::outbound::{Outbound, Package};
@@ -101,11 +101,8 @@ impl Free {
     /// The thread that receives sends its refusals and hellos itself.
     fn answer(&mut self, io: &mut Io<'_>) {
         while let Some(answer) = self.packages.next_answer() {
-            let (to, bytes, datagram) = match answer {
-                Answer::Refusal { to, bytes, datagram } => (to, bytes, datagram),
-                Answer::Hello { said, datagram } => (address(said.to.into()), said.bytes, datagram),
-            };
-            self.packages.send_answer(io, to, &datagram[..bytes]);
+            let to = answer.to(&self.packages.settings);
+            self.packages.send_answer(io, to, answer.datagram());
         }
     }
 

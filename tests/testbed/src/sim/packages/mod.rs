@@ -1,16 +1,17 @@
-//! The layer that carries packages: `Inbound`, called as the thread of the shell calls it, and `Outbound`, called by a
-//! driver of the shell; both watched.
+//! The layer that carries packages: `Inbound` and `Outbound`, called by the drivers of the shell, and watched.
 //!
-//! Here: what comes in, and what both drivers use. Without time slots `free` runs the driver; with them `sim/slotted`
-//! does, by what is in `slotted`. What must hold is in `checks`.
+//! Here: what comes in, and what all drivers use. Without time slots `free` runs the driver; with them `sim/slotted`
+//! does, by what is in `slotted`. What the driver that receives has is in `receiving`, what must hold is in `checks`.
 
 mod checks;
 mod free;
+mod receiving;
 mod settings;
 mod slotted;
 mod watch;
 
 pub use free::Free;
+use receiving::RxSystem;
 pub(super) use settings::{ROUTER_CLASS, digest};
 pub use settings::{address, settings};
 pub(super) use slotted::Hands;
@@ -23,13 +24,13 @@ use super::promise::Promise;
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Port, STRANGER, Sent};
 use rohrpost_mailbox::{Head, Options, Type};
-use rohrpost_routers::driver::{ANSWER_BYTES, ANSWERS, Answer, NotSent};
+use rohrpost_routers::driver::{Answer, NotSent, RxDriver};
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
-use rohrpost_routers::inbound::{self, Datagram, Inbound};
+use rohrpost_routers::inbound;
 use rohrpost_routers::intake::hurries;
 use rohrpost_routers::outbound::Outbound;
 use rohrpost_routers::report::Report;
-use rohrpost_routers::security::{HELLO_DATAGRAM_BYTES, PeerSessions, Said, TAG_BYTES};
+use rohrpost_routers::security::{PeerSessions, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
 use std::collections::VecDeque;
@@ -51,8 +52,7 @@ pub struct Packages {
     settings: Settings,
     stats: Arc<Stats>,
     outbound: Outbound,
-    inbound: Inbound,
-    buffer: Vec<u8>,
+    receiver: RxDriver,
     /// Bytes that the queue may take up.
     queue_bytes_max: u64,
     /// Taken last from the transit mailbox.
@@ -95,8 +95,7 @@ impl Packages {
         let stats = Stats::new(settings, now_ns);
         Self {
             outbound: Outbound::new(settings, stats.clone()),
-            inbound: Inbound::new(settings, stats.clone()),
-            buffer: vec![0; settings.network.datagram_bytes_max.max(1500)],
+            receiver: RxDriver::new(settings, &stats, None),
             queue_bytes_max: (settings.network.quota_bytes as u64 + 1024) * (settings.senders.len() as u64 + 1),
             in_hand: None,
             lost_before: None,
@@ -117,8 +116,9 @@ impl Packages {
 
     /// The same, sealing what it sends.
     pub(super) fn sealed(self, all: &Arc<PeerSessions>, incarnation: u64) -> Self {
-        let seals = Some(PackageSeals::new(all, incarnation));
-        Self { outbound: self.outbound.sealed(all.clone()), seals, ..self }
+        let seals = PackageSeals::new(all);
+        let receiver = RxDriver::new(&self.settings, &self.stats, Some(seals.gate(incarnation)));
+        Self { outbound: self.outbound.sealed(all.clone()), receiver, seals: Some(seals), ..self }
     }
 
     /// Takes the most important package from the transit mailbox.
@@ -186,35 +186,27 @@ impl Packages {
         }
     }
 
-    /// Asks whoever is not known.
-    fn ask(&mut self, io: &mut Io<'_>) {
-        let Some(seals) = &mut self.seals else { return };
-        while let Some(said) = seals.gate.ask(io.now.monotonic_ns, &self.stats, &mut self.buffer) {
-            io.oracle.saw("asked");
-            say(io, seals, &mut self.answers, said, &self.buffer[..said.bytes]);
-        }
-    }
-
-    /// Takes a datagram; what was in it, if that could be read.
-    fn take(&mut self, io: &mut Io<'_>, arrived: &Arrived) -> Rc<[u8]> {
+    /// Takes a datagram; what was in it, if that could be read. None: it is passed over.
+    fn take(&mut self, io: &mut Io<'_>, arrived: &Arrived) -> Option<Rc<[u8]>> {
         let now_ns = io.now.monotonic_ns;
         let (source, arrived_ns) = (arrived.source.map_or(STRANGER, address), arrived.stamp.monotonic_ns);
-        let came = Some(Came { at_ns: arrived_ns, incarnation: incarnation(&arrived.bytes) });
-        let is_young = self.stats.is_young(now_ns);
-        let mut watch = Watch { io, came, is_out: false, is_young, undelivered: &mut self.undelivered };
-        let Some(seals) = &mut self.seals else {
-            self.inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: &arrived.bytes }, &mut watch);
-            return arrived.bytes.clone();
-        };
-        let came = inbound::Came { source, arrived_ns, bytes: arrived.bytes.len() };
-        let (mut bytes, mut reply) = (arrived.bytes.to_vec(), [0; HELLO_DATAGRAM_BYTES]);
-        let inbound = &mut self.inbound;
-        if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
-            say(io, seals, &mut self.answers, said, &reply[..said.bytes]);
+        if self.receiver.passes_over(now_ns.saturating_sub(arrived_ns)) {
+            return None;
         }
-        // Packages for this peer may leave.
-        self.is_rung |= seals.gate.begin(now_ns);
-        if bytes.len() < HEAD_BYTES + TAG_BYTES { arrived.bytes.clone() } else { opened(&bytes) }
+        let came = Some(Came { at_ns: arrived_ns, incarnation: incarnation(&arrived.bytes) });
+        let mut bytes = arrived.bytes.to_vec();
+        let envelope = inbound::Came { source, arrived_ns, bytes: bytes.len() };
+        let (receiver, mut system) = self.receiving(io, came);
+        receiver.take(&mut system, now_ns, &envelope, &mut bytes);
+        let is_clear = self.seals.is_none() || bytes.len() < HEAD_BYTES + TAG_BYTES;
+        Some(if is_clear { arrived.bytes.clone() } else { opened(&bytes) })
+    }
+
+    /// The driver of the thread that receives, and what it has of the simulated computer.
+    fn receiving<'a, 'b>(&'a mut self, io: &'a mut Io<'b>, came: Option<Came>) -> (&'a mut RxDriver, RxSystem<'a, 'b>) {
+        let Self { receiver, stats, undelivered, answers, is_rung, .. } = self;
+        let is_young = stats.is_young(io.now.monotonic_ns);
+        (receiver, RxSystem { io, came, is_young, undelivered, answers, is_rung })
     }
 
     /// Tells callers on other nodes of commands that were not delivered here, by the router's own mailbox.
@@ -242,27 +234,22 @@ impl Packages {
         }
     }
 
-    /// Does what is due of the receiving half, and writes the refusals that it wants to be sent; when to ask again.
+    /// Does what is due of the receiving half; when to ask again.
     fn poll_inbound(&mut self, io: &mut Io<'_>) -> u64 {
-        if io.now.monotonic_ns > self.polled_ns + STILL_NS {
-            self.steady_since_ns = io.now.monotonic_ns;
+        let now_ns = io.now.monotonic_ns;
+        if now_ns > self.polled_ns + STILL_NS {
+            self.steady_since_ns = now_ns;
         }
-        self.polled_ns = io.now.monotonic_ns;
-        let is_young = self.stats.is_young(io.now.monotonic_ns);
-        self.ask(io);
-        let ask_ns = if self.seals.is_some() { io.now.monotonic_ns + LISTEN_NS } else { u64::MAX };
-        loop {
-            let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
-            match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
-                inbound::Output::Refuse { to, bytes } => {
-                    io.oracle.saw("refused");
-                    let mut datagram = [0; ANSWER_BYTES];
-                    datagram[..bytes].copy_from_slice(&self.buffer[..bytes]);
-                    put(&mut self.answers, Answer::Refusal { to, bytes, datagram });
-                }
-                inbound::Output::Wait { until_ns } => return until_ns.min(ask_ns),
-            }
-        }
+        self.polled_ns = now_ns;
+        let ask_ns = if self.seals.is_some() { now_ns + LISTEN_NS } else { u64::MAX };
+        let (receiver, mut system) = self.receiving(io, None);
+        receiver.poll(&mut system, now_ns).min(ask_ns)
+    }
+
+    /// From which sequence on the incarnation is heard that said a datagram, as it said when it began.
+    fn first_of(&self, datagram: &[u8]) -> Option<u64> {
+        let gate = self.receiver.gate()?;
+        Some(FrameHead::read(datagram).map_or(0, |(head, _)| gate.first(head.from)))
     }
 
     fn counted(&self, source: Option<usize>) -> (u64, u64, u64) {
@@ -283,7 +270,7 @@ impl Packages {
     pub(super) fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
         let source = arrived.source.filter(|node| *node != io.node);
         let before = self.counted(source);
-        let clear = self.take(io, arrived);
+        let Some(clear) = self.take(io, arrived) else { return io.oracle.saw("older than its router") };
         let after = self.counted(source);
         let (taken, copies, dropped) = (after.0 - before.0, after.1 - before.1, after.2 - before.2);
         io.line(|| format!("from {source:?}: {}, taken {taken}, copies {copies}", shown(&clear)));
@@ -297,7 +284,7 @@ impl Packages {
             io.oracle.broken(io.now, Promise::Accounts, text);
         }
         if taken > 0 {
-            let first = self.seals.as_ref().map(|seals| seals.first(&clear));
+            let first = self.first_of(&clear);
             io.oracle.took(io.now, io.life, (&clear, first), self.settings.digest);
             self.hears(io, source);
         } else if copies > 0 {
@@ -360,25 +347,4 @@ fn shown(datagram: &[u8]) -> String {
         }
         Err(error) => error.to_string(),
     }
-}
-
-/// Has a hello wait for the thread that sends.
-fn say(io: &Io<'_>, seals: &PackageSeals, answers: &mut VecDeque<Answer>, said: Said, hello: &[u8]) {
-    let mut datagram = [0; ANSWER_BYTES];
-    datagram[..hello.len()].copy_from_slice(hello);
-    let answer = Answer::Hello { said, datagram };
-    if io.plan.slots.is_some() {
-        seals.gate.waits(said, || put(answers, answer));
-    } else {
-        put(answers, answer);
-    }
-}
-
-/// Whether there was room.
-fn put(answers: &mut VecDeque<Answer>, answer: Answer) -> bool {
-    let has_room = answers.len() < ANSWERS;
-    if has_room {
-        answers.push_back(answer);
-    }
-    has_room
 }
