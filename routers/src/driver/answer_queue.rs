@@ -2,9 +2,9 @@
 
 use super::answer::{ANSWER_BYTES, Answer};
 use super::platform::{Platform, SlotEvent};
-use crate::frame::{NodeIndex, Reason};
+use crate::frame::{NodeIndex, RefusalReason};
 use crate::inbound::write_refusal;
-use crate::security::{HELLO_SLOT_BYTES, PeerSessions, Waiting};
+use crate::security::{HELLO_SLOT_BYTES, HelloQueue, PeerSessions};
 use crate::settings::Settings;
 use crate::tdma::{Carries, TransmitWindow};
 use std::net::IpAddr;
@@ -20,13 +20,13 @@ pub(super) struct AnswerQueue {
     /// When an address that no node has was refused last, ns.
     refused_ns: u64,
     /// Where all is sealed.
-    hellos: Option<Waiting>,
+    hellos: Option<HelloQueue>,
     settings: Arc<Settings>,
 }
 
 impl AnswerQueue {
     pub(super) fn new(settings: &Arc<Settings>, peer_sessions: Option<&Arc<PeerSessions>>) -> Self {
-        Self { refusal: None, refused_ns: 0, hellos: peer_sessions.map(Waiting::new), settings: settings.clone() }
+        Self { refusal: None, refused_ns: 0, hellos: peer_sessions.map(HelloQueue::new), settings: settings.clone() }
     }
 
     /// Of each peer the newest hellos wait; refusals wait where they are, one after the other.
@@ -47,7 +47,7 @@ impl AnswerQueue {
         if self.refusal.is_none() && self.hellos.is_none() && self.refused_ns + REFUSE_EVERY_NS <= now_ns {
             self.refused_ns = now_ns;
             let mut datagram = [0; ANSWER_BYTES];
-            let bytes = write_refusal(&self.settings, None, Reason::Digest, &mut datagram);
+            let bytes = write_refusal(&self.settings, None, RefusalReason::Digest, &mut datagram);
             self.refusal = Some(Answer::Refusal { to, bytes, datagram });
         }
     }

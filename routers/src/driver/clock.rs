@@ -9,7 +9,7 @@
 //! Without time slots [`ClockDriver::poll`] is the whole work of a thread; with them the thread of the slots takes and
 //! sends in windows.
 
-use super::share::Share;
+use super::cpu_budget::CpuBudget;
 use super::time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeSource};
 use crate::frame::{BadFrame, FrameHead, NodeIndex};
 use crate::security::{NotOpened, Opened, Opening, PeerSessions, Port, Rejection, Sealing, Tally};
@@ -58,7 +58,7 @@ pub struct ClockDriver {
     seals: Option<Seals>,
     written: Option<TimeRecord>,
     counts: TimeCounts,
-    share: Share,
+    share: CpuBudget,
     /// An address that no node has, which tells the time of another configuration.
     stranger: Option<IpAddr>,
 }
@@ -84,7 +84,7 @@ impl ClockDriver {
         let mut clock = Clock::new(settings, now_ns, realtime_ns, page).watching(now_ns, watched);
         let was_steady = clock.unsteady(now_ns).is_none();
         let unsteady = clock.look_at_clocks(looked).filter(|_| was_steady);
-        let (counts, share) = (TimeCounts::default(), Share::new(monotonic_ns));
+        let (counts, share) = (TimeCounts::default(), CpuBudget::new(monotonic_ns));
         let driver = Self { clock, system, addresses, seals: None, written: page, counts, share, stranger: None };
         (driver, unsteady)
     }

@@ -21,7 +21,7 @@ mod outlet;
 mod platform;
 mod rest;
 mod rx;
-mod share;
+mod cpu_budget;
 mod slots;
 mod time_platform;
 mod timing;

@@ -2,7 +2,7 @@
 
 use super::platform::NotSent;
 use crate::frame::NodeIndex;
-use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
+use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, OutboundStep, Package};
 use crate::report::Report;
 use crate::settings::Settings;
 
@@ -70,12 +70,12 @@ impl Transmitter {
         let output = outbound.poll(now_ns, &mut self.datagram, &mut report);
         drop(report);
         match output {
-            Output::Send { to, bytes } => {
+            OutboundStep::Send { to, bytes } => {
                 let sent = on.send(on.monotonic_ns(), to, &mut self.datagram, bytes);
                 settle(on, sent, &self.datagram[..bytes], &[]);
                 None
             }
-            Output::Wait { until_ns } => Some(until_ns.min(on.blocked().1)),
+            OutboundStep::Wait { until_ns } => Some(until_ns.min(on.blocked().1)),
         }
     }
 }

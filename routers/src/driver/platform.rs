@@ -7,7 +7,7 @@ use crate::intake::Transit;
 use crate::outbound::Outbound;
 use crate::report::Report;
 use crate::stats::Stats;
-use crate::tdma::{Planned, SlotScheduler, TransmitWindow, Verdict};
+use crate::tdma::{Planned, SlotScheduler, TransmitWindow, WindowVerdict};
 use crate::time::{Clock, SentId, Stamp, Step, TIME_BYTES};
 use std::net::IpAddr;
 
@@ -63,7 +63,7 @@ pub enum SlotEvent<'a> {
     /// The clock was asked between windows, when it may send nothing.
     Idle(&'a Step),
     /// It was time for a window.
-    Judged(&'a Planned, &'a Verdict),
+    Decided(&'a Planned, &'a WindowVerdict),
     /// A hello leaves in this window by what is only overheard.
     AnsweredOverheard(&'a TransmitWindow),
     /// A datagram of packages was made.

@@ -1,7 +1,7 @@
 //! Takes what other nodes sent: has datagrams opened, checked and delivered, and answers those that are to be answered.
 
 use super::answer::{ANSWER_BYTES, Answer};
-use crate::inbound::{Came, Datagram, Inbound, Output, SOCKET_MAX_NS};
+use crate::inbound::{Datagram, Envelope, Inbound, InboundStep, SOCKET_MAX_NS};
 use crate::report::Deliver;
 use crate::security::{Gate, Said};
 use crate::settings::Settings;
@@ -62,10 +62,10 @@ impl RxDriver {
     }
 
     /// Takes a datagram; where it is sealed, it is opened in place.
-    pub fn take(&mut self, on: &mut impl RxPlatform, now_ns: u64, came: &Came, datagram: &mut [u8]) {
+    pub fn take(&mut self, on: &mut impl RxPlatform, now_ns: u64, came: &Envelope, datagram: &mut [u8]) {
         let Self { inbound, gate, .. } = self;
         let Some(gate) = gate else {
-            let Came { source, arrived_ns, .. } = *came;
+            let Envelope { source, arrived_ns, .. } = *came;
             let datagram = Datagram { source, arrived_ns, bytes: datagram };
             return inbound.handle(now_ns, &datagram, &mut on.delivery());
         };
@@ -88,10 +88,10 @@ impl RxDriver {
         loop {
             let output = self.inbound.poll(now_ns, &mut datagram, &mut on.delivery());
             match output {
-                Output::Refuse { .. } if self.is_rest => {}
+                InboundStep::Refuse { .. } if self.is_rest => {}
                 // Without room for it, it is sent again a second later.
-                Output::Refuse { to, bytes } => drop(on.answer(Answer::Refusal { to, bytes, datagram })),
-                Output::Wait { until_ns } => return until_ns,
+                InboundStep::Refuse { to, bytes } => drop(on.answer(Answer::Refusal { to, bytes, datagram })),
+                InboundStep::Wait { until_ns } => return until_ns,
             }
         }
     }

@@ -19,16 +19,16 @@ pub(crate) enum Arrival {
     /// The newest.
     Newest,
     /// Newer ones came before it.
-    Overtaken,
+    Reordered,
     /// It had been counted as lost.
     Returned,
     /// It came before, or is too old to tell.
-    Copy,
+    Duplicate,
 }
 
 /// Sequences of one incarnation of one peer; at first all from 0 on are expected.
 #[derive(Debug, Default)]
-pub(crate) struct Window {
+pub(crate) struct SequenceWindow {
     next: u64,
     /// All below is decided.
     settled: u64,
@@ -39,7 +39,7 @@ pub(crate) struct Window {
     ticks: [u64; 2],
 }
 
-impl Window {
+impl SequenceWindow {
     /// For an incarnation that may have begun long before us: earlier sequences are not missed. Near its beginning both
     /// have just begun. Then missing sequences count as lost, even if nothing listened yet: a router sends to a peer of
     /// which it knows nothing, so packages may have been in them, and each must be accounted for.
@@ -65,15 +65,15 @@ impl Window {
             self.advance(sequence, lost);
             return Arrival::Newest;
         }
-        if self.is_copy(sequence) && !broken!(TakesCopies) {
-            return Arrival::Copy;
+        if self.is_duplicate(sequence) && !broken!(TakesCopies) {
+            return Arrival::Duplicate;
         }
         self.note(sequence);
-        if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Overtaken }
+        if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Reordered }
     }
 
     /// Whether a sequence came before, or is too old to tell.
-    pub(crate) fn is_copy(&self, sequence: u64) -> bool {
+    pub(crate) fn is_duplicate(&self, sequence: u64) -> bool {
         sequence < self.next && (self.next - sequence > WINDOW || self.has(sequence))
     }
 

@@ -1,7 +1,7 @@
 //! Finds out by challenge and response which incarnations live. A peer that has not answered takes no state.
 
 use super::hello::Hello;
-use super::opening::Greeting;
+use super::opening::OpenedHello;
 use super::peer_sessions::{PeerIncarnation, PeerSessions};
 use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
@@ -23,13 +23,13 @@ pub const CHALLENGE_MAX_NS: u64 = 2 * DRAW_EVERY_NS;
 pub struct Handshake {
     all: Arc<PeerSessions>,
     random: ChaCha20Rng,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerHandshake]>,
     /// An incarnation that has shown that it lives, and has not begun.
     begins: Option<(NodeIndex, PeerIncarnation)>,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Peer {
+struct PeerHandshake {
     /// When the present challenge was drawn, ns.
     drawn_ns: u64,
     /// The challenge before it, and when that was drawn; 0: none.
@@ -48,7 +48,7 @@ struct Questions {
 
 /// What a hello brought about.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Greeted {
+pub struct HelloOutcome {
     /// The peer has shown that it lives.
     pub proves: bool,
     /// An incarnation of the peer begins, with [`Handshake::begin`].
@@ -60,7 +60,7 @@ pub struct Greeted {
 impl Handshake {
     /// There is one. `seed` comes from a source of random numbers that is fit for keys; each incarnation has another.
     pub fn new(all: &Arc<PeerSessions>, seed: [u8; 32]) -> Self {
-        let peers = vec![Peer::default(); all.router.nodes.into()].into();
+        let peers = vec![PeerHandshake::default(); all.router.nodes.into()].into();
         let mut handshake = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), peers, begins: None };
         (0..all.router.nodes).for_each(|peer| handshake.draw(0, peer));
         handshake
@@ -69,13 +69,25 @@ impl Handshake {
     /// Takes a hello that was opened, if all else in its head is as it must be. `datagram` has room for a hello of
     /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If an incarnation begins by it, [`Self::begin`] when the
     /// reply has left.
-    pub fn greet(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
+    pub fn receive(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        greeting: &OpenedHello,
+        datagram: &mut [u8],
+    ) -> HelloOutcome {
         self.take(now_ns, head, greeting, true, datagram)
     }
 
     /// The same for a peer with another digest: no incarnation begins. A challenge is answered, so that its sender
     /// knows that this node lives, and by which configuration.
-    pub fn greet_other(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
+    pub fn receive_other(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        greeting: &OpenedHello,
+        datagram: &mut [u8],
+    ) -> HelloOutcome {
         self.take(now_ns, head, greeting, false, datagram)
     }
 
@@ -83,12 +95,12 @@ impl Handshake {
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &Greeting,
+        greeting: &OpenedHello,
         may_begin: bool,
         datagram: &mut [u8],
-    ) -> Greeted {
+    ) -> HelloOutcome {
         self.begin();
-        let (peer, Greeting { hello, key }) = (head.from, *greeting);
+        let (peer, OpenedHello { hello, key }) = (head.from, *greeting);
         self.refresh(now_ns, peer);
         let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);
         let begins = may_begin && proves && self.all.incarnation(peer) != Some(head.incarnation);
@@ -106,7 +118,7 @@ impl Handshake {
         // A peer that has proved that it lives gets the final response; any other must prove it first.
         let challenge = if is_question { self.all.challenge(peer) } else { 0 };
         let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
-        Greeted { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
+        HelloOutcome { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
 
     /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the

@@ -40,17 +40,17 @@ mod unverified;
 mod waiting;
 
 pub use gate::{ASK_EVERY_NS, Gate, Said};
-pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Handshake, PER_NS};
+pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Handshake, HelloOutcome, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
-pub use opening::{Greeting, Opened, Opening};
+pub use opening::{Opened, OpenedHello, Opening};
 pub use peer_sessions::{PeerSessions, Port, RouterIdentity};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;
-pub use sealing::{Sealing, Unacquainted};
+pub use sealing::{NoSession, Sealing};
 pub use tally::{Rejections, TELL_EVERY_NS, Tally};
-pub use waiting::{HELLO_SLOT_BYTES, Waiting};
+pub use waiting::{HELLO_SLOT_BYTES, HelloQueue};
 
 /// Bytes of a datagram that carries a hello.
 pub const HELLO_DATAGRAM_BYTES: usize = crate::frame::HEAD_BYTES + HELLO_BYTES + TAG_BYTES;

@@ -1,6 +1,6 @@
 //! The half that seals: one for each port, in the thread that sends there.
 
-use super::keys::End;
+use super::keys::Endpoint;
 use super::peer_sessions::{Known, PeerSessions, Port};
 use super::seal::{self, Seal};
 use crate::frame::{self, FrameHead, NodeIndex};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// No incarnation of the peer is known to live, so there is nobody to seal to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("no router has answered there yet")]
-pub struct Unacquainted;
+pub struct NoSession;
 
 /// Seals datagrams of one port.
 pub struct Sealing {
@@ -42,7 +42,7 @@ impl Sealing {
     /// For time in time slots: seals to each node that has a key, known or not. A node that joins must hear time before
     /// it may send a challenge.
     pub fn of_slots(all: &Arc<PeerSessions>) -> Self {
-        let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), End::any(node)));
+        let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), Endpoint::any(node)));
         Self { strangers: (0..all.router.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
     }
 
@@ -54,7 +54,7 @@ impl Sealing {
     ///
     /// # Panics
     /// If a sequence of the head was sealed before.
-    pub fn seal(&mut self, head: &FrameHead, datagram: &mut [u8]) -> Result<(), Unacquainted> {
+    pub fn seal(&mut self, head: &FrameHead, datagram: &mut [u8]) -> Result<(), NoSession> {
         head.write(0, datagram);
         self.close(datagram)
     }
@@ -66,7 +66,7 @@ impl Sealing {
     ///
     /// # Panics
     /// If a sequence of the head was sealed before, or there is no head.
-    pub fn close(&mut self, datagram: &mut [u8]) -> Result<(), Unacquainted> {
+    pub fn close(&mut self, datagram: &mut [u8]) -> Result<(), NoSession> {
         let (to, sequence) = frame::place_of(datagram);
         let port = self.port;
         let all = &self.all;
@@ -76,7 +76,7 @@ impl Sealing {
                 let key = Self::key_to_stranger(way.map(|way| way.key), seals.len(), sequence);
                 (key, &seals[key])
             }
-            None => way.map(|way| (way.key, &way.seal)).ok_or(Unacquainted)?,
+            None => way.map(|way| (way.key, &way.seal)).ok_or(NoSession)?,
         };
         all.use_up(port, to, sequence);
         frame::write_key(all.keys.id(key), datagram);
@@ -113,7 +113,7 @@ impl Sealing {
         to: NodeIndex,
     ) -> Option<&'a mut PeerSeal> {
         peers[usize::from(to)].of(all, to, |session| {
-            let peer = End { node: to, incarnation: session.incarnation };
+            let peer = Endpoint { node: to, incarnation: session.incarnation };
             let seal = all.keys.derive(session.key, &all.binding(port, all.own(), peer));
             PeerSeal { key: session.key, seal }
         })

@@ -49,15 +49,15 @@ use crate::outbound::Outbound;
 use crate::security::{self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing};
 use crate::settings::Settings;
 use crate::stats::Stats;
-use crate::tdma::{SlotScheduler, Table};
-use answers::Answers;
+use crate::tdma::{SlotScheduler, SlotTable};
+use answers::ErrorReplier;
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
 use news::News;
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
 use rx_thread::{PackageDelivery, RxSystem, RxThread};
 use sender_cache::SenderCache;
 use sending::Sending;
-use slots::Slots;
+use slots::SlotThread;
 use socket::InSocket;
 use std::io;
 use std::os::fd::OwnedFd;
@@ -66,7 +66,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use threads::Shared;
 use tx_thread::{TransitInlet, TxThread};
-use wire::Wire;
+use wire::PeerSockets;
 
 /// Why a router did not start.
 #[derive(Debug, thiserror::Error)]
@@ -113,7 +113,7 @@ pub struct Parts<'a> {
     /// Its sockets, if they are kept for it ([`listen`]), in that order; it makes the missing ones.
     pub sockets: Vec<OwnedFd>,
     /// A bad network between it and its sockets.
-    pub impair: Option<impair::Settings>,
+    pub impair: Option<impair::ImpairmentSettings>,
     /// Its clock; none unless time comes from a master.
     pub clock: Option<ClockParts>,
 }
@@ -130,7 +130,7 @@ pub struct Shell {
     /// The socket for packages comes first.
     sockets: Vec<Arc<InSocket>>,
     clock: Option<Arc<ClockState>>,
-    slots: Option<Arc<slots::State>>,
+    slots: Option<Arc<slots::SlotStatus>>,
     tunnel: Option<Arc<tunnel::Passed>>,
     /// Where datagrams are sealed.
     peer_sessions: Option<Arc<PeerSessions>>,
@@ -198,12 +198,12 @@ impl Shell {
         let transit = sender.receiver(via, transit::shape())?;
         node.set_routes(via, &transit::ranges(&settings.routes))?;
         let shared = Arc::new(Shared::new(&sender));
-        let answers = |participant| Answers::new(&settings, &stats, &faults, participant, via);
+        let answers = |participant| ErrorReplier::new(&settings, &stats, &faults, participant, via);
         let sealing = all.as_ref().map(|all| Sealing::new(all, Port::Packages));
         let sending = Sending {
             outbound,
             answers: answers(&sender),
-            wire: Wire::new(&settings, settings.network.port, sealing, impair, &failures),
+            wire: PeerSockets::new(&settings, settings.network.port, sealing, impair, &failures),
             rest: None,
         };
         let mut inlet = TransitInlet { transit, sending };
@@ -249,11 +249,11 @@ impl Shell {
             inlet.sending.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
             let tx_thread = TxThread { shared: shell.shared.clone(), driver: FreeDriver::new(&shell.settings), inlet };
             shell.begin("tx", move || {
-                if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
+                if let Err(error) = threads::schedule(threads::TX_FIFO) {
                     tracing::warn!(
                         "the router's threads run as modules do, and not before them: {error}; allow it with a limit \
                          `rtprio` of {} for this user (limits.conf) or CAP_SYS_NICE",
-                        threads::ARRIVALS_FIFO
+                        threads::RX_FIFO
                     );
                 }
                 tx_thread.run();
@@ -262,7 +262,7 @@ impl Shell {
         let rx_thread = RxThread { driver, system, stats: shell.stats.clone() };
         shell.begin("rx", move || {
             // A refusal was reported by the other.
-            let _ = threads::schedule(threads::ARRIVALS_FIFO);
+            let _ = threads::schedule(threads::RX_FIFO);
             rx_thread.run();
         })?;
         Ok(shell)
@@ -278,7 +278,7 @@ impl Shell {
         let settings = self.settings.clone();
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
-        let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
+        let table = SlotTable::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
         let works = Works::new(clock)?.sealed(self.peer_sessions.as_ref(), true).in_slots(table.for_clock());
         let spin_ns = spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(ANSWERS);
@@ -290,7 +290,7 @@ impl Shell {
             answers: (waiting, self.sockets[0].clone()),
         };
         let counted = (self.shared.clone(), self.stats.clone());
-        let slots = Slots::new(own, counted, inlet, works, scheduler);
+        let slots = SlotThread::new(own, counted, inlet, works, scheduler);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(answers)
@@ -327,7 +327,7 @@ impl Shell {
     }
 
     /// State of the time slots, if there are any.
-    pub fn slots(&self) -> Option<&Arc<slots::State>> {
+    pub fn slots(&self) -> Option<&Arc<slots::SlotStatus>> {
         self.slots.as_ref()
     }
 

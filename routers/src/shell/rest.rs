@@ -4,14 +4,14 @@
 //! the wire's rate with real time, which goes first. A second thread receives at that port. So the kernel separates both
 //! kinds before any thread runs, and a flood of one takes no room or time from the other.
 
-use super::answers::{Answers, Faults};
+use super::answers::{ErrorReplier, Faults};
 use super::handover::{Giver, Taker, Waited, handover};
 use super::rx_thread::{PackageDelivery, RxSystem, RxThread};
 use super::sender_cache::SenderCache;
 use super::sending::Sending;
 use super::socket::{InSocket, REST_BYTES};
 use super::threads::{Shared, schedule_below};
-use super::wire::Wire;
+use super::wire::PeerSockets;
 use super::{Shell, ShellError, transit};
 use crate::driver::{RestDriver, RestInlet, RestStep, RxDriver};
 use crate::impair;
@@ -74,7 +74,7 @@ impl Shell {
         &mut self,
         (node, name): (&Arc<Node>, Name),
         faults: &Arc<dyn Faults>,
-        (socket, impair): (Option<OwnedFd>, Option<impair::Settings>),
+        (socket, impair): (Option<OwnedFd>, Option<impair::ImpairmentSettings>),
     ) -> Result<Option<Giver>, ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
         if !settings.parts_rest() {
@@ -92,13 +92,13 @@ impl Shell {
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         // The real-time half knows whether a peer is there.
         let via = transit::name(name);
-        let answers = |participant| Answers::new(&settings, &self.stats, faults, participant, via);
+        let answers = |participant| ErrorReplier::new(&settings, &self.stats, faults, participant, via);
         let (giver, taker) = handover(&shared);
         let sealing = all.map(|all| Sealing::new(all, Port::Rest));
         let sending = Sending {
             outbound,
             answers: answers(&sender),
-            wire: Wire::new(&settings, port, sealing, impair, &self.failures),
+            wire: PeerSockets::new(&settings, port, sealing, impair, &self.failures),
             rest: None,
         };
         let system = RxSystem {

@@ -2,7 +2,7 @@
 //! with a datagram says the [driver](crate::driver).
 
 use super::ages::Ages;
-use super::answers::Answers;
+use super::answers::ErrorReplier;
 use super::news::News;
 use super::sender_cache::SenderCache;
 use super::socket::{InSocket, Received};
@@ -10,8 +10,8 @@ use super::threads::{Awake, Shared};
 use crate::counts::Cause;
 use crate::driver::{Answer, RxDriver, RxPlatform};
 use crate::frame::NodeIndex;
-use crate::inbound::Came;
-use crate::report::{Deliver, Event, NotDelivered, Report};
+use crate::inbound::Envelope;
+use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, SendError, monotonic_ns};
@@ -82,7 +82,7 @@ impl RxThread {
                         stats.dropped.add(dropped.wrapping_sub(seen_dropped).into());
                         seen_dropped = dropped;
                     }
-                    let came = Came { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
+                    let came = Envelope { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
                     driver.take(system, now_ns, &came, &mut datagram[..bytes]);
                 }
             }
@@ -99,7 +99,7 @@ impl RxThread {
 /// Delivers packages, and replies for undeliverable ones.
 pub(super) struct PackageDelivery {
     pub(super) sender_cache: SenderCache,
-    pub(super) answers: Answers,
+    pub(super) answers: ErrorReplier,
     /// None where another thread reports the same.
     pub(super) news: Option<News>,
     pub(super) ages: Arc<Ages>,
@@ -125,7 +125,7 @@ impl Deliver for PackageDelivery {
         Err(error.into())
     }
 
-    fn event(&mut self, event: Event) {
+    fn event(&mut self, event: RouterEvent) {
         self.news.iter().for_each(|news| news.event(event));
     }
 }

@@ -1,9 +1,9 @@
 //! What a thread that sends as packages come has: a queue, and the sockets.
 
-use super::answers::Answers;
+use super::answers::ErrorReplier;
 use super::failure::Failure;
 use super::handover::Giver;
-use super::wire::Wire;
+use super::wire::PeerSockets;
 use crate::counts::Cause;
 use crate::driver::{Handover, NotSent, Outlet, RealTimeOutlet};
 use crate::frame::NodeIndex;
@@ -15,13 +15,13 @@ use std::io::IoSlice;
 /// Queue and sockets.
 pub(super) struct Sending {
     pub(super) outbound: Outbound,
-    pub(super) answers: Answers,
-    pub(super) wire: Wire,
+    pub(super) answers: ErrorReplier,
+    pub(super) wire: PeerSockets,
     /// To the thread that sends what is not real time; none where there is none.
     pub(super) rest: Option<Giver>,
 }
 
-impl Report for Answers {
+impl Report for ErrorReplier {
     fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
         self.answer(peer, head, body, cause, None);
     }

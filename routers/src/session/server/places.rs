@@ -7,13 +7,13 @@
 //! ```
 
 use super::crowd::Crowd;
-use super::member::{Member, State};
+use super::member::{Member, MemberState};
 use super::principal::{Principal, Principals};
 use super::work::WORK_SHARE;
-use super::{Host, Server};
+use super::{Server, ServerHost};
 use crate::broken::broken;
 use crate::session::ClientIndex;
-use crate::session::frame::{Hello, Reason};
+use crate::session::frame::{SessionHello, SessionRefusalReason};
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 
@@ -69,19 +69,19 @@ impl Places {
     }
 
     /// It does not stand before its hello any more.
-    pub(super) fn greets_no_more(&mut self, client: ClientIndex, member: &Member) {
+    pub(super) fn handshake_ends(&mut self, client: ClientIndex, member: &Member) {
         self.greetings.remove(&member.address, member.began_ns, client);
     }
 }
 
 impl Server {
     /// A connection was made, from this address. None: so many are there that it must be closed.
-    pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl Host) -> Option<ClientIndex> {
+    pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl ServerHost) -> Option<ClientIndex> {
         let address = Principal::of(from.ip());
-        if self.places.greetings.len() >= self.settings.greetings_max.into() {
-            let oldest = self.oldest_greeting(&address)?;
+        if self.places.greetings.len() >= self.settings.handshakes_max.into() {
+            let oldest = self.oldest_handshake(&address)?;
             self.places.crowded.greetings += 1;
-            self.refuse(now_ns, oldest, Reason::Silent, (0, 0), "others wait to be let in", host);
+            self.refuse(now_ns, oldest, SessionRefusalReason::Silent, (0, 0), "others wait to be let in", host);
         }
         let index = match self.places.free.pop_first() {
             Some(free) => free,
@@ -99,11 +99,11 @@ impl Server {
     }
 
     /// Of the connections before their hello, one that gives way to a new one from this address.
-    fn oldest_greeting(&self, address: &Principal) -> Option<ClientIndex> {
+    fn oldest_handshake(&self, address: &Principal) -> Option<ClientIndex> {
         let greetings = &self.places.greetings;
         let (largest, most) = greetings.largest()?;
         if broken!(CrowdsOut) {
-            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == State::Greeting;
+            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Handshake;
             return self.present().filter(greeting).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
         }
         let owner = if greetings.count_of(address) == most { address } else { largest };
@@ -115,18 +115,18 @@ impl Server {
         &mut self,
         now_ns: u64,
         client: ClientIndex,
-        hello: &Hello<'_>,
-        host: &mut impl Host,
+        hello: &SessionHello<'_>,
+        host: &mut impl ServerHost,
     ) -> bool {
         let Some(owner) = self.member(client).map(|member| member.principal.clone()) else { return false };
         if self.places.principals.members.len() >= self.settings.clients_max.into() {
             let Some(newest) = self.gives_way_to(&owner) else { return false };
             self.places.crowded.clients += 1;
             let text = "the principal with most connections gives way to one with fewer";
-            self.refuse(now_ns, newest, Reason::Full, (0, 0), text, host);
+            self.refuse(now_ns, newest, SessionRefusalReason::Full, (0, 0), text, host);
         }
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return false };
-        self.places.greets_no_more(client, member);
+        self.places.handshake_ends(client, member);
         member.principal_id = self.places.principals.joins(&owner, member.began_ns, client, WORK_SHARE);
         member.joins(now_ns, hello);
         let is_own = self.settings.system.is_some_and(|(system, _)| system == hello.system);
@@ -156,8 +156,8 @@ impl Server {
     /// The place is free; the next client in it is another.
     pub(super) fn free(&mut self, client: ClientIndex) {
         let Some(member) = self.members.get_mut(usize::from(client.0)).and_then(Option::take) else { return };
-        if member.state == State::Greeting {
-            self.places.greets_no_more(client, &member);
+        if member.state == MemberState::Handshake {
+            self.places.handshake_ends(client, &member);
         }
         if member.is_due {
             self.due.retain(|due| *due != client);
@@ -166,6 +166,6 @@ impl Server {
     }
 
     fn places_max(&self) -> usize {
-        usize::from(self.settings.clients_max) + usize::from(self.settings.greetings_max)
+        usize::from(self.settings.clients_max) + usize::from(self.settings.handshakes_max)
     }
 }

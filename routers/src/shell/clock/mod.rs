@@ -19,7 +19,7 @@ mod works;
 
 pub use local::Skew;
 pub(crate) use local::looked;
-pub use state::{ClockState, Snapshot};
+pub use state::{ClockSnapshot, ClockState};
 pub(super) use works::Works;
 
 use crate::driver::ClockStep;
@@ -66,7 +66,7 @@ pub struct ClockParts {
     /// The node whose page it writes; none in tests that look at [`ClockState`] alone.
     pub node: Option<Arc<Node>>,
     /// A bad network before its socket.
-    pub impair: Option<impair::Settings>,
+    pub impair: Option<impair::ImpairmentSettings>,
     /// Whether the kernel stamps datagrams, if it can; else the clock does, as where it cannot.
     pub kernel_stamps: bool,
     /// For tests: see [`Skew`].

@@ -2,14 +2,14 @@
 //! may look at. The thread belongs to the owner.
 
 use super::local::LocalClock;
-use super::socket::{Came, TimeSocket};
-use super::state::{ClockState, Snapshot};
+use super::socket::{ReceivedDatagram, TimeSocket};
+use super::state::{ClockSnapshot, ClockState};
 use super::{ClockError, ClockParts};
 use crate::driver::{
     ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeStart,
 };
 use crate::frame::NodeIndex;
-use crate::impair::{Impairment, Output};
+use crate::impair::{Impairment, ImpairmentStep};
 use crate::security::PeerSessions;
 use crate::time::{Clock, Exchange, InSlots, Looked, SentId, Stamp, TIME_BYTES, Unsteady};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, Watched, monotonic_ns, realtime_ns};
@@ -20,7 +20,7 @@ use std::sync::mpsc::SyncSender;
 
 /// What the impairment keeps besides the bytes.
 #[derive(Clone, Copy)]
-struct Held {
+struct DelayedArrival {
     source: IpAddr,
     stamp: Stamp,
     since_ns: u64,
@@ -37,7 +37,7 @@ struct TimeSystem {
     local: LocalClock,
     socket: TimeSocket,
     keeper: Option<TimeKeeper>,
-    impairment: Option<Impairment<Held>>,
+    impairment: Option<Impairment<DelayedArrival>>,
     /// When the impairment has more, local ns.
     held_ns: u64,
     observer: Option<SyncSender<Exchange>>,
@@ -64,7 +64,7 @@ impl Works {
         };
         let addresses = nodes.iter().map(SocketAddr::ip).collect();
         let (driver, unsteady) = ClockDriver::new(settings, addresses, start);
-        let snapshot = Snapshot::of(driver.clock(), local.now_ns());
+        let snapshot = ClockSnapshot::of(driver.clock(), local.now_ns());
         let mut system = TimeSystem {
             local,
             socket,
@@ -168,14 +168,14 @@ impl TimePlatform for TimeSystem {
 
     fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> Option<TimeArrival> {
         loop {
-            let came = self.socket.receive(datagram).map(|Came { bytes, source, realtime_ns }| {
+            let came = self.socket.receive(datagram).map(|ReceivedDatagram { bytes, source, realtime_ns }| {
                 let now_ns = self.local.now_ns();
                 let stamp = realtime_ns.and_then(|ns| self.local.stamp(ns)).unwrap_or(Stamp::by_us(now_ns));
                 (now_ns, TimeArrival { bytes, source, stamp })
             });
             let Some(impairment) = &mut self.impairment else { return Some(came?.1) };
             if let Some((since_ns, TimeArrival { bytes, source, stamp })) = came {
-                impairment.push(since_ns, Held { source, stamp, since_ns }, &datagram[..bytes]);
+                impairment.push(since_ns, DelayedArrival { source, stamp, since_ns }, &datagram[..bytes]);
             }
             if let Some(held) = self.take_held(datagram) {
                 return Some(held);
@@ -206,8 +206,8 @@ impl TimePlatform for TimeSystem {
 
     fn publish(&mut self, clock: &Clock, counts: TimeCounts) {
         let TimeCounts { exchanges, by_kernel, ignored } = counts;
-        let seen = Snapshot::of(clock, self.local.now_ns());
-        self.state.show(&Snapshot { exchanges, by_kernel, ignored, real_time: self.real_time, ..seen });
+        let seen = ClockSnapshot::of(clock, self.local.now_ns());
+        self.state.show(&ClockSnapshot { exchanges, by_kernel, ignored, real_time: self.real_time, ..seen });
     }
 
     fn happened(&mut self, _: &Clock, event: TimeEvent<'_>) {
@@ -232,13 +232,13 @@ impl TimeSystem {
     fn take_held(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> Option<TimeArrival> {
         let now_ns = self.local.now_ns();
         match self.impairment.as_mut()?.poll(now_ns) {
-            Output::Send { to: Held { source, stamp, since_ns }, datagram: held } => {
+            ImpairmentStep::Send { to: DelayedArrival { source, stamp, since_ns }, datagram: held } => {
                 let bytes = held.len().min(datagram.len());
                 datagram[..bytes].copy_from_slice(&held[..bytes]);
                 self.held_ns = now_ns;
                 Some(TimeArrival { bytes, source, stamp: Stamp { ns: stamp.ns + (now_ns - since_ns), ..stamp } })
             }
-            Output::Wait { until_ns } => {
+            ImpairmentStep::Wait { until_ns } => {
                 self.held_ns = until_ns;
                 None
             }

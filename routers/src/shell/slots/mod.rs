@@ -11,7 +11,7 @@ mod speech;
 mod state;
 
 pub use granted::Granted;
-pub use state::{Snapshot, State};
+pub use state::{SlotSnapshot, SlotStatus};
 
 use super::clock::{ClockState, Works};
 use super::sending::Sending;
@@ -45,7 +45,7 @@ pub(super) struct Own {
 }
 
 /// What the thread has.
-pub(super) struct Slots {
+pub(super) struct SlotThread {
     driver: SlotDriver,
     system: System,
 }
@@ -61,11 +61,11 @@ struct System {
     answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
     settings: Arc<Settings>,
     router: Name,
-    snapshot: Snapshot,
-    state: Arc<State>,
+    snapshot: SlotSnapshot,
+    state: Arc<SlotStatus>,
 }
 
-impl Slots {
+impl SlotThread {
     /// From what would send as packages come.
     pub(super) fn new(
         own: Own,
@@ -75,8 +75,8 @@ impl Slots {
         scheduler: SlotScheduler,
     ) -> Self {
         let TransitInlet { transit, sending } = inlet;
-        let snapshot = Snapshot::new(scheduler.silent());
-        let state = Arc::new(State::new(snapshot));
+        let snapshot = SlotSnapshot::new(scheduler.silent());
+        let state = Arc::new(SlotStatus::new(snapshot));
         let Own { router, settings, peer_sessions, answers } = own;
         let driver = SlotDriver::new(&settings, peer_sessions.as_ref(), scheduler, monotonic_ns());
         let system = System { shared, stats, works, transit, sending, answers, settings, router, snapshot, state };
@@ -84,7 +84,7 @@ impl Slots {
     }
 
     /// What others may look at.
-    pub(super) fn state(&self) -> Arc<State> {
+    pub(super) fn state(&self) -> Arc<SlotStatus> {
         self.system.state.clone()
     }
 
@@ -169,7 +169,7 @@ impl Platform for System {
         speech::tell_change(before, silent, || speech::parted(settings, works.clock().parted_by(works.now_ns())));
         let (counts, lead_ns) = (scheduler.counts(works.clock()), scheduler.lead_ns());
         let WindowLog { held, windows } = *log;
-        *snapshot = Snapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
+        *snapshot = SlotSnapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
         state.show(snapshot);
     }
 

@@ -25,7 +25,7 @@ use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Port, STRANGER, Sent};
 use rohrpost_mailbox::{Head, Options, Type};
 use rohrpost_routers::driver::{Answer, NotSent, RxDriver};
-use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
+use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use rohrpost_routers::inbound;
 use rohrpost_routers::intake::hurries;
 use rohrpost_routers::outbound::Outbound;
@@ -195,7 +195,7 @@ impl Packages {
         }
         let came = Some(Came { at_ns: arrived_ns, incarnation: incarnation(&arrived.bytes) });
         let mut bytes = arrived.bytes.to_vec();
-        let envelope = inbound::Came { source, arrived_ns, bytes: bytes.len() };
+        let envelope = inbound::Envelope { source, arrived_ns, bytes: bytes.len() };
         let (receiver, mut system) = self.receiving(io, came);
         receiver.take(&mut system, now_ns, &envelope, &mut bytes);
         let is_clear = self.seals.is_none() || bytes.len() < HEAD_BYTES + TAG_BYTES;

@@ -14,7 +14,7 @@ use rohrpost_routers::driver::{
 };
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::security::PeerSessions;
-use rohrpost_routers::tdma::Table;
+use rohrpost_routers::tdma::SlotTable;
 use rohrpost_routers::time::{Clock, Looked, Role, SentId, Stamp, TIME_BYTES, Term, TimeSettings};
 use std::collections::VecDeque;
 use std::net::IpAddr;
@@ -165,7 +165,7 @@ impl Ticking {
     }
 
     /// The same with time slots; all of its datagrams leave in windows.
-    pub(super) fn in_slots(self, table: &Table) -> Self {
+    pub(super) fn in_slots(self, table: &SlotTable) -> Self {
         Self { driver: self.driver.in_slots(table.for_clock()), ..self }
     }
 

@@ -7,7 +7,7 @@ use crate::sim::station::{Arrived, Io};
 use rohrpost_mailbox::TimeRecord;
 use rohrpost_routers::driver::{TimeEvent, TimeSource};
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
-use rohrpost_routers::time::message::Message;
+use rohrpost_routers::time::message::TimeMessage;
 use rohrpost_routers::time::{Clock, JOINING_SYNCS, RATE_MAX_PPB, Role, TIME_BYTES, Term, TimeEstimate};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -35,10 +35,10 @@ pub(in crate::sim) struct UnverifiedPeer {
 }
 
 /// What a frame told of the time, if it did.
-fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &Message) -> Option<TimeFrame> {
+fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &TimeMessage) -> Option<TimeFrame> {
     let (term, sent_ns) = match message {
-        Message::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
-        Message::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
+        TimeMessage::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
+        TimeMessage::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
         _ => return None,
     };
     let came_ns = arrived.stamp.true_ns;
@@ -144,7 +144,7 @@ impl TimeWatch {
         if source == TimeSource::Unproven && role_before == Role::Master && clock.role() == Role::Listening {
             io.oracle.saw("time: stepped back");
         }
-        let Some(message) = Message::parse(head.kind, rest).ok().filter(|_| is_taken) else { return };
+        let Some(message) = TimeMessage::parse(head.kind, rest).ok().filter(|_| is_taken) else { return };
         let Some(told) = self.arrived.as_ref().map(|arrived| told(io, arrived, head, clock.digest(), &message)) else {
             return;
         };
@@ -154,13 +154,13 @@ impl TimeWatch {
             }
             // A node that hears a master does not go by others.
             (TimeSource::Proven, Some(told))
-                if matches!(message, Message::Sync(_)) || clock.role() == Role::Listening =>
+                if matches!(message, TimeMessage::Sync(_)) || clock.role() == Role::Listening =>
             {
                 note(&mut self.told, told);
             }
             _ => {}
         }
-        if let (TimeSource::Proven, Message::Sync(sync)) = (source, message) {
+        if let (TimeSource::Proven, TimeMessage::Sync(sync)) = (source, message) {
             self.heard = if sync.replacement { self.heard } else { (sync.term, sync.cycle) };
             if sync.replacement && clock.coarse(io.now.monotonic_ns) != heard_before {
                 let text = format!("node {} goes by what {} says in the place of the master", io.node, head.from);
@@ -172,7 +172,7 @@ impl TimeWatch {
     /// No Sync leaves in the place of a master whose own of this cycle has come.
     fn sends(&self, io: &mut Io<'_>, datagram: &[u8; TIME_BYTES]) {
         let Ok((head, rest)) = FrameHead::parse(datagram) else { return };
-        if let Ok(Message::Sync(sync)) = Message::parse(head.kind, rest)
+        if let Ok(TimeMessage::Sync(sync)) = TimeMessage::parse(head.kind, rest)
             && sync.replacement
             && self.heard == (sync.term, sync.cycle)
         {
