@@ -1,7 +1,7 @@
 //! What the cores tell of: packages that go no further, and what happens to peers.
 
 use crate::counts::Cause;
-use crate::frame::{NodeIndex, Reason};
+use crate::frame::{NodeIndex, RefusalReason};
 use crate::security::NotOpened;
 use rohrpost_mailbox::{Head, SendError};
 use std::net::IpAddr;
@@ -31,7 +31,7 @@ pub trait Deliver: Report {
     fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered>;
 
     /// Something happened that people want to know of, each once until it is over.
-    fn event(&mut self, event: Event);
+    fn event(&mut self, event: RouterEvent);
 }
 
 /// Why a package is not in its mailbox.
@@ -62,7 +62,7 @@ impl From<SendError> for NotDelivered {
 
 /// What happens between routers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Event {
+pub enum RouterEvent {
     /// A peer is heard: for the first time, or after silence.
     Heard {
         /// Which.
@@ -121,7 +121,7 @@ pub enum Event {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Mismatch {
     /// Why it is refused.
-    pub reason: Reason,
+    pub reason: RefusalReason,
     /// Wire version of the other end; ours is [`frame::VERSION`](crate::frame::VERSION).
     pub version: u8,
     /// Digest of the other end, where it was readable.

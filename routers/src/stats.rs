@@ -100,7 +100,7 @@ impl Stats {
     }
 
     /// Whether a peer is there.
-    pub fn state(&self, peer: NodeIndex, now_ns: u64) -> crate::link::State {
+    pub fn state(&self, peer: NodeIndex, now_ns: u64) -> crate::link::PeerLinkState {
         self.knows.as_deref().unwrap_or(self).peer(peer).link.state(self.started_ns, now_ns)
     }
 

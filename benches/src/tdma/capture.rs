@@ -9,7 +9,7 @@ use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg};
 use nix::sys::time::{TimeSpec, TimeValLike};
 use rohrpost_mailbox::{Name, Type, monotonic_ns, realtime_ns};
 use rohrpost_routers::frame::Frame;
-use rohrpost_routers::time::message::Message;
+use rohrpost_routers::time::message::TimeMessage;
 use std::io::IoSliceMut;
 use std::os::fd::{AsRawFd, OwnedFd};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -215,9 +215,9 @@ fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
             }
             FrameKind::Packages
         }
-        Frame::Time(rest) => match Message::parse(head.kind, rest) {
-            Ok(Message::Sync(sync)) if sync.replacement => FrameKind::Replacement,
-            Ok(Message::Sync(_)) => FrameKind::Sync,
+        Frame::Time(rest) => match TimeMessage::parse(head.kind, rest) {
+            Ok(TimeMessage::Sync(sync)) if sync.replacement => FrameKind::Replacement,
+            Ok(TimeMessage::Sync(_)) => FrameKind::Sync,
             _ => FrameKind::Said,
         },
         Frame::Alive(_) | Frame::Refusal(_) => FrameKind::Said,

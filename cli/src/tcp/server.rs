@@ -8,7 +8,7 @@ use rohrpost_config::Node;
 use rohrpost_mailbox::{monotonic_ns, realtime_ns};
 use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::session::server::{Names, OwnNode, OwnNodes, ServerSettings};
-use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
+use rohrpost_routers::tcp::{MemberSnapshot, ServerParts, ServerSeal, ServerShell};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -95,9 +95,9 @@ const HANDSHAKES_MIN: u16 = 64;
 /// Ranges per report: with the names of their clients they fit in a package.
 const HOSTS_MAX: usize = 512;
 
-fn hosts(members: &[Member]) -> BeyondHosts {
+fn hosts(members: &[MemberSnapshot]) -> BeyondHosts {
     let all = members.iter().flat_map(|member| member.hosts.iter().map(move |range| (range, member)));
-    let host = |((first, last), member): (&(Name, Name), &Member)| BeyondHost {
+    let host = |((first, last), member): (&(Name, Name), &MemberSnapshot)| BeyondHost {
         first: first.raw(),
         last: last.raw(),
         client: member.name.clone(),
@@ -107,7 +107,7 @@ fn hosts(members: &[Member]) -> BeyondHosts {
     BeyondHosts { more: ranges.saturating_sub(hosts.len() as u64), hosts }
 }
 
-fn client(member: Member) -> BeyondClient {
+fn client(member: MemberSnapshot) -> BeyondClient {
     BeyondClient {
         name: member.name,
         address: member.peer,

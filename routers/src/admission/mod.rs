@@ -65,7 +65,7 @@ pub enum ArrivalPath {
 
 /// Why a package is not admitted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Refused {
+pub enum NotAdmitted {
     /// Its sender is not hosted where it came from.
     ForeignName,
     /// It is from or for a router's own mailbox, or for a router of another system.
@@ -76,23 +76,23 @@ pub enum Refused {
     NotAllowed,
 }
 
-impl From<Refused> for counts::Cause {
-    fn from(why: Refused) -> Self {
+impl From<NotAdmitted> for counts::Cause {
+    fn from(why: NotAdmitted) -> Self {
         match why {
-            Refused::ForeignName => Self::ForeignName,
-            Refused::RoutersOwn => Self::RoutersOwn,
-            Refused::BadPacket => Self::BadPacket,
-            Refused::NotAllowed => Self::NotAllowed,
+            NotAdmitted::ForeignName => Self::ForeignName,
+            NotAdmitted::RoutersOwn => Self::RoutersOwn,
+            NotAdmitted::BadPacket => Self::BadPacket,
+            NotAdmitted::NotAllowed => Self::NotAllowed,
         }
     }
 }
 
-impl From<Refused> for session::Cause {
-    fn from(why: Refused) -> Self {
+impl From<NotAdmitted> for session::Cause {
+    fn from(why: NotAdmitted) -> Self {
         match why {
-            Refused::ForeignName => Self::Foreign,
-            Refused::RoutersOwn | Refused::BadPacket => Self::RoutersOwn,
-            Refused::NotAllowed => Self::NotAllowed,
+            NotAdmitted::ForeignName => Self::Foreign,
+            NotAdmitted::RoutersOwn | NotAdmitted::BadPacket => Self::RoutersOwn,
+            NotAdmitted::NotAllowed => Self::NotAllowed,
         }
     }
 }
@@ -113,17 +113,17 @@ impl Admission {
     ///
     /// # Errors
     /// Why not.
-    pub fn validate(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), Refused> {
+    pub fn validate(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), NotAdmitted> {
         let is_reply = matches!(head.kind.kind(), Kind::Reply(_));
         match way {
             ArrivalPath::Lan { is_its_name: false, .. } if !broken!(AdmitsForeignNames) => {
-                return Err(Refused::ForeignName);
+                return Err(NotAdmitted::ForeignName);
             }
             // In our own names the server itself speaks: it says that a module of ours is not there.
             ArrivalPath::Beyond { is_our_name }
                 if (is_our_name && !is_reply || !head.from.is_mailbox()) && !broken!(AdmitsForeignNames) =>
             {
-                return Err(Refused::ForeignName);
+                return Err(NotAdmitted::ForeignName);
             }
             ArrivalPath::Lan { .. } | ArrivalPath::Beyond { .. } => {}
         }
@@ -132,9 +132,9 @@ impl Admission {
             self.judge_routers_own(way, head, body)?;
         }
         if self.is_across_systems(way, head) && !broken!(AdmitsRoutersOwn) {
-            return Err(Refused::RoutersOwn);
+            return Err(NotAdmitted::RoutersOwn);
         }
-        if self.access.allows(head) { Ok(()) } else { Err(Refused::NotAllowed) }
+        if self.access.allows(head) { Ok(()) } else { Err(NotAdmitted::NotAllowed) }
     }
 
     /// Whether a body is an IP packet from the tunnel's address of a node to ours.
@@ -158,7 +158,7 @@ impl Admission {
 
     /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own
     /// address.
-    fn judge_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), Refused> {
+    fn judge_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), NotAdmitted> {
         let node = match way {
             ArrivalPath::Lan { node, .. } => Some(node),
             ArrivalPath::Beyond { .. } => None,
@@ -169,8 +169,8 @@ impl Admission {
             && self.tunnel_end(head.to).is_some()
             && head.kind == PACKET;
         match node.filter(|_| is_tunnel) {
-            None if !broken!(AdmitsRoutersOwn) => Err(Refused::RoutersOwn),
-            Some(node) if !self.is_packet_of(node, body) && !broken!(AdmitsPackets) => Err(Refused::BadPacket),
+            None if !broken!(AdmitsRoutersOwn) => Err(NotAdmitted::RoutersOwn),
+            Some(node) if !self.is_packet_of(node, body) && !broken!(AdmitsPackets) => Err(NotAdmitted::BadPacket),
             _ => Ok(()),
         }
     }

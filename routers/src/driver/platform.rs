@@ -6,7 +6,7 @@ use crate::intake::Transit;
 use crate::outbound::Outbound;
 use crate::report::Report;
 use crate::stats::Stats;
-use crate::tdma::{Planned, SlotScheduler, TransmitWindow, Verdict};
+use crate::tdma::{Planned, SlotScheduler, TransmitWindow, WindowVerdict};
 use crate::time::{Clock, SentId, Stamp, Step, TIME_BYTES};
 
 /// The system took a datagram neither to send nor to keep it: its packages are lost.
@@ -58,7 +58,7 @@ pub enum SlotEvent<'a> {
     /// The clock was asked between windows, when it may send nothing.
     Idle(&'a Step),
     /// It was time for a window.
-    Judged(&'a Planned, &'a Verdict),
+    Judged(&'a Planned, &'a WindowVerdict),
     /// A hello leaves in this window by what is only overheard.
     AnsweredOverheard(&'a TransmitWindow),
     /// A datagram of packages was made.

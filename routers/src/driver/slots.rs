@@ -8,14 +8,14 @@
 //!                                       stamps, datagrams of time ─▶ Clock
 //! ```
 
-use super::held::{self, Held};
+use super::held::{self, HeldDatagram};
 use super::log::WindowLog;
 use super::platform::{NotSent, Platform, SlotEvent};
 use super::timing::{LAST_LOOK_NS, LOOK_BURST, NAP_NS, SLEEP_NS_MAX, TIDY_NS};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::intake::{Intake, MAKING_NS, QUIET_NS, Transit};
 use crate::outbound::Outbound;
-use crate::tdma::{Carries, Kind, Next, Planned, SlotScheduler, TransmitWindow, Verdict};
+use crate::tdma::{Carries, Next, Planned, SlotScheduler, TransmitWindow, WindowKind, WindowVerdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
 use rohrpost_network::Network;
 
@@ -29,7 +29,7 @@ pub struct SlotDriver {
     /// Room for the largest datagram, and its seal.
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
-    held: Option<Held>,
+    held: Option<HeldDatagram>,
     phase: Phase,
     /// When the socket of time was read last, local ns.
     looked_ns: u64,
@@ -117,7 +117,7 @@ impl SlotDriver {
                 self.look(on);
                 self.open(on, &planned);
                 // Who is to send only if a Sync is missing looks for it once more.
-                let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
+                let is_slot = matches!(planned.window.kind, WindowKind::Slot { .. });
                 let looks = !is_slot && planned.call_ns.saturating_sub(on.local_ns()) > 2 * LAST_LOOK_NS;
                 self.phase = Phase::Spins { planned, looks };
             }
@@ -198,7 +198,7 @@ impl SlotDriver {
     /// Awake for a slot, it takes from the mailbox what that has room for.
     fn open(&mut self, on: &mut impl Platform, planned: &Planned) {
         on.happened(SlotEvent::Awake(planned));
-        if let (Kind::Slot { .. }, None) = (planned.window.kind, self.scheduler.silent()) {
+        if let (WindowKind::Slot { .. }, None) = (planned.window.kind, self.scheduler.silent()) {
             let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
             self.intake.open(on.monotonic_ns(), self.scheduler.table().wire().bytes_in(sends_ns));
         }
@@ -229,7 +229,7 @@ impl SlotDriver {
         let called_ns = on.local_ns();
         let verdict = self.scheduler.validate(planned, called_ns, on.clock());
         on.happened(SlotEvent::Judged(planned, &verdict));
-        if let Verdict::Send(tx_window) = verdict {
+        if let WindowVerdict::Send(tx_window) = verdict {
             self.use_window(on, tx_window, called_ns);
         }
         self.intake.close();
@@ -281,7 +281,7 @@ impl SlotDriver {
     fn send_packages(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
         self.drop_if_old(on);
         while let Some(made) = self.next_datagram(on, tx_window) {
-            let (Held { to, bytes, .. }, now_ns) = (made, on.local_ns());
+            let (HeldDatagram { to, bytes, .. }, now_ns) = (made, on.local_ns());
             if !tx_window.fits(now_ns, bytes) {
                 self.missed(on, made);
                 break;
@@ -295,7 +295,7 @@ impl SlotDriver {
 
     /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread
     /// stands still meanwhile.
-    fn next_datagram(&mut self, on: &mut impl Platform, tx_window: &TransmitWindow) -> Option<Held> {
+    fn next_datagram(&mut self, on: &mut impl Platform, tx_window: &TransmitWindow) -> Option<HeldDatagram> {
         if let Some(held) = self.held.take() {
             return Some(held);
         }
@@ -310,12 +310,12 @@ impl SlotDriver {
         let (to, bytes) = outbound.poll_slot(made_ns, (room_bytes, &mut self.datagram[..]), behind, &mut report)?;
         drop(report);
         on.happened(SlotEvent::Made);
-        Some(Held { to, bytes, made_ns })
+        Some(HeldDatagram { to, bytes, made_ns })
     }
 
     /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time:
     /// then it would keep up what is, and is lost.
-    fn missed(&mut self, on: &mut impl Platform, made: Held) {
+    fn missed(&mut self, on: &mut impl Platform, made: HeldDatagram) {
         let datagram = &self.datagram[..made.bytes];
         let held = held::is_real_time(datagram, &self.network);
         on.happened(SlotEvent::Missed { datagram, held });

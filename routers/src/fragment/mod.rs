@@ -26,7 +26,7 @@ pub enum Change {
 
 /// A complete package.
 #[derive(Debug)]
-pub struct Whole<'a> {
+pub struct CompletePackage<'a> {
     /// Its head.
     pub head: Head,
     /// Sequence of the datagram with its first fragment: its place in the order.
@@ -70,7 +70,7 @@ impl Reassembly {
         part: &Fragment<'_>,
         is_late: impl FnOnce() -> bool,
         mut tell: impl FnMut(&Head, &[u8], Change),
-    ) -> Option<Whole<'_>> {
+    ) -> Option<CompletePackage<'_>> {
         let is_its =
             |partial: &Partial| partial.first == part.first || broken!(MixesPackages) && partial.head == part.head;
         let known = self.partial.iter().position(|partial| partial.is_used && is_its(partial));
@@ -93,7 +93,7 @@ impl Reassembly {
         if !is_late {
             self.delivers(&head, first);
         }
-        Some(Whole { head, first, is_late, body: &self.partial[at].body })
+        Some(CompletePackage { head, first, is_late, body: &self.partial[at].body })
     }
 
     /// A package of the datagram with this sequence is delivered: incomplete packages of its flow that began before it

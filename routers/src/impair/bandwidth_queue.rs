@@ -7,7 +7,7 @@
 //! A segment that is lost, or changed, is sent again after a retransmission time, and what is behind it waits with it.
 //! One that is held back makes the others wait as well. Copies are nothing to a stream.
 
-use super::{BYTES_MAX, Drawn, Settings, nanos};
+use super::{BYTES_MAX, Drawn, ImpairmentSettings, nanos};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
@@ -23,7 +23,7 @@ const WAITS_NS: u64 = 20_000_000;
 
 /// Bytes on their way.
 pub struct BandwidthQueue {
-    settings: Settings,
+    settings: ImpairmentSettings,
     random: ChaCha8Rng,
     /// When the line has sent what it was given.
     free_ns: u64,
@@ -37,7 +37,7 @@ pub struct BandwidthQueue {
 
 impl BandwidthQueue {
     /// `stream` tells users of one seed apart.
-    pub fn new(settings: Settings, stream: u64) -> Self {
+    pub fn new(settings: ImpairmentSettings, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
         random.set_stream(stream);
         let (on_way, bytes) = (VecDeque::new(), VecDeque::new());
@@ -74,7 +74,7 @@ impl BandwidthQueue {
 
     /// How much later a segment arrives because it did not at once, ns.
     fn again_ns(&mut self, first: &Drawn) -> u64 {
-        let Settings { loss, corrupt, delay, .. } = self.settings;
+        let ImpairmentSettings { loss, corrupt, delay, .. } = self.settings;
         let fails = |drawn: &Drawn| loss.holds(drawn.loss) || corrupt.holds(drawn.corrupt);
         let (mut fails_now, mut later_ns) = (fails(first), 0);
         for tries in 0..TRIES_MAX {

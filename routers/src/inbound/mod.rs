@@ -17,7 +17,7 @@ pub use window::{REORDER_MAX, WINDOW};
 use crate::admission::capped;
 use crate::broken::broken;
 use crate::counts::Cause;
-use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, Reason, VERSION};
+use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, RefusalReason, VERSION};
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::Stats;
@@ -50,7 +50,7 @@ pub struct Datagram<'a> {
 
 /// Envelope of a datagram that was opened: as [`Datagram`] has it.
 #[derive(Clone, Copy, Debug)]
-pub struct Came {
+pub struct Envelope {
     /// Source address.
     pub source: IpAddr,
     /// Arrival.
@@ -61,7 +61,7 @@ pub struct Came {
 
 /// What to do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Output {
+pub enum InboundStep {
     /// Send the first bytes of the buffer to the packages' port of an address, then ask again.
     Refuse {
         /// The address.
@@ -106,7 +106,7 @@ impl Inbound {
     /// Handles any datagram.
     pub fn handle(&mut self, now_ns: u64, datagram: &Datagram<'_>, deliver: &mut impl Deliver) {
         let Datagram { source, arrived_ns, bytes } = *datagram;
-        let came = Came { source, arrived_ns, bytes: bytes.len() };
+        let came = Envelope { source, arrived_ns, bytes: bytes.len() };
         match Frame::parse(datagram.bytes) {
             Ok((_, Frame::Refusal(refusal))) => self.refused_by(now_ns, source, &refusal, deliver),
             Ok((_, Frame::Time(_))) | Err(BadFrame::Foreign) => self.stats.foreign.add(1),
@@ -115,11 +115,11 @@ impl Inbound {
                 Some(mismatch) => self.refuse(now_ns, source, mismatch, deliver),
             },
             Err(BadFrame::Version(version)) => {
-                let mismatch = Mismatch { reason: Reason::Version, version, digest: None };
+                let mismatch = Mismatch { reason: RefusalReason::Version, version, digest: None };
                 self.refuse(now_ns, source, mismatch, deliver);
             }
             Err(BadFrame::Sealed) => {
-                let mismatch = Mismatch { reason: Reason::Sealed, version: VERSION, digest: None };
+                let mismatch = Mismatch { reason: RefusalReason::Sealed, version: VERSION, digest: None };
                 self.refuse(now_ns, source, mismatch, deliver);
             }
             Err(BadFrame::Damaged(_)) => self.damaged(source),
@@ -131,7 +131,7 @@ impl Inbound {
     pub fn handle_opened(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         (head, text, first): (&FrameHead, &[u8], u64),
         deliver: &mut impl Deliver,
     ) {
@@ -198,16 +198,16 @@ impl Inbound {
     ///
     /// # Panics
     /// If it has not.
-    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], deliver: &mut impl Deliver) -> Output {
+    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], deliver: &mut impl Deliver) -> InboundStep {
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, deliver);
         }
         if self.must_refuse
             && let Some((to, reason)) = self.due(now_ns)
         {
-            return Output::Refuse { to, bytes: self.refusal(to, reason, datagram) };
+            return InboundStep::Refuse { to, bytes: self.refusal(to, reason, datagram) };
         }
-        Output::Wait { until_ns: self.sweep_ns }
+        InboundStep::Wait { until_ns: self.sweep_ns }
     }
 
     /// Packages with missing fragments.
@@ -219,7 +219,7 @@ impl Inbound {
     fn take(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         (head, first): (&FrameHead, Option<u64>),
         frame: Frame<'_>,
         deliver: &mut impl Deliver,

@@ -28,7 +28,7 @@ pub(crate) enum Arrival {
 
 /// Sequences of one incarnation of one peer; at first all from 0 on are expected.
 #[derive(Debug, Default)]
-pub(crate) struct Window {
+pub(crate) struct SequenceWindow {
     next: u64,
     /// All below is decided.
     settled: u64,
@@ -39,7 +39,7 @@ pub(crate) struct Window {
     ticks: [u64; 2],
 }
 
-impl Window {
+impl SequenceWindow {
     /// For an incarnation that may have begun long before us: earlier sequences are not missed. Near its beginning both
     /// have just begun. Then missing sequences count as lost, even if nothing listened yet: a router sends to a peer of
     /// which it knows nothing, so packages may have been in them, and each must be accounted for.

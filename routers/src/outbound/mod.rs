@@ -10,9 +10,9 @@
 use crate::admission::capped;
 use crate::broken::broken;
 use crate::counts::Cause;
-use crate::frame::{self, Fragment, Kind, NodeIndex};
-use crate::link::State;
-use crate::queue::{Place, Queue, Waiting};
+use crate::frame::{self, Fragment, FrameKind, NodeIndex};
+use crate::link::PeerLinkState;
+use crate::queue::{Place, Queue, QueuedPackage};
 use crate::report::Report;
 use crate::security::PeerSessions;
 use crate::settings::Settings;
@@ -29,7 +29,7 @@ mod slot;
 
 use flows::Aboard;
 pub(crate) use own::kind_of_own;
-use pace::Pace;
+use pace::Pacer;
 
 /// Longest time from the publishing of a package to its leaving. "At most once" allows 2 s to its mailbox, so this
 /// leaves half a second for the wire and the other end.
@@ -68,7 +68,7 @@ pub enum Accepted {
 
 /// What to do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Output {
+pub enum OutboundStep {
     /// Send the first bytes of the buffer as one datagram, then ask again.
     Send {
         /// Receiver.
@@ -89,7 +89,7 @@ pub struct Outbound {
     settings: Settings,
     stats: Arc<Stats>,
     queue: Queue,
-    pace: Pace,
+    pace: Pacer,
     levels: [u8; 256],
     /// Modules of this node by their numbers, sorted, and the quota of each.
     senders: Box<[(u32, u16)]>,
@@ -135,7 +135,7 @@ impl Outbound {
         let others = settings.senders.len();
         Self {
             queue: Queue::new(others + 1, settings.nodes.len(), settings.network.quota_bytes),
-            pace: Pace::new(settings),
+            pace: Pacer::new(settings),
             levels: std::array::from_fn(|priority| settings.network.level(Priority(priority as u8))),
             senders: senders.into(),
             others: others as u16,
@@ -199,7 +199,8 @@ impl Outbound {
         {
             return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package) };
         }
-        let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
+        let waiting =
+            QueuedPackage { head, published_ns: package.published_ns, peer, sender, level, ..QueuedPackage::default() };
         let stats = &self.stats;
         let taken = self.queue.push(waiting, package.body, |gone, body| {
             stats.waiting[usize::from(gone.level)].take_back(1);
@@ -259,7 +260,7 @@ impl Outbound {
     ///
     /// # Panics
     /// If it has not.
-    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
+    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> OutboundStep {
         let datagram = &mut datagram[..self.datagram_bytes];
         self.aboard.clear();
         self.greet_new_sessions();
@@ -270,13 +271,13 @@ impl Outbound {
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {
-            return Output::Send { to: peer, bytes: self.alive(now_ns, peer, datagram) };
+            return OutboundStep::Send { to: peer, bytes: self.alive(now_ns, peer, datagram) };
         }
         let quiet_until_ns = if self.queue.is_empty() { self.alive_ns } else { self.alive_ns.min(self.sweep_ns) };
         while let Some(place) = self.queue.first_among(self.open()) {
             let waiting = *self.queue.at(place);
             if let Err(until_ns) = self.pace.may_leave(now_ns, waiting.level) {
-                return Output::Wait { until_ns: until_ns.min(quiet_until_ns) };
+                return OutboundStep::Wait { until_ns: until_ns.min(quiet_until_ns) };
             }
             if let Some(cause) = self.why_not(now_ns, waiting.peer, waiting.published_ns) {
                 self.drop_out(place, cause, report);
@@ -287,17 +288,17 @@ impl Outbound {
             } else {
                 self.pack(now_ns, (waiting.peer, waiting.level, LEVELS as u8), datagram, report)
             };
-            return Output::Send { to: waiting.peer, bytes };
+            return OutboundStep::Send { to: waiting.peer, bytes };
         }
         // A package for a peer without a session may become too old.
-        Output::Wait { until_ns: if self.queue.is_empty() { self.alive_ns } else { quiet_until_ns } }
+        OutboundStep::Wait { until_ns: if self.queue.is_empty() { self.alive_ns } else { quiet_until_ns } }
     }
 
     /// The socket did not take the last datagram; nor the body if it was [`Accepted::Send`].
     pub fn unsent(&mut self, datagram: &[u8], body: &[u8], report: &mut impl Report) {
         let Some((kind, peer, mut rest)) = kind_of_own(datagram) else { return };
         self.stats.peer(peer).sent.unsent.add(1);
-        if kind == Kind::Packages {
+        if kind == FrameKind::Packages {
             while let Ok(head) = Head::from_bytes(rest) {
                 rest = &rest[PACKAGE_HEAD_BYTES..];
                 let (inside, behind) = rest.split_at_checked(head.len.into()).unwrap_or((body, &[]));
@@ -305,7 +306,7 @@ impl Outbound {
                 rest = behind;
             }
         }
-        if kind == Kind::Fragment
+        if kind == FrameKind::Fragment
             && let Ok(part) = Fragment::parse(rest)
         {
             // Without this fragment the others are worth nothing.
@@ -344,10 +345,10 @@ impl Outbound {
     fn why_not(&self, now_ns: u64, peer: NodeIndex, published_ns: u64) -> Option<Cause> {
         match self.stats.state(peer, now_ns) {
             _ if is_stale(now_ns, published_ns) => Some(Cause::Stale),
-            State::Unknown | State::Alive => None,
-            State::Silent => Some(Cause::Silent),
-            State::Unheard => Some(Cause::Unheard),
-            State::Refused(_) => Some(Cause::Refused),
+            PeerLinkState::Unknown | PeerLinkState::Alive => None,
+            PeerLinkState::Silent => Some(Cause::Silent),
+            PeerLinkState::Unheard => Some(Cause::Unheard),
+            PeerLinkState::Refused(_) => Some(Cause::Refused),
         }
     }
 
@@ -414,7 +415,7 @@ impl Outbound {
         frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.datagram_bytes
     }
 
-    fn is_large(&self, waiting: &Waiting) -> bool {
+    fn is_large(&self, waiting: &QueuedPackage) -> bool {
         DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.datagram_bytes
     }
 

@@ -11,7 +11,7 @@ use super::datagram::PART_START;
 use super::{DIRECT_HEAD_BYTES, Outbound};
 use crate::broken::broken;
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
-use crate::queue::Waiting;
+use crate::queue::QueuedPackage;
 use crate::report::Report;
 use rohrpost_mailbox::Priority;
 use rohrpost_network::LEVELS;
@@ -77,7 +77,7 @@ impl Outbound {
     }
 
     /// Bytes of a package's own datagram; for a package in fragments, of its next.
-    fn takes_bytes(&self, waiting: &Waiting) -> usize {
+    fn takes_bytes(&self, waiting: &QueuedPackage) -> usize {
         let len = usize::from(waiting.head.len);
         if !self.is_large(waiting) {
             return DIRECT_HEAD_BYTES + len;

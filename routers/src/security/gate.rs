@@ -7,9 +7,9 @@ use super::peer_sessions::{PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::tally::Tally;
 use crate::frame::{self, BadFrame, FrameHead, NodeIndex};
-use crate::inbound::{Came, Inbound};
+use crate::inbound::{Envelope, Inbound};
 use crate::link::SILENT_AFTER_NS;
-use crate::report::{Deliver, Event, Mismatch};
+use crate::report::{Deliver, Mismatch, RouterEvent};
 use crate::stats::Stats;
 use std::sync::Arc;
 
@@ -45,13 +45,13 @@ pub struct Gate {
     /// None at a port without handshakes: the port of packages finds out which incarnations live.
     handshake: Option<Handshake>,
     tally: Tally,
-    peers: Box<[Asked]>,
+    peers: Box<[ChallengeSchedule]>,
     /// Nobody is to be asked before this, ns.
     look_ns: u64,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Asked {
+struct ChallengeSchedule {
     /// When it was asked last, ns; none: never.
     at_ns: Option<u64>,
     /// When its present incarnation began, ns.
@@ -76,7 +76,7 @@ impl Gate {
             opening: Opening::new(all, port),
             handshake,
             tally: Tally::new(all.rejections(port)),
-            peers: vec![Asked::default(); all.router.nodes.into()].into(),
+            peers: vec![ChallengeSchedule::default(); all.router.nodes.into()].into(),
             all: all.clone(),
             look_ns: 0,
         }
@@ -87,7 +87,7 @@ impl Gate {
     pub fn take(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         datagram: &mut [u8],
         inbound: &mut Inbound,
         deliver: &mut impl Deliver,
@@ -183,7 +183,7 @@ impl Gate {
     }
 
     fn is_to_be_asked(&mut self, peer: NodeIndex, now_ns: u64, stats: &Stats) -> bool {
-        let Asked { at_ns, began_ns, missed_since_ns } = &mut self.peers[usize::from(peer)];
+        let ChallengeSchedule { at_ns, began_ns, missed_since_ns } = &mut self.peers[usize::from(peer)];
         let is_over = |every_ns| at_ns.is_none_or(|at_ns| at_ns + every_ns <= now_ns);
         if !self.all.is_peer(peer) || !is_over(DOUBT_EVERY_NS) {
             return false;
@@ -201,7 +201,7 @@ impl Gate {
     fn reject(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         rejection: Rejection,
         why: NotOpened,
         inbound: &Inbound,
@@ -213,7 +213,7 @@ impl Gate {
             inbound.suspect(now_ns, peer, Mismatch { reason, version, digest: None });
         }
         if let Some(datagrams) = self.tally.note(now_ns, peer, rejection) {
-            deliver.event(Event::Rejected { source, peer, why, datagrams });
+            deliver.event(RouterEvent::Rejected { source, peer, why, datagrams });
         }
     }
 }

@@ -23,13 +23,13 @@ pub const CHALLENGE_MAX_NS: u64 = 2 * DRAW_EVERY_NS;
 pub struct Handshake {
     all: Arc<PeerSessions>,
     random: ChaCha20Rng,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerHandshake]>,
     /// An incarnation that has shown that it lives, and has not begun.
     begins: Option<(NodeIndex, PeerIncarnation)>,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Peer {
+struct PeerHandshake {
     /// When the present challenge was drawn, ns.
     drawn_ns: u64,
     /// The challenge before it, and when that was drawn; 0: none.
@@ -60,7 +60,7 @@ pub struct Greeted {
 impl Handshake {
     /// There is one. `seed` comes from a source of random numbers that is fit for keys; each incarnation has another.
     pub fn new(all: &Arc<PeerSessions>, seed: [u8; 32]) -> Self {
-        let peers = vec![Peer::default(); all.router.nodes.into()].into();
+        let peers = vec![PeerHandshake::default(); all.router.nodes.into()].into();
         let mut handshake = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), peers, begins: None };
         (0..all.router.nodes).for_each(|peer| handshake.draw(0, peer));
         handshake

@@ -113,13 +113,13 @@ pub(super) enum Purpose {
 
 /// One end of a direction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct End {
+pub(super) struct Endpoint {
     pub(super) node: NodeIndex,
     /// Its incarnation; 0: any.
     pub(super) incarnation: u64,
 }
 
-impl End {
+impl Endpoint {
     /// Whatever incarnation the node has.
     pub(super) fn any(node: NodeIndex) -> Self {
         Self { node, incarnation: 0 }
@@ -131,8 +131,8 @@ impl End {
 pub(super) struct Binding {
     pub(super) purpose: Purpose,
     pub(super) system: u8,
-    pub(super) from: End,
-    pub(super) to: End,
+    pub(super) from: Endpoint,
+    pub(super) to: Endpoint,
 }
 
 impl Binding {

@@ -50,7 +50,7 @@ pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;
 pub use sealing::{Sealing, Unacquainted};
 pub use tally::{Rejections, TELL_EVERY_NS, Tally};
-pub use waiting::{HELLO_SLOT_BYTES, Waiting};
+pub use waiting::{HELLO_SLOT_BYTES, HelloQueue};
 
 /// Bytes of a datagram that carries a hello.
 pub const HELLO_DATAGRAM_BYTES: usize = crate::frame::HEAD_BYTES + HELLO_BYTES + TAG_BYTES;

@@ -2,14 +2,14 @@
 
 use super::HELLO_DATAGRAM_BYTES;
 use super::hello::Hello;
-use super::keys::End;
+use super::keys::Endpoint;
 use super::peer_sessions::{Known, PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::seal::{self, Seal};
 use super::unverified::UnverifiedIncarnations;
 use crate::broken::broken;
-use crate::frame::{FrameHead, Kind, NodeIndex};
-use crate::inbound::window::{Arrival, Window};
+use crate::frame::{FrameHead, FrameKind, NodeIndex};
+use crate::inbound::window::{Arrival, SequenceWindow};
 use std::sync::Arc;
 
 /// A datagram with a valid seal.
@@ -34,7 +34,7 @@ pub struct Greeting {
 pub struct Opening {
     all: Arc<PeerSessions>,
     port: Port,
-    peers: Box<[Known<Heard>]>,
+    peers: Box<[Known<HeardIncarnation>]>,
     /// By node: incarnations of it that are not known to live.
     overheard: Box<[UnverifiedIncarnations]>,
     /// By node; the one that was heard last stands first.
@@ -54,14 +54,14 @@ struct Past {
 }
 
 /// A peer's present incarnation as it is heard.
-struct Heard {
+struct HeardIncarnation {
     incarnation: u64,
     /// By the place of the key: which of two the peer seals with is its choice.
     seals: Vec<Seal>,
     /// From this sequence on it is heard. At the port of what is not real time no hello says it: then it is that of
     /// what is opened first.
     first: Option<u64>,
-    window: Window,
+    window: SequenceWindow,
 }
 
 impl Opening {
@@ -103,7 +103,7 @@ impl Opening {
         if !is_there(head.from) {
             return Err(Rejection::Address.into());
         }
-        if head.kind == Kind::Hello {
+        if head.kind == FrameKind::Hello {
             return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));
         }
         let past = &mut self.past[usize::from(head.from)];
@@ -130,7 +130,7 @@ impl Opening {
     /// known: then it can be overheard.
     pub fn is_strange(&mut self, datagram: &[u8]) -> bool {
         let Ok((head, _)) = FrameHead::read(datagram) else { return false };
-        let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != Kind::Hello;
+        let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != FrameKind::Hello;
         let heard = |opening: &mut Self| {
             let Self { peers, overheard, past, all, port } = opening;
             let heard = Self::heard(peers, overheard, &mut past[usize::from(head.from)], all, *port, head.from);
@@ -171,7 +171,7 @@ impl Opening {
         self.all.doubt(head.from);
         let all = &self.all;
         let text = self.overheard[usize::from(head.from)].open((&head, key), datagram, || {
-            let peer = End { node: head.from, incarnation: head.incarnation };
+            let peer = Endpoint { node: head.from, incarnation: head.incarnation };
             all.keys.derive(key, &all.binding(Port::Time, peer, all.own()))
         });
         Ok((head, text.ok_or(Rejection::Forged)?))
@@ -203,15 +203,15 @@ impl Opening {
     }
 
     fn heard<'a>(
-        peers: &'a mut [Known<Heard>],
+        peers: &'a mut [Known<HeardIncarnation>],
         overheard: &[UnverifiedIncarnations],
         past: &mut [Past; PAST],
         all: &PeerSessions,
         port: Port,
         from: NodeIndex,
-    ) -> Option<&'a mut Heard> {
+    ) -> Option<&'a mut HeardIncarnation> {
         peers[usize::from(from)].of(all, from, |session| {
-            let peer = End { node: from, incarnation: session.incarnation };
+            let peer = Endpoint { node: from, incarnation: session.incarnation };
             let from = match port {
                 // What is sealed there is sealed to this incarnation of ours: all of it may be opened, and once.
                 Port::Rest => remembered(past, session.incarnation),
@@ -220,11 +220,11 @@ impl Opening {
                     session.next[port as usize].max(overheard[usize::from(from)].next(session.incarnation))
                 }
             };
-            Heard {
+            HeardIncarnation {
                 incarnation: session.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
                 first: (port != Port::Rest).then_some(from),
-                window: Window::going_on(from),
+                window: SequenceWindow::going_on(from),
             }
         })
     }

@@ -1,6 +1,6 @@
 //! The half that seals: one for each port, in the thread that sends there.
 
-use super::keys::End;
+use super::keys::Endpoint;
 use super::peer_sessions::{Known, PeerSessions, Port};
 use super::seal::{self, Seal};
 use crate::frame::{self, FrameHead, NodeIndex};
@@ -42,7 +42,7 @@ impl Sealing {
     /// For time in time slots: seals to each node that has a key, known or not. A node that joins must hear time before
     /// it may send a challenge.
     pub fn of_slots(all: &Arc<PeerSessions>) -> Self {
-        let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), End::any(node)));
+        let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), Endpoint::any(node)));
         Self { strangers: (0..all.router.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
     }
 
@@ -113,7 +113,7 @@ impl Sealing {
         to: NodeIndex,
     ) -> Option<&'a mut PeerSeal> {
         peers[usize::from(to)].of(all, to, |session| {
-            let peer = End { node: to, incarnation: session.incarnation };
+            let peer = Endpoint { node: to, incarnation: session.incarnation };
             let seal = all.keys.derive(session.key, &all.binding(port, all.own(), peer));
             PeerSeal { key: session.key, seal }
         })

@@ -10,16 +10,16 @@ use std::sync::Arc;
 pub const HELLO_SLOT_BYTES: usize = HELLO_DATAGRAM_BYTES - TAG_BYTES;
 
 /// Used by the sending thread of a node in time slots.
-pub struct Waiting {
+pub struct HelloQueue {
     all: Arc<PeerSessions>,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerHellos]>,
     /// The peer with the next turn.
     next: usize,
 }
 
 /// What waits for a peer.
 #[derive(Clone, Default)]
-struct Peer {
+struct PeerHellos {
     reply: Option<Word>,
     question: Option<Word>,
 }
@@ -33,10 +33,10 @@ struct Word {
     datagram: [u8; HELLO_DATAGRAM_BYTES],
 }
 
-impl Waiting {
+impl HelloQueue {
     /// Nothing waits.
     pub fn new(all: &Arc<PeerSessions>) -> Self {
-        Self { peers: vec![Peer::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
+        Self { peers: vec![PeerHellos::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
     }
 
     /// A hello that is to leave. It takes the place of the one before; but a reply by which an incarnation begins gives

@@ -25,10 +25,10 @@ pub mod server;
 mod splitter;
 mod table;
 
-pub use counts::{Cause, ClassCounts, Counts};
+pub use counts::{Cause, SessionClassCounts, SessionCounts};
 pub use estimate::{Bounded, ServerClockEstimate};
 pub use outgoing::BATCH_BYTES;
-pub use table::{Conflict, ENTRIES_MAX, Table};
+pub use table::{Conflict, ENTRIES_MAX, RoutingTable};
 
 use rohrpost_mailbox::{Head, Kind, Name, Options, Type};
 
@@ -58,7 +58,7 @@ pub const FRAME_MAX_NS: u64 = 30_000_000_000;
 pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
 /// Writes the answers to commands that go no further: what a fault looks like is not the routers' business.
-pub trait Answers {
+pub trait ErrorReplies {
     /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for.
     /// False: it gets none.
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
@@ -71,7 +71,7 @@ fn answer_to(
     call: &[u8],
     why: Cause,
     holder: Option<&str>,
-    answers: &mut impl Answers,
+    answers: &mut impl ErrorReplies,
 ) -> Option<(Head, Vec<u8>)> {
     let Kind::Command(number) = head.kind.kind() else { return None };
     let is_answered = head.from.is_mailbox() && head.to.is_mailbox() && why.told().is_some();

@@ -8,7 +8,7 @@
 //! A program of the classic packet filter: it needs no rights, and costs some nanoseconds a datagram. It checks the
 //! address alone. A datagram with a forged node's address passes, and is checked like any other.
 
-use crate::frame::{self, Kind};
+use crate::frame::{self, FrameKind};
 use crate::security::TAG_BYTES;
 use crate::time::TIME_BYTES;
 use socket2::{SockFilter, SockRef};
@@ -58,7 +58,7 @@ pub(super) fn take_time_only_from(socket: &impl AsFd, addresses: &[IpAddr], dige
 fn time_of_others(digest: u64) -> [SockFilter; 12] {
     const UDP_HEAD: u32 = 8;
     let lengths = [TIME_BYTES, TIME_BYTES + TAG_BYTES].map(|bytes| UDP_HEAD + bytes as u32);
-    let [first, last] = [Kind::Sync, Kind::Reply].map(frame::beginning).map(u32::from_be_bytes);
+    let [first, last] = [FrameKind::Sync, FrameKind::Reply].map(frame::beginning).map(u32::from_be_bytes);
     let [low, high] = [0, 32].map(|shift| ((digest >> shift) as u32).swap_bytes());
     [
         SockFilter::new(LOAD_LENGTH, 0, 0, 0),
@@ -184,14 +184,14 @@ mod tests {
         };
         inside.set_nonblocking(true).unwrap();
         for (name, datagram, is_taken) in [
-            ("another low half", frame(Kind::Sync, DIGEST ^ 1), true),
-            ("another high half", frame(Kind::Reply, DIGEST ^ 1 << 63), true),
-            ("sealed", [frame(Kind::Request, 3), vec![0; TAG_BYTES]].concat(), true),
-            ("this configuration", frame(Kind::Sync, DIGEST), false),
-            ("packages", frame(Kind::Packages, 3), false),
-            ("a hello", frame(Kind::Hello, 3), false),
-            ("too long", [frame(Kind::Sync, 3), vec![0]].concat(), false),
-            ("too short", frame(Kind::Sync, 3)[..TIME_BYTES - 1].to_vec(), false),
+            ("another low half", frame(FrameKind::Sync, DIGEST ^ 1), true),
+            ("another high half", frame(FrameKind::Reply, DIGEST ^ 1 << 63), true),
+            ("sealed", [frame(FrameKind::Request, 3), vec![0; TAG_BYTES]].concat(), true),
+            ("this configuration", frame(FrameKind::Sync, DIGEST), false),
+            ("packages", frame(FrameKind::Packages, 3), false),
+            ("a hello", frame(FrameKind::Hello, 3), false),
+            ("too long", [frame(FrameKind::Sync, 3), vec![0]].concat(), false),
+            ("too short", frame(FrameKind::Sync, 3)[..TIME_BYTES - 1].to_vec(), false),
             ("junk", vec![0x5a; TIME_BYTES], false),
         ] {
             // Loopback: it has come, or is dropped, when this returns.

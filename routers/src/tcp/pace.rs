@@ -44,7 +44,7 @@ pub(super) struct Holding {
 
 /// Of one connection.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(super) struct ConnectionPace {
     /// When it was full first, ns; since then it was wanted all the time.
     full_ns: Option<u64>,
     /// Bytes taken since then.
@@ -58,13 +58,13 @@ pub(super) struct Pace {
     unsent: u64,
 }
 
-impl Default for Pace {
+impl Default for ConnectionPace {
     fn default() -> Self {
         Self { full_ns: None, taken: 0, rate: None, is_bound: false, round_trip_ns: None, unsent: UNSENT_BYTES_FIRST }
     }
 }
 
-impl Pace {
+impl ConnectionPace {
     /// What the kernel may keep before it has sent it.
     pub(super) fn unsent_bytes(&self) -> usize {
         self.unsent as usize
@@ -140,7 +140,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     /// A connection that is always full, at so many bytes a ms; what it was told last.
-    fn run(pace: &mut Pace, from_ms: u64, ms: u64, bytes_ms: usize) -> Option<Holding> {
+    fn run(pace: &mut ConnectionPace, from_ms: u64, ms: u64, bytes_ms: usize) -> Option<Holding> {
         let mut last = None;
         for at in from_ms..from_ms + ms {
             last = pace.wrote(bytes_ms, false, || at * MS).or(last);
@@ -156,7 +156,7 @@ mod tests {
             (60, 15 * 1024, Some(60 * 1024), "half a Mbit/s"),
             (10_000, 32 * 1024, None, "fast: the kernel knows best"),
         ] {
-            let mut pace = Pace::default();
+            let mut pace = ConnectionPace::default();
             assert_eq!(pace.batch_bytes(), BATCH_BYTES, "as long as nothing is known");
             let told = run(&mut pace, 0, 2000, bytes_ms).unwrap();
             assert_eq!(
@@ -172,13 +172,13 @@ mod tests {
 
     #[test]
     fn a_connection_is_soon_fast_again_after_a_pause_and_not_slow_for_lack_of_data() {
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         run(&mut pace, 0, 2000, 1000);
         // It takes nothing for seven seconds.
         assert!(pace.wrote(0, false, || 9000 * MS).unwrap().unsent < UNSENT_BYTES_MAX / 2);
         run(&mut pace, 9000, 2000, 1000);
         assert!(pace.rate > Some(900_000) && pace.piece_bytes().is_none(), "{pace:?}");
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         for at in 0..100 {
             assert_eq!(pace.wrote(10, false, || at * 200 * MS), None, "it had all that there was in between");
             pace.wrote(10, true, || at * 200 * MS);
@@ -189,7 +189,7 @@ mod tests {
     /// A line that carries so many bytes a ms, so long there and back, of which no more is under way than is held: what
     /// is held at the end.
     fn run_held(bytes_ms: u64, round_trip_ms: u64) -> u64 {
-        let (mut pace, mut held) = (Pace::default(), 8 * 1024);
+        let (mut pace, mut held) = (ConnectionPace::default(), 8 * 1024);
         pace.set_round_trip(Some(round_trip_ms * MS));
         for round in 0..40 {
             let bytes = held.min(bytes_ms * round_trip_ms);
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn what_was_bound_in_a_pause_is_free_when_it_is_fast_again() {
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         run(&mut pace, 0, 2000, 1000);
         let paused = pace.wrote(0, false, || 9000 * MS).unwrap();
         assert!(paused.held.is_some_and(|held| held < HELD_BYTES_MAX), "{paused:?}");
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn what_takes_all_at_once_is_fast() {
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         let told: Vec<_> = (0..9).filter_map(|_| pace.wrote(65_000, true, || unreachable!())).collect();
         let unsent: Vec<_> = told.iter().map(|holding| holding.unsent).collect();
         assert_eq!((unsent, pace.piece_bytes()), (vec![4096, 8192, 16_384, 32_768], None));

@@ -1,7 +1,7 @@
 //! State of a client and the server, as their threads last stored it, for the thread that publishes it.
 
 use crate::session::server::Crowded;
-use crate::session::{Cause, Counts};
+use crate::session::{Cause, SessionCounts};
 use rohrpost_mailbox::{Name, Priority, TimeRecord};
 use std::sync::{Mutex, PoisonError};
 
@@ -30,8 +30,8 @@ pub struct Class {
 
 impl Class {
     /// All classes that did something.
-    pub(super) fn all(counts: &Counts) -> Vec<Self> {
-        let class = |(priority, counts): (Priority, &crate::session::ClassCounts)| {
+    pub(super) fn all(counts: &SessionCounts) -> Vec<Self> {
+        let class = |(priority, counts): (Priority, &crate::session::SessionClassCounts)| {
             let lost = Cause::ALL.into_iter().map(|cause| (cause, counts.lost(cause))).filter(|(_, count)| *count > 0);
             Self {
                 priority,
@@ -84,7 +84,7 @@ impl Outage {
 
 /// A client, as it sees itself.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Link {
+pub struct ClientLink {
     /// Whether it takes part.
     pub state: LinkState,
     /// Why not, as it was last told; empty if it does.
@@ -109,7 +109,7 @@ pub struct Link {
 
 /// A client, as the server sees it.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Member {
+pub struct MemberSnapshot {
     /// Its name; before its hello, where it comes from.
     pub name: String,
     /// Where it comes from.
@@ -136,7 +136,7 @@ pub struct Member {
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Members {
     /// Connections that are there; of many the first.
-    pub members: Vec<Member>,
+    pub members: Vec<MemberSnapshot>,
     /// Connections besides these.
     pub more: u64,
     /// Clients that took part and do not any more.

@@ -1,6 +1,6 @@
 //! One connection of a session: bytes in and out, sealed or not, without waiting.
 
-use super::pace::{Holding, Pace};
+use super::pace::{ConnectionPace, Holding};
 use super::seal::{Holder, Sealed};
 use nix::libc;
 use rohrpost_mailbox::monotonic_ns;
@@ -25,7 +25,7 @@ pub enum Moved {
 pub struct Stream {
     socket: Paced,
     sealed: Option<Sealed>,
-    pace: Pace,
+    pace: ConnectionPace,
 }
 
 /// A socket. Before each piece the kernel is asked whether it holds enough already: it checks itself only before it
@@ -83,7 +83,7 @@ impl Stream {
     pub(super) fn new(socket: TcpStream, sealed: Option<Sealed>) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         socket.set_nodelay(true)?;
-        let pace = Pace::default();
+        let pace = ConnectionPace::default();
         SockRef::from(&socket).set_tcp_notsent_lowat(pace.unsent_bytes() as u32)?;
         Ok(Self { socket: Paced { socket, piece_bytes: pace.piece_bytes() }, sealed, pace })
     }

@@ -22,7 +22,7 @@ pub const UNPROVEN_CYCLES: u64 = 4;
 
 /// Purpose of a window.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum Kind {
+pub enum WindowKind {
     /// Synchronisation by the master at this place in their order.
     Synchronisation {
         /// From 0.
@@ -39,7 +39,7 @@ pub enum Kind {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Window {
     /// Purpose.
-    pub kind: Kind,
+    pub kind: WindowKind,
     /// Counts cycles of system time since 1970.
     pub cycle: u64,
     /// The first frame is on the wire no earlier than this, system ns.
@@ -61,7 +61,7 @@ pub struct Owner {
 
 /// The slots of a system, and this node's windows among them.
 #[derive(Clone, Debug)]
-pub struct Table {
+pub struct SlotTable {
     own: NodeIndex,
     masters: Vec<NodeIndex>,
     cycle_ns: u64,
@@ -81,7 +81,7 @@ struct Slot {
     phase: u64,
 }
 
-impl Table {
+impl SlotTable {
     /// The table of `nodes` nodes as `own` sees it. `masters` in their order. `heads_bytes`: bytes of IP and UDP
     /// headers for each datagram, see [`Settings::overhead_bytes`](crate::settings::Settings::overhead_bytes).
     pub fn new(tdma: &Tdma, masters: &[NodeIndex], own: NodeIndex, nodes: u8, heads_bytes: usize) -> Self {
@@ -212,7 +212,7 @@ impl Table {
 
     fn synchronisation(&self, rank: u8, cycle: u64) -> Option<Window> {
         self.window(
-            Kind::Synchronisation { rank },
+            WindowKind::Synchronisation { rank },
             cycle,
             u64::from(rank) * self.synchronisation_ns,
             self.synchronisation_ns,
@@ -220,11 +220,11 @@ impl Table {
     }
 
     fn slot_window(&self, index: usize, slot: &Slot, cycle: u64) -> Option<Window> {
-        self.window(Kind::Slot { index: index as u16 }, cycle, slot.offset_ns, slot.length_ns)
+        self.window(WindowKind::Slot { index: index as u16 }, cycle, slot.offset_ns, slot.length_ns)
     }
 
     /// None after the year 2554.
-    fn window(&self, kind: Kind, cycle: u64, offset_ns: u64, length_ns: u64) -> Option<Window> {
+    fn window(&self, kind: WindowKind, cycle: u64, offset_ns: u64, length_ns: u64) -> Option<Window> {
         let begin_ns = cycle.checked_mul(self.cycle_ns)?.checked_add(offset_ns)?;
         let guard_ns = if broken!(IgnoresGuard) { 0 } else { self.guard_ns };
         let end_ns = begin_ns.checked_add(length_ns.saturating_sub(guard_ns))?;

@@ -1,7 +1,7 @@
 //! One window in use: what still fits in it.
 
 use super::LATE_NS;
-use super::table::{Kind, Window};
+use super::table::{Window, WindowKind};
 use super::wire::Wire;
 use crate::broken::broken;
 use crate::time::Allowed;
@@ -123,7 +123,7 @@ impl TransmitWindow {
 
     /// Whether a hello may leave in it.
     pub fn carries_hello(&self) -> bool {
-        matches!(self.window.kind, Kind::Slot { .. })
+        matches!(self.window.kind, WindowKind::Slot { .. })
     }
 
     /// Whether a refusal may leave in it: who is not sure of the time sends nothing but questions.
@@ -135,10 +135,10 @@ impl TransmitWindow {
     pub fn allowed(&self) -> Allowed {
         match self.window.kind {
             _ if self.carries == Carries::Hello && !broken!(TellsUnproven) => Allowed::Nothing,
-            Kind::Synchronisation { .. } => {
+            WindowKind::Synchronisation { .. } => {
                 Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns }
             }
-            Kind::Slot { .. } => Allowed::Slot,
+            WindowKind::Slot { .. } => Allowed::Slot,
         }
     }
 }

@@ -17,7 +17,7 @@ const REFUSED_NS: u64 = 10_000_000_000;
 const APART_NS: u64 = 1_000_000_000;
 
 /// The greater one continues: whether its time is followed, and its digest.
-pub(super) type Claim = (bool, u64);
+pub(super) type TimelineClaim = (bool, u64);
 
 /// A node of another configuration.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +64,7 @@ impl Others {
     }
 
     /// A node, or an address that no node has, sends time of another configuration.
-    pub(super) fn hears(&mut self, node: Option<NodeIndex>, local_ns: u64, theirs: Claim, own: Claim) {
+    pub(super) fn hears(&mut self, node: Option<NodeIndex>, local_ns: u64, theirs: TimelineClaim, own: TimelineClaim) {
         let grace_ns = self.grace_ns;
         let other = self.other(node, theirs.1, local_ns);
         if local_ns.saturating_sub(other.heard_ns) > APART_NS {

@@ -6,7 +6,7 @@ mod pair;
 mod refusals;
 
 use super::order::Order;
-use super::window::{Arrival, Window};
+use super::window::{Arrival, SequenceWindow};
 use super::*;
 use crate::harness::{End, MS, S, START, head, module};
 use proptest::prelude::*;
@@ -34,7 +34,7 @@ pub(crate) const CHECKS: &[fn()] = &[
 
 fn check_window() {
     use Arrival::{Copy, Newest, Overtaken, Returned};
-    let mut window = Window::joining(3);
+    let mut window = SequenceWindow::joining(3);
     let mut lost_in_all = 0;
     for (sequence, arrival, lost, why) in [
         (3, Newest, 0, "the first"),
@@ -71,13 +71,13 @@ fn a_window_knows_gaps_and_copies() {
 #[test]
 fn a_router_that_joins_late_misses_nothing_sent_before() {
     let mut lost = 0;
-    let mut window = Window::joining(5000);
+    let mut window = SequenceWindow::joining(5000);
     assert_eq!(window.arrive(5000, &mut lost), Arrival::Newest);
     assert_eq!(window.arrive(4999, &mut lost), Arrival::Overtaken);
-    let mut window = Window::going_on(5000);
+    let mut window = SequenceWindow::going_on(5000);
     assert_eq!(window.arrive(4999, &mut lost), Arrival::Copy);
     assert_eq!((window.arrive(5000, &mut lost), lost, window.close()), (Arrival::Newest, 0, 0));
-    let mut window = Window::default();
+    let mut window = SequenceWindow::default();
     window.arrive(5000, &mut lost);
     assert_eq!((lost, window.close()), (5000 - 63, 63), "a restarted peer's are ours from the first on");
 }
@@ -157,7 +157,7 @@ proptest! {
     fn a_window_does_what_a_set_does(
         jumps in prop::collection::vec(prop_oneof![8 => -100i64..40, 1 => -1500i64..1500], 1..400),
     ) {
-        let (mut window, mut came, mut lost) = (Window::default(), BTreeSet::new(), 0);
+        let (mut window, mut came, mut lost) = (SequenceWindow::default(), BTreeSet::new(), 0);
         let (mut at, mut returned) = (0i64, 0);
         for jump in jumps {
             at = (at + jump).max(0);
@@ -199,8 +199,15 @@ fn the_real_time_port_decides_which_incarnation_lives() {
     let mut inbound = Inbound::new(&end.settings, rest.clone());
     let mut hear = |end: &mut End, incarnation, sequence| {
         let digest = end.settings.digest;
-        let head =
-            FrameHead { kind: crate::frame::Kind::Alive, system: 1, from: 1, to: 0, digest, incarnation, sequence };
+        let head = FrameHead {
+            kind: crate::frame::FrameKind::Alive,
+            system: 1,
+            from: 1,
+            to: 0,
+            digest,
+            incarnation,
+            sequence,
+        };
         let (told, before) = ([0; 24], rest.peer(1).received.datagrams.get());
         let bytes = [&head.to_bytes(&[&told])[..], &told].concat();
         let datagram = Datagram { source: crate::harness::address(1), arrived_ns: START, bytes: &bytes };

@@ -137,7 +137,7 @@ fn the_largest_package_goes_in_the_smallest_datagrams() {
 }
 
 fn check_what_does_not_go() {
-    let mismatch = Mismatch { reason: crate::frame::Reason::Digest, version: 1, digest: Some(1) };
+    let mismatch = Mismatch { reason: crate::frame::RefusalReason::Digest, version: 1, digest: Some(1) };
     check_cause(|_| {}, Cause::Silent);
     let unheard = |end: &End| {
         let link = &end.stats.peer(1).link;

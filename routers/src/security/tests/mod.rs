@@ -8,7 +8,7 @@ mod slots;
 
 use super::*;
 use crate::broken::{Broken, with};
-use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use crate::frame::{FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use std::num::NonZeroU8;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -70,7 +70,7 @@ impl Router {
     }
 
     pub(super) fn head(&self, port: Port, to: NodeIndex, sequence: u64) -> FrameHead {
-        let kind = if port == Port::Time { Kind::Sync } else { Kind::Packages };
+        let kind = if port == Port::Time { FrameKind::Sync } else { FrameKind::Packages };
         FrameHead { kind, system: SYSTEM, from: self.own, to, digest: DIGEST, incarnation: self.incarnation, sequence }
     }
 

@@ -7,13 +7,13 @@
 //! ```
 
 use super::crowd::Crowd;
-use super::member::{Member, State};
+use super::member::{Member, MemberState};
 use super::principal::{Principal, Principals};
 use super::work::WORK_SHARE;
-use super::{Host, Server};
+use super::{Server, ServerHost};
 use crate::broken::broken;
 use crate::session::ClientIndex;
-use crate::session::frame::{Hello, Reason};
+use crate::session::frame::{SessionHello, SessionRefusalReason};
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 
@@ -76,12 +76,12 @@ impl Places {
 
 impl Server {
     /// A connection was made, from this address. None: so many are there that it must be closed.
-    pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl Host) -> Option<ClientIndex> {
+    pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl ServerHost) -> Option<ClientIndex> {
         let address = Principal::of(from.ip());
         if self.places.greetings.len() >= self.settings.greetings_max.into() {
             let oldest = self.oldest_greeting(&address)?;
             self.places.crowded.greetings += 1;
-            self.refuse(now_ns, oldest, Reason::Silent, (0, 0), "others wait to be let in", host);
+            self.refuse(now_ns, oldest, SessionRefusalReason::Silent, (0, 0), "others wait to be let in", host);
         }
         let index = match self.places.free.pop_first() {
             Some(free) => free,
@@ -103,7 +103,7 @@ impl Server {
         let greetings = &self.places.greetings;
         let (largest, most) = greetings.largest()?;
         if broken!(CrowdsOut) {
-            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == State::Greeting;
+            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Greeting;
             return self.present().filter(greeting).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
         }
         let owner = if greetings.count_of(address) == most { address } else { largest };
@@ -115,15 +115,15 @@ impl Server {
         &mut self,
         now_ns: u64,
         client: ClientIndex,
-        hello: &Hello<'_>,
-        host: &mut impl Host,
+        hello: &SessionHello<'_>,
+        host: &mut impl ServerHost,
     ) -> bool {
         let Some(owner) = self.member(client).map(|member| member.principal.clone()) else { return false };
         if self.places.principals.members.len() >= self.settings.clients_max.into() {
             let Some(newest) = self.gives_way_to(&owner) else { return false };
             self.places.crowded.clients += 1;
             let text = "the principal with most connections gives way to one with fewer";
-            self.refuse(now_ns, newest, Reason::Full, (0, 0), text, host);
+            self.refuse(now_ns, newest, SessionRefusalReason::Full, (0, 0), text, host);
         }
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return false };
         self.places.greets_no_more(client, member);
@@ -156,7 +156,7 @@ impl Server {
     /// The place is free; the next client in it is another.
     pub(super) fn free(&mut self, client: ClientIndex) {
         let Some(member) = self.members.get_mut(usize::from(client.0)).and_then(Option::take) else { return };
-        if member.state == State::Greeting {
+        if member.state == MemberState::Greeting {
             self.places.greets_no_more(client, &member);
         }
         if member.is_due {

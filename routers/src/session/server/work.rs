@@ -39,13 +39,13 @@ impl Default for Registering {
 pub(super) struct Registrations {
     /// The next one is not looked at before, ns.
     pub(super) next_ns: u64,
-    pub(super) waiting: Option<Waiting>,
+    pub(super) waiting: Option<PendingRegistration>,
     /// Ranges that it hosts.
     pub(super) ranges: usize,
 }
 
 #[derive(Debug)]
-pub(super) struct Waiting {
+pub(super) struct PendingRegistration {
     pub(super) number: u32,
     pub(super) ranges: Vec<Range>,
 }

@@ -4,8 +4,8 @@ use super::ground::Notes;
 use super::plan::{COMMON, server_settings};
 use super::world::MS;
 use crate::session::ClientIndex;
-use crate::session::frame::{Hello, Message, Range, Ranges};
-use crate::session::server::{Output, Server, ServerSettings};
+use crate::session::frame::{Range, Ranges, SessionHello, SessionMessage};
+use crate::session::server::{Server, ServerSettings, ServerStep};
 use nix::time::{ClockId, clock_gettime};
 use rohrpost_mailbox::Name;
 use std::time::Duration;
@@ -25,7 +25,7 @@ fn says(client: usize) -> Vec<u8> {
     let ranges: Vec<Range> = (0..RANGES).map(|index| Range::module(module(index))).collect();
     let (mut bytes, mut laid_out) = (Vec::new(), Vec::new());
     let (system, incarnation, name) = (module(0).system(), 1 + client as u64, "a client");
-    let hello = Hello {
+    let hello = SessionHello {
         system,
         reaches_own: true,
         common: COMMON,
@@ -35,8 +35,8 @@ fn says(client: usize) -> Vec<u8> {
         asked_ns: 1,
         name,
     };
-    Message::Hello(hello).write(&mut bytes);
-    Message::Register(Ranges::new(1, &ranges, &mut laid_out)).write(&mut bytes);
+    SessionMessage::Hello(hello).write(&mut bytes);
+    SessionMessage::Register(Ranges::new(1, &ranges, &mut laid_out)).write(&mut bytes);
     bytes
 }
 
@@ -57,7 +57,7 @@ fn coming_at_once(clients: usize) -> Duration {
         assert!(looks < 100, "{} ranges of {clients} clients", server.table().len());
         (now_ns, looks) = (now_ns + 100 * MS, looks + 1);
         let began = worked();
-        while let Output::Write(client) = server.poll(now_ns, &mut host) {
+        while let ServerStep::Write(client) = server.poll(now_ns, &mut host) {
             let bytes = server.ready(client).len();
             server.took(now_ns, client, bytes);
         }

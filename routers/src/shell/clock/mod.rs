@@ -20,7 +20,7 @@ mod works;
 
 pub use local::Skew;
 pub(crate) use local::looked;
-pub use state::{ClockState, Snapshot};
+pub use state::{ClockSnapshot, ClockState};
 pub(super) use works::Works;
 
 use crate::impair;
@@ -31,7 +31,7 @@ use nix::sys::time::TimeSpec;
 use rohrpost_config::{FIFO_MAX, Installation, TimeSource};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_mailbox::{Node, NodeError, monotonic_ns};
-use share::Share;
+use share::CpuBudget;
 use std::io::{self, PipeReader, PipeWriter};
 use std::net::SocketAddr;
 use std::os::fd::AsFd;
@@ -73,7 +73,7 @@ pub struct ClockParts {
     /// The node whose page it writes; none in tests that look at [`ClockState`] alone.
     pub node: Option<Arc<Node>>,
     /// A bad network before its socket.
-    pub impair: Option<impair::Settings>,
+    pub impair: Option<impair::ImpairmentSettings>,
     /// Whether the kernel stamps datagrams, if it can; else the clock does, as where it cannot.
     pub kernel_stamps: bool,
     /// For tests: see [`Skew`].
@@ -162,7 +162,7 @@ impl Worker {
         // The router's other threads tell when it is refused.
         self.works.runs_in_real_time(schedule(Scheduling::Fifo(FIFO)).is_ok());
         let mut datagram = [0; TIME_BYTES];
-        let mut share = Share::new(monotonic_ns());
+        let mut share = CpuBudget::new(monotonic_ns());
         loop {
             let began_ns = monotonic_ns();
             // Used up, what comes waits; what is due is sent all the same.

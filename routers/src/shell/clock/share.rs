@@ -12,14 +12,14 @@ const USED_NS_MAX: u64 = 1_000_000;
 
 /// What is left of it.
 #[derive(Debug)]
-pub(super) struct Share {
+pub(super) struct CpuBudget {
     /// Less than 0: it used more than it had.
     saved_ns: i64,
     since_ns: u64,
     is_used_up: bool,
 }
 
-impl Share {
+impl CpuBudget {
     pub(super) fn new(now_ns: u64) -> Self {
         Self { saved_ns: SAVED_NS_MAX.cast_signed(), since_ns: now_ns, is_used_up: false }
     }
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn a_flooded_thread_works_a_tenth_of_the_time_and_others_never_rest() {
-        let (mut share, mut now_ns, mut worked_ns) = (Share::new(0), 0, 0);
+        let (mut share, mut now_ns, mut worked_ns) = (CpuBudget::new(0), 0, 0);
         while now_ns < 1_000 * MS {
             match share.rests_until_ns(now_ns) {
                 Some(until_ns) => now_ns = until_ns,
@@ -68,7 +68,7 @@ mod tests {
             }
         }
         assert!((99 * MS..104 * MS).contains(&worked_ns), "{worked_ns} of {now_ns}");
-        let mut quiet = Share::new(0);
+        let mut quiet = CpuBudget::new(0);
         for round in 1..10_000 {
             assert_eq!(quiet.rests_until_ns(round * MS), None);
             quiet.uses(round * MS, round * MS + 80_000);

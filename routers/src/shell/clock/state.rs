@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// How it stands with system time on this node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Snapshot {
+pub struct ClockSnapshot {
     /// What the node does for the common time.
     pub role: Role,
     /// The master that it follows, or itself.
@@ -38,7 +38,7 @@ pub struct Snapshot {
     pub real_time: bool,
 }
 
-impl Snapshot {
+impl ClockSnapshot {
     pub(super) fn of(clock: &Clock, now_ns: u64) -> Self {
         let Reading { term, synchronised, .. } = clock.reading(now_ns);
         Self {
@@ -63,21 +63,21 @@ impl Snapshot {
 /// Shared by the clock's thread and whoever wants to know.
 #[derive(Debug)]
 pub struct ClockState {
-    snapshot: Mutex<Snapshot>,
+    snapshot: Mutex<ClockSnapshot>,
 }
 
 impl ClockState {
-    pub(super) fn new(snapshot: Snapshot) -> Self {
+    pub(super) fn new(snapshot: ClockSnapshot) -> Self {
         Self { snapshot: Mutex::new(snapshot) }
     }
 
     /// How it stands. For tools: modules read the node's page.
-    pub fn snapshot(&self) -> Snapshot {
+    pub fn snapshot(&self) -> ClockSnapshot {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Of the clock's thread. It never waits for who looks: then the next one is shown.
-    pub(super) fn show(&self, snapshot: &Snapshot) {
+    pub(super) fn show(&self, snapshot: &ClockSnapshot) {
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;
         }

@@ -2,11 +2,11 @@
 //! look at. Whose thread it is, and when that sends, is its owner's business.
 
 use super::local::LocalClock;
-use super::socket::{Came, TimeSocket};
-use super::state::{ClockState, Snapshot};
+use super::socket::{ReceivedDatagram, TimeSocket};
+use super::state::{ClockSnapshot, ClockState};
 use super::{ClockError, ClockParts};
 use crate::frame::{BadFrame, FrameHead, NodeIndex};
-use crate::impair::{Impairment, Output};
+use crate::impair::{Impairment, ImpairmentStep};
 use crate::security::{NotOpened, Opened, Opening, PeerSessions, Port, Rejection, Sealing, TAG_BYTES, Tally};
 use crate::time::{Clock, Exchange, InSlots, SentId, Stamp, TIME_BYTES};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, realtime_ns};
@@ -23,7 +23,7 @@ const SEALED_BYTES: usize = TIME_BYTES + TAG_BYTES;
 
 /// What the impairment keeps besides the bytes.
 #[derive(Clone, Copy)]
-struct Held {
+struct DelayedArrival {
     source: IpAddr,
     stamp: Stamp,
     since_ns: u64,
@@ -36,11 +36,11 @@ pub(in crate::shell) struct Works {
     socket: TimeSocket,
     keeper: Option<TimeKeeper>,
     written: Option<TimeRecord>,
-    impairment: Option<Impairment<Held>>,
+    impairment: Option<Impairment<DelayedArrival>>,
     observer: Option<SyncSender<Exchange>>,
     seals: Option<Seals>,
     state: Arc<ClockState>,
-    snapshot: Snapshot,
+    snapshot: ClockSnapshot,
     system: u8,
     /// Who says what time it is by another configuration, from an address that no node has.
     refuse: Option<IpAddr>,
@@ -54,7 +54,7 @@ struct Seals {
 }
 
 /// A datagram of time that was opened.
-enum Heard<'a> {
+enum TimeDatagram<'a> {
     /// Of an incarnation that is known to live.
     Proven(FrameHead, &'a [u8]),
     /// Of one that may be over.
@@ -71,13 +71,13 @@ impl Seals {
         node: Option<NodeIndex>,
         overhears: bool,
         datagram: &'a mut [u8],
-    ) -> Option<Heard<'a>> {
+    ) -> Option<TimeDatagram<'a>> {
         let is_there = |from| node == Some(from);
         let opened = if overhears && self.opening.is_strange(datagram) {
-            self.opening.overhear_from(datagram, is_there).map(|(head, text)| Heard::Overheard(head, text))
+            self.opening.overhear_from(datagram, is_there).map(|(head, text)| TimeDatagram::Overheard(head, text))
         } else {
             match self.opening.open_from(datagram, is_there) {
-                Ok(Opened::Frame(head, text)) => Ok(Heard::Proven(head, text)),
+                Ok(Opened::Frame(head, text)) => Ok(TimeDatagram::Proven(head, text)),
                 // A hello is for the other port: the one that opens says so.
                 Ok(Opened::Hello(..)) => Err(Rejection::NotOurs.into()),
                 Err(why) => Err(why),
@@ -109,7 +109,7 @@ impl Works {
         let page = keeper.as_ref().and_then(TimeKeeper::record);
         let watched = keeper.as_ref().and_then(TimeKeeper::watched);
         let clock = Clock::new(settings, local.now_ns(), realtime_ns(), page).watching(local.now_ns(), watched);
-        let snapshot = Snapshot::of(&clock, local.now_ns());
+        let snapshot = ClockSnapshot::of(&clock, local.now_ns());
         let mut works = Self {
             clock,
             local,
@@ -219,12 +219,14 @@ impl Works {
     fn take_datagrams(&mut self, most: usize) -> u64 {
         let mut datagram = [0; SEALED_BYTES];
         for _ in 0..most {
-            let Some(Came { bytes, source, realtime_ns }) = self.socket.receive(&mut datagram) else { break };
+            let Some(ReceivedDatagram { bytes, source, realtime_ns }) = self.socket.receive(&mut datagram) else {
+                break;
+            };
             let now_ns = self.local.now_ns();
             let stamp = realtime_ns.and_then(|ns| self.local.stamp(ns)).unwrap_or(Stamp::by_us(now_ns));
             match &mut self.impairment {
                 Some(impairment) => {
-                    impairment.push(now_ns, Held { source, stamp, since_ns: now_ns }, &datagram[..bytes])
+                    impairment.push(now_ns, DelayedArrival { source, stamp, since_ns: now_ns }, &datagram[..bytes])
                 }
                 None => self.hand(now_ns, source, stamp, &mut datagram[..bytes]),
             }
@@ -237,9 +239,9 @@ impl Works {
         loop {
             let now_ns = self.local.now_ns();
             let Some(impairment) = &mut self.impairment else { return u64::MAX };
-            let (Held { source, stamp, since_ns }, held) = match impairment.poll(now_ns) {
-                Output::Send { to, datagram } => (to, datagram),
-                Output::Wait { until_ns } => return until_ns,
+            let (DelayedArrival { source, stamp, since_ns }, held) = match impairment.poll(now_ns) {
+                ImpairmentStep::Send { to, datagram } => (to, datagram),
+                ImpairmentStep::Wait { until_ns } => return until_ns,
             };
             let bytes = held.len().min(SEALED_BYTES);
             datagram[..bytes].copy_from_slice(&held[..bytes]);
@@ -251,20 +253,20 @@ impl Works {
     fn hand(&mut self, now_ns: u64, source: IpAddr, stamp: Stamp, datagram: &mut [u8]) {
         let overhears = self.clock.overhears(now_ns);
         let opened = match &mut self.seals {
-            None => FrameHead::parse(datagram).ok().map(|(head, rest)| Heard::Proven(head, rest)),
+            None => FrameHead::parse(datagram).ok().map(|(head, rest)| TimeDatagram::Proven(head, rest)),
             Some(seals) => seals.open(now_ns, source, self.socket.node_at(source), overhears, datagram),
         };
         let taken = match opened {
-            Some(Heard::Proven(head, rest)) if head.digest != self.clock.digest() => {
+            Some(TimeDatagram::Proven(head, rest)) if head.digest != self.clock.digest() => {
                 let node = self.socket.node_at(source);
                 // Whoever has an address that no node has here does not hear it from anybody else.
                 self.refuse = self.refuse.or((node.is_none() && head.system == self.system).then_some(source));
                 self.clock.handle_other(now_ns, stamp, node, &head, rest).is_ok()
             }
-            Some(Heard::Proven(head, rest)) if self.socket.is_from(head.from, source) => {
+            Some(TimeDatagram::Proven(head, rest)) if self.socket.is_from(head.from, source) => {
                 self.clock.handle(now_ns, stamp, &head, rest).is_ok()
             }
-            Some(Heard::Overheard(head, rest)) if self.socket.is_from(head.from, source) => {
+            Some(TimeDatagram::Overheard(head, rest)) if self.socket.is_from(head.from, source) => {
                 self.clock.overhear(now_ns, stamp, &head, rest).is_ok()
             }
             _ => false,
@@ -295,9 +297,9 @@ impl Works {
     }
 
     fn show(&mut self) {
-        let Snapshot { exchanges, by_kernel, ignored, real_time, .. } = self.snapshot;
-        let seen = Snapshot::of(&self.clock, self.local.now_ns());
-        self.snapshot = Snapshot { exchanges, by_kernel, ignored, real_time, ..seen };
+        let ClockSnapshot { exchanges, by_kernel, ignored, real_time, .. } = self.snapshot;
+        let seen = ClockSnapshot::of(&self.clock, self.local.now_ns());
+        self.snapshot = ClockSnapshot { exchanges, by_kernel, ignored, real_time, ..seen };
         self.state.show(&self.snapshot);
     }
 }

@@ -2,9 +2,9 @@
 
 use super::super::socket::InSocket;
 use super::speech;
-use crate::frame::{NodeIndex, Reason};
+use crate::frame::{NodeIndex, RefusalReason};
 use crate::inbound::write_refusal;
-use crate::security::{HELLO_SLOT_BYTES, Said, Waiting};
+use crate::security::{HELLO_SLOT_BYTES, HelloQueue, Said};
 use crate::settings::Settings;
 use crate::tdma::TransmitWindow;
 use std::net::IpAddr;
@@ -36,7 +36,7 @@ pub(in crate::shell) struct AnswerQueue {
     /// When somebody without a number was refused last, ns.
     refused_ns: u64,
     /// Where all is sealed.
-    hellos: Option<Waiting>,
+    hellos: Option<HelloQueue>,
     /// By which they leave.
     socket: Arc<InSocket>,
     settings: Arc<Settings>,
@@ -45,7 +45,7 @@ pub(in crate::shell) struct AnswerQueue {
 impl AnswerQueue {
     pub(in crate::shell) fn new(
         answers: Receiver<Answer>,
-        hellos: Option<Waiting>,
+        hellos: Option<HelloQueue>,
         socket: Arc<InSocket>,
         settings: Arc<Settings>,
     ) -> Self {
@@ -70,7 +70,7 @@ impl AnswerQueue {
         if self.refusal.is_none() && self.hellos.is_none() && self.refused_ns + REFUSE_EVERY_NS <= now_ns {
             self.refused_ns = now_ns;
             let mut datagram = [0; REFUSAL_BYTES];
-            let bytes = write_refusal(&self.settings, None, Reason::Digest, &mut datagram);
+            let bytes = write_refusal(&self.settings, None, RefusalReason::Digest, &mut datagram);
             self.refusal = Some(Answer::Refusal { to, bytes, datagram });
         }
     }

@@ -2,7 +2,7 @@
 
 use super::super::clock::FIFO;
 use crate::driver::spin_ns;
-use crate::tdma::{Table, Window};
+use crate::tdma::{SlotTable, Window};
 use rohrpost_config::duration_decimal;
 use rohrpost_mailbox::sys::{Reservation, Scheduling, reserve, schedule};
 use std::time::Duration;
@@ -32,7 +32,7 @@ pub enum Granted {
 impl Granted {
     /// Asks for the calling thread; what is refused is told once. Never bound to a processor: where another thread
     /// stands in the way it goes to the next.
-    pub(super) fn ask(table: &Table) -> Self {
+    pub(super) fn ask(table: &SlotTable) -> Self {
         let wanted = Wanted::new(table);
         let refused = match reserve(wanted.reservation()) {
             Ok(()) => {
@@ -77,7 +77,7 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn new(table: &Table) -> Self {
+    fn new(table: &SlotTable) -> Self {
         let period_ns = table.cycle_ns().min(PERIOD_NS_MAX);
         let naps_ns = period_ns / 1_000_000 * MILLISECOND_NS;
         Self { period_ns, needed_ns: busiest_ns(table, period_ns) + naps_ns }
@@ -108,7 +108,7 @@ impl Wanted {
 }
 
 /// What windows take that begin within one period, at most.
-fn busiest_ns(table: &Table, period_ns: u64) -> u64 {
+fn busiest_ns(table: &SlotTable, period_ns: u64) -> u64 {
     let end_ns = CYCLES * table.cycle_ns() + period_ns;
     let next = |from_ns| table.next_window(from_ns).filter(|window| window.begin_ns < end_ns);
     let windows = std::iter::successors(next(0), |window| next(window.begin_ns + 1));
@@ -149,7 +149,7 @@ mod tests {
             slots: slots.iter().map(slot).collect(),
             tunnel: None,
         };
-        Wanted::new(&Table::new(&tdma, &[0], 0, 3, settings(0, 3).overhead_bytes()))
+        Wanted::new(&SlotTable::new(&tdma, &[0], 0, 3, settings(0, 3).overhead_bytes()))
     }
 
     #[test]

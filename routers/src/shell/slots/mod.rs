@@ -12,15 +12,15 @@ mod speech;
 mod state;
 
 pub use granted::Granted;
-pub use state::{Snapshot, State};
+pub use state::{SlotSnapshot, SlotStatus};
 
-use super::answers::Answers;
+use super::answers::ErrorReplier;
 use super::clock::{ClockState, Works};
 use super::failure::Failure;
 use super::sending::Sending;
 use super::threads::Shared;
 use super::tx_thread::TxThread;
-use super::wire::Wire;
+use super::wire::PeerSockets;
 use crate::driver::{NotSent, Platform, SlotDriver, SlotStep, WindowLog};
 use crate::frame::NodeIndex;
 use crate::intake::Transit;
@@ -46,7 +46,7 @@ pub(super) struct Own {
 }
 
 /// What the thread has.
-pub(super) struct Slots {
+pub(super) struct SlotThread {
     driver: SlotDriver,
     system: System,
 }
@@ -59,15 +59,15 @@ struct System {
     works: Works,
     transit: Receiver,
     outbound: Outbound,
-    answers: Answers,
-    wire: Wire,
+    answers: ErrorReplier,
+    wire: PeerSockets,
     line: AnswerQueue,
     router: Name,
-    snapshot: Snapshot,
-    state: Arc<State>,
+    snapshot: SlotSnapshot,
+    state: Arc<SlotStatus>,
 }
 
-impl Slots {
+impl SlotThread {
     /// From what would send as packages come.
     pub(super) fn new(
         own: Own,
@@ -78,8 +78,8 @@ impl Slots {
     ) -> Self {
         let TxThread { shared, transit, sending, .. } = tx_thread;
         let Sending { outbound, answers, wire, datagram, stats } = sending;
-        let snapshot = Snapshot::new(scheduler.silent());
-        let state = Arc::new(State::new(snapshot));
+        let snapshot = SlotSnapshot::new(scheduler.silent());
+        let state = Arc::new(SlotStatus::new(snapshot));
         let driver = SlotDriver::new(own.network, own.nodes, scheduler, datagram, monotonic_ns());
         let router = own.router;
         let system = System { shared, stats, works, transit, outbound, answers, wire, line, router, snapshot, state };
@@ -87,7 +87,7 @@ impl Slots {
     }
 
     /// What others may look at.
-    pub(super) fn state(&self) -> Arc<State> {
+    pub(super) fn state(&self) -> Arc<SlotStatus> {
         self.system.state.clone()
     }
 
@@ -169,7 +169,7 @@ impl Platform for System {
         speech::tell_change(before, silent, || line.parted_by(works.clock.parted_by(works.now_ns())));
         let (counts, lead_ns) = (scheduler.counts(&works.clock), scheduler.lead_ns());
         let WindowLog { held, windows } = *log;
-        *snapshot = Snapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
+        *snapshot = SlotSnapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
         state.show(snapshot);
     }
 

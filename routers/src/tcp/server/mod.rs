@@ -8,9 +8,9 @@ mod reporter;
 
 use super::fault_writer::FaultWriter;
 use super::seal::{Holder, ServerSeal};
-use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, Member, Members, SAY_EVERY_NS};
+use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, MemberSnapshot, Members, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
-use crate::session::server::{Names, Output, Rights, Server, ServerSettings, View};
+use crate::session::server::{Names, Rights, Server, ServerSettings, ServerStep, View};
 use crate::session::{Cause, ClientIndex};
 use crate::shell::Faults;
 use door::{listen, raise_descriptors};
@@ -75,12 +75,12 @@ pub struct ServerParts<'a> {
 
 /// The TCP router at work; dropped, it tells its clients and ends.
 pub struct ServerShell {
-    shared: Arc<Shared>,
+    shared: Arc<ServerShared>,
     thread: Option<JoinHandle<()>>,
 }
 
 #[derive(Debug)]
-struct Shared {
+struct ServerShared {
     ends: AtomicBool,
     bell: EventFd,
     seen: LatestValue<Members>,
@@ -105,9 +105,9 @@ impl ServerShell {
             epoll.add(&bell, EpollEvent::new(EpollFlags::EPOLLIN, BELL))
         };
         watch(&epoll).map_err(|errno| io("epoll")(errno.into()))?;
-        let shared = Arc::new(Shared { ends: AtomicBool::new(false), bell, seen: LatestValue::default() });
+        let shared = Arc::new(ServerShared { ends: AtomicBool::new(false), bell, seen: LatestValue::default() });
         let fault_writer = FaultWriter::new(faults, format!("beyond the TCP router at {address}"));
-        let work = Work {
+        let work = ServerThread {
             shared: shared.clone(),
             server: Server::new(settings),
             host: ServerReporter::new(fault_writer),
@@ -149,7 +149,7 @@ impl Drop for ServerShell {
     }
 }
 
-struct Connection {
+struct ServerConnection {
     stream: Stream,
     peer: String,
     /// It has shown a certificate, if it must.
@@ -159,8 +159,8 @@ struct Connection {
 }
 
 /// What the thread has.
-struct Work {
-    shared: Arc<Shared>,
+struct ServerThread {
+    shared: Arc<ServerShared>,
     server: Server,
     host: ServerReporter,
     seal: Option<ServerSeal>,
@@ -173,12 +173,12 @@ struct Work {
     accept_ns: Option<u64>,
     epoll: Epoll,
     /// By client.
-    connections: Vec<Option<Connection>>,
+    connections: Vec<Option<ServerConnection>>,
     clock: SystemClock,
     piece: Box<[u8]>,
 }
 
-impl Work {
+impl ServerThread {
     /// Until the router ends.
     fn run(mut self) {
         let mut events = [EpollEvent::empty(); EVENTS];
@@ -203,10 +203,10 @@ impl Work {
                 self.server.end(now_ns, &mut self.host);
             }
             match self.server.poll(now_ns, &mut self.host) {
-                Output::Write(client) => self.write(client),
-                Output::Close(client) => self.close(client),
-                Output::Wait { .. } if ending && self.connections.iter().all(Option::is_none) => return,
-                Output::Wait { until_ns } => self.sleep(&mut events, until_ns.min(say_ns)),
+                ServerStep::Write(client) => self.write(client),
+                ServerStep::Close(client) => self.close(client),
+                ServerStep::Wait { .. } if ending && self.connections.iter().all(Option::is_none) => return,
+                ServerStep::Wait { until_ns } => self.sleep(&mut events, until_ns.min(say_ns)),
             }
         }
     }
@@ -327,7 +327,7 @@ impl Work {
             let hosts = hosts.get_mut(usize::from(client.0)).filter(|hosts| hosts.len() < HOSTS_MAX);
             hosts.into_iter().for_each(|hosts| hosts.push((range.first, range.last)));
         }
-        let member = |client: View<'_>| Member {
+        let member = |client: View<'_>| MemberSnapshot {
             name: client.name.to_owned(),
             peer: self
                 .connections
@@ -366,6 +366,6 @@ impl Work {
     }
 }
 
-fn connection(connections: &mut [Option<Connection>], client: ClientIndex) -> Option<&mut Connection> {
+fn connection(connections: &mut [Option<ServerConnection>], client: ClientIndex) -> Option<&mut ServerConnection> {
     connections.get_mut(usize::from(client.0))?.as_mut()
 }
