@@ -84,7 +84,7 @@ const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 1), ("routers/src", 1)
 
 /// How many lines of a folder are still too wide, or have words that are not the field's; they may only become fewer.
 const WORDS_LEFT: &[(&str, usize)] = &[
-    ("cli/src", 7),
+    ("cli/src", 6),
     ("gui-bridge/src", 7),
     ("mailbox/proof", 49),
     ("mailbox/src", 119),
@@ -92,8 +92,8 @@ const WORDS_LEFT: &[(&str, usize)] = &[
     ("modules/schema", 2),
     ("modules/src", 108),
     ("modules/tests", 4),
-    ("routers/src", 182),
-    ("routers/tests", 17),
+    ("routers/src", 43),
+    ("routers/tests", 15),
     ("tests", 1),
     ("tests/e2e", 2),
     ("tests/testbed", 114),

@@ -83,7 +83,7 @@ pub enum RouterEvent {
         /// Which.
         peer: NodeIndex,
     },
-    /// We take nothing from whoever sent this.
+    /// Its sender is refused: we take nothing from it.
     Refused {
         /// Where it came from.
         source: IpAddr,

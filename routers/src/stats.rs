@@ -1,4 +1,4 @@
-//! What a router counts, for whoever wants to know: packages by class, losses by cause, peers.
+//! What a router counts: packages by class, losses by cause, peers.
 //!
 //! What is not real time has threads of its own ([`Stats::of_rest`]): they count its classes in the same places, and
 //! datagrams in their own.
@@ -44,7 +44,7 @@ pub struct Stats {
     pub on_wire_bytes: Count,
     /// When the router began, ns of the monotonic clock.
     pub started_ns: u64,
-    /// Of what is not real time: who knows which peers are there.
+    /// Of what is not real time: the counters that know which peers are there.
     knows: Option<Arc<Self>>,
 }
 

@@ -5,7 +5,7 @@
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::frame::{Alive, Fragment, Frame, FrameHead, FrameKind, Refusal, RefusalReason, VERSION};
 use rohrpost_routers::session::frame::HOPS_MAX;
-use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, GREETING_MAX_NS};
+use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, HANDSHAKE_MAX_NS};
 use rohrpost_routers::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
 use rohrpost_routers::time::Term;
 use rohrpost_routers::time::message::{Reply, Request, Sync, TimeMessage};
@@ -150,7 +150,7 @@ fn time_has_the_documented_bytes() {
 fn sessions_close_after_the_documented_times() {
     let seconds = |ns: u64| format!("{} s", ns as f64 / 1e9);
     for (ns, words) in [
-        (GREETING_MAX_NS, "from its beginning to the welcome"),
+        (HANDSHAKE_MAX_NS, "from its beginning to the welcome"),
         (SILENT_AFTER_NS, "in which nothing came; in the middle of a frame 8 s"),
         (SILENT_AFTER_NS, "if also the oldest question of the client that was not answered left 2.5 s ago"),
         (STALLED_AFTER_NS, "in which the stream took nothing of what was ready"),

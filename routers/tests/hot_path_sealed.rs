@@ -46,7 +46,7 @@ impl Router {
     fn greet(&mut self, now_ns: u64, hello: &mut [u8; HELLO_DATAGRAM_BYTES]) -> bool {
         let mut reply = [0; HELLO_DATAGRAM_BYTES];
         let Opened::Hello(head, greeting) = self.opening.open(hello).unwrap() else { panic!("no hello") };
-        let replied = self.handshake.greet(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
+        let replied = self.handshake.receive(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
         self.handshake.begin();
         *hello = reply;
         replied

@@ -47,7 +47,7 @@ impl Module for ServerModule {
             own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
             incarnation: realtime_ns().max(1),
             clients_max: tcp.clients,
-            greetings_max: tcp.clients.max(HANDSHAKES_MIN),
+            handshakes_max: tcp.clients.max(HANDSHAKES_MIN),
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
         };
@@ -75,12 +75,12 @@ impl Module for ServerModule {
                 refused: seen.refused,
                 refusal: seen.refusal,
                 crowded: BeyondCrowded {
-                    greetings: seen.crowded.greetings,
+                    greetings: seen.crowded.handshakes,
                     clients: seen.crowded.clients,
                     ranges: seen.crowded.ranges,
                     packages: seen.crowded_packages,
                 },
-                overtaken: seen.overtaken,
+                overtaken: seen.superseded,
                 held_lines: seen.held,
                 classes: classes(&seen.classes),
             },

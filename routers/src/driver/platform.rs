@@ -26,7 +26,7 @@ pub trait Platform {
     fn time(&mut self) -> (&mut Clock, &Stats);
     /// The router's mailbox, and the queue behind it.
     fn transit(&mut self) -> impl Transit;
-    /// The queue; and who is told of what it loses.
+    /// The queue, and the receiver of reports on what it loses.
     fn queue(&mut self) -> (&mut Outbound, impl Report);
     /// Hands over the datagram in the first `bytes` of a buffer, which has room for a seal behind them.
     ///

@@ -116,7 +116,7 @@ impl SlotDriver {
             Phase::Sleeps(Some(planned)) => {
                 self.look(on);
                 self.open(on, &planned);
-                // Who is to send only if a Sync is missing looks for it once more.
+                // A node that sends only if a Sync is missing looks for that Sync once more.
                 let is_slot = matches!(planned.window.kind, WindowKind::Slot { .. });
                 let looks = !is_slot && planned.call_ns.saturating_sub(on.local_ns()) > 2 * LAST_LOOK_NS;
                 self.phase = Phase::Spins { planned, looks };
@@ -158,8 +158,8 @@ impl SlotDriver {
         }
     }
 
-    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is silent waits
-    /// for datagrams of time; others read them once a cycle at least.
+    /// Between windows: drops what waits in vain, and keeps room in the mailbox. A silent node waits for datagrams of
+    /// time; others read them once a cycle at least.
     fn between(&mut self, on: &mut impl Platform, is_silent: bool, wake_ns: u64) {
         let now_ns = on.monotonic_ns();
         self.tidied_ns = now_ns;
@@ -327,8 +327,7 @@ impl SlotDriver {
         }
     }
 
-    /// What was made and found no slot for long is lost: whoever sent it counts on that nothing arrives that is much
-    /// older than it may be.
+    /// A datagram that was made and found no slot for long is lost: its sender relies on a limit of age.
     fn drop_if_old(&mut self, on: &mut impl Platform) {
         let now_ns = on.monotonic_ns();
         if let Some(held) = self.held.take_if(|held| held.is_old(now_ns)) {
@@ -372,7 +371,7 @@ impl SlotDriver {
     }
 }
 
-/// One in a slot: whoever brings refusals or hellos about must not take the slots of packages.
+/// At most one in a slot: a peer that provokes refusals or hellos must not take the slots of packages.
 fn answer(on: &mut impl Platform, tx_window: &mut TransmitWindow) {
     let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
     let overheard = if asks { on.clock().overheard(now_ns) } else { None };

@@ -16,7 +16,7 @@ pub(super) const NAP_NS: u64 = 1_000_000;
 pub(super) const SLEEP_NS_MAX: u64 = NAP_NS + NAP_NS / 4;
 const _: () = assert!(
     (SLEEP_NS_MAX + SPIN_NS_MAX) as u128 <= TRANSIT_LOOK.as_nanos(),
-    "who declares flows counts on it, that what waits does not overflow meanwhile"
+    "declared flows rely on it: what waits does not overflow meanwhile"
 );
 /// So many datagrams of time, and one for each node, are read at a look: to read one takes some microseconds.
 pub(super) const LOOK_BURST: usize = 16;

@@ -69,17 +69,17 @@ fn jitter_spreads_evenly_and_keeps_the_order() {
 }
 
 #[test]
-fn what_is_held_back_is_overtaken_and_nothing_else() {
+fn what_is_held_back_is_reordered_and_nothing_else() {
     let (arrived, counts) = arrivals("delay=1ms,reorder=5%", 0, 10_000, 100_000);
     assert_eq!(arrived.len(), 10_000);
     assert!((400..600).contains(&counts.held_back), "{counts:?}");
     let mut highest = 0;
-    let overtaken = numbers(&arrived).into_iter().filter(|number| {
+    let reordered = numbers(&arrived).into_iter().filter(|number| {
         highest = highest.max(*number);
         *number < highest
     });
-    let overtaken = overtaken.count() as u64;
-    assert!(overtaken > counts.held_back / 2 && overtaken <= counts.held_back, "{overtaken} of {}", counts.held_back);
+    let reordered = reordered.count() as u64;
+    assert!(reordered > counts.held_back / 2 && reordered <= counts.held_back, "{reordered} of {}", counts.held_back);
 }
 
 #[test]

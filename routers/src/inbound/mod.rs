@@ -158,7 +158,7 @@ impl Inbound {
     }
 
     /// Whether an incarnation of a peer with this head may begin: it may if all that must be equal is.
-    pub(crate) fn may_greet(
+    pub(crate) fn may_handshake(
         &mut self,
         now_ns: u64,
         source: IpAddr,

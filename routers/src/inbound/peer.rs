@@ -205,14 +205,14 @@ impl PeerReceiver {
         way.peer.link.next.set(self.window.next());
         match arrival {
             Arrival::Newest => return true,
-            Arrival::Overtaken => received.reordered.add(1),
+            Arrival::Reordered => received.reordered.add(1),
             Arrival::Returned => {
                 received.reordered.add(1);
                 received.returned.add(1);
             }
-            Arrival::Copy => received.duplicates.add(1),
+            Arrival::Duplicate => received.duplicates.add(1),
         }
-        arrival != Arrival::Copy
+        arrival != Arrival::Duplicate
     }
 
     /// Restarts the wait for it: this router could not have heard it.

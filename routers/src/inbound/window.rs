@@ -19,11 +19,11 @@ pub(crate) enum Arrival {
     /// The newest.
     Newest,
     /// Newer ones came before it.
-    Overtaken,
+    Reordered,
     /// It had been counted as lost.
     Returned,
     /// It came before, or is too old to tell.
-    Copy,
+    Duplicate,
 }
 
 /// Sequences of one incarnation of one peer; at first all from 0 on are expected.
@@ -65,15 +65,15 @@ impl SequenceWindow {
             self.advance(sequence, lost);
             return Arrival::Newest;
         }
-        if self.is_copy(sequence) && !broken!(TakesCopies) {
-            return Arrival::Copy;
+        if self.is_duplicate(sequence) && !broken!(TakesCopies) {
+            return Arrival::Duplicate;
         }
         self.note(sequence);
-        if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Overtaken }
+        if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Reordered }
     }
 
     /// Whether a sequence came before, or is too old to tell.
-    pub(crate) fn is_copy(&self, sequence: u64) -> bool {
+    pub(crate) fn is_duplicate(&self, sequence: u64) -> bool {
         sequence < self.next && (self.next - sequence > WINDOW || self.has(sequence))
     }
 

@@ -263,7 +263,7 @@ impl Outbound {
     pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> OutboundStep {
         let datagram = &mut datagram[..self.datagram_bytes];
         self.aboard.clear();
-        self.greet_new_sessions();
+        self.announce_to_new_sessions();
         self.look_at_what_is_real_time(now_ns);
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
@@ -379,7 +379,7 @@ impl Outbound {
     }
 
     /// A peer with a new session gets a keep-alive at once.
-    fn greet_new_sessions(&mut self) {
+    fn announce_to_new_sessions(&mut self) {
         let Some(all) = &self.peer_sessions else { return };
         let reached = all.reached();
         if reached != self.reached {
@@ -388,7 +388,7 @@ impl Outbound {
     }
 
     /// A peer in a new incarnation soon gets a keep-alive that it is heard: it may wait for that.
-    fn greet_new_incarnations(&mut self) {
+    fn announce_to_new_incarnations(&mut self) {
         for (peer, stats) in self.peers.iter_mut().zip(0..).map(|(peer, node)| (peer, self.stats.peer(node))) {
             let life = stats.link.incarnation.get();
             if std::mem::replace(&mut peer.life, life) != life {
@@ -433,7 +433,7 @@ impl Outbound {
     /// Drops packages that waited too long behind others, and those to peers that are gone.
     fn sweep(&mut self, now_ns: u64, report: &mut impl Report) {
         self.sweep_ns = now_ns + SWEEP_EVERY_NS;
-        self.greet_new_incarnations();
+        self.announce_to_new_incarnations();
         for peer in 0..self.settings.nodes.len() as NodeIndex {
             for level in 0..LEVELS as u8 {
                 while let Some(place) = self.queue.first_of(peer, level) {

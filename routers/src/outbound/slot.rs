@@ -33,7 +33,7 @@ impl Outbound {
         let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };
         let datagram = &mut datagram[..room_bytes];
         self.aboard.clear();
-        self.greet_new_sessions();
+        self.announce_to_new_sessions();
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {

@@ -2,7 +2,7 @@
 //! not known.
 
 use super::handshake::Handshake;
-use super::opening::{Greeting, Opened, Opening};
+use super::opening::{Opened, OpenedHello, Opening};
 use super::peer_sessions::{PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::tally::Tally;
@@ -102,16 +102,16 @@ impl Gate {
             Ok(Opened::Frame(head, text)) => {
                 inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
             }
-            Ok(Opened::Hello(head, greeting)) => {
+            Ok(Opened::Hello(head, opened)) => {
                 if let Some(handshake) = &mut self.handshake
-                    && inbound.may_greet(now_ns, came.source, &head, deliver)
+                    && inbound.may_handshake(now_ns, came.source, &head, deliver)
                 {
-                    let greeted = handshake.greet(now_ns, &head, &greeting, reply);
-                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: greeted.begins };
-                    return greeted.reply_bytes.map(said);
+                    let outcome = handshake.receive(now_ns, &head, &opened, reply);
+                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: outcome.begins };
+                    return outcome.reply_bytes.map(said);
                 }
                 if inbound.is_of_other(came.source, &head) {
-                    return self.greet_other(now_ns, &head, &greeting, inbound, reply);
+                    return self.answer_other(now_ns, &head, &opened, inbound, reply);
                 }
             }
             Err(NotOpened::Bad(why @ (BadFrame::Foreign | BadFrame::Damaged(_) | BadFrame::Sealed))) => {
@@ -127,19 +127,19 @@ impl Gate {
 
     /// Tells a peer with another configuration so, in a sealed reply. Without it each end would take the other's
     /// datagrams for replays.
-    fn greet_other(
+    fn answer_other(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &Greeting,
+        opened: &OpenedHello,
         inbound: &Inbound,
         reply: &mut [u8],
     ) -> Option<Said> {
-        let greeted = self.handshake.as_mut()?.greet_other(now_ns, head, greeting, reply);
-        if greeted.proves && greeting.hello.next[Port::Time as usize] > 0 {
+        let outcome = self.handshake.as_mut()?.receive_other(now_ns, head, opened, reply);
+        if outcome.proves && opened.hello.next[Port::Time as usize] > 0 {
             inbound.tells_other(now_ns, head);
         }
-        greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
+        outcome.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
     }
 
     /// From which sequence on the present incarnation of a peer is heard; what is missing from there on is lost.

@@ -1,7 +1,7 @@
 //! Finds out by challenge and response which incarnations live. A peer that has not answered takes no state.
 
 use super::hello::Hello;
-use super::opening::Greeting;
+use super::opening::OpenedHello;
 use super::peer_sessions::{PeerIncarnation, PeerSessions};
 use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
@@ -48,7 +48,7 @@ struct Questions {
 
 /// What a hello brought about.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Greeted {
+pub struct HelloOutcome {
     /// The peer has shown that it lives.
     pub proves: bool,
     /// An incarnation of the peer begins, with [`Handshake::begin`].
@@ -69,26 +69,38 @@ impl Handshake {
     /// Takes a hello that was opened, if all else in its head is as it must be. `datagram` has room for a hello of
     /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If an incarnation begins by it, [`Self::begin`] when the
     /// reply has left.
-    pub fn greet(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
-        self.take(now_ns, head, greeting, true, datagram)
+    pub fn receive(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        opened: &OpenedHello,
+        datagram: &mut [u8],
+    ) -> HelloOutcome {
+        self.take(now_ns, head, opened, true, datagram)
     }
 
     /// The same for a peer with another digest: no incarnation begins. A challenge is answered, so that its sender
     /// knows that this node lives, and by which configuration.
-    pub fn greet_other(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
-        self.take(now_ns, head, greeting, false, datagram)
+    pub fn receive_other(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        opened: &OpenedHello,
+        datagram: &mut [u8],
+    ) -> HelloOutcome {
+        self.take(now_ns, head, opened, false, datagram)
     }
 
     fn take(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &Greeting,
+        opened: &OpenedHello,
         may_begin: bool,
         datagram: &mut [u8],
-    ) -> Greeted {
+    ) -> HelloOutcome {
         self.begin();
-        let (peer, Greeting { hello, key }) = (head.from, *greeting);
+        let (peer, OpenedHello { hello, key }) = (head.from, *opened);
         self.refresh(now_ns, peer);
         let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);
         let begins = may_begin && proves && self.all.incarnation(peer) != Some(head.incarnation);
@@ -106,7 +118,7 @@ impl Handshake {
         // A peer that has proved that it lives gets the final response; any other must prove it first.
         let challenge = if is_question { self.all.challenge(peer) } else { 0 };
         let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
-        Greeted { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
+        HelloOutcome { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
 
     /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the

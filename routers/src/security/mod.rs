@@ -40,10 +40,10 @@ mod unverified;
 mod waiting;
 
 pub use gate::{ASK_EVERY_NS, Gate, Said};
-pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Handshake, PER_NS};
+pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Handshake, HelloOutcome, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
-pub use opening::{Greeting, Opened, Opening};
+pub use opening::{Opened, OpenedHello, Opening};
 pub use peer_sessions::{PeerSessions, Port, RouterIdentity};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};

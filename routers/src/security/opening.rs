@@ -18,12 +18,12 @@ pub enum Opened<'a> {
     /// Of the peer's present incarnation to our present one, and not opened before: its head and what was sealed.
     Frame(FrameHead, &'a [u8]),
     /// Of some incarnation of the peer, perhaps long ago: for the [`Handshake`](super::Handshake) alone.
-    Hello(FrameHead, Greeting),
+    Hello(FrameHead, OpenedHello),
 }
 
 /// A hello as it came.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Greeting {
+pub struct OpenedHello {
     /// What it says.
     pub hello: Hello,
     /// Place of its key.
@@ -112,13 +112,13 @@ impl Opening {
             all.doubt(head.from);
             Rejection::OtherIncarnation
         })?;
-        if heard.window.is_copy(head.sequence) && !broken!(OpensTwice) {
+        if heard.window.is_duplicate(head.sequence) && !broken!(OpensTwice) {
             return Err(Rejection::Replay.into());
         }
         let text = heard.seals[key].open(seal::of_sequence(head.sequence), datagram).ok_or(Rejection::Forged)?;
         // What the network lost is another's to count.
         let arrival = heard.window.arrive(head.sequence, &mut 0);
-        debug_assert!(arrival != Arrival::Copy || broken!(OpensTwice));
+        debug_assert!(arrival != Arrival::Duplicate || broken!(OpensTwice));
         heard.first.get_or_insert(head.sequence);
         if self.port == Port::Rest {
             past[0].next = heard.window.next();
@@ -189,7 +189,7 @@ impl Opening {
         self.peers[usize::from(peer)].made.as_ref().and_then(|heard| heard.first).unwrap_or(0)
     }
 
-    fn hello(&self, head: &FrameHead, key: usize, datagram: &mut [u8]) -> Result<Greeting, Rejection> {
+    fn hello(&self, head: &FrameHead, key: usize, datagram: &mut [u8]) -> Result<OpenedHello, Rejection> {
         if self.port != Port::Packages {
             return Err(Rejection::NotOurs);
         }
@@ -199,7 +199,7 @@ impl Opening {
         let number = u32::try_from(head.sequence).map_err(|_| Rejection::Forged)?;
         let seal = self.all.hello_from(head.from, key);
         let text = seal.open(seal::of_hello(head.incarnation, number), datagram).ok_or(Rejection::Forged)?;
-        Ok(Greeting { hello: Hello::parse(text).ok_or(Rejection::Forged)?, key })
+        Ok(OpenedHello { hello: Hello::parse(text).ok_or(Rejection::Forged)?, key })
     }
 
     fn heard<'a>(

@@ -51,7 +51,7 @@ pub const SLOW_SILENT_AFTER_NS: u64 = 8_000_000_000;
 /// An end that has taken nothing of what is ready for so long is gone.
 pub const STALLED_AFTER_NS: u64 = 10_000_000_000;
 /// From the beginning of a connection to its welcome, at most; however busily bytes come.
-pub const GREETING_MAX_NS: u64 = 5_000_000_000;
+pub const HANDSHAKE_MAX_NS: u64 = 5_000_000_000;
 /// From the first byte of a frame to its last, at most.
 pub const FRAME_MAX_NS: u64 = 30_000_000_000;
 /// What time alone brings about is looked for this often.

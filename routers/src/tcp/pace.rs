@@ -1,5 +1,5 @@
-//! How fast a connection takes bytes, and how many of them the kernel is to hold by that: what it holds can be
-//! overtaken by nothing.
+//! Measures how fast a connection takes bytes, and limits by that how many of them the kernel buffers: nothing more
+//! important can pass them.
 //!
 //! ```text
 //!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if always wanted

@@ -150,7 +150,7 @@ pub struct Members {
     /// Packages of those that were lost.
     pub crowded_packages: u64,
     /// Registrations that a later one of the same client took the place of before they were looked at.
-    pub overtaken: u64,
+    pub superseded: u64,
     /// Lines that were not said one by one, since there were too many of their cause.
     pub held: u64,
     /// What went through.

@@ -126,7 +126,7 @@ impl TransmitWindow {
         matches!(self.window.kind, WindowKind::Slot { .. })
     }
 
-    /// Whether a refusal may leave in it: who is not sure of the time sends nothing but questions.
+    /// Whether a refusal may leave in it: a node that is not sure of the time sends nothing but hellos.
     pub fn carries_refusal(&self) -> bool {
         self.carries_hello() && self.carries == Carries::All
     }

@@ -332,7 +332,7 @@ impl Clock {
         }
         let origin = self.origin(now_ns);
         if let Some(term) = self.election.takes_over(now_ns, origin) {
-            self.reign(now_ns, term, origin);
+            self.become_master(now_ns, term, origin);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Election of the master: the order of candidates, the silence that ends a reign, and which of two masters yields.
+//! Election of the master: the order of candidates, the silence that ends a term, and which of two masters yields.
 
 use super::message::{Request, Sync};
 use super::unverified::UnverifiedPeers;

@@ -146,7 +146,7 @@ impl World {
                 None
             }
             Ok(Opened::Hello(head, hello)) => {
-                let reply = router.handshake.greet(0, &head, &hello, &mut room);
+                let reply = router.handshake.receive(0, &head, &hello, &mut room);
                 router.handshake.begin();
                 if reply.begins {
                     assert!(sent.step >= router.drawn, "an incarnation began by what was said before");

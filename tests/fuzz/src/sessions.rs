@@ -71,7 +71,7 @@ pub(crate) fn server() -> Server {
         own_nodes: OwnNodes::default(),
         incarnation: 5,
         clients_max: 3,
-        greetings_max: 2,
+        handshakes_max: 2,
         quota_bytes: 64 << 10,
         levels: std::array::from_fn(|priority| priority as u8 >> 3),
     })

@@ -33,24 +33,24 @@ pub(crate) const CHECKS: &[fn()] = &[
 ];
 
 fn check_window() {
-    use Arrival::{Copy, Newest, Overtaken, Returned};
+    use Arrival::{Duplicate, Newest, Reordered, Returned};
     let mut window = SequenceWindow::joining(3);
     let mut lost_in_all = 0;
     for (sequence, arrival, lost, why) in [
         (3, Newest, 0, "the first"),
-        (0, Overtaken, 0, "both have just begun"),
-        (3, Copy, 0, "came before"),
+        (0, Reordered, 0, "both have just begun"),
+        (3, Duplicate, 0, "came before"),
         (5, Newest, 0, "a gap"),
-        (4, Overtaken, 0, "closes it"),
-        (4, Copy, 0, "once"),
+        (4, Reordered, 0, "closes it"),
+        (4, Duplicate, 0, "once"),
         (70, Newest, 3, "1, 2 and 6 are given up: the last is 64 behind"),
         (2, Returned, 0, "late, but not a copy"),
-        (2, Copy, 0, "once"),
-        (7, Overtaken, 0, "may still come"),
+        (2, Duplicate, 0, "once"),
+        (7, Reordered, 0, "may still come"),
         (2000, Newest, 1937 - 7 - 2, "a window is skipped: all from 7 to 1936 but 7 and 70"),
         (977, Returned, 0, "the oldest of which is known whether it came"),
-        (976, Copy, 0, "cannot be told"),
-        (1999, Overtaken, 0, "may still come"),
+        (976, Duplicate, 0, "cannot be told"),
+        (1999, Reordered, 0, "may still come"),
     ] {
         let mut more = 0;
         assert_eq!(window.arrive(sequence, &mut more), arrival, "{sequence}: {why}");
@@ -73,9 +73,9 @@ fn a_router_that_joins_late_misses_nothing_sent_before() {
     let mut lost = 0;
     let mut window = SequenceWindow::joining(5000);
     assert_eq!(window.arrive(5000, &mut lost), Arrival::Newest);
-    assert_eq!(window.arrive(4999, &mut lost), Arrival::Overtaken);
+    assert_eq!(window.arrive(4999, &mut lost), Arrival::Reordered);
     let mut window = SequenceWindow::going_on(5000);
-    assert_eq!(window.arrive(4999, &mut lost), Arrival::Copy);
+    assert_eq!(window.arrive(4999, &mut lost), Arrival::Duplicate);
     assert_eq!((window.arrive(5000, &mut lost), lost, window.close()), (Arrival::Newest, 0, 0));
     let mut window = SequenceWindow::default();
     window.arrive(5000, &mut lost);
@@ -165,7 +165,7 @@ proptest! {
             let next = came.last().map_or(0, |last| last + 1);
             let arrival = window.arrive(sequence, &mut lost);
             let known = sequence + WINDOW >= next && !came.contains(&sequence);
-            prop_assert_eq!(arrival == Arrival::Copy, !known, "{}", sequence);
+            prop_assert_eq!(arrival == Arrival::Duplicate, !known, "{}", sequence);
             returned += u64::from(arrival == Arrival::Returned);
             if known {
                 came.insert(sequence);

@@ -143,11 +143,11 @@ pub(super) fn check_priority_of_parts() {
 fn what_a_peer_said_before_it_had_our_configuration_does_not_part_us() {
     let mut end = End::new(0, |settings| settings.network.security = Security::Keys);
     let old = FrameHead { digest: 8, ..datagram(0, &head(module(200, 0), module(60, 1), 60)).0 };
-    assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));
+    assert!(!end.inbound.may_handshake(START, address(1), &old, &mut end.log));
     assert!(matches!(end.stats.state(1, START), PeerLinkState::Refused(_)), "nothing else is known of it");
     assert_eq!(causes(&mut end, &[head(module(200, 0), module(60, 1), 60)]), [None]);
     assert_eq!(end.stats.state(1, START), PeerLinkState::Alive);
-    assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));
+    assert!(!end.inbound.may_handshake(START, address(1), &old, &mut end.log));
     assert_eq!(end.stats.state(1, START), PeerLinkState::Alive);
     assert!(end.refusals(START).is_empty(), "and nobody is told without a seal");
 }

@@ -98,7 +98,7 @@ impl Router {
         let mut room = [0; HELLO_DATAGRAM_BYTES];
         match self.opening[0].open(&mut datagram.to_vec())? {
             Opened::Hello(head, greeting) => {
-                let greeted = self.handshake.greet(now_ns, &head, &greeting, &mut room);
+                let greeted = self.handshake.receive(now_ns, &head, &greeting, &mut room);
                 assert_eq!(self.handshake.begin().is_some(), greeted.begins);
                 Ok((greeted.begins, greeted.reply_bytes.map(|bytes| room[..bytes].to_vec())))
             }

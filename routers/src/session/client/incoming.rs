@@ -18,7 +18,7 @@ impl Client {
         self.heard_ns = now_ns;
         self.asking.heard();
         let mut splitter = std::mem::take(&mut self.splitter);
-        while matches!(self.state, ClientState::Greeting { .. } | ClientState::Member) {
+        while matches!(self.state, ClientState::Handshake { .. } | ClientState::Member) {
             let message = match splitter.next(now_ns, LENGTH_MAX, &mut bytes) {
                 Ok(None) => break,
                 Ok(Some((head, rest))) => SessionMessage::parse(head, rest),
@@ -35,7 +35,7 @@ impl Client {
     fn handle(&mut self, now_ns: u64, message: &SessionMessage<'_>, host: &mut impl ClientHost) {
         match (self.state, message) {
             (_, SessionMessage::Refusal(refusal)) => self.refused(now_ns, refusal, host),
-            (ClientState::Greeting { .. }, SessionMessage::Welcome(welcome)) => self.welcomed(now_ns, welcome, host),
+            (ClientState::Handshake { .. }, SessionMessage::Welcome(welcome)) => self.welcomed(now_ns, welcome, host),
             (ClientState::Member, SessionMessage::Registered(verdict)) => self.registered(now_ns, verdict, host),
             (ClientState::Member, SessionMessage::Package(carried)) => self.take(now_ns, carried, host),
             (ClientState::Member, SessionMessage::Answer(answer)) => {

@@ -1,9 +1,9 @@
 //! A client: keeps up a connection to the server, registers what it hosts, and carries packages both ways.
 //!
 //! ```text
-//!  away ─ wait is over ─▶ connecting ─ connected ─▶ greeting ─ welcome ─▶ member ─ register ─▶ up
-//!   ▲                         └───── too long ─────────┴─ refusal ─┴─ silence, damage, end of the stream ┘
-//!   └──────────────────────────── waits longer each time ◀─────────────────────────────────────┘
+//!  away ─ wait is over ─▶ connecting ─ connected ─▶ handshake ─ welcome ─▶ member ─ register ─▶ up
+//!   ▲                         └───── too long ─────────┴─ refusal ──┴─ silence, damage, end of the stream ┘
+//!   └──────────────────────────── waits longer each time ◀──────────────────────────────────────┘
 //! ```
 
 mod asking;
@@ -20,7 +20,7 @@ use super::frame::{
 };
 use super::outgoing::Outgoing;
 use super::splitter::Splitter;
-use super::{ErrorReplies, GREETING_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
+use super::{ErrorReplies, HANDSHAKE_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
 use crate::admission::Admission;
 use crate::broken::broken;
 use crate::report::NotDelivered;
@@ -123,7 +123,7 @@ pub trait ClientHost: ErrorReplies {
 enum ClientState {
     Away { until_ns: u64 },
     Connecting { until_ns: u64 },
-    Greeting { until_ns: u64 },
+    Handshake { until_ns: u64 },
     Member,
     Closing,
 }
@@ -237,7 +237,7 @@ impl Client {
 
     /// Whether there is a connection.
     pub fn is_connected(&self) -> bool {
-        matches!(self.state, ClientState::Greeting { .. } | ClientState::Member)
+        matches!(self.state, ClientState::Handshake { .. } | ClientState::Member)
     }
 
     /// The shortest way there and back of late, ns.
@@ -278,7 +278,7 @@ impl Client {
     /// The connection is made.
     pub fn connected(&mut self, now_ns: u64) {
         self.attempt += 1;
-        self.state = ClientState::Greeting { until_ns: now_ns + GREETING_MAX_NS };
+        self.state = ClientState::Handshake { until_ns: now_ns + HANDSHAKE_MAX_NS };
         self.splitter = Splitter::default();
         self.outgoing.cut();
         (self.heard_ns, self.moved_ns) = (now_ns, now_ns);
@@ -362,7 +362,7 @@ impl Client {
             ClientState::Away { until_ns } | ClientState::Connecting { until_ns } if now_ns < until_ns => {
                 return ClientStep::Wait { until_ns: until_ns.min(self.look_ns) };
             }
-            ClientState::Member | ClientState::Greeting { .. } if !self.is_gone(now_ns) => {}
+            ClientState::Member | ClientState::Handshake { .. } if !self.is_gone(now_ns) => {}
             _ => {
                 self.closed(now_ns, host);
                 return ClientStep::Close;
@@ -384,7 +384,7 @@ impl Client {
         let is_silent = self.asking.is_silent(now_ns, self.heard_ns, self.moved_ns, is_slow);
         let is_stalled = now_ns.saturating_sub(self.moved_ns) > STALLED_AFTER_NS;
         match self.state {
-            ClientState::Greeting { until_ns } => now_ns >= until_ns,
+            ClientState::Handshake { until_ns } => now_ns >= until_ns,
             _ => (is_silent && !broken!(WaitsForSilent)) || is_stalled,
         }
     }

@@ -4,8 +4,7 @@ use super::member::{MemberState, PendingRefusal, RoundTrip, TimeRequest};
 use super::{Server, ServerEvent, ServerHost};
 use crate::broken::broken;
 use crate::session::frame::{
-    BadSessionFrame, GREETING_LENGTH_MAX, LENGTH_MAX, NAME_BYTES_MAX, SessionHello, SessionMessage,
-    SessionRefusalReason,
+    BadSessionFrame, HELLO_LENGTH_MAX, LENGTH_MAX, NAME_BYTES_MAX, SessionHello, SessionMessage, SessionRefusalReason,
 };
 use crate::session::{ClientIndex, LOOK_EVERY_NS};
 
@@ -30,7 +29,7 @@ impl Server {
         let mut splitter = std::mem::take(&mut member.splitter);
         loop {
             let length_max = match self.member(client).map(|member| member.state) {
-                Some(MemberState::Greeting) => GREETING_LENGTH_MAX,
+                Some(MemberState::Handshake) => HELLO_LENGTH_MAX,
                 Some(MemberState::Member) => LENGTH_MAX,
                 // What it still says nobody reads.
                 Some(MemberState::Leaving { .. }) | None => return,
@@ -53,7 +52,7 @@ impl Server {
     fn handle(&mut self, now_ns: u64, client: ClientIndex, message: &SessionMessage<'_>, host: &mut impl ServerHost) {
         let Some(member) = self.member_mut(client) else { return };
         match (member.state, message) {
-            (MemberState::Greeting, SessionMessage::Hello(hello)) => self.greet(now_ns, client, hello, host),
+            (MemberState::Handshake, SessionMessage::Hello(hello)) => self.take_hello(now_ns, client, hello, host),
             (MemberState::Member, SessionMessage::Register(ranges)) => self.register(now_ns, client, *ranges, host),
             (MemberState::Member, SessionMessage::Package(carried)) => self.carry(now_ns, client, carried, host),
             (MemberState::Member, SessionMessage::Ask(asked_ns)) => {
@@ -66,7 +65,7 @@ impl Server {
         }
     }
 
-    fn greet(&mut self, now_ns: u64, client: ClientIndex, hello: &SessionHello<'_>, host: &mut impl ServerHost) {
+    fn take_hello(&mut self, now_ns: u64, client: ClientIndex, hello: &SessionHello<'_>, host: &mut impl ServerHost) {
         if let Some(member) = self.member_mut(client) {
             match member.certified {
                 None => hello.name.clone_into(&mut member.name),
@@ -136,8 +135,8 @@ impl Server {
         let Some(Some(member)) = self.members.get(usize::from(client.0)) else { return };
         match member.state {
             MemberState::Leaving { .. } => return,
-            MemberState::Greeting => {
-                self.places.greets_no_more(client, member);
+            MemberState::Handshake => {
+                self.places.handshake_ends(client, member);
                 host.event(ServerEvent::Refused { name: &member.name, reason, digests, text });
             }
             MemberState::Member => self.leave(now_ns, client, Some(reason), host),

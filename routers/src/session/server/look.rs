@@ -7,7 +7,7 @@ use super::{Server, ServerEvent, ServerHost};
 use crate::broken::broken;
 use crate::session::counts::Cause;
 use crate::session::frame::SessionRefusalReason;
-use crate::session::{ClientIndex, FRAME_MAX_NS, GREETING_MAX_NS, LOOK_EVERY_NS};
+use crate::session::{ClientIndex, FRAME_MAX_NS, HANDSHAKE_MAX_NS, LOOK_EVERY_NS};
 use crate::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
 
 /// A look that comes so late says that the server stood still itself: that nothing was heard says nothing then.
@@ -70,9 +70,9 @@ fn objection(now_ns: u64, member: &Member) -> Option<(SessionRefusalReason, &'st
     let silent_after_ns = if frame_ns.is_some() { SLOW_SILENT_AFTER_NS } else { SILENT_AFTER_NS };
     match member.state {
         MemberState::Leaving { .. } => None,
-        MemberState::Greeting if broken!(GreetsForEver) => None,
-        MemberState::Greeting => {
-            (since(member.began_ns) > GREETING_MAX_NS).then_some((SessionRefusalReason::Silent, "no hello"))
+        MemberState::Handshake if broken!(GreetsForEver) => None,
+        MemberState::Handshake => {
+            (since(member.began_ns) > HANDSHAKE_MAX_NS).then_some((SessionRefusalReason::Silent, "no hello"))
         }
         MemberState::Member if since(member.heard_ns) > silent_after_ns && !broken!(WaitsForSilent) => {
             Some((SessionRefusalReason::Silent, ""))

@@ -11,7 +11,7 @@ use crate::session::splitter::Splitter;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum MemberState {
     /// It has not said hello.
-    Greeting,
+    Handshake,
     /// It takes part.
     Member,
     /// It is told why it may not any more, and then closed.
@@ -105,7 +105,7 @@ pub(super) struct Member {
 impl Member {
     pub(super) fn new(now_ns: u64, name: String, address: Principal, quota_bytes: usize) -> Self {
         Self {
-            state: MemberState::Greeting,
+            state: MemberState::Handshake,
             name,
             system: 0,
             certified: None,

@@ -1,9 +1,9 @@
 //! The server: takes what clients send, and gives it to the client that hosts the name.
 //!
 //! ```text
-//!  accept ─▶ greeting ─ hello ─▶ member ─ register ─▶ Table        received ─▶ intake ─▶ carry ─▶ Outgoing of another
-//!               │ too long, wrong      │ silent, stalled, replaced                                   │
-//!               └──── refusal ────▶ leaving ─▶ closed                poll ─▶ Write, Close, Wait ◀────┘
+//!  accept ─▶ handshake ─ hello ─▶ member ─ register ─▶ RoutingTable  received ─▶ intake ─▶ carry ─▶ another's Outgoing
+//!               │ too long, wrong       │ silent, stalled, replaced                                     │
+//!               └──── refusal ─────▶ leaving ─▶ closed                poll ─▶ Write, Close, Wait ◀──────┘
 //! ```
 
 mod carry;
@@ -51,7 +51,7 @@ pub struct ServerSettings {
     /// Clients that may take part at a time.
     pub clients_max: u16,
     /// Connections that have not said hello yet; of more the oldest gives way.
-    pub greetings_max: u16,
+    pub handshakes_max: u16,
     /// Bytes of packages that wait for one client.
     pub quota_bytes: usize,
     /// Level of each priority; 0 goes first.
@@ -181,8 +181,8 @@ impl Server {
     }
 
     /// Registrations that were never looked at, since the same client sent a later one before its turn.
-    pub fn overtaken(&self) -> u64 {
-        self.registering.overtaken
+    pub fn superseded(&self) -> u64 {
+        self.registering.superseded
     }
 
     /// How often somebody had more of something than its share.

@@ -44,7 +44,7 @@ impl Server {
         }
         let waiting = PendingRegistration { number: ranges.number, ranges: ranges.collect() };
         if of_client.waiting.replace(waiting).is_some() {
-            self.registering.overtaken += 1;
+            self.registering.superseded += 1;
         }
     }
 

@@ -25,12 +25,12 @@ pub(super) struct Registering {
     /// The principal with the first turn in the next round.
     pub(super) first: u16,
     /// Registrations that a later one of the same client took the place of.
-    pub(super) overtaken: u64,
+    pub(super) superseded: u64,
 }
 
 impl Default for Registering {
     fn default() -> Self {
-        Self { left: WORK_MAX, first: 0, overtaken: 0 }
+        Self { left: WORK_MAX, first: 0, superseded: 0 }
     }
 }
 

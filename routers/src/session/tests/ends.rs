@@ -9,7 +9,7 @@ use crate::session::frame::{
     Carried, HEAD_BYTES, HOPS_MAX, LENGTH_MAX, Ranges, SessionFrameHead, SessionHello, SessionMessage,
 };
 use crate::session::server::{self, MemberState};
-use crate::session::{Cause, GREETING_MAX_NS, SILENT_AFTER_NS};
+use crate::session::{Cause, HANDSHAKE_MAX_NS, SILENT_AFTER_NS};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
 
 pub(super) const CHECKS: &[fn()] = &[
@@ -115,14 +115,14 @@ fn check_slow_greetings() {
         ground.now_ns += 100 * MS;
         waited_ns += 100 * MS;
         ground.settle();
-        assert!(waited_ns < GREETING_MAX_NS + 2 * S, "still there");
+        assert!(waited_ns < HANDSHAKE_MAX_NS + 2 * S, "still there");
     }
     // Many of them do not keep others out: the oldest gives way.
     for _ in 0..20 {
         let _ = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said);
     }
     ground.settle();
-    let greeting = ground.server.clients().filter(|(_, _, state)| *state == MemberState::Greeting).count();
+    let greeting = ground.server.clients().filter(|(_, _, state)| *state == MemberState::Handshake).count();
     assert!(greeting <= 4 && ground.ends[0].0.is_up(), "{greeting}");
 }
 

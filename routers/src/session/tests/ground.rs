@@ -69,7 +69,7 @@ impl Ground {
         (clients_max, greetings_max): (u16, u16),
         clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
     ) -> Self {
-        Self::with(server::ServerSettings { clients_max, greetings_max, ..server_settings(5) }, clients)
+        Self::with(server::ServerSettings { clients_max, handshakes_max: greetings_max, ..server_settings(5) }, clients)
     }
 
     pub(super) fn with(

@@ -43,7 +43,7 @@ fn says(client: usize) -> Vec<u8> {
 /// What the server's thread works until so many clients, each with its own address, are connected and host their names.
 fn coming_at_once(clients: usize) -> Duration {
     let (clients_max, greetings_max) = (clients as u16, clients as u16);
-    let mut server = Server::new(ServerSettings { clients_max, greetings_max, ..server_settings(5) });
+    let mut server = Server::new(ServerSettings { clients_max, handshakes_max: greetings_max, ..server_settings(5) });
     let (mut host, mut now_ns, mut work) = (Notes::default(), 100_000 * MS, Duration::ZERO);
     for client in 0..clients {
         let ([high, low], bytes) = ((client as u16).to_be_bytes(), says(client));

@@ -36,7 +36,7 @@ fn check_many_registrations() {
     for number in 0..500 {
         register(&mut ground, 1, number, &ranges[number as usize..]);
     }
-    assert_eq!(ground.server.overtaken(), 498, "the first is looked at, the last waits");
+    assert_eq!(ground.server.superseded(), 498, "the first is looked at, the last waits");
     let hosted = |ground: &Ground| ground.server.views().find(|view| view.index == place).unwrap().ranges;
     assert_eq!(hosted(&ground), RANGES_MAX);
     assert!(ground.server.bytes_of(place) < before_bytes + 2 * RANGES_MAX * size_of::<Range>());
@@ -45,7 +45,7 @@ fn check_many_registrations() {
     assert_eq!(ground.delivered(2), [module(2)]);
     ground.now_ns += LOOK_EVERY_NS;
     ground.settle();
-    assert_eq!((hosted(&ground), ground.server.overtaken()), (RANGES_MAX - 499, 498), "the last counts");
+    assert_eq!((hosted(&ground), ground.server.superseded()), (RANGES_MAX - 499, 498), "the last counts");
 }
 
 #[test]

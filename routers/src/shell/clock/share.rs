@@ -1,5 +1,5 @@
-//! How much of a processor the clock's thread may use: it stands above all others, and whoever writes a node's address
-//! on what it sends is read by it.
+//! How much of a processor the clock's thread may use. It has the highest priority, and it reads each datagram that
+//! bears the address of a node, forged or not.
 
 /// Of so much time it may use one part.
 const PARTS: u64 = 10;
@@ -7,7 +7,7 @@ const PARTS: u64 = 10;
 const SAVED_NS_MAX: u64 = 2_000_000;
 /// Used up, it leaves what comes in its socket until it has saved so much again, ns.
 const RESUMES_NS: u64 = 200_000;
-/// Whose thread stood still did not work for longer, ns.
+/// Longest time that counts as work, ns: in a longer one the thread stood still.
 const USED_NS_MAX: u64 = 1_000_000;
 
 /// What is left of it.

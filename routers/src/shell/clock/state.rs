@@ -60,7 +60,7 @@ impl ClockSnapshot {
     }
 }
 
-/// Shared by the clock's thread and whoever wants to know.
+/// Shared by the clock's thread and its readers.
 #[derive(Debug)]
 pub struct ClockState {
     snapshot: Mutex<ClockSnapshot>,
@@ -76,7 +76,7 @@ impl ClockState {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Of the clock's thread. It never waits for who looks: then the next one is shown.
+    /// For the clock's thread. It never waits for a reader: then the next snapshot is shown.
     pub(super) fn show(&self, snapshot: &ClockSnapshot) {
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;

@@ -1,5 +1,5 @@
 //! A clock's core and what it has of the system: its socket, the kernel's stamps, the node's page, and what others may
-//! look at. Whose thread it is, and when that sends, is its owner's business.
+//! look at. Its owner runs the thread, and decides when that sends.
 
 use super::local::LocalClock;
 use super::socket::{ReceivedDatagram, TimeSocket};
@@ -42,7 +42,7 @@ pub(in crate::shell) struct Works {
     state: Arc<ClockState>,
     snapshot: ClockSnapshot,
     system: u8,
-    /// Who says what time it is by another configuration, from an address that no node has.
+    /// Sends time of another configuration, from an address that no node has; it is to be refused.
     refuse: Option<IpAddr>,
 }
 
@@ -169,7 +169,7 @@ impl Works {
         let Some(seals) = &mut self.seals else { return self.socket.send(to, datagram) };
         let mut sealed = [0; SEALED_BYTES];
         sealed[..TIME_BYTES].copy_from_slice(datagram);
-        // Who is not known yet is told later what time it is.
+        // A peer without a session yet is told the time later.
         seals.sealing.close(&mut sealed).is_ok() && self.socket.send(to, &sealed)
     }
 
@@ -204,7 +204,7 @@ impl Works {
         }
     }
 
-    /// To whom it is to be said, where nothing is sealed, that there is another configuration.
+    /// Address that is to be told of another configuration, where nothing is sealed.
     pub(in crate::shell) fn refuses(&mut self) -> Option<IpAddr> {
         self.refuse.take()
     }
@@ -259,7 +259,7 @@ impl Works {
         let taken = match opened {
             Some(TimeDatagram::Proven(head, rest)) if head.digest != self.clock.digest() => {
                 let node = self.socket.node_at(source);
-                // Whoever has an address that no node has here does not hear it from anybody else.
+                // No other part refuses a sender with an address of no node here.
                 self.refuse = self.refuse.or((node.is_none() && head.system == self.system).then_some(source));
                 self.clock.handle_other(now_ns, stamp, node, &head, rest).is_ok()
             }
@@ -275,7 +275,7 @@ impl Works {
         if let Some(exchange) = self.clock.take_exchange() {
             (self.snapshot.exchanges, self.snapshot.by_kernel) = (self.snapshot.exchanges + 1, exchange.by_kernel);
             if let Some(observer) = &self.observer {
-                // Who does not keep up misses some.
+                // An observer that does not keep up misses some.
                 let _ = observer.try_send(exchange);
             }
         }

@@ -14,7 +14,7 @@ pub(super) fn be_punctual() {
     let _ = nix::sys::prctl::set_timerslack(SLACK_NS);
 }
 
-/// Sleeps for so long, ns, from now on. Interrupted, it wakes up earlier: whoever sleeps looks at the clock anyway.
+/// Sleeps for so long, ns, from now on. Interrupted, it wakes up earlier: the caller looks at the clock anyway.
 pub(super) fn sleep(for_ns: u64) {
     let until_ns = monotonic_ns().saturating_add(for_ns);
     let until = TimeSpec::new((until_ns / SECOND_NS).cast_signed(), (until_ns % SECOND_NS).cast_signed());

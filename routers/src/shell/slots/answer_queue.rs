@@ -11,7 +11,7 @@ use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-/// Whoever has no number here is refused so often at most.
+/// Senders without a number here are refused so often at most.
 const REFUSE_EVERY_NS: u64 = 50_000_000;
 
 /// Room for the longest refusal.
@@ -22,7 +22,7 @@ pub(in crate::shell) const ANSWERS: usize = 32;
 
 /// What the thread that receives wants to have sent.
 pub(in crate::shell) enum Answer {
-    /// Where nothing is sealed: to whom another configuration or version is refused.
+    /// Where nothing is sealed: a refusal of another configuration or version, and its receiver.
     Refusal { to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES] },
     /// Where all is sealed.
     Hello { said: Said, datagram: [u8; REFUSAL_BYTES] },
@@ -31,7 +31,7 @@ pub(in crate::shell) enum Answer {
 /// In the hands of the thread that sends.
 pub(in crate::shell) struct AnswerQueue {
     answers: Receiver<Answer>,
-    /// The refusal whose turn is next.
+    /// The refusal that is next.
     refusal: Option<Answer>,
     /// When somebody without a number was refused last, ns.
     refused_ns: u64,
@@ -75,7 +75,7 @@ impl AnswerQueue {
         }
     }
 
-    /// Whose configuration this node goes by, and whose not, in words.
+    /// Which nodes have another configuration than this one, in words.
     pub(super) fn parted_by(&self, others: impl Iterator<Item = (Option<NodeIndex>, u64)>) -> String {
         speech::parted(&self.settings, others)
     }

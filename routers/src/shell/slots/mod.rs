@@ -1,8 +1,8 @@
 //! The thread that sends in time slots: it has the router's mailbox, its queue, all sockets that send, and the clock.
 //! What it does with them, and when, says the [driver](crate::driver).
 //!
-//! It is never rung: who publishes a package makes no system call, and waits for a slot anyway. It takes nothing from
-//! the heap.
+//! Its bell is never rung: publishing a package makes no system call, since the package waits for a slot anyway. The
+//! thread takes nothing from the heap.
 
 mod alarm;
 mod answer_queue;
@@ -36,7 +36,7 @@ use rohrpost_network::Network;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Whose thread it is.
+/// What the thread knows of its node.
 #[derive(Clone, Copy)]
 pub(super) struct Own {
     pub(super) router: Name,

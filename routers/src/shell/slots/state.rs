@@ -36,7 +36,7 @@ impl SlotSnapshot {
     }
 }
 
-/// Shared by the thread of the time slots and whoever wants to know.
+/// Shared by the thread of the time slots and its readers.
 #[derive(Debug)]
 pub struct SlotStatus {
     snapshot: Mutex<SlotSnapshot>,
@@ -52,7 +52,7 @@ impl SlotStatus {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Of the thread itself. It never waits for who looks: then the next one is shown.
+    /// For the thread itself. It never waits for a reader: then the next snapshot is shown.
     pub(super) fn show(&self, snapshot: &SlotSnapshot) {
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;

@@ -95,7 +95,7 @@ impl ServerShell {
         let ServerParts { address, settings, faults, seal, names, node } = parts;
         let own = settings.system.map(|(system, _)| system);
         let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
-        raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.greetings_max) + DESCRIPTORS_BESIDE);
+        raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.handshakes_max) + DESCRIPTORS_BESIDE);
         let listener = listen(address)?;
         let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|errno| io("epoll")(errno.into()))?;
         let bell = EventFd::from_flags(EfdFlags::EFD_CLOEXEC | EfdFlags::EFD_NONBLOCK)
@@ -346,7 +346,7 @@ impl ServerThread {
         let classes = Class::all(self.server.counts());
         let ServerReporter { left, refused, ref refusal, .. } = self.host;
         let (refusal, held) = (refusal.clone(), self.host.held());
-        let (crowded, overtaken) = (self.server.crowded(), self.server.overtaken());
+        let (crowded, superseded) = (self.server.crowded(), self.server.superseded());
         let crowded_packages = self.server.counts().lost_for(Cause::Share);
         let mut views = self.server.views();
         let members = views.by_ref().take(MEMBERS_MAX).map(member).collect();
@@ -359,7 +359,7 @@ impl ServerThread {
             refusal,
             crowded,
             crowded_packages,
-            overtaken,
+            superseded,
             held,
             classes,
         });

@@ -55,7 +55,7 @@ impl Clock {
 
     /// This node is master from now on. Its own time continues, or the one that it heard; else the first epoch begins
     /// by its wall clock.
-    pub(super) fn reign(&mut self, now_ns: u64, term: Term, origin: Origin) {
+    pub(super) fn become_master(&mut self, now_ns: u64, term: Term, origin: Origin) {
         self.line.stop_slew(now_ns);
         if origin == Origin::Heard {
             self.take_up_heard(now_ns);
@@ -74,7 +74,7 @@ impl Clock {
         self.slaves.iter_mut().for_each(|slave| *slave = Slave { next_ns: now_ns, ..Slave::default() });
         let error_ns = self.line.record().error_ns;
         if let Some(slots) = &mut self.slots {
-            slots.reigns(error_ns, origin);
+            slots.become_master(error_ns, origin);
         }
     }
 

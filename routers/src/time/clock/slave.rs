@@ -44,7 +44,7 @@ impl Clock {
                     self.drafts.clear();
                 }
             }
-            // The same reign under a later term: the timeline continues.
+            // The same master under a later term: the timeline continues.
             SyncOutcome::Followed if self.timeline == sync.began => self.term = sync.term,
             SyncOutcome::Followed => {}
         }

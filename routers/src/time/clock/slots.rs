@@ -87,7 +87,7 @@ impl SlotClock {
     }
 
     /// This node is master; its time may be this far off that of an earlier term.
-    pub(super) fn reigns(&mut self, error_ns: u64, origin: Origin) {
+    pub(super) fn become_master(&mut self, error_ns: u64, origin: Origin) {
         self.goes_by(error_ns);
         self.beginning = if origin == Origin::Own { 0 } else { BEGINNING_CYCLES };
     }
@@ -102,7 +102,7 @@ impl Clock {
         let hears_ns = self.interval_ns.saturating_mul(OTHERS_CYCLES);
         self.others.gives(hears_ns.saturating_add(settings.slot_every_ns.saturating_mul(OTHERS_SLOTS)));
         // A node that hears no other restarts its terms, but above those of its earlier incarnation, which others may
-        // still follow: a reign lasts longer than a millisecond.
+        // still follow: a term lasts longer than a millisecond.
         if self.line.record().epoch > 0 {
             self.election.speaks_of(Term::new(self.hello_ns / MS, 0), 0);
         }
@@ -227,7 +227,7 @@ impl Clock {
             return;
         }
         if let Some(term) = self.election.succeeds() {
-            self.reign(now_ns, term, Origin::Own);
+            self.become_master(now_ns, term, Origin::Own);
         }
     }
 
