@@ -183,7 +183,7 @@ pub struct PeerReceived {
     pub damaged: Count,
     /// Datagrams of another version or digest, or of an address that is not its; dropped.
     pub refused: Count,
-    /// Lives of it that were heard, without the first.
+    /// Incarnations of it that were heard, without the first.
     pub restarts: Count,
 }
 

@@ -1,9 +1,9 @@
-//! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line,
-//! changed bits. And what the same network is to a stream: a [`BandwidthQueue`].
+//! A bad network between a router and its socket, from a seed: loss, delay, jitter, duplicates, changed order, a slow
+//! line, changed bits. And what the same network is to a stream: a [`BandwidthQueue`].
 //!
 //! ```text
 //!  push ──▶ lost? ──▶ line of `rate` ──▶ delay ± jitter ──▶ held back? ──▶ changed bit? ──▶ due, in order of time ──▶ poll
-//!                                                                            └─ copied? ──▶ once more, a little later
+//!                                                                            └─ duplicated? ──▶ once more, a little later
 //! ```
 //!
 //! Each fault can be had alone: jitter never changes the order (as queues of switches do not), only `reorder` does.
@@ -32,7 +32,7 @@ pub const BYTES_MAX: usize = 16 << 20;
 /// No delay or jitter is longer.
 pub const DELAY_MAX: Duration = Duration::from_secs(10);
 
-/// What is held back, or copied, comes at most so much later; twice the delay, if that is longer.
+/// What is held back, or duplicated, comes at most so much later; twice the delay, if that is longer.
 const LATER_NS: u64 = 2_000_000;
 
 /// A part of all datagrams, in millionths.
@@ -118,7 +118,7 @@ impl ImpairmentSettings {
     }
 }
 
-/// What became of the datagrams so far. Pushed + copied = passed + lost + full + those still on their way.
+/// What became of the datagrams so far. Pushed + duplicated = passed + lost + full + those still on their way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct ImpairmentCounts {
     /// Given to [`Impairment::push`].
@@ -129,8 +129,8 @@ pub struct ImpairmentCounts {
     pub lost: u64,
     /// Lost because too many were on their way.
     pub full: u64,
-    /// Second copies made.
-    pub copied: u64,
+    /// Duplicates made.
+    pub duplicated: u64,
     /// Held back.
     pub held_back: u64,
     /// Changed.
@@ -239,7 +239,7 @@ impl<T: Clone> Impairment<T> {
         }
         let bit = self.settings.corrupt.holds(drawn.corrupt).then_some(drawn.bit);
         if self.settings.duplicate.holds(drawn.duplicate) {
-            self.counts.copied += 1;
+            self.counts.duplicated += 1;
             let copy_due_ns = due_ns.saturating_add(self.settings.later_ns(drawn.copy_later));
             self.hold(copy_due_ns, to.clone(), datagram, None);
         }

@@ -49,8 +49,8 @@ fn shares_are_what_they_say() {
     assert_eq!(arrived.len() as u64 + counts.lost, 100_000);
     assert!((4_800..5_200).contains(&counts.lost), "{counts:?}");
     let (arrived, counts) = arrivals("duplicate=1%", 0, 100_000, 1000);
-    assert_eq!(arrived.len() as u64, 100_000 + counts.copied);
-    assert!((900..1_100).contains(&counts.copied), "{counts:?}");
+    assert_eq!(arrived.len() as u64, 100_000 + counts.duplicated);
+    assert!((900..1_100).contains(&counts.duplicated), "{counts:?}");
     let (_, counts) = arrivals("corrupt=0.1%", 0, 100_000, 1000);
     assert!((60..140).contains(&counts.corrupted), "{counts:?}");
     let (arrived, _) = arrivals("loss=100%", 0, 1000, 1000);
@@ -198,8 +198,8 @@ proptest! {
             now_ns += wait_ns;
             way.push(now_ns, (), &vec![0; bytes]);
             while let ImpairmentStep::Send { .. } = way.poll(now_ns) {}
-            let ImpairmentCounts { pushed, passed, lost, full, copied, .. } = way.counts();
-            prop_assert_eq!(pushed + copied, passed + lost + full + way.on_way() as u64);
+            let ImpairmentCounts { pushed, passed, lost, full, duplicated, .. } = way.counts();
+            prop_assert_eq!(pushed + duplicated, passed + lost + full + way.on_way() as u64);
         }
     }
 }

@@ -215,7 +215,7 @@ impl Inbound {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    /// `first`: see [`PeerReceiver::lives`].
+    /// `first`: see [`PeerReceiver::is_present`].
     fn take(
         &mut self,
         now_ns: u64,
@@ -228,7 +228,7 @@ impl Inbound {
         let way = PeerContext { from, stats: &self.stats, peer: self.stats.peer(from) };
         let peer = &mut self.peers[usize::from(from)];
         let is_other = first.is_none() && self.stats.is_other_incarnation(from, head.incarnation);
-        if is_other || !peer.lives(now_ns, head, first, &way, deliver) {
+        if is_other || !peer.is_present(now_ns, head, first, &way, deliver) {
             return way.peer.received.old.add(1);
         }
         if !peer.is_new(head.sequence, &way) {

@@ -78,7 +78,7 @@ impl PeerReceiver {
     /// What it sent before it was over says nothing: that may be a duplicate from the wire or a replay. Unauthenticated
     /// claims need a second datagram: see [`Doubt`]. `first`: where datagrams are sealed, the handshake has shown that
     /// this incarnation is the present one, and that it counts from this sequence on.
-    pub(super) fn lives(
+    pub(super) fn is_present(
         &mut self,
         now_ns: u64,
         head: &FrameHead,

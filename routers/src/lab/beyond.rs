@@ -22,8 +22,8 @@ const HOME_PORT: DeviceIndex = FAR_BRIDGE + 1;
 const FAR: DeviceIndex = LAN + 1;
 
 impl Lab {
-    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. Once
-    /// in the life of a lab.
+    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. To
+    /// be called once in a lab.
     ///
     /// # Errors
     /// As for [`Lab::new`].

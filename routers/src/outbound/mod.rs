@@ -122,7 +122,7 @@ struct KeepAlive {
     quiet_until_ns: u64,
     tell_ns: u64,
     /// Its incarnation at the last look.
-    life: u64,
+    incarnation: u64,
 }
 
 impl Outbound {
@@ -390,8 +390,8 @@ impl Outbound {
     /// A peer in a new incarnation soon gets a keep-alive that it is heard: it may wait for that.
     fn announce_to_new_incarnations(&mut self) {
         for (peer, stats) in self.peers.iter_mut().zip(0..).map(|(peer, node)| (peer, self.stats.peer(node))) {
-            let life = stats.link.incarnation.get();
-            if std::mem::replace(&mut peer.life, life) != life {
+            let incarnation = stats.link.incarnation.get();
+            if std::mem::replace(&mut peer.incarnation, incarnation) != incarnation {
                 (peer.tell_ns, self.alive_ns) = (0, 0);
             }
         }

@@ -166,7 +166,7 @@ impl Gate {
         began.is_some()
     }
 
-    /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
+    /// The next challenge that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
     pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
         if now_ns < self.look_ns || self.handshake.is_none() {
             return None;

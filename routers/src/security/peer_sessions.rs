@@ -100,7 +100,7 @@ struct PeerSession {
     session: Published,
     /// What it must answer for an incarnation of it to begin.
     challenge: AtomicU64,
-    /// Questions to it.
+    /// Challenges to it.
     asked: AtomicU32,
     /// Hellos of this incarnation to it.
     hellos: AtomicU64,
@@ -244,12 +244,12 @@ impl PeerSessions {
     /// A challenge to a peer, with one of its keys after the other: which of them the peer has is not known. None
     /// as long as no incarnation of it could take an answer.
     pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
-        let question = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
-        if question.challenge == 0 {
+        let hello = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
+        if hello.challenge == 0 {
             return None;
         }
         let asked = self.peer(peer).asked.fetch_add(1, Ordering::Relaxed) as usize;
-        Some(self.hello(peer, asked % self.keys.len(), question, datagram))
+        Some(self.hello(peer, asked % self.keys.len(), hello, datagram))
     }
 
     /// The sequences that come next: of packages, and of time.

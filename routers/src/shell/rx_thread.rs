@@ -108,11 +108,11 @@ impl RxThread {
 
     /// Sends challenges to peers without a session or without a sign of life, where datagrams are sealed.
     fn ask(&mut self, now_ns: u64) {
-        let mut question = [0; REFUSAL_BYTES];
+        let mut challenge = [0; REFUSAL_BYTES];
         while let Some(gate) = &mut self.guard
-            && let Some(said) = gate.ask(now_ns, &self.stats, &mut question)
+            && let Some(said) = gate.ask(now_ns, &self.stats, &mut challenge)
         {
-            self.say(said, question);
+            self.say(said, challenge);
         }
     }
 

@@ -91,7 +91,7 @@ pub struct ClientLink {
     pub why: String,
     /// Connections so far.
     pub connections: u64,
-    /// Shortest way there and back of late, ns.
+    /// Shortest recent round trip, ns.
     pub round_trip_ns: Option<u64>,
     /// How far off system time by the server is at most, ns; none if the server does not know it.
     pub time_error_ns: Option<u64>,

@@ -132,7 +132,7 @@ impl Stream {
         }
     }
 
-    /// The way there and back takes so long, ns, as far as that is known.
+    /// The round trip, ns, as far as that is known.
     pub(super) fn set_round_trip(&mut self, round_trip_ns: Option<u64>) {
         self.pace.set_round_trip(round_trip_ns);
     }

@@ -113,7 +113,7 @@ impl Election {
         }
     }
 
-    /// Sets the delays that depend on slots. A slave needs `intervals` to ask; question and answer wait for slots, so a
+    /// Sets the delays that depend on slots. A slave needs `intervals` to ask; request and reply wait for slots, so a
     /// master must not be replaced earlier for not answering. A new time begins only after no time was heard for long
     /// enough. A successor sends before the silence of its master is over.
     pub(super) fn asks_after(&mut self, intervals: u64, asks_every_ns: u64) {

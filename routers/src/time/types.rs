@@ -80,8 +80,8 @@ pub enum Ignored {
     /// From a master that must yield, late, or a duplicate.
     #[error("late, twice, or of a master that must yield")]
     Late,
-    /// A reply to no open question.
-    #[error("no such question")]
+    /// A reply to no open request.
+    #[error("no such request")]
     Unasked,
     /// From an unverified sender, and of no use.
     #[error("of a router that has not shown that it lives")]
@@ -142,7 +142,7 @@ pub struct InSlots {
     pub allowance_ns: u64,
     /// Each node with slots has one at least this often, ns.
     pub slot_every_ns: u64,
-    /// This node and all that may be master have one this often: for questions and answers.
+    /// This node and all that may be master have one this often: for requests and replies.
     pub asks_every_ns: u64,
     /// Each node may send a hello at least this often, ns.
     pub hello_every_ns: u64,

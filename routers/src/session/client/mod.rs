@@ -240,7 +240,7 @@ impl Client {
         matches!(self.state, ClientState::Handshake { .. } | ClientState::Member)
     }
 
-    /// The shortest way there and back of late, ns.
+    /// The shortest recent round trip, ns.
     pub fn round_trip_ns(&self) -> Option<u64> {
         self.estimate.round_trip_ns()
     }

@@ -46,7 +46,7 @@ pub(super) struct PendingRefusal {
     pub(super) text: String,
 }
 
-/// The way there and back: a client says something as soon as it reads its welcome.
+/// The round trip: a client says something as soon as it reads its welcome.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) enum RoundTrip {
     /// There was no welcome.

@@ -8,10 +8,10 @@
 //!
 //! The thread sleeps in one system call until a datagram, a stamp or its time comes. It takes nothing from the heap for
 //! a datagram. What strangers send is dropped in the kernel; whatever comes with a node's address, it works for a
-//! [share](share) of the time at most.
+//! [share](CpuBudget) of the time at most.
 
+mod cpu_budget;
 mod local;
-mod share;
 mod socket;
 mod state;
 #[cfg(test)]
@@ -26,12 +26,12 @@ pub(super) use works::Works;
 use crate::impair;
 use crate::settings::Settings;
 use crate::time::{Exchange, Step, TIME_BYTES, TimeSettings};
+use cpu_budget::CpuBudget;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use rohrpost_config::{FIFO_MAX, Installation, TimeSource};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_mailbox::{Node, NodeError, monotonic_ns};
-use share::CpuBudget;
 use std::io::{self, PipeReader, PipeWriter};
 use std::net::SocketAddr;
 use std::os::fd::AsFd;

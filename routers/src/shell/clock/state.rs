@@ -22,7 +22,7 @@ pub struct ClockSnapshot {
     pub offset_ns: i64,
     /// How much faster than its own clock the master's runs, ns a second.
     pub rate_ppb: i64,
-    /// Shortest way there and back of late, ns.
+    /// Shortest recent round trip, ns.
     pub delay_ns: Option<u64>,
     /// When the master was heard last, monotonic ns.
     pub heard_ns: Option<u64>,
