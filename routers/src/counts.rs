@@ -79,7 +79,7 @@ pub struct Side {
     classes: Box<[ClassCounts]>,
 }
 
-/// Of one class.
+/// Counts of one class.
 #[derive(Default, Debug)]
 pub struct ClassCounts {
     /// Packages: taken from this node's senders; or come from other nodes, with those of which only fragments came.

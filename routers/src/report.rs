@@ -60,7 +60,7 @@ impl From<SendError> for NotDelivered {
     }
 }
 
-/// What happens between routers.
+/// A change between routers that people are told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RouterEvent {
     /// A peer is heard: for the first time, or after silence.

@@ -25,14 +25,14 @@ use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER};
 use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
 
-/// Of a router of the LAN: takes IP packets from the same mailbox of other nodes.
+/// Mailbox of a router for IP packets from the same mailbox of other nodes.
 pub const TUNNEL: u8 = 4;
 /// Type of an IP packet.
 pub const PACKET: Type = Type::data(1);
 /// An IP packet goes behind all packages of modules.
 pub(crate) const PACKET_PRIORITY: Priority = Priority(0);
 
-/// What of configuration the judgement needs. The default refuses nothing but what is wrong in itself.
+/// The part of configuration that admission needs. The default refuses nothing but what is wrong in itself.
 #[derive(Clone, Debug, Default)]
 pub struct Admission {
     /// Which classes may command which.

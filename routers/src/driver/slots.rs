@@ -42,7 +42,7 @@ pub struct SlotDriver {
     log: WindowLog,
 }
 
-/// What to do until it is polled again.
+/// What to do until the next poll.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SlotStep {
     /// Sleep, ns from now on.
@@ -57,7 +57,7 @@ pub enum SlotStep {
     },
 }
 
-/// What it waits for.
+/// What the driver waits for.
 #[derive(Clone, Copy)]
 enum Phase {
     /// Nothing has been planned.

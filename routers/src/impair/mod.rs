@@ -32,10 +32,10 @@ pub const BYTES_MAX: usize = 16 << 20;
 /// No delay or jitter is longer.
 pub const DELAY_MAX: Duration = Duration::from_secs(10);
 
-/// What is held back, or duplicated, comes at most so much later; twice the delay, if that is longer.
+/// Longest extra delay of what is held back or duplicated; twice the delay, if that is longer.
 const LATER_NS: u64 = 2_000_000;
 
-/// A part of all datagrams, in millionths.
+/// Probability that something happens to a datagram, in millionths.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Probability(u32);
 
@@ -137,7 +137,7 @@ pub struct ImpairmentCounts {
     pub corrupted: u64,
 }
 
-/// What [`Impairment::poll`] says.
+/// Next step, from [`Impairment::poll`].
 #[derive(PartialEq, Eq, Debug)]
 pub enum ImpairmentStep<'a, T> {
     /// This one has arrived; ask again.

@@ -59,7 +59,7 @@ pub struct Envelope {
     pub bytes: usize,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Inbound::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum InboundStep {
     /// Send the first bytes of the buffer to the packages' port of an address, then ask again.

@@ -92,7 +92,7 @@ impl Lab {
     }
 }
 
-/// Of the networks that are set aside for tests of networks (RFC 2544, RFC 5180), so that no file has it.
+/// An address of the networks that are set aside for tests (RFC 2544, RFC 5180), so that no file has it.
 fn far_address(like: IpAddr, index: u8) -> IpAddr {
     match like {
         IpAddr::V4(_) => Ipv4Addr::new(198, 18, 0, index).into(),

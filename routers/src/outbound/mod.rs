@@ -50,7 +50,7 @@ pub struct Package<'a> {
     pub body: &'a [u8],
 }
 
-/// What became of a package.
+/// Result for a package that is handed over.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Accepted {
     /// Send these bytes and then the body, now, as one datagram.
@@ -66,7 +66,7 @@ pub enum Accepted {
     Lost,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Outbound::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OutboundStep {
     /// Send the first bytes of the buffer as one datagram, then ask again.

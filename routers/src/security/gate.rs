@@ -50,6 +50,7 @@ pub struct Gate {
     look_ns: u64,
 }
 
+/// What decides when a peer is challenged again.
 #[derive(Clone, Copy, Default)]
 struct ChallengeSchedule {
     /// When it was asked last, ns; none: never.

@@ -17,7 +17,7 @@ pub struct HelloQueue {
     next: usize,
 }
 
-/// What waits for a peer.
+/// Hellos to one peer that wait.
 #[derive(Clone, Default)]
 struct PeerHellos {
     reply: Option<Word>,

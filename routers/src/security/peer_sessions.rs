@@ -92,7 +92,7 @@ impl fmt::Debug for PeerSessions {
     }
 }
 
-/// A peer.
+/// Keys, challenge and counters of one peer.
 struct PeerSession {
     /// By the place of the key.
     hello_to: Vec<Seal>,

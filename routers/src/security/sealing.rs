@@ -21,7 +21,7 @@ pub struct Sealing {
     strangers: Box<[Vec<Seal>]>,
 }
 
-/// To a peer's present incarnation.
+/// Seal to a peer's present incarnation.
 struct PeerSeal {
     /// Place of the key.
     key: usize,

@@ -54,10 +54,10 @@ pub const STALLED_AFTER_NS: u64 = 10_000_000_000;
 pub const HANDSHAKE_MAX_NS: u64 = 5_000_000_000;
 /// From the first byte of a frame to its last, at most.
 pub const FRAME_MAX_NS: u64 = 30_000_000_000;
-/// What time alone brings about is looked for this often.
+/// Interval between two looks for what only the passing of time changes.
 pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
-/// Writes the answers to commands that go no further: what a fault looks like is not the routers' business.
+/// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.
 pub trait ErrorReplies {
     /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for.
     /// False: it gets none.

@@ -45,7 +45,7 @@ pub(super) fn take_only_from(socket: &impl AsFd, addresses: &[IpAddr]) -> io::Re
 /// that hears these must know it, and refuse. Forged frames of that form are read, too.
 ///
 /// # Errors
-/// As [`take_only_from`].
+/// Like [`take_only_from`], for datagrams of time.
 pub(super) fn take_time_only_from(socket: &impl AsFd, addresses: &[IpAddr], digest: u64) -> io::Result<()> {
     let mut program = program(addresses);
     // In place of the verdict for all others.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Of the sending thread. Above every module: a router that waits for a module delays other modules' packages.
+/// Priority of the sending thread, above every module: a router that waits for a module delays other modules' packages.
 pub(super) const DEPARTURES_FIFO: u8 = FIFO_MAX + 9;
 /// Of the receiving thread: a flood of outgoing packages must not keep answers from coming in. It sleeps when the
 /// socket is empty.

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// What sockets hold of what the line has not taken yet: what it carries in so long.
+/// Limit of what sockets buffer before the line: what the line carries in this time.
 const HELD: Duration = Duration::from_millis(50);
 const HELD_BYTES_MIN: usize = 4 * 1024;
 const HELD_BYTES_MAX: usize = 256 * 1024;

@@ -10,7 +10,7 @@
 
 use crate::session::BATCH_BYTES;
 
-/// What the kernel may keep before it has sent it: what leaves in so long.
+/// Limits what the kernel has not sent yet: what leaves in this time.
 const UNSENT_NS: u64 = 250_000_000;
 /// The same and what is under way to the other end: what leaves in so long, or in two round trips. With less than one
 /// round trip the limit itself would slow the connection down, more and more; two let it grow.
@@ -22,9 +22,9 @@ const UNSENT_BYTES_FIRST: u64 = 2 * 1024;
 const HELD_BYTES_MIN: u64 = 4 * 1024;
 /// Faster connections have as much on the way as the kernel thinks good.
 const HELD_BYTES_MAX: u64 = 192 * 1024;
-/// Of one that was bound and is fast again: more than any kernel grants, so the most that this one does.
+/// For a connection that was limited and is fast again: more than any kernel grants, so the most that this one does.
 const HELD_BYTES_FREE: u64 = 64 * 1024 * 1024;
-/// With less, a second and more lies between a byte and word of it, however little the kernel holds.
+/// Below this rate a byte is acknowledged after a second or more, however little the kernel holds.
 const SLOW_BYTES_S: u64 = 64 * 1024;
 /// The rate is that over so long, or over a round trip, or over so many bytes: at first a connection takes more than
 /// leaves.
@@ -32,7 +32,7 @@ const WINDOW_NS: u64 = 500_000_000;
 const WINDOW_BYTES: u64 = 256 * 1024;
 const SECOND_NS: u128 = 1_000_000_000;
 
-/// What the kernel is to hold of a connection.
+/// Limits of what the kernel holds of a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Holding {
     /// Bytes that have not been sent.
@@ -41,7 +41,7 @@ pub(super) struct Holding {
     pub(super) held: Option<u64>,
 }
 
-/// Of one connection.
+/// Pace of one connection, as measured.
 #[derive(Debug)]
 pub(super) struct ConnectionPace {
     /// When it was full first, ns; since then it was wanted all the time.

@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 
-/// What came of reading or writing.
+/// Result of reading or writing.
 #[derive(Debug)]
 pub enum Moved {
     /// So many bytes, at least one.

@@ -17,7 +17,7 @@ use rohrpost_network::Tdma;
 use rohrpost_network::TimeShare;
 use std::time::Duration;
 
-/// By an unverified time a hello leaves in one of this many cycles, since that time may be wrong.
+/// While the time is unverified, a hello leaves in one of this many cycles, since that time may be wrong.
 pub const UNPROVEN_CYCLES: u64 = 4;
 
 /// Purpose of a window.

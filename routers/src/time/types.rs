@@ -38,7 +38,8 @@ pub enum Role {
 /// What to do next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Step {
-    /// The buffer has a datagram for this node. If it is to be stamped, its id comes back with [`Clock::sent`].
+    /// The buffer has a datagram for this node. If it is to be stamped, its id comes back with
+    /// [`Clock::sent`](super::Clock::sent).
     Send {
         /// Receiver.
         to: NodeIndex,
@@ -91,7 +92,7 @@ pub enum Ignored {
     NegativeDelay,
 }
 
-/// Result of [`Clock::reading`].
+/// Result of [`Clock::reading`](super::Clock::reading).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reading {
     /// System time, its epoch and its bound, by the node's page.

@@ -73,7 +73,7 @@ pub struct ClientPackage<'a> {
     pub hops: u8,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Client::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClientStep {
     /// Connect; then [`Client::connected`] or [`Client::closed`].
@@ -89,7 +89,7 @@ pub enum ClientStep {
     },
 }
 
-/// What people want to know of, each once until it changes.
+/// A change that people are told once.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClientEvent<'a> {
     /// The server takes and brings packages.

@@ -117,7 +117,7 @@ pub(super) const fn is_tls(bytes: &[u8]) -> bool {
 
 const _: () = assert!(LENGTH_MAX < 0x01_03_14, "no head begins as a record of TLS");
 
-/// A frame, read.
+/// A parsed frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SessionMessage<'a> {
     /// Identity of a client.

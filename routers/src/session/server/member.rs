@@ -21,7 +21,7 @@ pub enum MemberState {
     },
 }
 
-/// A question for the time that waits for its answer.
+/// A request for the time that waits for its response.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimeRequest {
     pub(super) asked_ns: u64,
@@ -38,7 +38,7 @@ pub(super) struct Judged {
     pub(super) holder: String,
 }
 
-/// A refusal that waits for its way out.
+/// A refusal that is not sent yet.
 #[derive(Debug)]
 pub(super) struct PendingRefusal {
     pub(super) reason: SessionRefusalReason,

@@ -82,7 +82,7 @@ pub struct View<'a> {
     pub bytes: usize,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Server::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ServerStep {
     /// Write what [`Server::ready`] has, then say how much with [`Server::took`].
@@ -96,7 +96,7 @@ pub enum ServerStep {
     },
 }
 
-/// What people want to know of.
+/// A change that people are told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ServerEvent<'a> {
     /// A client takes part.

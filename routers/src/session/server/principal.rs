@@ -33,7 +33,7 @@ impl Principal {
 /// A principal by a number that no other gets as long as anything of it waits.
 pub(in crate::session) type PrincipalId = u32;
 
-/// What a principal that takes part uses.
+/// Resources that a principal uses.
 #[derive(Debug)]
 pub(in crate::session) struct Uses {
     owner: Principal,

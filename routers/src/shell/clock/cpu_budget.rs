@@ -1,7 +1,7 @@
 //! How much of a processor the clock's thread may use. It has the highest priority, and it reads each datagram that
 //! bears the address of a node, forged or not.
 
-/// Of so much time it may use one part.
+/// It may use one part in this many of all time.
 const PARTS: u64 = 10;
 /// What it did not use it may use later, up to so much, ns: all that comes at once in quiet times.
 const SAVED_NS_MAX: u64 = 2_000_000;
@@ -10,7 +10,7 @@ const RESUMES_NS: u64 = 200_000;
 /// Longest time that counts as work, ns: in a longer one the thread stood still.
 const USED_NS_MAX: u64 = 1_000_000;
 
-/// What is left of it.
+/// Processor time that the clock's thread has left.
 #[derive(Debug)]
 pub(super) struct CpuBudget {
     /// Less than 0: it used more than it had.

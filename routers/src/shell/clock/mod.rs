@@ -8,7 +8,7 @@
 //!
 //! The thread sleeps in one system call until a datagram, a stamp or its time comes. It takes nothing from the heap for
 //! a datagram. What strangers send is dropped in the kernel; whatever comes with a node's address, it works for a
-//! [share](CpuBudget) of the time at most.
+//! share of the time at most.
 
 mod cpu_budget;
 mod local;
@@ -47,7 +47,7 @@ pub(super) const FIFO: u8 = FIFO_MAX + 11;
 /// However long nothing comes: so often it looks whether the computer has slept, or its clock is slewed.
 const LOOKS_EVERY: Duration = Duration::from_millis(100);
 
-/// So many datagrams are taken before what is due is sent.
+/// Datagrams that are taken before what is due is sent.
 const BURST: usize = 64;
 
 /// Why a clock did not start.

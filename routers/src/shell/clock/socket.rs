@@ -24,7 +24,7 @@ const PRIORITY: u32 = 6;
 const RETURNED_BYTES: usize = TIME_BYTES + TAG_BYTES + 128;
 const CONTROL_BYTES: usize = 512;
 
-/// What a socket has.
+/// Socket for datagrams of time.
 pub(super) struct TimeSocket {
     socket: UdpSocket,
     peers: Vec<SockaddrStorage>,

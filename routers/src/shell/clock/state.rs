@@ -5,7 +5,7 @@ use crate::time::{Clock, Reading, Role, Term};
 use rohrpost_mailbox::TimeRecord;
 use std::sync::{Mutex, PoisonError};
 
-/// How it stands with system time on this node.
+/// System time on this node at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockSnapshot {
     /// What the node does for the common time.

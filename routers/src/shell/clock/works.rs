@@ -21,7 +21,7 @@ const WRITE_TRIES: usize = 8;
 /// Room for a datagram of time, and what seals it.
 const SEALED_BYTES: usize = TIME_BYTES + TAG_BYTES;
 
-/// What the impairment keeps besides the bytes.
+/// What the impairment keeps of a datagram besides its bytes.
 #[derive(Clone, Copy)]
 struct DelayedArrival {
     source: IpAddr,

@@ -20,7 +20,7 @@ pub(in crate::shell) const REFUSAL_BYTES: usize = 128;
 /// second later.
 pub(in crate::shell) const ANSWERS: usize = 32;
 
-/// What the thread that receives wants to have sent.
+/// An answer from the receiving thread, to be sent.
 pub(in crate::shell) enum Answer {
     /// Where nothing is sealed: a refusal of another configuration or version, and its receiver.
     Refusal { to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES] },

@@ -45,13 +45,13 @@ pub(super) struct Own {
     pub(super) network: Network,
 }
 
-/// What the thread has.
+/// State of the thread.
 pub(super) struct SlotThread {
     driver: SlotDriver,
     system: System,
 }
 
-/// What the driver has of the system.
+/// Implements the driver's platform with the real system.
 struct System {
     shared: Arc<Shared>,
     /// In which the thread that receives counts.

@@ -5,7 +5,7 @@ use crate::driver::{Used, WINDOWS};
 use crate::tdma::{Silent, SlotCounts};
 use std::sync::{Mutex, PoisonError};
 
-/// How it stands with the time slots of this node.
+/// Time slots of this node at one moment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SlotSnapshot {
     /// What became of its windows.

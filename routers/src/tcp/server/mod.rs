@@ -28,9 +28,9 @@ use std::thread::JoinHandle;
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
 const EVENTS: usize = 256;
-/// What a process has open besides its connections, at most.
+/// File descriptors of a process besides its connections, at most.
 const DESCRIPTORS_BESIDE: u64 = 256;
-/// What is no client's place.
+/// Token of the listening socket; no client has this index.
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
 
@@ -56,7 +56,7 @@ pub enum ServerError {
     Thread(io::Error),
 }
 
-/// What it is made of.
+/// Parts of a server.
 pub struct ServerParts<'a> {
     /// Where it listens.
     pub address: SocketAddr,
@@ -158,7 +158,7 @@ struct ServerConnection {
     awaits_room: bool,
 }
 
-/// What the thread has.
+/// State of the thread.
 struct ServerThread {
     shared: Arc<ServerShared>,
     server: Server,
