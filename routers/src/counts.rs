@@ -55,7 +55,7 @@ rohrpost_mailbox::causes! {
 pub struct Count(AtomicU64);
 
 impl Count {
-    /// As it stands.
+    /// The present number.
     pub fn get(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }

@@ -1,5 +1,5 @@
-//! The one point of admission: what comes from another node, from another system, or by the TCP router is judged here
-//! before it reaches a mailbox.
+//! The one point of admission: what comes from another node, from another system, or by the TCP router is validated
+//! here before it reaches a mailbox.
 //!
 //! ```text
 //!  LAN ─▶ Inbound ──────────┐                                    ┌─▶ the mailbox, with the priority that it may have
@@ -98,7 +98,7 @@ impl From<NotAdmitted> for session::Cause {
 }
 
 impl Admission {
-    /// As configuration has it for a node.
+    /// Admission for a node, as in the configuration.
     pub fn new(installation: &Installation, node: &str) -> Self {
         let tunnel = installation.tdma.as_ref().and_then(|tdma| tdma.tunnel);
         Self {
@@ -129,7 +129,7 @@ impl Admission {
         }
         // A reply in the name of such a mailbox says that it takes nothing.
         if self.is_routers_own(head.to) || self.is_routers_own(head.from) && !is_reply {
-            self.judge_routers_own(way, head, body)?;
+            self.validate_routers_own(way, head, body)?;
         }
         if self.is_across_systems(way, head) && !broken!(AdmitsRoutersOwn) {
             return Err(NotAdmitted::RoutersOwn);
@@ -158,7 +158,7 @@ impl Admission {
 
     /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own
     /// address.
-    fn judge_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), NotAdmitted> {
+    fn validate_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), NotAdmitted> {
         let node = match way {
             ArrivalPath::Lan { node, .. } => Some(node),
             ArrivalPath::Beyond { .. } => None,

@@ -22,7 +22,7 @@ pub trait Platform {
     fn monotonic_ns(&self) -> u64;
     /// What is known of system time.
     fn clock(&self) -> &Clock;
-    /// The same, to be changed; and in which the half that receives counts.
+    /// The clock, to be changed, and the counters of the receiving half.
     fn time(&mut self) -> (&mut Clock, &Stats);
     /// The router's mailbox, and the queue behind it.
     fn transit(&mut self) -> impl Transit;
@@ -58,7 +58,7 @@ pub enum SlotEvent<'a> {
     /// The clock was asked between windows, when it may send nothing.
     Idle(&'a Step),
     /// It was time for a window.
-    Judged(&'a Planned, &'a WindowVerdict),
+    Decided(&'a Planned, &'a WindowVerdict),
     /// A hello leaves in this window by what is only overheard.
     AnsweredOverheard(&'a TransmitWindow),
     /// A datagram of packages was made.

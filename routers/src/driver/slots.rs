@@ -81,7 +81,7 @@ struct First {
 }
 
 impl SlotDriver {
-    /// Of a router that begins at `now_ns`. `datagram`: room for the largest, and its seal.
+    /// The driver of a router that begins at `now_ns`. `datagram`: room for the largest, and its seal.
     pub fn new(network: Network, nodes: usize, scheduler: SlotScheduler, datagram: Box<[u8]>, now_ns: u64) -> Self {
         Self {
             network,
@@ -228,7 +228,7 @@ impl SlotDriver {
     fn window(&mut self, on: &mut impl Platform, planned: &Planned) {
         let called_ns = on.local_ns();
         let verdict = self.scheduler.validate(planned, called_ns, on.clock());
-        on.happened(SlotEvent::Judged(planned, &verdict));
+        on.happened(SlotEvent::Decided(planned, &verdict));
         if let WindowVerdict::Send(tx_window) = verdict {
             self.use_window(on, tx_window, called_ns);
         }

@@ -234,7 +234,7 @@ impl<'a> Frame<'a> {
         Ok((head, Self::read(head.kind, datagram[2], rest)?))
     }
 
-    /// The same for the rest after a head, as a router of a `version` wrote it.
+    /// Reads the rest after a head, as a router of a `version` wrote it.
     pub(crate) fn read(kind: FrameKind, version: u8, rest: &'a [u8]) -> Result<Self, BadFrame> {
         Ok(match kind {
             FrameKind::Packages => Self::Packages(Packages::check(rest)?),

@@ -43,7 +43,7 @@ impl Probability {
     /// All of them, in millionths.
     pub const ALL: u32 = 1_000_000;
 
-    /// So many in a million; more than [`ALL`](Self::ALL) is all.
+    /// This many in a million; more than [`ALL`](Self::ALL) is all.
     pub const fn per_million(millionths: u32) -> Self {
         Self(if millionths > Self::ALL { Self::ALL } else { millionths })
     }

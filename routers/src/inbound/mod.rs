@@ -90,7 +90,7 @@ pub struct Inbound {
 }
 
 impl Inbound {
-    /// For the router of `settings.own`.
+    /// State for the router of `settings.own`.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         Self {
             peers: settings.nodes.iter().map(|_| PeerReceiver::default()).collect(),
@@ -126,7 +126,7 @@ impl Inbound {
         }
     }
 
-    /// The same for one that was sealed, and opened: `text` is what follows its head, `first` the first sequence that
+    /// Handles a datagram that was sealed, and opened: `text` is what follows its head, `first` the first sequence that
     /// counts of its incarnation.
     pub fn handle_opened(
         &mut self,

@@ -126,7 +126,7 @@ struct KeepAlive {
 }
 
 impl Outbound {
-    /// For the router of `settings.own`. Takes all its memory now.
+    /// State for the router of `settings.own`. Takes all its memory now.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         let groups = settings.senders.iter().enumerate();
         let names = groups.flat_map(|(index, names)| names.iter().map(move |name| (name.module().raw(), index as u16)));

@@ -108,7 +108,7 @@ struct Sender {
 }
 
 impl Queue {
-    /// For so many senders and nodes. `quota_bytes` is what each sender may have waiting.
+    /// A queue for this many senders and nodes. `quota_bytes` is what each sender may have waiting.
     pub fn new(senders: usize, nodes: usize, quota_bytes: usize) -> Self {
         let quota_blocks = quota_bytes.div_ceil(BLOCK_BYTES);
         let count = quota_blocks * senders;
@@ -279,7 +279,7 @@ impl Queue {
         self.first_among(u64::MAX)
     }
 
-    /// The same among packages for these peers, one bit each.
+    /// The first package of those for these peers, one bit each.
     pub fn first_among(&self, peers: u64) -> Option<Place> {
         if self.levels == 0 {
             return None;

@@ -67,7 +67,7 @@ impl Gate {
         Self::of(all, Port::Packages, Some(Handshake::new(all, seed)))
     }
 
-    /// One at the port of what is not real time, in the thread that receives there.
+    /// A gate at the port of what is not real time, in the thread that receives there.
     pub fn of_rest(all: &Arc<PeerSessions>) -> Self {
         Self::of(all, Port::Rest, None)
     }
@@ -143,7 +143,7 @@ impl Gate {
         outcome.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
     }
 
-    /// From which sequence on the present incarnation of a peer is heard; what is missing from there on is lost.
+    /// First sequence of a peer's present incarnation that counts; what is missing from there on is lost.
     pub fn first(&self, peer: NodeIndex) -> u64 {
         self.opening.first(peer)
     }

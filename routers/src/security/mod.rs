@@ -49,7 +49,7 @@ pub use peer_sessions::{PeerSessions, Port, RouterIdentity};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;
-pub use sealing::{Sealing, Unacquainted};
+pub use sealing::{NoSession, Sealing};
 pub use tally::{Rejections, TELL_EVERY_NS, Tally};
 
 /// Bytes of a datagram that carries a hello.

@@ -65,7 +65,7 @@ struct HeardIncarnation {
 }
 
 impl Opening {
-    /// For a port; there is one.
+    /// State for a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
         let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
         let overheard = (0..all.router.nodes).map(|_| UnverifiedIncarnations::default()).collect();

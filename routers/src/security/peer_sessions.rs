@@ -276,7 +276,7 @@ impl PeerSessions {
         HELLO_DATAGRAM_BYTES
     }
 
-    /// As if so many hellos had been said to a peer.
+    /// Pretends that this many hellos were sent to a peer.
     #[cfg(test)]
     pub(super) fn has_said(&self, peer: NodeIndex, hellos: u64) {
         self.peer(peer).hellos.store(hellos, Ordering::Relaxed);

@@ -39,7 +39,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// For a port; there is one.
+    /// Tally of a port; there is one.
     pub fn new(counts: &Arc<Rejections>) -> Self {
         Self { told: vec![Throttle::default(); counts.sources.len()].into(), counts: counts.clone() }
     }

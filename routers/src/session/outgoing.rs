@@ -83,7 +83,7 @@ impl Outgoing {
         }
     }
 
-    /// So many bytes are made ready at a time from now on, but no more than [`BATCH_BYTES`].
+    /// Makes this many bytes ready at a time from now on, but no more than [`BATCH_BYTES`].
     pub(super) fn set_batch(&mut self, bytes: usize) {
         self.batch_bytes = bytes.min(BATCH_BYTES);
     }
@@ -228,7 +228,7 @@ impl Outgoing {
         }
     }
 
-    /// Of `ready`, where the first frame begins of which nothing was taken.
+    /// Offset in `ready` of the first frame of which nothing was taken.
     fn next_frame(&self) -> usize {
         let mut at = self.begun;
         while let Some(length) = self.ready[at..].first_chunk().filter(|_| at < self.taken) {

@@ -151,7 +151,7 @@ impl Shell {
         Self::start_with(parts, None)
     }
 
-    /// The same for a router that seals its datagrams, and takes only sealed ones. It draws a new incarnation instead
+    /// Starts a router that seals its datagrams, and takes only sealed ones. It draws a new incarnation instead
     /// of the one in its settings: two runs with one incarnation would have one key.
     ///
     /// # Errors
@@ -254,11 +254,11 @@ impl Shell {
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
             tx_thread.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
             shell.begin("tx", move || {
-                if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
+                if let Err(error) = threads::schedule(threads::TX_FIFO) {
                     tracing::warn!(
                         "the router's threads run as modules do, and not before them: {error}; allow it with a limit \
                          `rtprio` of {} for this user (limits.conf) or CAP_SYS_NICE",
-                        threads::ARRIVALS_FIFO
+                        threads::RX_FIFO
                     );
                 }
                 tx_thread.run();
@@ -266,7 +266,7 @@ impl Shell {
         }
         shell.begin("rx", move || {
             // A refusal was reported by the other.
-            let _ = threads::schedule(threads::ARRIVALS_FIFO);
+            let _ = threads::schedule(threads::RX_FIFO);
             rx_thread.run();
         })?;
         Ok(shell)

@@ -38,7 +38,7 @@ pub(super) struct Rest {
 }
 
 impl Rest {
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(mut self) {
         while !self.shared.ends() {
             self.take();

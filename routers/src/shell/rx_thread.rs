@@ -44,7 +44,7 @@ pub(super) struct RxThread {
 }
 
 impl RxThread {
-    /// Until the socket is closed.
+    /// Runs until the socket is closed.
     pub(super) fn run(mut self) {
         let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
         let (mut awake, mut ring_ns, mut seen_dropped) = (Awake::default(), 0, 0);

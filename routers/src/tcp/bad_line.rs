@@ -39,7 +39,7 @@ pub(super) struct BadLine {
 }
 
 impl BadLine {
-    /// To a server.
+    /// Begins a line to a server.
     ///
     /// # Errors
     /// What the system says.
@@ -106,7 +106,7 @@ impl BadLineThread {
         }
     }
 
-    /// Until one of the two ends closes, or is gone.
+    /// Carries bytes until one of the two ends closes, or is gone.
     fn carry(&mut self, near: &TcpStream) -> io::Result<()> {
         near.set_nonblocking(true)?;
         near.set_nodelay(true)?;

@@ -17,7 +17,7 @@ const UNSENT_NS: u64 = 250_000_000;
 const HELD_NS: u64 = 1_000_000_000;
 const UNSENT_BYTES_MIN: u64 = 4 * 1024;
 const UNSENT_BYTES_MAX: u64 = 32 * 1024;
-/// Until the rate is known.
+/// Limit while the rate is unknown.
 const UNSENT_BYTES_FIRST: u64 = 2 * 1024;
 const HELD_BYTES_MIN: u64 = 4 * 1024;
 /// Faster connections have as much on the way as the kernel thinks good.

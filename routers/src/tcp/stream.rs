@@ -79,7 +79,7 @@ impl Stream {
         Self::new(socket.into(), sealed)
     }
 
-    /// One that was accepted.
+    /// A stream of an accepted connection.
     pub(super) fn new(socket: TcpStream, sealed: Option<Sealed>) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         socket.set_nodelay(true)?;

@@ -114,7 +114,7 @@ impl SlotTable {
         self.masters.iter().position(|master| *master == self.own).map(|rank| rank as u8)
     }
 
-    /// From the beginning of one cycle to that of the next, ns.
+    /// Time from the beginning of one cycle to that of the next, ns.
     pub fn cycle_ns(&self) -> u64 {
         self.cycle_ns
     }

@@ -71,7 +71,7 @@ impl History {
         self.samples = 0;
     }
 
-    /// From now on samples widen by this fraction of their age.
+    /// Widens samples by this fraction of their age from now on.
     pub(super) fn fades(&mut self, fade: f64) {
         self.fade = fade;
     }

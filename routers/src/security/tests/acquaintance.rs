@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn two_that_never_met_know_each_other_after_question_answer_and_last_word() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
-    assert_eq!(a.seal(Port::Packages, 1, b"too early"), Err(Unacquainted));
+    assert_eq!(a.seal(Port::Packages, 1, b"too early"), Err(NoSession));
     let question = a.ask(1);
     let (began, answer) = b.greet(&question).unwrap();
     assert!(!began && b.all.incarnation(0).is_none(), "a question proves nothing");
@@ -226,7 +226,7 @@ fn nothing_is_sealed_to_an_incarnation_before_the_last_word_has_left() {
     let Ok(Opened::Hello(head, greeting)) = a.opening[0].open(&mut answer) else { panic!() };
     let greeted = a.handshake.receive(0, &head, &greeting, &mut room);
     assert!(greeted.begins && greeted.reply_bytes.is_some());
-    assert_eq!((a.all.known(), a.seal(Port::Packages, 1, b"too early")), (0, Err(Unacquainted)));
+    assert_eq!((a.all.known(), a.seal(Port::Packages, 1, b"too early")), (0, Err(NoSession)));
     assert_eq!((a.handshake.begin(), a.all.known()), (Some(1), 0b10));
     let first = a.seal(Port::Packages, 1, b"first").unwrap();
     b.greet(&room).unwrap();

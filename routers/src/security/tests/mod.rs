@@ -75,7 +75,7 @@ impl Router {
     }
 
     /// The next datagram of a port.
-    pub(super) fn seal(&mut self, port: Port, to: NodeIndex, text: &[u8]) -> Result<Vec<u8>, Unacquainted> {
+    pub(super) fn seal(&mut self, port: Port, to: NodeIndex, text: &[u8]) -> Result<Vec<u8>, NoSession> {
         let head = self.head(port, to, self.next[port as usize]);
         self.next[port as usize] += 1;
         let mut datagram = [&[0; HEAD_BYTES], text, &[0; TAG_BYTES]].concat();

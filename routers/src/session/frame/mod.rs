@@ -30,7 +30,7 @@ use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES as PACKAGE_HEAD_BYTES};
 pub const HEAD_BYTES: usize = 8;
 /// Bytes behind a frame's head, at most: the largest package, and when it was published.
 pub const LENGTH_MAX: usize = PUBLISHED_BYTES + PACKAGE_HEAD_BYTES + BODY_BYTES_MAX;
-/// The same before the hello.
+/// Longest frame before the hello.
 pub const HELLO_LENGTH_MAX: usize = 256;
 /// A package passes so many servers and programs that hand it on, at most.
 pub const HOPS_MAX: u8 = 8;

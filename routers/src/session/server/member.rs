@@ -30,9 +30,9 @@ pub(super) struct TimeRequest {
     pub(super) by_hello: bool,
 }
 
-/// A verdict that waits for its way out.
+/// A verdict that is not sent yet.
 #[derive(Debug)]
-pub(super) struct Judged {
+pub(super) struct PendingVerdict {
     /// But for the holder.
     pub(super) verdict: RegistrationVerdict<'static>,
     pub(super) holder: String,
@@ -87,7 +87,7 @@ pub(super) struct Member {
     pub(super) outgoing: Outgoing,
     pub(super) asked: Option<TimeRequest>,
     pub(super) registrations: Registrations,
-    pub(super) judged: Option<Judged>,
+    pub(super) judged: Option<PendingVerdict>,
     pub(super) refused: Option<PendingRefusal>,
     pub(super) round_trip: RoundTrip,
     /// When the connection began, ns.

@@ -272,7 +272,7 @@ impl Server {
         }
     }
 
-    /// So many bytes are made ready for a client at a time from now on.
+    /// Makes this many bytes ready for a client at a time from now on.
     pub fn set_batch(&mut self, client: ClientIndex, bytes: usize) {
         if let Some(member) = self.member_mut(client) {
             member.outgoing.set_batch(bytes);

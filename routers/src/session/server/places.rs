@@ -48,7 +48,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// One of a system that takes part.
+    /// A client of a system that takes part.
     pub(super) fn of_system(&self, system: u8) -> Option<ClientIndex> {
         let least = (system, ClientIndex(0));
         self.systems.range(least..).next().filter(|(of, _)| *of == system).map(|(_, client)| *client)
@@ -98,7 +98,7 @@ impl Server {
         Some(client)
     }
 
-    /// Of the connections before their hello, one that gives way to a new one from this address.
+    /// The connection before its hello that gives way to a new one from this address.
     fn oldest_handshake(&self, address: &Principal) -> Option<ClientIndex> {
         let handshakes = &self.places.handshakes;
         let (largest, most) = handshakes.largest()?;

@@ -11,7 +11,7 @@ use super::{Server, ServerEvent, ServerHost};
 use crate::broken::broken;
 use crate::session::ClientIndex;
 use crate::session::frame::{Objection, Range, Ranges, RegistrationVerdict, SessionRefusalReason};
-use crate::session::server::member::{Judged, Member};
+use crate::session::server::member::{Member, PendingVerdict};
 use crate::session::table::ENTRIES_MAX;
 use rohrpost_mailbox::Name;
 
@@ -140,7 +140,7 @@ impl Server {
                     verdict: &RegistrationVerdict { holder: &holder, ..verdict },
                 });
             }
-            member.judged = Some(Judged { verdict, holder });
+            member.judged = Some(PendingVerdict { verdict, holder });
         }
         self.is_due(client);
     }

@@ -32,7 +32,7 @@ impl CpuBudget {
         self.is_used_up |= self.saved_ns <= 0;
     }
 
-    /// Until when it leaves alone what comes; none if it need not.
+    /// End of the time in which it reads nothing, ns; none if it may read.
     pub(super) fn rests_until_ns(&mut self, now_ns: u64) -> Option<u64> {
         self.saves(now_ns);
         let lacks_ns = RESUMES_NS.cast_signed() - self.saved_ns;

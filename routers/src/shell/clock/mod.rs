@@ -120,7 +120,7 @@ impl ClockService {
         Self::of(Works::new(parts)?)
     }
 
-    /// The same of what was made already.
+    /// A service of parts that were made already.
     pub(super) fn of(works: Works) -> Result<Self, ClockError> {
         let state = works.state().clone();
         let (ended, ends) = io::pipe().map_err(ClockError::Thread)?;

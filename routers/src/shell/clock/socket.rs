@@ -74,7 +74,7 @@ impl TimeSocket {
         })
     }
 
-    /// From now on its datagrams are sealed.
+    /// Expects sealed datagrams from now on.
     pub(super) fn sealed(self) -> Self {
         Self { datagram_bytes: TIME_BYTES + TAG_BYTES, ..self }
     }

@@ -71,7 +71,7 @@ impl ClockState {
         Self { snapshot: Mutex::new(snapshot) }
     }
 
-    /// How it stands. For tools: modules read the node's page.
+    /// The present state. For tools: modules read the node's page.
     pub fn snapshot(&self) -> ClockSnapshot {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }

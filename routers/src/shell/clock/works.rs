@@ -133,7 +133,7 @@ impl Works {
         self.sealing(all, |all| Sealing::new(all, Port::Time))
     }
 
-    /// The same in time slots.
+    /// Seals in time slots.
     pub(in crate::shell) fn sealed_in_slots(self, all: Option<&Arc<PeerSessions>>) -> Self {
         self.sealing(all, Sealing::of_slots)
     }

@@ -8,7 +8,7 @@ const SECOND_NS: u64 = 1_000_000_000;
 /// The kernel wakes an ordinary thread so much later than it asks for, if that saves it a wake-up; by default 50 µs.
 const SLACK_NS: u64 = 1;
 
-/// From now on the calling thread wakes up when it wants to, also if it is an ordinary one.
+/// Makes the calling thread wake up on time from now on, also if it is an ordinary one.
 pub(super) fn be_punctual() {
     // Refused, it wakes up a little later.
     let _ = nix::sys::prctl::set_timerslack(SLACK_NS);

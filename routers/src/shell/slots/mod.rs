@@ -68,7 +68,7 @@ struct System {
 }
 
 impl SlotThread {
-    /// From what would send as packages come.
+    /// Makes the thread from the parts of a router without slots.
     pub(super) fn new(
         own: Own,
         tx_thread: TxThread,
@@ -96,7 +96,7 @@ impl SlotThread {
         self.system.works.state().clone()
     }
 
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(self) {
         let Self { mut driver, mut system } = self;
         alarm::be_punctual();

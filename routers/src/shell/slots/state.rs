@@ -23,7 +23,7 @@ pub struct SlotSnapshot {
 }
 
 impl SlotSnapshot {
-    /// Of a router that begins.
+    /// Snapshot of a router that begins.
     pub(super) fn new(silent: Option<Silent>) -> Self {
         Self {
             counts: SlotCounts::default(),
@@ -47,7 +47,7 @@ impl SlotStatus {
         Self { snapshot: Mutex::new(snapshot) }
     }
 
-    /// How it stands.
+    /// The present state.
     pub fn snapshot(&self) -> SlotSnapshot {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -194,7 +194,7 @@ struct ClientThread {
 }
 
 impl ClientThread {
-    /// Until the node ends.
+    /// Runs until the node ends.
     fn run(mut self) {
         let mut say_ns = 0;
         // Whether it has written since it last looked at the socket.

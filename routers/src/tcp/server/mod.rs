@@ -179,7 +179,7 @@ struct ServerThread {
 }
 
 impl ServerThread {
-    /// Until the router ends.
+    /// Runs until the router ends.
     fn run(mut self) {
         let mut events = [EpollEvent::empty(); EVENTS];
         let (mut ending, mut say_ns) = (false, 0);

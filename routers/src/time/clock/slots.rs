@@ -129,7 +129,7 @@ impl Clock {
         self
     }
 
-    /// As [`Clock::poll`], for a clock in time slots: what may leave now. Handle all received datagrams before: a
+    /// Like [`Clock::poll`], for a clock in time slots: what may leave now. Handle all received datagrams before: a
     /// backup master sends when it has not heard the master's Sync of this cycle. Datagrams that need another window
     /// are dropped.
     pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
@@ -350,7 +350,7 @@ impl Clock {
         Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))
     }
 
-    /// The same, if its bound is small enough to send by it.
+    /// The present time, if its bound is small enough to send by it.
     pub(super) fn sure(&self, now_ns: u64) -> Option<TimeEstimate> {
         let allowance_ns = self.slots.as_ref()?.settings.allowance_ns;
         self.estimate().filter(|own| own.bound_ns(now_ns) <= allowance_ns)

@@ -109,7 +109,7 @@ impl Platform for Ground<'_, '_> {
                 self.io.oracle.broken(self.io.now, Promise::Exclusive, "a clock sends outside of its windows".into());
             }
             SlotEvent::Idle(Step::Wait { .. }) => {}
-            SlotEvent::Judged(planned, verdict) => self.judged(planned, verdict),
+            SlotEvent::Decided(planned, verdict) => self.judged(planned, verdict),
             SlotEvent::AnsweredOverheard(tx_window) => self.answered_overheard(tx_window),
             SlotEvent::Made => self.made(),
             SlotEvent::Missed { datagram, held: true } => {
