@@ -132,7 +132,7 @@ fn octets(address: IpAddr) -> Vec<u8> {
 }
 
 impl Netlink {
-    /// For the namespace that this thread is in.
+    /// A socket in the namespace of this thread.
     pub(crate) fn new() -> io::Result<Self> {
         let socket = socket(AddressFamily::Netlink, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::NetlinkRoute)?;
         setsockopt(&socket, sockopt::ReceiveTimeout, &PATIENCE)?;

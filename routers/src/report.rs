@@ -70,7 +70,7 @@ impl From<SendError> for NotDelivered {
     }
 }
 
-/// What happens between routers.
+/// A change between routers that people are told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RouterEvent {
     /// A peer is heard: for the first time, or after silence.
@@ -93,7 +93,7 @@ pub enum RouterEvent {
         /// Which.
         peer: NodeIndex,
     },
-    /// We take nothing from whoever sent this.
+    /// Its sender is refused: we take nothing from it.
     Refused {
         /// Where it came from.
         source: IpAddr,

@@ -75,7 +75,7 @@ impl Module for ServerModule {
                 refused: seen.refused,
                 refusal: seen.refusal,
                 crowded: BeyondCrowded {
-                    greetings: seen.crowded.greetings,
+                    greetings: seen.crowded.handshakes,
                     clients: seen.crowded.clients,
                     ranges: seen.crowded.ranges,
                     packages: seen.crowded_packages,

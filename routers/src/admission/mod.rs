@@ -1,5 +1,5 @@
-//! The one point of admission: what comes from another node, from another system, or by the TCP router is judged here
-//! before it reaches a mailbox.
+//! The one point of admission: what comes from another node, from another system, or by the TCP router is validated
+//! here before it reaches a mailbox.
 //!
 //! ```text
 //!  LAN ─▶ Inbound ──────────┐                                    ┌─▶ the mailbox, with the priority that it may have
@@ -25,14 +25,14 @@ use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER};
 use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
 
-/// Of a router of the LAN: takes IP packets from the same mailbox of other nodes.
+/// Mailbox of a router for IP packets from the same mailbox of other nodes.
 pub const TUNNEL: u8 = 4;
 /// Type of an IP packet.
 pub const PACKET: Type = Type::data(1);
 /// An IP packet goes behind all packages of modules.
 pub(crate) const PACKET_PRIORITY: Priority = Priority(0);
 
-/// What of configuration the judgement needs. The default refuses nothing but what is wrong in itself.
+/// The part of configuration that admission needs. The default refuses nothing but what is wrong in itself.
 #[derive(Clone, Debug, Default)]
 pub struct Admission {
     /// Which classes may command which.
@@ -98,7 +98,7 @@ impl From<NotAdmitted> for session::Cause {
 }
 
 impl Admission {
-    /// As configuration has it for a node.
+    /// Admission for a node, as in the configuration.
     pub fn new(installation: &Installation, node: &str) -> Self {
         let tunnel = installation.tdma.as_ref().and_then(|tdma| tdma.tunnel);
         Self {

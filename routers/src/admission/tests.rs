@@ -6,7 +6,7 @@ const ROUTER: Class = Class(250);
 const TCP: Class = Class(64);
 const TUNNEL_NET: Tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
 
-/// Of node 0, with a tunnel, where only class 100 may command class 200.
+/// Admission of node 0, with a tunnel, where only class 100 may command class 200.
 fn admission() -> Admission {
     let rule = config::Access { class: Class(200), callers: vec![Class(100)], line: 7 };
     Admission { access: Access::new(&[rule]), router: Some(ROUTER), tcp: Some(TCP), tunnel: Some((TUNNEL_NET, 0)) }

@@ -1,16 +1,16 @@
-//! How much of a processor the clock's thread may use: it stands above all others, and reads all that comes with the
-//! address of a node.
+//! How much of a processor the clock's thread may use. It has the highest priority, and it reads each datagram that
+//! bears the address of a node, forged or not.
 
-/// Of so much time it may use one part.
+/// It may use one part in this many of all time.
 const PARTS: u64 = 10;
 /// What it did not use it may use later, up to so much, ns: all that comes at once in quiet times.
 const SAVED_NS_MAX: u64 = 2_000_000;
 /// Used up, it leaves what comes in its socket until it has saved so much again, ns.
 const RESUMES_NS: u64 = 200_000;
-/// A thread that stood still did not work for longer, ns.
+/// Longest time that counts as work, ns: in a longer one the thread stood still.
 const USED_NS_MAX: u64 = 1_000_000;
 
-/// What is left of it.
+/// Processor time that the clock's thread has left.
 #[derive(Debug)]
 pub(super) struct CpuBudget {
     /// Less than 0: it used more than it had.
@@ -32,7 +32,7 @@ impl CpuBudget {
         self.is_used_up |= self.saved_ns <= 0;
     }
 
-    /// Until when it leaves alone what comes; none if it need not.
+    /// End of the time in which it reads nothing, ns; none if it may read.
     pub(super) fn rests_until_ns(&mut self, now_ns: u64) -> Option<u64> {
         self.saves(now_ns);
         let lacks_ns = RESUMES_NS.cast_signed() - self.saved_ns;

@@ -8,7 +8,7 @@ use rohrpost_network::{LEVEL_NOT_REAL_TIME, Network};
 /// It waits for another slot at most so long.
 pub const HELD_NS_MAX: u64 = 100_000_000;
 
-/// Its receiver, and where it lies in the buffer: at its beginning.
+/// Its receiver and its length; it stands at the beginning of the buffer.
 #[derive(Clone, Copy)]
 pub(super) struct HeldDatagram {
     pub(super) to: NodeIndex,

@@ -14,6 +14,7 @@
 mod answer;
 mod answer_queue;
 mod clock;
+mod cpu_budget;
 mod free;
 mod held;
 mod log;
@@ -21,7 +22,6 @@ mod outlet;
 mod platform;
 mod rest;
 mod rx;
-mod cpu_budget;
 mod slots;
 mod time_platform;
 mod timing;

@@ -24,11 +24,11 @@ pub trait Platform {
     fn monotonic_ns(&self) -> u64;
     /// What is known of system time.
     fn clock(&self) -> &Clock;
-    /// The same, to be changed; and in which the half that receives counts.
+    /// The clock, to be changed, and the counters of the receiving half.
     fn time(&mut self) -> (&mut Clock, &Stats);
     /// The router's mailbox, and the queue behind it.
     fn transit(&mut self) -> impl Transit;
-    /// The queue, and what takes its reports of losses.
+    /// The queue, and the receiver of reports on what it loses.
     fn queue(&mut self) -> (&mut Outbound, impl Report);
     /// Hands over the datagram in the first `bytes` of a buffer, which has room for a seal behind them.
     ///

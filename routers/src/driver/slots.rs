@@ -47,7 +47,7 @@ pub struct SlotDriver {
     log: WindowLog,
 }
 
-/// What to do until it is polled again.
+/// What to do until the next poll.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SlotStep {
     /// Sleep, ns from now on.
@@ -62,7 +62,7 @@ pub enum SlotStep {
     },
 }
 
-/// What it waits for.
+/// What the driver waits for.
 #[derive(Clone, Copy)]
 enum Phase {
     /// Nothing has been planned.
@@ -128,7 +128,7 @@ impl SlotDriver {
             Phase::Sleeps(Some(planned)) => {
                 self.look(on);
                 self.open(on, &planned);
-                // A node that is to send only if a Sync is missing looks for it once more.
+                // A node that sends only if a Sync is missing looks for that Sync once more.
                 let is_slot = matches!(planned.window.kind, WindowKind::Slot { .. });
                 let looks = !is_slot && planned.call_ns.saturating_sub(on.local_ns()) > 2 * LAST_LOOK_NS;
                 self.phase = Phase::Spins { planned, looks };
@@ -170,8 +170,8 @@ impl SlotDriver {
         }
     }
 
-    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. A silent node
-    /// waits for datagrams of time; others read them once a cycle at least.
+    /// Between windows: drops what waits in vain, and keeps room in the mailbox. A silent node waits for datagrams of
+    /// time; others read them once a cycle at least.
     fn between(&mut self, on: &mut impl Platform, is_silent: bool, wake_ns: u64) {
         let now_ns = on.monotonic_ns();
         self.tidied_ns = now_ns;
@@ -343,8 +343,7 @@ impl SlotDriver {
         }
     }
 
-    /// What was made and found no slot for long is lost: its sender counts on that nothing arrives that is much
-    /// older than it may be.
+    /// A datagram that was made and found no slot for long is lost: its sender relies on a limit of age.
     fn drop_if_old(&mut self, on: &mut impl Platform) {
         let now_ns = on.monotonic_ns();
         if let Some(held) = self.held.take_if(|held| held.is_old(now_ns)) {

@@ -147,8 +147,7 @@ impl FrameHead {
         if b[2] != VERSION && b[3] != FrameKind::Refusal as u8 {
             return Err(BadFrame::Version(b[2]));
         }
-        let kind =
-            FrameKind::ALL.into_iter().find(|kind| *kind as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
+        let kind = FrameKind::ALL.into_iter().find(|it| *it as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
         let head = Self {
             kind,
             system: b[4],
@@ -235,7 +234,7 @@ impl<'a> Frame<'a> {
         Ok((head, Self::read(head.kind, datagram[2], rest)?))
     }
 
-    /// The same for the rest after a head, as a router of a `version` wrote it.
+    /// Reads the rest after a head, as a router of a `version` wrote it.
     pub(crate) fn read(kind: FrameKind, version: u8, rest: &'a [u8]) -> Result<Self, BadFrame> {
         Ok(match kind {
             FrameKind::Packages => Self::Packages(Packages::check(rest)?),

@@ -12,13 +12,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
-/// What is sent at a time, bytes.
+/// Size of a segment, bytes.
 const SEGMENT_BYTES: usize = 1448;
-/// A segment is sent again after this time and the way there and back; after twice that the next time, and so on.
+/// A segment is sent again after this time and the round trip; after twice that the next time, and so on.
 const SENT_AGAIN_NS: u64 = 200_000_000;
-/// So often at most: nobody waits for a stream for so long.
+/// Retransmissions at most: nobody waits longer for a stream.
 const TRIES_MAX: u32 = 16;
-/// What waits to be sent: so much as leaves in this time, and no less than a segment.
+/// Limit of what waits to be sent: what leaves in this time, and no less than a segment.
 const WAITS_NS: u64 = 20_000_000;
 
 /// Bytes on their way.
@@ -155,7 +155,7 @@ mod tests {
             ("loss=1%,seed=3", 1 << 20, 200, 1500, "sent again, most of them once, all at the same time"),
             ("corrupt=1%,seed=3", 1 << 20, 200, 1500, "a sum is wrong, and it is sent again"),
             ("reorder=5%,seed=3", 1 << 20, 1, 2, "the others wait for what was held back"),
-            ("duplicate=50%", 1 << 20, 0, 0, "copies are dropped"),
+            ("duplicate=50%", 1 << 20, 0, 0, "duplicates are dropped"),
         ] {
             let (_, took_ns) = carry(text, bytes);
             assert!((least_ms * MS..=most_ms * MS).contains(&took_ns), "{text}: {took_ns} ns: {why}");

@@ -1,9 +1,9 @@
-//! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line,
-//! changed bits. And what the same network is to a stream: a [`BandwidthQueue`].
+//! A bad network between a router and its socket, from a seed: loss, delay, jitter, duplicates, changed order, a slow
+//! line, changed bits. And what the same network is to a stream: a [`BandwidthQueue`].
 //!
 //! ```text
 //!  push ──▶ lost? ──▶ line of `rate` ──▶ delay ± jitter ──▶ held back? ──▶ changed bit? ──▶ due, in order of time ──▶ poll
-//!                                                                            └─ copied? ──▶ once more, a little later
+//!                                                                            └─ duplicated? ──▶ once more, a little later
 //! ```
 //!
 //! Each fault can be had alone: jitter never changes the order (as queues of switches do not), only `reorder` does.
@@ -32,10 +32,10 @@ pub const BYTES_MAX: usize = 16 << 20;
 /// No delay or jitter is longer.
 pub const DELAY_MAX: Duration = Duration::from_secs(10);
 
-/// What is held back, or copied, comes at most so much later; twice the delay, if that is longer.
+/// Longest extra delay of what is held back or duplicated; twice the delay, if that is longer.
 const LATER_NS: u64 = 2_000_000;
 
-/// A part of all datagrams, in millionths.
+/// Probability that something happens to a datagram, in millionths.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Probability(u32);
 
@@ -43,7 +43,7 @@ impl Probability {
     /// All of them, in millionths.
     pub const ALL: u32 = 1_000_000;
 
-    /// So many in a million; more than [`ALL`](Self::ALL) is all.
+    /// This many in a million; more than [`ALL`](Self::ALL) is all.
     pub const fn per_million(millionths: u32) -> Self {
         Self(if millionths > Self::ALL { Self::ALL } else { millionths })
     }
@@ -54,17 +54,17 @@ impl Probability {
 }
 
 /// How bad the network is. The text form, `loss=5%,delay=2ms,seed=7`, has each key at most once, in any order; see
-/// [`Settings::from_str`].
+/// [`ImpairmentSettings::from_str`].
 ///
 /// ```
-/// # use rohrpost_routers::impair::Settings;
-/// let settings: Settings = "loss=5%,delay=2ms,jitter=1ms,rate=10MiB,seed=7".parse().unwrap();
+/// # use rohrpost_routers::impair::ImpairmentSettings;
+/// let settings: ImpairmentSettings = "loss=5%,delay=2ms,jitter=1ms,rate=10MiB,seed=7".parse().unwrap();
 /// assert_eq!(settings.to_string(), "loss=5%,delay=2ms,jitter=1ms,rate=10MiB,seed=7");
-/// let wrong = "loss=5".parse::<Settings>().unwrap_err();
+/// let wrong = "loss=5".parse::<ImpairmentSettings>().unwrap_err();
 /// assert_eq!(wrong.to_string(), "`loss=5`: write a share from 0% to 100%, such as loss=5%");
 /// ```
 ///
-/// [`Settings::from_str`]: std::str::FromStr::from_str
+/// [`ImpairmentSettings::from_str`]: std::str::FromStr::from_str
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ImpairmentSettings {
     /// Never arrive.
@@ -118,7 +118,7 @@ impl ImpairmentSettings {
     }
 }
 
-/// What became of the datagrams so far. Pushed + copied = passed + lost + full + those still on their way.
+/// What became of the datagrams so far. Pushed + duplicated = passed + lost + full + those still on their way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct ImpairmentCounts {
     /// Given to [`Impairment::push`].
@@ -129,7 +129,7 @@ pub struct ImpairmentCounts {
     pub lost: u64,
     /// Lost because too many were on their way.
     pub full: u64,
-    /// Second copies made.
+    /// Duplicates made.
     pub duplicated: u64,
     /// Held back.
     pub held_back: u64,
@@ -137,7 +137,7 @@ pub struct ImpairmentCounts {
     pub corrupted: u64,
 }
 
-/// What [`Impairment::poll`] says.
+/// Next step, from [`Impairment::poll`].
 #[derive(PartialEq, Eq, Debug)]
 pub enum ImpairmentStep<'a, T> {
     /// This one has arrived; ask again.

@@ -74,12 +74,12 @@ fn what_is_held_back_is_reordered_and_nothing_else() {
     assert_eq!(arrived.len(), 10_000);
     assert!((400..600).contains(&counts.held_back), "{counts:?}");
     let mut highest = 0;
-    let overtaken = numbers(&arrived).into_iter().filter(|number| {
+    let reordered = numbers(&arrived).into_iter().filter(|number| {
         highest = highest.max(*number);
         *number < highest
     });
-    let overtaken = overtaken.count() as u64;
-    assert!(overtaken > counts.held_back / 2 && overtaken <= counts.held_back, "{overtaken} of {}", counts.held_back);
+    let reordered = reordered.count() as u64;
+    assert!(reordered > counts.held_back / 2 && reordered <= counts.held_back, "{reordered} of {}", counts.held_back);
 }
 
 #[test]
@@ -175,11 +175,11 @@ proptest! {
     fn what_is_written_reads_back(
         shares in proptest::array::uniform4(0..=Probability::ALL),
         delay_us in 0u64..=10_000_000, jitter_us in 0u64..=10_000_000,
-        rate in proptest::option::of(1u64..), seed: u64,
+        rate_bytes_s in proptest::option::of(1u64..), seed: u64,
     ) {
         let [loss, duplicate, reorder, corrupt] = shares.map(Probability::per_million);
         let (delay, jitter) = (Duration::from_micros(delay_us), Duration::from_micros(jitter_us));
-        let settings = ImpairmentSettings { loss, delay, jitter, duplicate, reorder, rate_bytes_s: rate, corrupt, seed };
+        let settings = ImpairmentSettings { loss, delay, jitter, duplicate, reorder, rate_bytes_s, corrupt, seed };
         prop_assert_eq!(settings.to_string().parse(), Ok(settings));
     }
 
@@ -199,7 +199,7 @@ proptest! {
             way.push(now_ns, (), &vec![0; bytes]);
             while let ImpairmentStep::Send { .. } = way.poll(now_ns) {}
             let ImpairmentCounts { pushed, passed, lost, full, duplicated, .. } = way.counts();
-            prop_assert_eq!(pushed + copied, passed + lost + full + way.on_way() as u64);
+            prop_assert_eq!(pushed + duplicated, passed + lost + full + way.on_way() as u64);
         }
     }
 }

@@ -59,7 +59,7 @@ pub struct Envelope {
     pub bytes: usize,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Inbound::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum InboundStep {
     /// Send the first bytes of the buffer to the packages' port of an address, then ask again.
@@ -90,7 +90,7 @@ pub struct Inbound {
 }
 
 impl Inbound {
-    /// For the router of `settings.own`.
+    /// State for the router of `settings.own`.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         Self {
             peers: settings.nodes.iter().map(|_| PeerReceiver::default()).collect(),
@@ -126,7 +126,7 @@ impl Inbound {
         }
     }
 
-    /// The same for one that was sealed, and opened: `text` is what follows its head, `first` the first sequence that
+    /// Handles a datagram that was sealed, and opened: `text` is what follows its head, `first` the first sequence that
     /// counts of its incarnation.
     pub fn handle_opened(
         &mut self,
@@ -215,7 +215,7 @@ impl Inbound {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    /// `first`: see [`PeerReceiver::lives`].
+    /// `first`: see [`PeerReceiver::is_present`].
     fn take(
         &mut self,
         now_ns: u64,

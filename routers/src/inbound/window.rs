@@ -40,15 +40,15 @@ pub(crate) struct SequenceWindow {
 }
 
 impl SequenceWindow {
-    /// For an incarnation that may have begun long before us: earlier sequences are not missed. Near its beginning both
-    /// have just begun. Then missing sequences count as lost, even if nothing listened yet: a router sends to a peer of
-    /// which it knows nothing, so packages may have been in them, and each must be accounted for.
+    /// Window of an incarnation that may have begun long before us: earlier sequences are not missed. Near its start
+    /// both have just begun. Then missing sequences count as lost, even if nothing listened yet: a router sends to a
+    /// peer of which it knows nothing, so packages may have been in them, and each must be accounted for.
     pub(crate) fn joining(sequence: u64) -> Self {
         let start = if sequence < REORDER_MAX { 0 } else { sequence };
         Self { next: start, settled: start, start, ticks: [start; 2], ..Self::default() }
     }
 
-    /// For an incarnation that was heard before: earlier sequences have come.
+    /// Window of an incarnation that was heard before: earlier sequences have come.
     pub(crate) fn going_on(sequence: u64) -> Self {
         let came = [u64::MAX; (WINDOW / 64) as usize];
         Self { next: sequence, settled: sequence, start: sequence, came, ticks: [sequence; 2] }
@@ -92,11 +92,11 @@ impl SequenceWindow {
     fn advance(&mut self, sequence: u64, lost: &mut u64) {
         let next = sequence + 1;
         // A sequence that leaves the window is decided before its bit is used again.
-        let judged = next.saturating_sub(REORDER_MAX);
-        *lost += self.settle(judged.min(self.next));
-        if judged > self.settled {
-            *lost += judged - self.settled;
-            self.settled = judged;
+        let settled = next.saturating_sub(REORDER_MAX);
+        *lost += self.settle(settled.min(self.next));
+        if settled > self.settled {
+            *lost += settled - self.settled;
+            self.settled = settled;
         }
         if next - self.next >= WINDOW {
             self.came = [0; (WINDOW / 64) as usize];

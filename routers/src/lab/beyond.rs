@@ -22,8 +22,8 @@ const HOME_PORT: DeviceIndex = FAR_BRIDGE + 1;
 const FAR: DeviceIndex = LAN + 1;
 
 impl Lab {
-    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. Once
-    /// in the life of a lab.
+    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. To
+    /// be called once in a lab.
     ///
     /// # Errors
     /// As for [`Lab::new`].
@@ -92,7 +92,7 @@ impl Lab {
     }
 }
 
-/// Of the networks that are set aside for tests of networks (RFC 2544, RFC 5180), so that no file has it.
+/// An address of the networks that are set aside for tests (RFC 2544, RFC 5180), so that no file has it.
 fn far_address(like: IpAddr, index: u8) -> IpAddr {
     match like {
         IpAddr::V4(_) => Ipv4Addr::new(198, 18, 0, index).into(),

@@ -37,8 +37,8 @@ impl Outbound {
         bytes
     }
 
-    /// As many whole packages for a peer as fit, level by level between the two; returns the datagram's length. The
-    /// first one fits.
+    /// Packs as many whole packages for a peer as fit, level by level between the two; returns the datagram's length.
+    /// The first one fits.
     pub(super) fn pack(
         &mut self,
         now_ns: u64,

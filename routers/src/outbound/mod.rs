@@ -50,7 +50,7 @@ pub struct Package<'a> {
     pub body: &'a [u8],
 }
 
-/// What became of a package.
+/// Result for a package that is handed over.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Accepted {
     /// Send these bytes and then the body, now, as one datagram.
@@ -66,7 +66,7 @@ pub enum Accepted {
     Lost,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Outbound::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OutboundStep {
     /// Send the first bytes of the buffer as one datagram, then ask again.
@@ -122,11 +122,11 @@ struct KeepAlive {
     quiet_until_ns: u64,
     tell_ns: u64,
     /// Its incarnation at the last look.
-    life: u64,
+    incarnation: u64,
 }
 
 impl Outbound {
-    /// For the router of `settings.own`. Takes all its memory now.
+    /// State for the router of `settings.own`. Takes all its memory now.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         let groups = settings.senders.iter().enumerate();
         let names = groups.flat_map(|(index, names)| names.iter().map(move |name| (name.module().raw(), index as u16)));
@@ -390,8 +390,8 @@ impl Outbound {
     /// A peer in a new incarnation soon gets a keep-alive that it is heard: it may wait for that.
     fn announce_to_new_incarnations(&mut self) {
         for (peer, stats) in self.peers.iter_mut().zip(0..).map(|(peer, node)| (peer, self.stats.peer(node))) {
-            let life = stats.link.incarnation.get();
-            if std::mem::replace(&mut peer.life, life) != life {
+            let incarnation = stats.link.incarnation.get();
+            if std::mem::replace(&mut peer.incarnation, incarnation) != incarnation {
                 (peer.tell_ns, self.alive_ns) = (0, 0);
             }
         }

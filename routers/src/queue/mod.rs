@@ -23,8 +23,7 @@ use blocks::{BLOCK_BYTES, Blocks, Chain};
 use hints::Hints;
 use list::{List, Lists};
 use rohrpost_mailbox::{Head, Kind, Options};
-use rohrpost_network::LEVELS;
-use rohrpost_network::NODES_MAX;
+use rohrpost_network::{LEVELS, NODES_MAX};
 pub use shares::QueueShare;
 use shares::Shares;
 
@@ -109,7 +108,7 @@ struct Sender {
 }
 
 impl Queue {
-    /// For so many senders and nodes. `quota_bytes` is what each sender may have waiting.
+    /// A queue for this many senders and nodes. `quota_bytes` is what each sender may have waiting.
     pub fn new(senders: usize, nodes: usize, quota_bytes: usize) -> Self {
         let quota_blocks = quota_bytes.div_ceil(BLOCK_BYTES);
         let count = quota_blocks * senders;
@@ -170,7 +169,7 @@ impl Queue {
     #[must_use]
     pub fn push(&mut self, waiting: QueuedPackage, body: &[u8], mut gone: impl FnMut(&QueuedPackage, &[u8])) -> bool {
         let needed = Blocks::needed(body.len());
-        if !self.make_room(usize::from(waiting.sender), waiting.level, needed, &mut gone) {
+        if !self.evict(usize::from(waiting.sender), waiting.level, needed, &mut gone) {
             return false;
         }
         // A package has at least one block, and there are as many places as blocks.
@@ -226,7 +225,7 @@ impl Queue {
         let QueueEntry { body: old, .. } = self.entries[place.0 as usize];
         let needed = Blocks::needed(body.len());
         let (sender, level) = (usize::from(newer.sender), newer.level);
-        if !self.make_room(sender, level, needed.saturating_sub(old.blocks()), &mut gone) {
+        if !self.evict(sender, level, needed.saturating_sub(old.blocks()), &mut gone) {
             return false;
         }
         self.blocks.free(old);
@@ -240,15 +239,9 @@ impl Queue {
         true
     }
 
-    fn make_room(
-        &mut self,
-        sender: usize,
-        level: u8,
-        needed: u32,
-        gone: &mut impl FnMut(&QueuedPackage, &[u8]),
-    ) -> bool {
+    fn evict(&mut self, sender: usize, level: u8, needed: u32, gone: &mut impl FnMut(&QueuedPackage, &[u8])) -> bool {
         if self.shares.is_some() {
-            return self.make_shared_room(sender, level, needed, gone);
+            return self.evict_shared(sender, level, needed, gone);
         }
         let own = &self.senders[sender];
         let lower = usize::from(level) + 1;
@@ -286,7 +279,7 @@ impl Queue {
         self.first_among(u64::MAX)
     }
 
-    /// The same among packages for these peers, one bit each.
+    /// The first package of those for these peers, one bit each.
     pub fn first_among(&self, peers: u64) -> Option<Place> {
         if self.levels == 0 {
             return None;

@@ -137,7 +137,7 @@ impl Queue {
 
     /// Makes room where all use one memory: from the sender that uses more than this one would, then from this one
     /// itself.
-    pub(super) fn make_shared_room(
+    pub(super) fn evict_shared(
         &mut self,
         sender: usize,
         level: u8,

@@ -231,7 +231,7 @@ impl Model {
         Some(self.waiting.remove(at))
     }
 
-    /// Of one sender; returns what was displaced, by `first`.
+    /// Pushes a package of one sender; returns what was displaced, by `first`.
     fn push_newest(&mut self, new: QueuedPackage) -> Vec<u64> {
         let blocks = |waiting: &QueuedPackage| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
         let state = |waiting: &QueuedPackage| (waiting.level, waiting.head.id);

@@ -50,6 +50,7 @@ pub struct Gate {
     look_ns: u64,
 }
 
+/// What decides when a peer is challenged again.
 #[derive(Clone, Copy, Default)]
 struct ChallengeSchedule {
     /// When it was asked last, ns; none: never.
@@ -66,7 +67,7 @@ impl Gate {
         Self::of(all, Port::Packages, Some(Handshake::new(all, seed)))
     }
 
-    /// One at the port of what is not real time, in the thread that receives there.
+    /// A gate at the port of what is not real time, in the thread that receives there.
     pub fn of_rest(all: &Arc<PeerSessions>) -> Self {
         Self::of(all, Port::Rest, None)
     }
@@ -102,16 +103,16 @@ impl Gate {
             Ok(Opened::Frame(head, text)) => {
                 inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
             }
-            Ok(Opened::Hello(head, greeting)) => {
+            Ok(Opened::Hello(head, opened)) => {
                 if let Some(handshake) = &mut self.handshake
                     && inbound.may_handshake(now_ns, came.source, &head, deliver)
                 {
-                    let greeted = handshake.receive(now_ns, &head, &greeting, reply);
-                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: greeted.begins };
-                    return greeted.reply_bytes.map(said);
+                    let outcome = handshake.receive(now_ns, &head, &opened, reply);
+                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: outcome.begins };
+                    return outcome.reply_bytes.map(said);
                 }
                 if inbound.is_of_other(came.source, &head) {
-                    return self.answer_other(now_ns, &head, &greeting, inbound, reply);
+                    return self.answer_other(now_ns, &head, &opened, inbound, reply);
                 }
             }
             Err(NotOpened::Bad(why @ (BadFrame::Foreign | BadFrame::Damaged(_) | BadFrame::Sealed))) => {
@@ -131,18 +132,18 @@ impl Gate {
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &OpenedHello,
+        opened: &OpenedHello,
         inbound: &Inbound,
         reply: &mut [u8],
     ) -> Option<Said> {
-        let greeted = self.handshake.as_mut()?.receive_other(now_ns, head, greeting, reply);
-        if greeted.proves && greeting.hello.next[Port::Time as usize] > 0 {
+        let outcome = self.handshake.as_mut()?.receive_other(now_ns, head, opened, reply);
+        if outcome.proves && opened.hello.next[Port::Time as usize] > 0 {
             inbound.tells_other(now_ns, head);
         }
-        greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
+        outcome.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
     }
 
-    /// From which sequence on the present incarnation of a peer is heard; what is missing from there on is lost.
+    /// First sequence of a peer's present incarnation that counts; what is missing from there on is lost.
     pub fn first(&self, peer: NodeIndex) -> u64 {
         self.opening.first(peer)
     }
@@ -166,7 +167,7 @@ impl Gate {
         began.is_some()
     }
 
-    /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
+    /// The next challenge that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
     pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
         if now_ns < self.look_ns || self.handshake.is_none() {
             return None;

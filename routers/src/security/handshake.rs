@@ -9,8 +9,8 @@ use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use std::sync::Arc;
 
-/// Questions of one peer that are answered in [`PER_NS`], at most: recorded ones that are sent again must not cost more
-/// than they are worth. Of more than half as many, a random share is.
+/// Challenges of one peer that are answered in [`PER_NS`], at most: replayed ones must not cost much. Of more than half
+/// as many, a random share is.
 pub const ANSWERS_MAX: u32 = 10;
 /// See [`ANSWERS_MAX`].
 pub const PER_NS: u64 = 100_000_000;
@@ -34,11 +34,11 @@ struct PeerHandshake {
     drawn_ns: u64,
     /// The challenge before it, and when that was drawn; 0: none.
     before: (u64, u64),
-    questions: Questions,
+    challenges: ChallengeRate,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Questions {
+struct ChallengeRate {
     since_ns: u64,
     came: u32,
     answered: u32,
@@ -73,10 +73,10 @@ impl Handshake {
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &OpenedHello,
+        opened: &OpenedHello,
         datagram: &mut [u8],
     ) -> HelloOutcome {
-        self.take(now_ns, head, greeting, true, datagram)
+        self.take(now_ns, head, opened, true, datagram)
     }
 
     /// The same for a peer with another digest: no incarnation begins. A challenge is answered, so that its sender
@@ -85,22 +85,22 @@ impl Handshake {
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &OpenedHello,
+        opened: &OpenedHello,
         datagram: &mut [u8],
     ) -> HelloOutcome {
-        self.take(now_ns, head, greeting, false, datagram)
+        self.take(now_ns, head, opened, false, datagram)
     }
 
     fn take(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &OpenedHello,
+        opened: &OpenedHello,
         may_begin: bool,
         datagram: &mut [u8],
     ) -> HelloOutcome {
         self.begin();
-        let (peer, OpenedHello { hello, key }) = (head.from, *greeting);
+        let (peer, OpenedHello { hello, key }) = (head.from, *opened);
         self.refresh(now_ns, peer);
         let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);
         let begins = may_begin && proves && self.all.incarnation(peer) != Some(head.incarnation);
@@ -112,11 +112,11 @@ impl Handshake {
         if begins {
             self.begins = Some((peer, PeerIncarnation { incarnation: head.incarnation, key, next: hello.next }));
         }
-        let is_question = hello.answer == 0;
+        let is_challenge = hello.answer == 0;
         // Only a living peer can answer a challenge, and only once: such replies need no limit.
-        let may = hello.challenge != 0 && (proves || is_question && self.may_answer(now_ns, peer));
+        let may = hello.challenge != 0 && (proves || is_challenge && self.may_answer(now_ns, peer));
         // A peer that has proved that it lives gets the final response; any other must prove it first.
-        let challenge = if is_question { self.all.challenge(peer) } else { 0 };
+        let challenge = if is_challenge { self.all.challenge(peer) } else { 0 };
         let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
         HelloOutcome { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
@@ -152,17 +152,17 @@ impl Handshake {
 
     /// In a flood each challenge has the same chance, not only the first: one of them may come from a living peer.
     fn may_answer(&mut self, now_ns: u64, peer: NodeIndex) -> bool {
-        let questions = &mut self.peers[usize::from(peer)].questions;
-        let passed_ns = now_ns.saturating_sub(questions.since_ns);
+        let challenges = &mut self.peers[usize::from(peer)].challenges;
+        let passed_ns = now_ns.saturating_sub(challenges.since_ns);
         if passed_ns >= PER_NS {
-            let came_before = if passed_ns < 2 * PER_NS { questions.came } else { 0 };
-            *questions = Questions { since_ns: now_ns, came_before, ..Questions::default() };
+            let came_before = if passed_ns < 2 * PER_NS { challenges.came } else { 0 };
+            *challenges = ChallengeRate { since_ns: now_ns, came_before, ..ChallengeRate::default() };
         }
-        questions.came = questions.came.saturating_add(1);
+        challenges.came = challenges.came.saturating_add(1);
         let share = ANSWERS_MAX / 2;
-        let is_drawn = questions.came_before <= share || self.random.next_u32() % questions.came_before < share;
-        let may = is_drawn && questions.answered < ANSWERS_MAX;
-        questions.answered += u32::from(may);
+        let is_drawn = challenges.came_before <= share || self.random.next_u32() % challenges.came_before < share;
+        let may = is_drawn && challenges.answered < ANSWERS_MAX;
+        challenges.answered += u32::from(may);
         may
     }
 }

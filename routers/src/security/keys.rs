@@ -29,7 +29,7 @@ impl InstallationKey {
         Self { id, secret: Salt::new(HKDF_SHA256, SALT).extract(bytes) }
     }
 
-    /// By which people see that two nodes have the same key; it says nothing of the key itself.
+    /// Shows people that two nodes have the same key, and nothing of the key itself.
     pub fn fingerprint(&self) -> [u8; 8] {
         let mut bytes = [0; 8];
         let okm = self.secret.expand(&[b"fingerprint"], FingerprintLength);
@@ -91,7 +91,7 @@ impl KeyRing {
         Seal::new(LessSafeKey::new(UnboundKey::from(okm)))
     }
 
-    /// The same of every key.
+    /// Derives a seal from every key.
     pub(super) fn derive_all(&self, of: &Binding) -> Vec<Seal> {
         (0..self.len()).map(|place| self.derive(place, of)).collect()
     }

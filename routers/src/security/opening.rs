@@ -41,8 +41,8 @@ pub struct Opening {
     past: Box<[[Past; PAST]]>,
 }
 
-/// Lives of a peer that took turns: of so many it is remembered what was opened of them at the port of what is not real
-/// time.
+/// Incarnations of a peer that took turns: so many are remembered, each with what was opened of it at the port of what
+/// is not real time.
 const PAST: usize = 4;
 
 /// An incarnation that was heard at that port, and from which sequence on it is heard when it is taken for the present
@@ -65,7 +65,7 @@ struct HeardIncarnation {
 }
 
 impl Opening {
-    /// For a port; there is one.
+    /// State for a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
         let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
         let overheard = (0..all.router.nodes).map(|_| UnverifiedIncarnations::default()).collect();

@@ -92,7 +92,7 @@ impl fmt::Debug for PeerSessions {
     }
 }
 
-/// A peer.
+/// Keys, challenge and counters of one peer.
 struct PeerSession {
     /// By the place of the key.
     hello_to: Vec<Seal>,
@@ -100,7 +100,7 @@ struct PeerSession {
     session: Published,
     /// What it must answer for an incarnation of it to begin.
     challenge: AtomicU64,
-    /// Questions to it.
+    /// Challenges to it.
     asked: AtomicU32,
     /// Hellos of this incarnation to it.
     hellos: AtomicU64,
@@ -244,12 +244,12 @@ impl PeerSessions {
     /// A challenge to a peer, with one of its keys after the other: which of them the peer has is not known. None
     /// as long as no incarnation of it could take an answer.
     pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
-        let question = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
-        if question.challenge == 0 {
+        let hello = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
+        if hello.challenge == 0 {
             return None;
         }
         let asked = self.peer(peer).asked.fetch_add(1, Ordering::Relaxed) as usize;
-        Some(self.hello(peer, asked % self.keys.len(), question, datagram))
+        Some(self.hello(peer, asked % self.keys.len(), hello, datagram))
     }
 
     /// The sequences that come next: of packages, and of time.
@@ -276,7 +276,7 @@ impl PeerSessions {
         HELLO_DATAGRAM_BYTES
     }
 
-    /// As if so many hellos had been said to a peer.
+    /// Pretends that this many hellos were sent to a peer.
     #[cfg(test)]
     pub(super) fn has_said(&self, peer: NodeIndex, hellos: u64) {
         self.peer(peer).hellos.store(hellos, Ordering::Relaxed);

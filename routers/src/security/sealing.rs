@@ -6,7 +6,7 @@ use super::seal::{self, Seal};
 use crate::frame::{self, FrameHead, NodeIndex};
 use std::sync::Arc;
 
-/// No incarnation of the peer is known to live, so there is nobody to seal to.
+/// No incarnation of the peer has answered a challenge yet, so nothing can be sealed to it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("no router has answered there yet")]
 pub struct NoSession;
@@ -21,7 +21,7 @@ pub struct Sealing {
     strangers: Box<[Vec<Seal>]>,
 }
 
-/// To a peer's present incarnation.
+/// Seal to a peer's present incarnation.
 struct PeerSeal {
     /// Place of the key.
     key: usize,
@@ -33,13 +33,13 @@ struct PeerSeal {
 const OTHER_KEY_EVERY: u64 = 4;
 
 impl Sealing {
-    /// For a port; there is one.
+    /// State for a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
         let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
         Self { peers, strangers: Box::default(), all: all.clone(), port }
     }
 
-    /// For time in time slots: seals to each node that has a key, known or not. A node that joins must hear time before
+    /// Seals time in time slots, to each node that has a key, known or not. A node that joins must hear time before
     /// it may send a challenge.
     pub fn of_slots(all: &Arc<PeerSessions>) -> Self {
         let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), Endpoint::any(node)));
@@ -59,7 +59,7 @@ impl Sealing {
         self.close(datagram)
     }
 
-    /// The same for a datagram with a written head, with a check or without.
+    /// Seals a datagram with a written head, with a check or without.
     ///
     /// # Errors
     /// [`Unacquainted`]: ask first.

@@ -71,7 +71,7 @@ pub struct SessionCounts {
     classes: Box<[SessionClassCounts]>,
 }
 
-/// Of one class.
+/// Counts of one class.
 #[derive(Default, Debug)]
 pub struct SessionClassCounts {
     /// Packages that came; one to all systems once for each of them.

@@ -98,7 +98,7 @@ impl ServerClockEstimate {
         self.answers
     }
 
-    /// The shortest way there and back of those that are kept, ns.
+    /// The shortest round trip of those that are kept, ns.
     pub fn round_trip_ns(&self) -> Option<u64> {
         self.kept.iter().flatten().map(|sample| sample.ways_ns).min()
     }

@@ -6,7 +6,7 @@ use super::server::Principals;
 use super::{ErrorReplies, answer_to};
 use rohrpost_mailbox::Head;
 
-/// Of one connection, while something is done with what leaves by it.
+/// Accounts for what leaves by one connection.
 pub(super) struct Ledger<'a, H> {
     counts: &'a SessionCounts,
     host: &'a mut H,

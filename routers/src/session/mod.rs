@@ -50,14 +50,14 @@ pub const SILENT_AFTER_NS: u64 = 3_500_000_000;
 pub const SLOW_SILENT_AFTER_NS: u64 = 8_000_000_000;
 /// An end that has taken nothing of what is ready for so long is gone.
 pub const STALLED_AFTER_NS: u64 = 10_000_000_000;
-/// From the beginning of a connection to its welcome, at most; however busily bytes come.
+/// Longest time from the beginning of a connection to its welcome; however busily bytes come.
 pub const HANDSHAKE_MAX_NS: u64 = 5_000_000_000;
-/// From the first byte of a frame to its last, at most.
+/// Longest time from the first byte of a frame to its last.
 pub const FRAME_MAX_NS: u64 = 30_000_000_000;
-/// What time alone brings about is looked for this often.
+/// Interval between two looks for what only the passing of time changes.
 pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
-/// Writes the answers to commands that go no further: what a fault looks like is not the routers' business.
+/// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.
 pub trait ErrorReplies {
     /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for.
     /// False: it gets none.

@@ -48,7 +48,7 @@ pub(super) trait Fates {
     fn crowded(&mut self, _sender: u32) {}
 }
 
-/// Of one connection, or of the one that comes next.
+/// What leaves by a connection, or by the next one.
 #[derive(Debug)]
 pub(super) struct Outgoing {
     ready: Vec<u8>,
@@ -83,7 +83,7 @@ impl Outgoing {
         }
     }
 
-    /// So many bytes are made ready at a time from now on, but no more than [`BATCH_BYTES`].
+    /// Makes this many bytes ready at a time from now on, but no more than [`BATCH_BYTES`].
     pub(super) fn set_batch(&mut self, bytes: usize) {
         self.batch_bytes = bytes.min(BATCH_BYTES);
     }
@@ -228,7 +228,7 @@ impl Outgoing {
         }
     }
 
-    /// Of `ready`, where the first frame begins of which nothing was taken.
+    /// Offset in `ready` of the first frame of which nothing was taken.
     fn next_frame(&self) -> usize {
         let mut at = self.begun;
         while let Some(length) = self.ready[at..].first_chunk().filter(|_| at < self.taken) {
@@ -271,7 +271,7 @@ fn replace(queue: &mut Queue, older: Place, newer: QueuedPackage, body: &[u8], f
     is_taken
 }
 
-/// What becomes of those that give way to a package of this sender.
+/// Accounts for packages that give way to one of this sender.
 fn gives_way(sender: u16, fates: &mut impl Fates) -> impl FnMut(&QueuedPackage, &[u8]) {
     move |gone, beginning| lose(gone, beginning, gone.sender != sender, fates)
 }

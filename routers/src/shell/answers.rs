@@ -37,7 +37,7 @@ pub trait Faults: Send + Sync {
     fn write(&self, call: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool;
 }
 
-/// Replies on behalf of modules that cannot.
+/// Sends error replies on behalf of modules that cannot reply.
 pub(super) struct ErrorReplier {
     settings: Arc<Settings>,
     stats: Arc<Stats>,

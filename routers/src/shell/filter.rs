@@ -41,11 +41,11 @@ pub(super) fn take_only_from(socket: &impl AsFd, addresses: &[IpAddr]) -> io::Re
     SockRef::from(socket).attach_filter(&program(addresses))
 }
 
-/// The same for a socket of time. It also takes, from anywhere, frames of time with another digest than this: a node
+/// Filters a socket of time. It also takes, from anywhere, frames of time with another digest than this: a node
 /// that hears these must know it, and refuse. Forged frames of that form are read, too.
 ///
 /// # Errors
-/// As [`take_only_from`].
+/// Like [`take_only_from`], for datagrams of time.
 pub(super) fn take_time_only_from(socket: &impl AsFd, addresses: &[IpAddr], digest: u64) -> io::Result<()> {
     let mut program = program(addresses);
     // In place of the verdict for all others.
@@ -76,7 +76,7 @@ fn time_of_others(digest: u64) -> [SockFilter; 12] {
     ]
 }
 
-/// One address after the other, each word by word.
+/// Compares with one address after the other, each word by word.
 fn program(addresses: &[IpAddr]) -> Vec<SockFilter> {
     let of_one = |address: &IpAddr| {
         let (place, bytes) = match address {
@@ -109,7 +109,7 @@ mod tests {
     const PEER: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 2);
     const STRANGER: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 3);
 
-    /// As many nodes as there may be; those in `last` come after all others.
+    /// The largest possible number of nodes; those in `last` come after all others.
     fn nodes(last: &[IpAddr]) -> Vec<IpAddr> {
         let many = (0..NODES_MAX as u8 - last.len() as u8).map(|node| IpAddr::V4(Ipv4Addr::new(127, 9, 9, node)));
         many.chain(last.iter().copied()).collect()

@@ -148,7 +148,7 @@ impl Shell {
         Self::start_with(parts, None)
     }
 
-    /// The same for a router that seals its datagrams, and takes only sealed ones. It draws a new incarnation instead
+    /// Starts a router that seals its datagrams, and takes only sealed ones. It draws a new incarnation instead
     /// of the one in its settings: two runs with one incarnation would have one key.
     ///
     /// # Errors

@@ -51,7 +51,7 @@ impl RestInlet for HandoverInlet {
 }
 
 impl Rest {
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(mut self) {
         while !self.shared.ends() {
             match self.driver.poll(&mut self.inlet) {

@@ -61,7 +61,7 @@ impl RxPlatform for RxSystem {
 }
 
 impl RxThread {
-    /// Until the socket is closed.
+    /// Runs until the socket is closed.
     pub(super) fn run(mut self) {
         let mut datagram = vec![0; DATAGRAM_BYTES];
         let (mut awake, mut ring_ns, mut seen_dropped) = (Awake::default(), 0, 0);

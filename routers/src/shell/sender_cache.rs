@@ -38,12 +38,12 @@ pub(crate) struct SenderCache {
 }
 
 impl SenderCache {
-    /// To mailboxes of this node alone, of these ranges.
+    /// A cache for mailboxes of this node alone, of these ranges.
     pub(crate) fn here(participant: &Arc<Participant>, hosts: &[(Name, Name)]) -> Self {
         Self::new(participant, Reach::Here(HostedNames::new(hosts)))
     }
 
-    /// To all mailboxes that are reached.
+    /// A cache for all mailboxes that are reached.
     pub(crate) fn everywhere(participant: &Arc<Participant>) -> Self {
         Self::new(participant, Reach::Everywhere { absent: Vec::with_capacity(ABSENT_MAX), epoch: 0 })
     }
@@ -64,7 +64,7 @@ impl SenderCache {
         self.send_by(head.to, head, body)
     }
 
-    /// The same through a mailbox that is known to lead there: only that one is looked up.
+    /// Sends through a mailbox that is known to lead there: only that one is looked up.
     pub(crate) fn send_by(&mut self, router: Name, head: &Head, body: &[u8]) -> Result<(), SendError> {
         let Head { to, from, kind, id, priority, options, .. } = *head;
         let at = match self.sender_cache.binary_search_by_key(&router, |way| way.to) {

@@ -58,7 +58,7 @@ pub struct Passed {
     pub refused: Count,
 }
 
-/// Its end in the kernel.
+/// The device in the kernel.
 pub(super) struct TunDevice {
     file: File,
     mtu: usize,

@@ -42,7 +42,7 @@ impl Inlet for TransitInlet {
 }
 
 impl TxThread {
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(mut self) {
         let mut awake = Awake::default();
         while !self.shared.ends() {

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// What sockets hold of what the line has not taken yet: what it carries in so long.
+/// Limit of what sockets buffer before the line: what the line carries in this time.
 const HELD: Duration = Duration::from_millis(50);
 const HELD_BYTES_MIN: usize = 4 * 1024;
 const HELD_BYTES_MAX: usize = 256 * 1024;
@@ -39,7 +39,7 @@ pub(super) struct BadLine {
 }
 
 impl BadLine {
-    /// To a server.
+    /// Begins a line to a server.
     ///
     /// # Errors
     /// What the system says.
@@ -106,7 +106,7 @@ impl BadLineThread {
         }
     }
 
-    /// Until one of the two ends closes, or is gone.
+    /// Carries bytes until one of the two ends closes, or is gone.
     fn carry(&mut self, near: &TcpStream) -> io::Result<()> {
         near.set_nonblocking(true)?;
         near.set_nodelay(true)?;

@@ -3,12 +3,12 @@
 
 use crate::session::frame::SessionRefusalReason;
 
-/// Of one cause one line is said in so long.
+/// Interval between two lines of one cause.
 const EVERY_NS: u64 = 1_000_000_000;
 /// Clients of a robot come and go together: so many are named one by one.
 const AT_ONCE: u32 = 16;
 
-/// What a line is about.
+/// Subject of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
     /// A client takes part.

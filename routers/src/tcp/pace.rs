@@ -1,5 +1,5 @@
-//! How fast a connection takes bytes, and how many of them the kernel is to hold by that: what it holds can be
-//! overtaken by nothing.
+//! Measures how fast a connection takes bytes, and limits by that how many of them the kernel buffers: nothing more
+//! important can pass them.
 //!
 //! ```text
 //!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if always wanted
@@ -10,30 +10,29 @@
 
 use crate::session::BATCH_BYTES;
 
-/// What the kernel may keep before it has sent it: what leaves in so long.
+/// Limits what the kernel has not sent yet: what leaves in this time.
 const UNSENT_NS: u64 = 250_000_000;
-/// The same and what is under way to the other end: what leaves in so long, or in twice the way there and back. With
-/// less than that way takes in, the connection would be no faster than what is held, and so on ever less; twice that
-/// lets it grow.
+/// The same and what is under way to the other end: what leaves in so long, or in two round trips. With less than one
+/// round trip the limit itself would slow the connection down, more and more; two let it grow.
 const HELD_NS: u64 = 1_000_000_000;
 const UNSENT_BYTES_MIN: u64 = 4 * 1024;
 const UNSENT_BYTES_MAX: u64 = 32 * 1024;
-/// Until the rate is known.
+/// Limit while the rate is unknown.
 const UNSENT_BYTES_FIRST: u64 = 2 * 1024;
 const HELD_BYTES_MIN: u64 = 4 * 1024;
 /// Faster connections have as much on the way as the kernel thinks good.
 const HELD_BYTES_MAX: u64 = 192 * 1024;
-/// Of one that was bound and is fast again: more than any kernel grants, so the most that this one does.
+/// For a connection that was limited and is fast again: more than any kernel grants, so the most that this one does.
 const HELD_BYTES_FREE: u64 = 64 * 1024 * 1024;
-/// With less, a second and more lies between a byte and word of it, however little the kernel holds.
+/// Below this rate a byte is acknowledged after a second or more, however little the kernel holds.
 const SLOW_BYTES_S: u64 = 64 * 1024;
-/// The rate is that over so long, or over the way there and back, or over so many bytes: at first a connection takes
-/// more than leaves.
+/// The rate is that over so long, or over a round trip, or over so many bytes: at first a connection takes more than
+/// leaves.
 const WINDOW_NS: u64 = 500_000_000;
 const WINDOW_BYTES: u64 = 256 * 1024;
 const SECOND_NS: u128 = 1_000_000_000;
 
-/// What the kernel is to hold of a connection.
+/// Limits of what the kernel holds of a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Holding {
     /// Bytes that have not been sent.
@@ -42,7 +41,7 @@ pub(super) struct Holding {
     pub(super) held: Option<u64>,
 }
 
-/// Of one connection.
+/// Pace of one connection, as measured.
 #[derive(Debug)]
 pub(super) struct ConnectionPace {
     /// When it was full first, ns; since then it was wanted all the time.
@@ -53,7 +52,7 @@ pub(super) struct ConnectionPace {
     rate: Option<u64>,
     /// It holds less than the kernel likes.
     is_bound: bool,
-    /// The shortest way there and back so far, ns: what waits on a slow line makes later ones longer.
+    /// The shortest round trip so far, ns: what waits on a slow line makes later ones longer.
     round_trip_ns: Option<u64>,
     unsent: u64,
 }
@@ -85,7 +84,7 @@ impl ConnectionPace {
         (self.unsent < UNSENT_BYTES_MAX).then_some(self.unsent as usize)
     }
 
-    /// The way there and back took so long, ns, as far as that is known.
+    /// A round trip took so long, ns, as far as that is known.
     pub(super) fn set_round_trip(&mut self, took_ns: Option<u64>) {
         self.round_trip_ns = self.round_trip_ns.into_iter().chain(took_ns).min();
     }

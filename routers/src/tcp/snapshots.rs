@@ -5,7 +5,7 @@ use crate::session::{Cause, SessionCounts};
 use rohrpost_mailbox::{Name, Priority, TimeRecord};
 use std::sync::{Mutex, PoisonError};
 
-/// So often it is said anew.
+/// Interval between two snapshots.
 pub(super) const SAY_EVERY_NS: u64 = 200_000_000;
 
 /// Members that are said one by one: with what else is said they must fit into a package.
@@ -13,7 +13,7 @@ pub const MEMBERS_MAX: usize = 300;
 /// Ranges of a client that are told by name.
 pub(super) const HOSTS_MAX: usize = 64;
 
-/// What a class did at one end.
+/// Counts of one class at one end.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Class {
     /// The class's priority.
@@ -82,7 +82,7 @@ impl Outage {
     }
 }
 
-/// A client, as it sees itself.
+/// A client's link to its server, as the client sees it.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct ClientLink {
     /// Whether it takes part.
@@ -91,7 +91,7 @@ pub struct ClientLink {
     pub why: String,
     /// Connections so far.
     pub connections: u64,
-    /// Shortest way there and back of late, ns.
+    /// Shortest recent round trip, ns.
     pub round_trip_ns: Option<u64>,
     /// How far off system time by the server is at most, ns; none if the server does not know it.
     pub time_error_ns: Option<u64>,
@@ -157,7 +157,7 @@ pub struct Members {
     pub classes: Vec<Class>,
 }
 
-/// What one thread says, and others read: a few times a second.
+/// A value that one thread replaces, and others read, a few times a second.
 #[derive(Debug, Default)]
 pub(super) struct LatestValue<T>(Mutex<T>);
 

@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 
-/// What came of reading or writing.
+/// Result of reading or writing.
 #[derive(Debug)]
 pub enum Moved {
     /// So many bytes, at least one.
@@ -79,7 +79,7 @@ impl Stream {
         Self::new(socket.into(), sealed)
     }
 
-    /// One that was accepted.
+    /// A stream of an accepted connection.
     pub(super) fn new(socket: TcpStream, sealed: Option<Sealed>) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         socket.set_nodelay(true)?;
@@ -132,7 +132,7 @@ impl Stream {
         }
     }
 
-    /// The way there and back takes so long, ns, as far as that is known.
+    /// The round trip, ns, as far as that is known.
     pub(super) fn set_round_trip(&mut self, round_trip_ns: Option<u64>) {
         self.pace.set_round_trip(round_trip_ns);
     }

@@ -175,7 +175,7 @@ impl SlotScheduler {
         self.silent
     }
 
-    /// From the call to the wire, ns: the median, and the lead.
+    /// Time from the call to the wire, ns: the median, and the lead.
     pub fn lead_ns(&self) -> (u64, u64) {
         (self.lead.median_ns(), self.lead.ns())
     }

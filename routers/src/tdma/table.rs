@@ -17,7 +17,7 @@ use rohrpost_network::Tdma;
 use rohrpost_network::TimeShare;
 use std::time::Duration;
 
-/// By an unverified time a hello leaves in one of this many cycles, since that time may be wrong.
+/// While the time is unverified, a hello leaves in one of this many cycles, since that time may be wrong.
 pub const UNPROVEN_CYCLES: u64 = 4;
 
 /// Purpose of a window.
@@ -114,7 +114,7 @@ impl SlotTable {
         self.masters.iter().position(|master| *master == self.own).map(|rank| rank as u8)
     }
 
-    /// From the beginning of one cycle to that of the next, ns.
+    /// Time from the beginning of one cycle to that of the next, ns.
     pub fn cycle_ns(&self) -> u64 {
         self.cycle_ns
     }

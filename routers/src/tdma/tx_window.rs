@@ -77,7 +77,7 @@ impl TransmitWindow {
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
 
-    /// From the handover of a datagram now until its last bit is at the other computer, behind a store-and-forward
+    /// Time from the handover of a datagram now until its last bit is at the other computer, behind a store-and-forward
     /// switch, ns. `to_wire_ns`: how long it takes to the wire, unless that is busy for longer.
     pub fn arrives_after_ns(&self, now_ns: u64, datagram_bytes: usize, to_wire_ns: u64) -> u64 {
         self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
@@ -126,7 +126,7 @@ impl TransmitWindow {
         matches!(self.window.kind, WindowKind::Slot { .. })
     }
 
-    /// Whether a refusal may leave in it: who is not sure of the time sends nothing but questions.
+    /// Whether a refusal may leave in it: a node that is not sure of the time sends nothing but hellos.
     pub fn carries_refusal(&self) -> bool {
         self.carries_hello() && self.carries == Carries::All
     }

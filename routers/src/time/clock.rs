@@ -345,7 +345,7 @@ impl Clock {
         }
     }
 
-    /// Drafts what is due without a question.
+    /// Drafts what is due without a request.
     fn draft(&mut self, now_ns: u64) {
         match self.election.state() {
             ElectionState::Listening => self.draft_hello(now_ns),

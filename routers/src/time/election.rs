@@ -1,4 +1,4 @@
-//! Election of the master: the order of candidates, the silence that ends a reign, and which of two masters yields.
+//! Election of the master: the order of candidates, the silence that ends a term, and which of two masters yields.
 
 use super::message::{Request, Sync};
 use super::unverified::UnverifiedPeers;
@@ -21,7 +21,7 @@ pub(super) enum Origin {
     /// Its own, which the others follow.
     Own,
     /// The others' time, as this node heard it.
-    SyncOutcome,
+    Heard,
     /// A new time, different from any that other nodes may have.
     New,
 }
@@ -54,7 +54,7 @@ pub(super) enum ElectionState {
 
 /// What a Sync changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Heard {
+pub(super) enum SyncOutcome {
     /// Late, a duplicate, or from a master that must yield.
     Ignored,
     /// From the master that this node follows.
@@ -113,7 +113,7 @@ impl Election {
         }
     }
 
-    /// Sets the delays that depend on slots. A slave needs `intervals` to ask; question and answer wait for slots, so a
+    /// Sets the delays that depend on slots. A slave needs `intervals` to ask; request and reply wait for slots, so a
     /// master must not be replaced earlier for not answering. A new time begins only after no time was heard for long
     /// enough. A successor sends before the silence of its master is over.
     pub(super) fn asks_after(&mut self, intervals: u64, asks_every_ns: u64) {
@@ -177,10 +177,10 @@ impl Election {
         sync: &Sync,
         received_ns: u64,
         followed: bool,
-    ) -> Heard {
+    ) -> SyncOutcome {
         self.speaks_of(sync.term, sync.epoch);
         if self.masters.get(usize::from(sync.term.rank())) != Some(&from) {
-            return Heard::Ignored;
+            return SyncOutcome::Ignored;
         }
         let (term, began, epoch) = (sync.term, sync.began, sync.epoch);
         let (error_ns, id) = (sync.error_ns, sync.id);
@@ -197,33 +197,33 @@ impl Election {
             id,
         };
         let heard = match self.state {
-            ElectionState::Listening => Heard::Turned,
-            ElectionState::Master(own) if theirs.claim() > (followed, own) => Heard::Turned,
+            ElectionState::Listening => SyncOutcome::Turned,
+            ElectionState::Master(own) if theirs.claim() > (followed, own) => SyncOutcome::Turned,
             ElectionState::Master(own) => {
                 // The other will yield. A higher own term: no node that heard the other takes this one for older.
                 if let (true, Some(rank)) = (theirs.term > own, self.rank()) {
                     self.state = ElectionState::Master(self.next_term(rank));
                 }
-                Heard::Ignored
+                SyncOutcome::Ignored
             }
             ElectionState::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
                 if id <= master.id || term < master.term {
-                    Heard::Ignored
+                    SyncOutcome::Ignored
                 } else if began != master.began {
-                    Heard::Turned
+                    SyncOutcome::Turned
                 } else {
-                    Heard::Followed
+                    SyncOutcome::Followed
                 }
             }
-            ElectionState::Slave(master) if theirs.claim() > master.claim() => Heard::Turned,
+            ElectionState::Slave(master) if theirs.claim() > master.claim() => SyncOutcome::Turned,
             ElectionState::Slave(master) if theirs.term > master.term && self.is_succeeded(&master, received_ns) => {
-                Heard::Turned
+                SyncOutcome::Turned
             }
-            ElectionState::Slave(_) => Heard::Ignored,
+            ElectionState::Slave(_) => SyncOutcome::Ignored,
         };
         match (heard, self.state) {
-            (Heard::Ignored, _) => {}
-            (Heard::Followed, ElectionState::Slave(before)) if !sync.followed => {
+            (SyncOutcome::Ignored, _) => {}
+            (SyncOutcome::Followed, ElectionState::Slave(before)) if !sync.followed => {
                 self.state = ElectionState::Slave(Followed { answered_ns: before.answered_ns, ..theirs });
             }
             _ => self.state = ElectionState::Slave(theirs),
@@ -375,9 +375,7 @@ impl Election {
         }
         let (since_ns, patience_ns, last) = match self.state {
             ElectionState::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
-            ElectionState::Slave(master) => {
-                (master.answered_ns, self.silence_ns().max(self.deaf_ns), Some(master.node))
-            }
+            ElectionState::Slave(of) => (of.answered_ns, self.silence_ns().max(self.deaf_ns), Some(of.node)),
             ElectionState::Master(_) => return None,
         };
         // A node without time waits for one that has time.
@@ -391,7 +389,7 @@ impl Election {
         let staggered_ns = staggered_ns.saturating_add(apart_ns.saturating_mul(self.before(last) as u64));
         let takes_over_ns = since_ns.max(self.awake_since_ns).saturating_add(patience_ns);
         let begins_ns = match (origin, self.begins_after_ns, self.state) {
-            (Origin::Own | Origin::SyncOutcome, _, _) | (_, 0, _) => 0,
+            (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => 0,
             (Origin::New, begins_ns, ElectionState::Slave(master)) => master.heard_ns.saturating_add(begins_ns),
             (Origin::New, begins_ns, _) => {
                 let heard_ns = self.timed_heard_ns.unwrap_or(0).max(self.overheard_ns);

@@ -14,7 +14,7 @@ const SLOPES: usize = GUESS_BUCKETS * (GUESS_BUCKETS - 1) / 2;
 /// A bucket is left out of the guess if its best delay is this many times the best of all, and this much more.
 const WAITED_TIMES: i64 = 2;
 const WAITED_NS: i64 = 1_000;
-/// As a fraction of 1.
+/// [`RATE_MAX_PPB`] as a fraction of 1.
 pub(super) const RATE_MAX: f64 = RATE_MAX_PPB as f64 * 1e-9;
 /// Per nanosecond, so that times a span in ns it is a rate.
 const WANDER: f64 = WANDER_PPB_S as f64 * 1e-18;
@@ -71,7 +71,7 @@ impl History {
         self.samples = 0;
     }
 
-    /// From now on samples widen by this fraction of their age.
+    /// Widens samples by this fraction of their age from now on.
     pub(super) fn fades(&mut self, fade: f64) {
         self.fade = fade;
     }

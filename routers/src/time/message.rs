@@ -66,7 +66,7 @@ pub struct Sync {
     pub replacement: bool,
 }
 
-/// A slave's question; with id 0 it only says that the sender hears no master.
+/// A slave's request; with id 0 it only says that the sender hears no master.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Request {
     /// Of the [`Sync`]; 0: hears no master.

@@ -116,7 +116,7 @@ impl Others {
         self.refusals_ns = self.refusals_ns.max(until_ns);
     }
 
-    /// Until when this node is silent, if it is.
+    /// End of this node's silence, if it is silent.
     pub(super) fn silent_until_ns(&self, local_ns: u64) -> Option<u64> {
         let until_ns = self.all.iter().flatten().map(|other| other.until_ns).max();
         until_ns.filter(|until_ns| local_ns < *until_ns)

@@ -1,6 +1,6 @@
 //! Each part of the incoming half; those that a broken variant must fail are in `CHECKS`.
 
-mod lives;
+mod incarnations;
 mod names;
 mod pair;
 mod refusals;
@@ -16,13 +16,13 @@ pub(crate) const CHECKS: &[fn()] = &[
     check_window,
     check_order,
     check_floor,
-    lives::check_silence,
-    lives::check_restart,
-    lives::check_jump,
-    lives::check_forged_incarnations,
+    incarnations::check_silence,
+    incarnations::check_restart,
+    incarnations::check_jump,
+    incarnations::check_forged_incarnations,
     check_whole,
-    lives::check_one_way,
-    lives::check_socket,
+    incarnations::check_one_way,
+    incarnations::check_socket,
     refusals::check_digest,
     refusals::check_damaged,
     refusals::check_forged_refusals,
@@ -125,7 +125,7 @@ fn a_full_table_costs_packages_but_not_the_order() {
 
 /// A large package, then packages of many flows, then its last fragment.
 fn check_whole() {
-    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, lives::quick));
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, incarnations::quick));
     let large = head(module(50, 0), module(200, 1), 90);
     arm.queue(START, large, &[1; 4000]);
     let parts: Vec<_> = arm.leave(START).into_iter().map(|(_, part)| part).collect();

@@ -59,7 +59,7 @@ fn only_classes_that_are_listed_may_command_from_another_node() {
     assert_eq!(causes(&mut end, &packages), [None, Some(Cause::NotAllowed), None, None]);
 }
 
-/// Of node 0, with a tunnel: routers are of class 250.
+/// End of node 0, with a tunnel: routers are of class 250.
 fn guarded() -> End {
     End::new(0, |settings| {
         let tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };

@@ -143,6 +143,6 @@ impl Client {
             host.event(event);
         }
         self.told = Some(told);
-        self.state = ClientState::Over;
+        self.state = ClientState::Closing;
     }
 }

@@ -1,9 +1,9 @@
 //! A client: keeps up a connection to the server, registers what it hosts, and carries packages both ways.
 //!
 //! ```text
-//!  away ─ wait is over ─▶ connecting ─ connected ─▶ greeting ─ welcome ─▶ member ─ register ─▶ up
-//!   ▲                         └───── too long ─────────┴─ refusal ─┴─ silence, damage, end of the stream ┘
-//!   └──────────────────────────── waits longer each time ◀─────────────────────────────────────┘
+//!  away ─ wait is over ─▶ connecting ─ connected ─▶ handshake ─ welcome ─▶ member ─ register ─▶ up
+//!   ▲                         └───── too long ─────────┴─ refusal ──┴─ silence, damage, end of the stream ┘
+//!   └──────────────────────────── waits longer each time ◀──────────────────────────────────────┘
 //! ```
 
 mod asking;
@@ -73,7 +73,7 @@ pub struct ClientPackage<'a> {
     pub hops: u8,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Client::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClientStep {
     /// Connect; then [`Client::connected`] or [`Client::closed`].
@@ -89,7 +89,7 @@ pub enum ClientStep {
     },
 }
 
-/// What people want to know of, each once until it changes.
+/// A change that people are told once.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClientEvent<'a> {
     /// The server takes and brings packages.
@@ -121,18 +121,11 @@ pub trait ClientHost: ErrorReplies {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum ClientState {
-    Away {
-        until_ns: u64,
-    },
-    Connecting {
-        until_ns: u64,
-    },
-    Handshake {
-        until_ns: u64,
-    },
+    Away { until_ns: u64 },
+    Connecting { until_ns: u64 },
+    Handshake { until_ns: u64 },
     Member,
-    /// The connection is to be closed.
-    Over,
+    Closing,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -247,7 +240,7 @@ impl Client {
         matches!(self.state, ClientState::Handshake { .. } | ClientState::Member)
     }
 
-    /// The shortest way there and back of late, ns.
+    /// The shortest recent round trip, ns.
     pub fn round_trip_ns(&self) -> Option<u64> {
         self.estimate.round_trip_ns()
     }

@@ -2,7 +2,7 @@
 
 use super::BadSessionFrame;
 
-/// What is not read yet.
+/// Reads the fields of a frame, one after the other: the bytes that are not read yet.
 pub(super) struct FieldReader<'a>(&'a [u8]);
 
 impl<'a> FieldReader<'a> {

@@ -98,7 +98,7 @@ impl Welcome {
     }
 }
 
-/// Why a server takes a client not, or not any more.
+/// Why a server does not accept a client, or ends its session.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
 pub enum SessionRefusalReason {
@@ -155,7 +155,7 @@ impl SessionRefusalReason {
     }
 }
 
-/// "I take nothing from you, since …"
+/// Tells the other end why nothing is taken from it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SessionRefusal<'a> {
     /// Version of the refusing end.

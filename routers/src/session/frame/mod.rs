@@ -30,7 +30,7 @@ use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES as PACKAGE_HEAD_BYTES};
 pub const HEAD_BYTES: usize = 8;
 /// Bytes behind a frame's head, at most: the largest package, and when it was published.
 pub const LENGTH_MAX: usize = PUBLISHED_BYTES + PACKAGE_HEAD_BYTES + BODY_BYTES_MAX;
-/// The same before the hello.
+/// Longest frame before the hello.
 pub const HELLO_LENGTH_MAX: usize = 256;
 /// A package passes so many servers and programs that hand it on, at most.
 pub const HOPS_MAX: u8 = 8;
@@ -87,7 +87,7 @@ impl SessionFrameHead {
     /// Reads a head.
     ///
     /// # Errors
-    /// [`BadFrame`]; also if more would follow than `length_max`.
+    /// [`BadSessionFrame`]; also if more would follow than `length_max`.
     pub fn parse(bytes: &[u8; HEAD_BYTES], length_max: usize) -> Result<Self, BadSessionFrame> {
         if is_tls(bytes) {
             return Err(BadSessionFrame::Tls);
@@ -117,7 +117,7 @@ pub(super) const fn is_tls(bytes: &[u8]) -> bool {
 
 const _: () = assert!(LENGTH_MAX < 0x01_03_14, "no head begins as a record of TLS");
 
-/// A frame, read.
+/// A parsed frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SessionMessage<'a> {
     /// Identity of a client.
@@ -142,7 +142,7 @@ impl<'a> SessionMessage<'a> {
     /// Checks all that a frame says.
     ///
     /// # Errors
-    /// [`BadFrame`]
+    /// [`BadSessionFrame`]
     pub fn parse(head: SessionFrameHead, rest: &'a [u8]) -> Result<Self, BadSessionFrame> {
         let mut fields = FieldReader::new(rest);
         let message = match head.kind {

@@ -116,7 +116,7 @@ pub enum Objection {
     TooMany = 4,
 }
 
-/// What the server says to a registration: all of it holds, or nothing of it and all is as it was.
+/// The server's verdict on a registration: all of it is in force, or nothing of it changes anything.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct RegistrationVerdict<'a> {
     /// As the registration had it.

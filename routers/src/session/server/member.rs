@@ -21,7 +21,7 @@ pub enum MemberState {
     },
 }
 
-/// A question for the time that waits for its answer.
+/// A request for the time that waits for its response.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimeRequest {
     pub(super) asked_ns: u64,
@@ -30,7 +30,7 @@ pub(super) struct TimeRequest {
     pub(super) by_hello: bool,
 }
 
-/// A verdict that waits for its way out.
+/// A verdict that is not sent yet.
 #[derive(Debug)]
 pub(super) struct PendingVerdict {
     /// But for the holder.
@@ -38,7 +38,7 @@ pub(super) struct PendingVerdict {
     pub(super) holder: String,
 }
 
-/// A refusal that waits for its way out.
+/// A refusal that is not sent yet.
 #[derive(Debug)]
 pub(super) struct PendingRefusal {
     pub(super) reason: SessionRefusalReason,
@@ -46,7 +46,7 @@ pub(super) struct PendingRefusal {
     pub(super) text: String,
 }
 
-/// The way there and back: a client says something as soon as it reads its welcome.
+/// The round trip: a client says something as soon as it reads its welcome.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) enum RoundTrip {
     /// There was no welcome.

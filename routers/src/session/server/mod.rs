@@ -1,9 +1,9 @@
 //! The server: takes what clients send, and gives it to the client that hosts the name.
 //!
 //! ```text
-//!  accept ─▶ greeting ─ hello ─▶ member ─ register ─▶ Table        received ─▶ intake ─▶ carry ─▶ Outgoing of another
-//!               │ too long, wrong      │ silent, stalled, replaced                                   │
-//!               └──── refusal ────▶ leaving ─▶ closed                poll ─▶ Write, Close, Wait ◀────┘
+//!  accept ─▶ handshake ─ hello ─▶ member ─ register ─▶ RoutingTable  received ─▶ intake ─▶ carry ─▶ another's Outgoing
+//!               │ too long, wrong       │ silent, stalled, replaced                                     │
+//!               └──── refusal ─────▶ leaving ─▶ closed                poll ─▶ Write, Close, Wait ◀──────┘
 //! ```
 
 mod carry;
@@ -82,7 +82,7 @@ pub struct View<'a> {
     pub bytes: usize,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Server::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ServerStep {
     /// Write what [`Server::ready`] has, then say how much with [`Server::took`].
@@ -96,7 +96,7 @@ pub enum ServerStep {
     },
 }
 
-/// What people want to know of.
+/// A change that people are told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ServerEvent<'a> {
     /// A client takes part.
@@ -272,7 +272,7 @@ impl Server {
         }
     }
 
-    /// So many bytes are made ready for a client at a time from now on.
+    /// Makes this many bytes ready for a client at a time from now on.
     pub fn set_batch(&mut self, client: ClientIndex, bytes: usize) {
         if let Some(member) = self.member_mut(client) {
             member.outgoing.set_batch(bytes);

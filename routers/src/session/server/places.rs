@@ -2,8 +2,8 @@
 //! have one.
 //!
 //! ```text
-//!  accept ─▶ greeting: of too many the oldest of the address that has most gives way
-//!  hello  ─▶ member:   of too many the newest of the principal that has most, if the new one's has fewer by two
+//!  accept ─▶ handshake: of too many the oldest of the address that has most gives way
+//!  hello  ─▶ member:    of too many the newest of the principal that has most, if the new one's has fewer by two
 //! ```
 
 use super::crowd::Crowd;
@@ -24,7 +24,7 @@ const STRANGERS: u32 = 256;
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Crowded {
     /// Connections before their hello that gave way, since their address had most.
-    pub greetings: u64,
+    pub handshakes: u64,
     /// Clients that gave way to others with fewer, or were not let in while they had most.
     pub clients: u64,
     /// Registrations with more ranges than a principal may have.
@@ -37,7 +37,7 @@ pub(super) struct Places {
     /// Places that were left.
     free: BTreeSet<u16>,
     /// Clients without a hello yet, by address.
-    greetings: Crowd<Principal>,
+    handshakes: Crowd<Principal>,
     /// Admitted clients.
     pub(super) principals: Principals,
     /// Admitted clients, by incarnation.
@@ -48,7 +48,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// One of a system that takes part.
+    /// A client of a system that takes part.
     pub(super) fn of_system(&self, system: u8) -> Option<ClientIndex> {
         let least = (system, ClientIndex(0));
         self.systems.range(least..).next().filter(|(of, _)| *of == system).map(|(_, client)| *client)
@@ -70,7 +70,7 @@ impl Places {
 
     /// It does not stand before its hello any more.
     pub(super) fn handshake_ends(&mut self, client: ClientIndex, member: &Member) {
-        self.greetings.remove(&member.address, member.began_ns, client);
+        self.handshakes.remove(&member.address, member.began_ns, client);
     }
 }
 
@@ -78,9 +78,9 @@ impl Server {
     /// A connection was made, from this address. None: so many are there that it must be closed.
     pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl ServerHost) -> Option<ClientIndex> {
         let address = Principal::of(from.ip());
-        if self.places.greetings.len() >= self.settings.handshakes_max.into() {
+        if self.places.handshakes.len() >= self.settings.handshakes_max.into() {
             let oldest = self.oldest_handshake(&address)?;
-            self.places.crowded.greetings += 1;
+            self.places.crowded.handshakes += 1;
             self.refuse(now_ns, oldest, SessionRefusalReason::Silent, (0, 0), "others wait to be let in", host);
         }
         let index = match self.places.free.pop_first() {
@@ -92,22 +92,22 @@ impl Server {
             None => return None,
         };
         let client = ClientIndex(index);
-        self.places.greetings.add(&address, now_ns, client);
+        self.places.handshakes.add(&address, now_ns, client);
         let member = Member::new(now_ns, from.to_string(), address, self.settings.quota_bytes);
         self.members[usize::from(index)] = Some(Box::new(member));
         Some(client)
     }
 
-    /// Of the connections before their hello, one that gives way to a new one from this address.
+    /// The connection before its hello that gives way to a new one from this address.
     fn oldest_handshake(&self, address: &Principal) -> Option<ClientIndex> {
-        let greetings = &self.places.greetings;
-        let (largest, most) = greetings.largest()?;
+        let handshakes = &self.places.handshakes;
+        let (largest, most) = handshakes.largest()?;
         if broken!(CrowdsOut) {
-            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Handshake;
-            return self.present().filter(greeting).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
+            let handshake = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Handshake;
+            return self.present().filter(handshake).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
         }
-        let owner = if greetings.count_of(address) == most { address } else { largest };
-        greetings.ends_of(owner).map(|(oldest, _)| oldest)
+        let owner = if handshakes.count_of(address) == most { address } else { largest };
+        handshakes.ends_of(owner).map(|(oldest, _)| oldest)
     }
 
     /// A client said hello, and nothing speaks against it: whether there is a place for it.

@@ -255,9 +255,8 @@ fn what_a_stranger_says_takes_no_memory_and_is_told_to_him() {
         };
         let (head, rest) = ground.server.ready(index).split_first_chunk::<HEAD_BYTES>().unwrap();
         let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
-        assert!(
-            matches!(SessionMessage::parse(head, rest), Ok(SessionMessage::Refusal(refusal)) if refusal.text.contains(words))
-        );
+        let told = SessionMessage::parse(head, rest);
+        assert!(matches!(told, Ok(SessionMessage::Refusal(refusal)) if refusal.text.contains(words)));
         let bytes = ground.server.ready(index).len();
         ground.server.took(ground.now_ns, index, bytes);
         assert_eq!(ground.server.poll(ground.now_ns, &mut ground.said), server::ServerStep::Close(place));

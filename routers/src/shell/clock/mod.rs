@@ -59,11 +59,11 @@ pub enum ClockError {
 
 /// What a clock is made of.
 pub struct ClockParts {
-    /// Who it is, and who may be master.
+    /// Which node it is, and which nodes may be master.
     pub settings: TimeSettings,
     /// Where each node takes datagrams of time, in the order of the configuration; its own too.
     pub nodes: Vec<SocketAddr>,
-    /// The node whose page it writes; none in tests that look at [`ClockState`] alone.
+    /// It writes the page of this node; none in tests that look at [`ClockState`] alone.
     pub node: Option<Arc<Node>>,
     /// A bad network before its socket.
     pub impair: Option<impair::ImpairmentSettings>,
@@ -113,7 +113,7 @@ impl ClockService {
         Self::of(Works::new(parts)?)
     }
 
-    /// The same of what was made already.
+    /// A service of parts that were made already.
     pub(super) fn of(works: Works) -> Result<Self, ClockError> {
         let state = works.state().clone();
         let (ended, ends) = io::pipe().map_err(ClockError::Thread)?;

@@ -24,7 +24,7 @@ const PRIORITY: u32 = 6;
 const RETURNED_BYTES: usize = TIME_BYTES + TAG_BYTES + 128;
 const CONTROL_BYTES: usize = 512;
 
-/// What a socket has.
+/// Socket for datagrams of time.
 pub(super) struct TimeSocket {
     socket: UdpSocket,
     peers: Vec<SockaddrStorage>,
@@ -72,7 +72,7 @@ impl TimeSocket {
         })
     }
 
-    /// From now on its datagrams are sealed.
+    /// Expects sealed datagrams from now on.
     pub(super) fn sealed(self) -> Self {
         Self { datagram_bytes: TIME_BYTES + TAG_BYTES, ..self }
     }

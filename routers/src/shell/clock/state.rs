@@ -5,7 +5,7 @@ use crate::time::{Clock, Reading, Role, Term};
 use rohrpost_mailbox::TimeRecord;
 use std::sync::{Mutex, PoisonError};
 
-/// How it stands with system time on this node.
+/// System time on this node at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockSnapshot {
     /// What the node does for the common time.
@@ -22,7 +22,7 @@ pub struct ClockSnapshot {
     pub offset_ns: i64,
     /// How much faster than its own clock the master's runs, ns a second.
     pub rate_ppb: i64,
-    /// Shortest way there and back of late, ns.
+    /// Shortest recent round trip, ns.
     pub delay_ns: Option<u64>,
     /// When the master was heard last, monotonic ns.
     pub heard_ns: Option<u64>,
@@ -60,7 +60,7 @@ impl ClockSnapshot {
     }
 }
 
-/// Shared by the clock's thread and whoever wants to know.
+/// Shared by the clock's thread and its readers.
 #[derive(Debug)]
 pub struct ClockState {
     snapshot: Mutex<ClockSnapshot>,
@@ -71,12 +71,12 @@ impl ClockState {
         Self { snapshot: Mutex::new(snapshot) }
     }
 
-    /// How it stands. For tools: modules read the node's page.
+    /// The present state. For tools: modules read the node's page.
     pub fn snapshot(&self) -> ClockSnapshot {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Of the clock's thread. It never waits for who looks: then the next one is shown.
+    /// For the clock's thread. It never waits for a reader: then the next snapshot is shown.
     pub(super) fn show(&self, snapshot: &ClockSnapshot) {
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;

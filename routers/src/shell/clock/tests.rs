@@ -102,7 +102,7 @@ impl Clocks {
         u8::from(is_master(&1))
     }
 
-    /// The others follow one master, and are not further off than they say, at any moment; who that is.
+    /// All follow one master, and are not further off than they say, at any moment. Returns the master.
     fn check_bounds(&self) -> u8 {
         let master = self.master();
         let slaves = [1 - master, 2];

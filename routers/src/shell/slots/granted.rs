@@ -7,13 +7,13 @@ use rohrpost_config::duration_decimal;
 use rohrpost_mailbox::sys::{Reservation, Scheduling, reserve, schedule};
 use std::time::Duration;
 
-/// For a window, besides the time in which it sends and the spinning before it: to wake up, and to read what came.
+/// Time for a window besides sending and spinning: to wake up, and to read what came.
 const AROUND_NS: u64 = 100_000;
-/// For each millisecond: to take what waits in the mailbox.
+/// Time for each millisecond: to take what waits in the mailbox.
 const MILLISECOND_NS: u64 = 50_000;
 /// A longer period brings nothing: the runtime would have to last for longer.
 const PERIOD_NS_MAX: u64 = 10_000_000;
-/// Of a period, the most that is reserved: others have to live as well, and several nodes may be on one computer.
+/// Part of a period that is reserved at most: other threads need time, and several nodes may be on one computer.
 const SHARE_PERCENT_MAX: u64 = 60;
 /// Slot tables repeat themselves after so many cycles at most.
 const CYCLES: u64 = 64;
@@ -107,7 +107,7 @@ impl Wanted {
     }
 }
 
-/// What windows take that begin within one period, at most.
+/// Longest time that the windows within one period take together.
 fn busiest_ns(table: &SlotTable, period_ns: u64) -> u64 {
     let end_ns = CYCLES * table.cycle_ns() + period_ns;
     let next = |from_ns| table.next_window(from_ns).filter(|window| window.begin_ns < end_ns);

@@ -1,8 +1,8 @@
 //! The thread that sends in time slots: it has the router's mailbox, its queue, all sockets that send, and the clock.
 //! What it does with them, and when, says the [driver](crate::driver).
 //!
-//! It is never rung: who publishes a package makes no system call, and waits for a slot anyway. It takes nothing from
-//! the heap.
+//! Its bell is never rung: publishing a package makes no system call, since the package waits for a slot anyway. The
+//! thread takes nothing from the heap.
 
 mod alarm;
 mod granted;
@@ -44,13 +44,13 @@ pub(super) struct Own {
     pub(super) answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
 }
 
-/// What the thread has.
+/// State of the thread.
 pub(super) struct SlotThread {
     driver: SlotDriver,
     system: System,
 }
 
-/// What the driver has of the system.
+/// Implements the driver's platform with the real system.
 struct System {
     shared: Arc<Shared>,
     /// In which the thread that receives counts.
@@ -66,7 +66,7 @@ struct System {
 }
 
 impl SlotThread {
-    /// From what would send as packages come.
+    /// Makes the thread from the parts of a router without slots.
     pub(super) fn new(
         own: Own,
         (shared, stats): (Arc<Shared>, Arc<Stats>),
@@ -93,7 +93,7 @@ impl SlotThread {
         self.system.works.state().clone()
     }
 
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(self) {
         let Self { mut driver, mut system } = self;
         alarm::be_punctual();

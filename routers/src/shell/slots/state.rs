@@ -5,7 +5,7 @@ use crate::driver::{Used, WINDOWS};
 use crate::tdma::{Silent, SlotCounts};
 use std::sync::{Mutex, PoisonError};
 
-/// How it stands with the time slots of this node.
+/// Time slots of this node at one moment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SlotSnapshot {
     /// What became of its windows.
@@ -23,7 +23,7 @@ pub struct SlotSnapshot {
 }
 
 impl SlotSnapshot {
-    /// Of a router that begins.
+    /// Snapshot of a router that begins.
     pub(super) fn new(silent: Option<Silent>) -> Self {
         Self {
             counts: SlotCounts::default(),
@@ -36,7 +36,7 @@ impl SlotSnapshot {
     }
 }
 
-/// Shared by the thread of the time slots and whoever wants to know.
+/// Shared by the thread of the time slots and its readers.
 #[derive(Debug)]
 pub struct SlotStatus {
     snapshot: Mutex<SlotSnapshot>,
@@ -47,12 +47,12 @@ impl SlotStatus {
         Self { snapshot: Mutex::new(snapshot) }
     }
 
-    /// How it stands.
+    /// The present state.
     pub fn snapshot(&self) -> SlotSnapshot {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Of the thread itself. It never waits for who looks: then the next one is shown.
+    /// For the thread itself. It never waits for a reader: then the next snapshot is shown.
     pub(super) fn show(&self, snapshot: &SlotSnapshot) {
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;

@@ -61,7 +61,7 @@ pub enum ClientError {
     Thread(io::Error),
 }
 
-/// What it is made of.
+/// Parts of a client.
 pub struct ClientParts<'a> {
     /// The node that it serves.
     pub node: &'a Arc<Node>,
@@ -173,7 +173,7 @@ struct ClientConnection {
     awaits_room: bool,
 }
 
-/// What the thread has.
+/// State of the thread.
 struct ClientThread {
     shared: Arc<ClientShared>,
     /// Where it connects to.
@@ -194,7 +194,7 @@ struct ClientThread {
 }
 
 impl ClientThread {
-    /// Until the node ends.
+    /// Runs until the node ends.
     fn run(mut self) {
         let mut say_ns = 0;
         // Whether it has written since it last looked at the socket.

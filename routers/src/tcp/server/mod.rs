@@ -28,9 +28,9 @@ use std::thread::JoinHandle;
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
 const EVENTS: usize = 256;
-/// What a process has open besides its connections, at most.
+/// File descriptors of a process besides its connections, at most.
 const DESCRIPTORS_BESIDE: u64 = 256;
-/// What is no client's place.
+/// Token of the listening socket; no client has this index.
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
 
@@ -56,7 +56,7 @@ pub enum ServerError {
     Thread(io::Error),
 }
 
-/// What it is made of.
+/// Parts of a server.
 pub struct ServerParts<'a> {
     /// Where it listens.
     pub address: SocketAddr,
@@ -158,7 +158,7 @@ struct ServerConnection {
     awaits_room: bool,
 }
 
-/// What the thread has.
+/// State of the thread.
 struct ServerThread {
     shared: Arc<ServerShared>,
     server: Server,
@@ -179,7 +179,7 @@ struct ServerThread {
 }
 
 impl ServerThread {
-    /// Until the router ends.
+    /// Runs until the router ends.
     fn run(mut self) {
         let mut events = [EpollEvent::empty(); EVENTS];
         let (mut ending, mut say_ns) = (false, 0);
@@ -346,7 +346,7 @@ impl ServerThread {
         let classes = Class::all(self.server.counts());
         let ServerReporter { left, refused, ref refusal, .. } = self.host;
         let (refusal, held) = (refusal.clone(), self.host.held());
-        let (crowded, overtaken) = (self.server.crowded(), self.server.superseded());
+        let (crowded, superseded) = (self.server.crowded(), self.server.superseded());
         let crowded_packages = self.server.counts().lost_for(Cause::Share);
         let mut views = self.server.views();
         let members = views.by_ref().take(MEMBERS_MAX).map(member).collect();
@@ -359,7 +359,7 @@ impl ServerThread {
             refusal,
             crowded,
             crowded_packages,
-            superseded: overtaken,
+            superseded,
             held,
             classes,
         });

@@ -57,7 +57,7 @@ impl Clock {
     /// by its wall clock.
     pub(super) fn become_master(&mut self, now_ns: u64, term: Term, origin: Origin) {
         self.line.stop_slew(now_ns);
-        if origin == Origin::SyncOutcome {
+        if origin == Origin::Heard {
             self.take_up_heard(now_ns);
         }
         if self.line.is_synchronised() {

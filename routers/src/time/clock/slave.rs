@@ -4,7 +4,7 @@ use super::{Clock, Draft, EXCHANGE_NS_MIN, PendingExchange, rate_of};
 use crate::frame::FrameHead;
 use crate::time::broken::Broken;
 use crate::time::clock_model::{EVEN_PPB, wander_ns_s};
-use crate::time::election::{ElectionState, Followed, Heard};
+use crate::time::election::{ElectionState, Followed, SyncOutcome};
 use crate::time::history::{Estimate, OffsetSample};
 use crate::time::message::{Reply, Request, Sync};
 use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
@@ -32,23 +32,23 @@ impl Clock {
         }
         let heard = self.election.sync(head.from, head.incarnation, sync, received.ns, followed);
         match heard {
-            Heard::Ignored => {
+            SyncOutcome::Ignored => {
                 self.keep_term();
                 self.answer_master(now_ns, head.from);
                 return Err(Ignored::Late);
             }
-            Heard::Turned => {
+            SyncOutcome::Turned => {
                 self.line.stop_slew(now_ns);
                 self.forget();
                 if was_master {
                     self.drafts.clear();
                 }
             }
-            // The same reign under a later term: the timeline continues.
-            Heard::Followed if self.timeline == sync.began => self.term = sync.term,
-            Heard::Followed => {}
+            // The same master under a later term: the timeline continues.
+            SyncOutcome::Followed if self.timeline == sync.began => self.term = sync.term,
+            SyncOutcome::Followed => {}
         }
-        self.heard_in_slots(received, sync, heard == Heard::Turned && is_contested, heard == Heard::Turned);
+        self.heard_in_slots(received, sync, heard == SyncOutcome::Turned && is_contested, heard == SyncOutcome::Turned);
         let pauses = received.ns.saturating_sub(self.asked_ns) < self.pause_ns();
         if pauses || now_ns.saturating_sub(received.ns) > ANSWER_NS_MAX {
             return Ok(());

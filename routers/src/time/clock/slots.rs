@@ -102,7 +102,7 @@ impl Clock {
         let hears_ns = self.interval_ns.saturating_mul(OTHERS_CYCLES);
         self.others.gives(hears_ns.saturating_add(settings.slot_every_ns.saturating_mul(OTHERS_SLOTS)));
         // A node that hears no other restarts its terms, but above those of its earlier incarnation, which others may
-        // still follow: a reign lasts longer than a millisecond.
+        // still follow: a term lasts longer than a millisecond.
         if self.line.record().epoch > 0 {
             self.election.speaks_of(Term::new(self.hello_ns / MS, 0), 0);
         }
@@ -129,7 +129,7 @@ impl Clock {
         self
     }
 
-    /// As [`Clock::poll`], for a clock in time slots: what may leave now. Handle all received datagrams before: a
+    /// Like [`Clock::poll`], for a clock in time slots: what may leave now. Handle all received datagrams before: a
     /// backup master sends when it has not heard the master's Sync of this cycle. Datagrams that need another window
     /// are dropped.
     pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
@@ -350,7 +350,7 @@ impl Clock {
         Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))
     }
 
-    /// The same, if its bound is small enough to send by it.
+    /// The present time, if its bound is small enough to send by it.
     pub(super) fn sure(&self, now_ns: u64) -> Option<TimeEstimate> {
         let allowance_ns = self.slots.as_ref()?.settings.allowance_ns;
         self.estimate().filter(|own| own.bound_ns(now_ns) <= allowance_ns)
@@ -362,7 +362,7 @@ impl Clock {
             || self.coarse(now_ns).is_some_and(|heard| heard.bound_ns(now_ns) <= slots.settings.allowance_ns);
         match self.sure(now_ns) {
             Some(_) => Origin::Own,
-            None if is_heard() => Origin::SyncOutcome,
+            None if is_heard() => Origin::Heard,
             None => Origin::New,
         }
     }

@@ -17,11 +17,11 @@ pub struct HelloQueue {
     next: usize,
 }
 
-/// What waits for a peer.
+/// Hellos to one peer that wait.
 #[derive(Clone, Default)]
 struct PeerHellos {
     reply: Option<Word>,
-    question: Option<Word>,
+    challenge: Option<Word>,
 }
 
 #[derive(Clone, Copy)]
@@ -48,7 +48,7 @@ impl HelloQueue {
         let mut word = Word { at_ns: now_ns, begins: said.begins, datagram: [0; HELLO_DATAGRAM_BYTES] };
         word.datagram.copy_from_slice(&datagram[..HELLO_DATAGRAM_BYTES]);
         let Some(peer) = self.peers.get_mut(usize::from(said.to)) else { return };
-        let place = if said.is_reply { &mut peer.reply } else { &mut peer.question };
+        let place = if said.is_reply { &mut peer.reply } else { &mut peer.challenge };
         let stays = place.is_some_and(|before| before.begins && !word.begins && !before.is_old(now_ns));
         if !stays {
             *place = Some(word);
@@ -64,7 +64,7 @@ impl HelloQueue {
             let turns = (0..peers).map(|turn| (next + turn) % peers);
             for to in first.into_iter().chain(turns) {
                 let peer = &mut self.peers[to];
-                let place = if is_reply { &mut peer.reply } else { &mut peer.question };
+                let place = if is_reply { &mut peer.reply } else { &mut peer.challenge };
                 let Some(word) = place.take() else { continue };
                 if word.is_old(now_ns) {
                     if word.begins {
