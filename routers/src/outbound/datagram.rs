@@ -1,7 +1,6 @@
 //! Makes datagrams: of one package without a copy, of many that wait, of one fragment, or a keep-alive.
 
 use super::{DIRECT_HEAD_BYTES, KeepAlive, Outbound, Package, is_stale};
-use crate::broken::broken;
 use crate::counts::Cause;
 use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
@@ -57,7 +56,7 @@ impl Outbound {
             let waiting = *self.queue.at(place);
             let size = PACKAGE_HEAD_BYTES + usize::from(waiting.head.len);
             if waiting.parts > 0 || end + size > datagram.len() {
-                if self.in_slots && !broken!(OvertakesInSlot) {
+                if self.in_slots {
                     break;
                 }
                 // The rest of this level waits; something of a lower level may still fit.

@@ -8,7 +8,6 @@
 //! Each accepted package is sent or lost with a cause; see [`Stats`].
 
 use crate::admission::capped;
-use crate::broken::broken;
 use crate::counts::Cause;
 use crate::frame::{self, Fragment, Kind, NodeIndex};
 use crate::link::State;
@@ -180,7 +179,19 @@ impl Outbound {
     /// is so large that no second of its size would fit. With time slots each package waits for a slot. A package to a
     /// peer without a keep-alive so far waits, too: the peer doubts the first datagram of an incarnation.
     pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
-        let head = if broken!(Hurries) { package.head } else { capped(&package.head) };
+        let head = capped(&package.head);
+        self.accept_capped(now_ns, &Package { head, ..*package }, alone, report)
+    }
+
+    /// The same for a head that [`capped`] has been applied to.
+    pub fn accept_capped(
+        &mut self,
+        now_ns: u64,
+        package: &Package<'_>,
+        alone: bool,
+        report: &mut impl Report,
+    ) -> Accepted {
+        let head = package.head;
         self.stats.out.came(head.priority);
         let peer = match self.admit(now_ns, &head, package.published_ns) {
             Ok(peer) => peer,
@@ -358,7 +369,7 @@ impl Outbound {
 
     /// Peers to which something may leave now.
     fn open(&self) -> u64 {
-        if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full & self.hearing }
+        self.reached & !self.full & self.hearing
     }
 
     /// Accounts for the rate that real time uses, and copies which peers hear this node.
@@ -445,7 +456,7 @@ impl Outbound {
 }
 
 fn is_stale(now_ns: u64, published_ns: u64) -> bool {
-    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS && !broken!(SendsStale)
+    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS
 }
 
 fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause, report: &mut impl Report) {
@@ -456,5 +467,3 @@ fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause:
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) use tests::CHECKS;

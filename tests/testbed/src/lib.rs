@@ -2,5 +2,4 @@
 
 #![forbid(unsafe_code)]
 
-mod harm;
 pub mod sim;

@@ -67,7 +67,8 @@ fn until_the_new_incarnation_has_answered_the_old_one_is_heard() {
 }
 
 /// All hellos that ever were, said again to a router that lives, begin nothing and end nothing.
-pub(super) fn check_only_a_living_incarnation_begins() {
+#[test]
+fn only_a_living_incarnation_begins() {
     let mut kept = Vec::new();
     let mut b = Router::new(1, 200);
     for incarnation in 0..40 {
@@ -86,11 +87,6 @@ pub(super) fn check_only_a_living_incarnation_begins() {
     assert_eq!((b.all.incarnation(0), b.all.challenge(0)), (Some(300), challenge));
     let still = a.seal(Port::Packages, 1, b"still here").unwrap();
     assert!(b.open(Port::Packages, &still).is_ok());
-}
-
-#[test]
-fn only_a_living_incarnation_begins() {
-    check_only_a_living_incarnation_begins();
 }
 
 #[test]

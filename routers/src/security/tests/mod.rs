@@ -7,10 +7,8 @@ mod sealed;
 mod slots;
 
 use super::*;
-use crate::broken::{Broken, with};
 use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
 use std::num::NonZeroU8;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 pub(super) const SYSTEM: u8 = 1;
@@ -131,17 +129,4 @@ pub(super) fn pair() -> (Router, Router) {
 pub(super) fn checked(mut datagram: Vec<u8>) -> Vec<u8> {
     crate::frame::write_check(&mut datagram);
     datagram
-}
-
-#[test]
-fn mistakes_are_noticed() {
-    let checks: [(Broken, fn()); 3] = [
-        (Broken::OpensTwice, sealed::check_each_opens_once),
-        (Broken::BelievesUnopened, gate::check_a_cause_is_believed_of_the_silent_alone),
-        (Broken::BeginsUnproven, acquaintance::check_only_a_living_incarnation_begins),
-    ];
-    for (broken, check) in checks {
-        let noticed = with(broken, || catch_unwind(AssertUnwindSafe(check)));
-        assert!(noticed.is_err(), "{broken:?} is not noticed");
-    }
 }

@@ -3,7 +3,6 @@
 use super::asking::Asking;
 use super::{Client, Event, Host, Package, REGISTER_AGAIN_NS, Registration, Reported, State};
 use crate::admission::{ArrivalPath, Refused, capped};
-use crate::broken::broken;
 use crate::session::counts::Cause;
 use crate::session::estimate::ServerClockEstimate;
 use crate::session::frame::{BadFrame, Carried, LENGTH_MAX, Message, Reason, Refusal, VERSION, Verdict, Welcome};
@@ -44,7 +43,7 @@ impl Client {
 
     fn welcomed(&mut self, now_ns: u64, welcome: &Welcome, host: &mut impl Host) {
         let (yours, ours) = (self.settings.common, welcome.common);
-        if yours != ours && !broken!(TakesOtherCommon) {
+        if yours != ours {
             let text = "the TCP router";
             let refusal = Refusal { version: VERSION, reason: Reason::Common, yours, ours, text };
             return self.refused(now_ns, &refusal, host);
@@ -76,7 +75,7 @@ impl Client {
     }
 
     fn take(&mut self, now_ns: u64, carried: &Carried<'_>, host: &mut impl Host) {
-        let head = if broken!(AdmitsHurry) { carried.head } else { capped(&carried.head) };
+        let head = capped(&carried.head);
         let carried = Carried { head, ..*carried };
         self.inn.came(head.priority);
         let Some(session) = self.session(now_ns) else { return };
@@ -86,7 +85,7 @@ impl Client {
         let published_ns = u64::try_from(i128::from(carried.published_ns) + shift).unwrap_or(0).min(now_ns);
         let delivered = match self.validate(&carried, host) {
             Err(cause) => Err(cause),
-            Ok(()) if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) => Err(Cause::Stale),
+            Ok(()) if oldest_ns > AGE_MAX_NS => Err(Cause::Stale),
             Ok(()) => host.deliver(&Carried { published_ns, ..carried }).map_err(Cause::from),
         };
         match delivered {

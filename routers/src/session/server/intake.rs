@@ -2,7 +2,6 @@
 
 use super::member::{Asked, Refused, RoundTrip, State};
 use super::{Event, Host, Server};
-use crate::broken::broken;
 use crate::session::frame::{BadFrame, GREETING_LENGTH_MAX, Hello, LENGTH_MAX, Message, NAME_BYTES_MAX, Reason};
 use crate::session::{ClientIndex, LOOK_EVERY_NS};
 
@@ -95,7 +94,7 @@ impl Server {
 
     fn difference(&self, hello: &Hello<'_>) -> Option<Difference> {
         let settings = &self.settings;
-        if hello.common != settings.common && !broken!(TakesOtherCommon) {
+        if hello.common != settings.common {
             let digests = (hello.common, settings.common);
             return Some(Difference { reason: Reason::Common, digests, holder: settings.name.clone() });
         }
@@ -104,11 +103,7 @@ impl Server {
         let first = || self.places.of_system(hello.system).and_then(|first| self.member(first));
         let held = own.or_else(|| first().map(|member| (member.name.as_str(), member.system_digest)));
         let (holder, digest) = held.filter(|(_, digest)| *digest != hello.system_digest)?;
-        (!broken!(TakesOtherSystems)).then(|| Difference {
-            reason: Reason::System,
-            digests: (hello.system_digest, digest),
-            holder: holder.to_owned(),
-        })
+        Some(Difference { reason: Reason::System, digests: (hello.system_digest, digest), holder: holder.to_owned() })
     }
 
     fn refuse_bad(&mut self, now_ns: u64, client: ClientIndex, bad: BadFrame, host: &mut impl Host) {

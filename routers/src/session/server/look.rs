@@ -4,7 +4,6 @@
 use super::member::{Member, State};
 use super::work::WORK_SHARE;
 use super::{Event, Host, Server};
-use crate::broken::broken;
 use crate::session::counts::Cause;
 use crate::session::frame::Reason;
 use crate::session::{ClientIndex, FRAME_MAX_NS, GREETING_MAX_NS, LOOK_EVERY_NS};
@@ -45,15 +44,13 @@ impl Server {
         host.event(Event::Left { name: &member.name, why });
         self.places.leaves(now_ns, client, member);
         let (principal, ranges) = (member.principal_id, member.registrations.ranges);
-        if ranges > 0 && !broken!(KeepsNames) {
+        if ranges > 0 {
             self.table.remove(client);
         }
         if let Some(uses) = self.places.principals.uses_mut(principal) {
             uses.ranges = uses.ranges.saturating_sub(ranges);
         }
-        if !broken!(ForgetsGone) {
-            self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));
-        }
+        self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));
     }
 }
 
@@ -64,11 +61,8 @@ fn objection(now_ns: u64, member: &Member) -> Option<(Reason, &'static str)> {
     let silent_after_ns = if frame_ns.is_some() { SLOW_SILENT_AFTER_NS } else { SILENT_AFTER_NS };
     match member.state {
         State::Leaving { .. } => None,
-        State::Greeting if broken!(GreetsForEver) => None,
         State::Greeting => (since(member.began_ns) > GREETING_MAX_NS).then_some((Reason::Silent, "no hello")),
-        State::Member if since(member.heard_ns) > silent_after_ns && !broken!(WaitsForSilent) => {
-            Some((Reason::Silent, ""))
-        }
+        State::Member if since(member.heard_ns) > silent_after_ns => Some((Reason::Silent, "")),
         State::Member if frame_ns.is_some_and(|began_ns| since(began_ns) > FRAME_MAX_NS) => {
             Some((Reason::Silent, "a frame did not end"))
         }

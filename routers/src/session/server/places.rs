@@ -11,7 +11,6 @@ use super::member::{Member, State};
 use super::principal::{Principal, Principals};
 use super::work::WORK_SHARE;
 use super::{Host, Server};
-use crate::broken::broken;
 use crate::session::ClientIndex;
 use crate::session::frame::{Hello, Reason};
 use std::collections::{BTreeMap, BTreeSet};
@@ -102,10 +101,6 @@ impl Server {
     fn oldest_greeting(&self, address: &Principal) -> Option<ClientIndex> {
         let greetings = &self.places.greetings;
         let (largest, most) = greetings.largest()?;
-        if broken!(CrowdsOut) {
-            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == State::Greeting;
-            return self.present().filter(greeting).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
-        }
         let owner = if greetings.count_of(address) == most { address } else { largest };
         greetings.ends_of(owner).map(|(oldest, _)| oldest)
     }
@@ -150,7 +145,7 @@ impl Server {
         if own > 1 && own == most {
             self.places.crowded.clients += 1;
         }
-        newest.filter(|_| most >= own + 2 && !broken!(CrowdsOut))
+        newest.filter(|_| most >= own + 2)
     }
 
     /// The place is free; the next client in it is another.

@@ -139,7 +139,8 @@ fn moments_have_owners() {
     }
 }
 
-pub(super) fn windows_end_where_their_guard_begins() {
+#[test]
+fn windows_end_where_their_guard_begins() {
     let window = table(0).next_window(7 * CYCLE).unwrap();
     let expected =
         Window { kind: Kind::Synchronisation { rank: 0 }, cycle: 7, begin_ns: 7 * CYCLE, end_ns: 7 * CYCLE + 150 * US };

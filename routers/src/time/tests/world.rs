@@ -2,7 +2,7 @@
 //! every node's page at every moment against the promises of the module.
 
 use crate::frame::{FrameHead, NodeIndex};
-use crate::time::{Broken, Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
+use crate::time::{Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rohrpost_mailbox::TimeRecord;
@@ -54,11 +54,9 @@ pub(super) struct World {
     /// Which nodes hear which.
     cut: Vec<Vec<bool>>,
     pub(super) replay: String,
-    pub(super) broken: Option<Broken>,
     /// When a node became master, and which.
     pub(super) reigns: Vec<(u64, NodeIndex)>,
     pub(super) ignored: u64,
-    pub(super) failures: u32,
     /// True errors and bounds of slaves, ns, since it was emptied last.
     pub(super) errors: Vec<(u64, u64)>,
 }
@@ -95,10 +93,8 @@ impl World {
             terms: BTreeMap::new(),
             cut: vec![vec![false; nodes.into()]; nodes.into()],
             replay: format!("seed {seed}, {nodes} nodes, interval {interval:?}"),
-            broken: None,
             reigns: Vec::new(),
             ignored: 0,
-            failures: 0,
             errors: Vec::new(),
         };
         world.push(world.now, Event::SnapshotRequest);
@@ -120,10 +116,7 @@ impl World {
             digest: 7,
             incarnation,
         };
-        let mut clock = Clock::new(settings, one.oscillator.local_ns(at), wall_ns, one.page);
-        if let Some(broken) = self.broken {
-            clock.break_it(broken);
-        }
+        let clock = Clock::new(settings, one.oscillator.local_ns(at), wall_ns, one.page);
         one.clock = Some(clock);
         self.wake(node, at);
     }
@@ -220,10 +213,8 @@ impl World {
         }
     }
 
-    /// A broken clock is expected to fail, and the world continues.
     pub(super) fn fail(&mut self, what: &str) {
-        assert!(self.broken.is_some(), "{what}; at {} ms; {}", self.now / MS, self.replay);
-        self.failures += 1;
+        panic!("{what}; at {} ms; {}", self.now / MS, self.replay);
     }
 
     fn tell(&self) -> String {

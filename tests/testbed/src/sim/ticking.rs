@@ -146,7 +146,7 @@ impl Ticking {
         Self { clock: self.clock.in_slots(table.for_clock()), ..self }
     }
 
-    /// The core, so that mistakes can be switched on.
+    /// The core.
     pub fn clock(&mut self) -> &mut Clock {
         &mut self.clock
     }

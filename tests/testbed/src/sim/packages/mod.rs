@@ -19,7 +19,6 @@ use super::package::Role;
 use super::promise::Promise;
 use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
-use crate::harm::harmful;
 use rohrpost_mailbox::{Head, Options, Type};
 use rohrpost_routers::driver::NotSent;
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
@@ -137,20 +136,26 @@ impl Packages {
         }
         let alone = io.host.transit.is_empty() && io.plan.slots.is_none();
         let does_harm = io.oracle.packages[parcel.number as usize].role == Role::Intruder;
-        let accepted = harmful(does_harm, || self.accept(io, parcel.head, parcel.published_ns, &parcel.body, alone));
+        let package = Package { head: parcel.head, published_ns: parcel.published_ns, body: &parcel.body };
+        let accepted = self.accept(io, &package, alone, does_harm);
         io.oracle.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
         let head = parcel.head;
         self.in_hand = Some(parcel);
         Some((head, accepted))
     }
 
-    fn accept(&mut self, io: &mut Io<'_>, head: Head, published_ns: u64, body: &[u8], alone: bool) -> Accepted {
-        let package = Package { head, published_ns, body };
+    /// `does_harm`: the router of an intruder lets its program write any priority.
+    fn accept(&mut self, io: &mut Io<'_>, package: &Package<'_>, alone: bool, does_harm: bool) -> Accepted {
         let mut watch = Watch::out(io, &mut self.undelivered);
-        let accepted = self.outbound.accept(watch.io.now.monotonic_ns, &package, alone, &mut watch);
+        let now_ns = watch.io.now.monotonic_ns;
+        let accepted = if does_harm {
+            self.outbound.accept_capped(now_ns, package, alone, &mut watch)
+        } else {
+            self.outbound.accept(now_ns, package, alone, &mut watch)
+        };
         if let Accepted::Send { to, head } = &accepted {
             io.oracle.saw("sent at once");
-            self.send(io, *to, Rc::from([&head[..], body].concat()));
+            self.send(io, *to, Rc::from([&head[..], package.body].concat()));
         }
         accepted
     }
@@ -246,7 +251,8 @@ impl Packages {
             let (number, head, body) = io.oracle.post(io.now, head, (io.node, to_node.into()), role);
             io.oracle.accepted(io.life, number, io.now.monotonic_ns);
             io.oracle.saw("told a caller on another node");
-            self.accept(io, head, io.now.monotonic_ns, &body, false);
+            let package = Package { head, published_ns: io.now.monotonic_ns, body: &body };
+            self.accept(io, &package, false, false);
         }
     }
 
