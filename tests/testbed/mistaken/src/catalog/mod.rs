@@ -1,5 +1,6 @@
 //! Each mistake: what it does wrong, how the routers' sources change for it, and where it shows.
 
+mod carrying;
 mod lan;
 mod session;
 mod slots;
@@ -43,7 +44,7 @@ pub struct Group {
 
 /// All mistakes.
 pub const GROUPS: &[Group] = &[
-    lan::CARRYING,
+    carrying::CARRYING,
     lan::ADMISSION,
     lan::CROWDED,
     lan::FORGED,
