@@ -26,8 +26,8 @@ pub struct Planted {
     pub name: &'static str,
     /// The core, and what it does wrong.
     pub text: &'static str,
-    /// The routers' test that fails with it; none: it shows in whole networks only, see the tests of this crate.
-    pub shows_in: Option<&'static str>,
+    /// The routers' own test that fails with it.
+    pub shows_in: &'static str,
     /// The changes.
     pub edits: &'static [Edit],
 }

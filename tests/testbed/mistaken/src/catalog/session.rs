@@ -9,7 +9,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "ForgetsPieces",
             text: "Session: the beginning of a frame that comes in pieces is lost.",
-            shows_in: None,
+            shows_in: "session::tests::ends::frames_that_come_byte_by_byte_are_whole",
             edits: &[edit(
                 "session/splitter.rs",
                 r"return Ok(None);
@@ -24,7 +24,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "TakesTwice",
             text: "Session: a name that another client hosts is given away.",
-            shows_in: None,
+            shows_in: "session::tests::ends::a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes",
             edits: &[edit(
                 "session/table.rs",
                 "self.in_the_way(client, range)",
@@ -34,7 +34,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "TakesInside",
             text: "Session: a narrower range inside another client's range is given away.",
-            shows_in: None,
+            shows_in: "session::tests::shares::of_what_one_client_hosts_no_other_gets_a_part",
             edits: &[edit(
                 "session/table.rs",
                 "let objection = if held.holds(range)",
@@ -47,7 +47,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "GivesAwayOwn",
             text: "Session: names that the file gives the nodes of the own system are given to any client.",
-            shows_in: None,
+            shows_in: "session::tests::shares::what_the_file_gives_a_node_no_other_client_gets_where_nobody_shows_a_certificate",
             edits: &[edit(
                 "session/server/rights.rs",
                 "let is_free = |not: &Names| !not.meet(range);",
@@ -57,7 +57,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "GoesThroughAll",
             text: "Session: a registration goes through the ranges of all clients.",
-            shows_in: None,
+            shows_in: "session::tests::registering::when_eight_times_as_many_clients_come_at_once_the_server_works_about_eight_times_as_long",
             edits: &[edit(
                 "session/table.rs",
                 r"self.remove(client);
@@ -72,7 +72,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "FillsTable",
             text: "Session: a principal may have as many ranges as there is room for.",
-            shows_in: None,
+            shows_in: "session::tests::shares::one_certificate_does_not_fill_the_table_however_often_it_connects",
             edits: &[edit(
                 "session/server/registering.rs",
                 "let room = (RANGES_SHARE + before).saturating_sub(used);",
@@ -83,7 +83,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "CrowdsOut",
             text: "Session: of too many connections, those of the principal with most do not give way.",
-            shows_in: None,
+            shows_in: "session::tests::shares::one_address_does_not_push_others_out_before_their_hello",
             edits: &[
                 edit(
                     "session/server/places.rs",
@@ -104,7 +104,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "SharesQueue",
             text: "Session: packages of one principal give way to more important ones of another.",
-            shows_in: None,
+            shows_in: "session::tests::shares::an_urgent_flood_of_a_line_leaves_others_their_share",
             edits: &[edit(
                 "queue/shares.rs",
                 "let number = share.sender;",
@@ -114,7 +114,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "IgnoresShares",
             text: "Session: the most important leaves first, however much of it one principal sends.",
-            shows_in: None,
+            shows_in: "session::tests::shares::an_urgent_flood_of_a_line_leaves_others_their_share",
             edits: &[edit(
                 "queue/shares.rs",
                 "let shares = self.shares.as_ref();",
@@ -124,7 +124,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "SendsCutAgain",
             text: "Session: bytes made ready for a broken connection leave by the next one.",
-            shows_in: None,
+            shows_in: "session::tests::strain::what_was_ready_for_a_connection_that_broke_is_gone_with_it",
             edits: &[edit(
                 "session/outgoing.rs",
                 r"pub(super) fn cut(&mut self) {
@@ -138,7 +138,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "DeliversOld",
             text: "Session: a package that was under way too long is delivered.",
-            shows_in: None,
+            shows_in: "session::tests::ends::what_the_streams_held_for_too_long_is_not_delivered",
             edits: &[edit(
                 "session/client/incoming.rs",
                 "Ok(()) if oldest_ns > AGE_MAX_NS => Err(Cause::Stale),",
@@ -148,7 +148,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "TrustsTheWay",
             text: "Session: half of the round trip is no part of a time's bound.",
-            shows_in: None,
+            shows_in: "session::estimate::tests::the_shortest_exchange_counts_until_it_is_old",
             edits: &[edit(
                 "session/estimate.rs",
                 "let ways_ns = self.ways_ns.div_ceil(2);",
@@ -158,7 +158,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "KeepsHops",
             text: "Session: a package that is handed on has no more hops than before.",
-            shows_in: None,
+            shows_in: "session::tests::ends::a_package_that_goes_round_is_stopped",
             edits: &[edit(
                 "session/server/carry.rs",
                 "let hops = carried.hops.saturating_add(1);",
@@ -168,7 +168,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "TakesForeignNames",
             text: "Session: a client may send in the names of others.",
-            shows_in: None,
+            shows_in: "session::tests::ends::names_of_others_are_sent_by_nobody",
             edits: &[edit(
                 "session/server/carry.rs",
                 "let objection = if !is_own {",
@@ -178,7 +178,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "HandsBack",
             text: "Session: a package that a client cannot deliver comes back to it.",
-            shows_in: None,
+            shows_in: "session::tests::ends::packages_go_to_the_host_of_the_name_and_never_back",
             edits: &[edit(
                 "session/server/carry.rs",
                 "let to = self.table.client_of(carried.head.to).filter(|to| *to != from);",
@@ -188,7 +188,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "ToOwnTwice",
             text: "Session: a client that reaches its own system gets back what it sends to all systems.",
-            shows_in: None,
+            shows_in: "session::tests::a_client_that_stands_still_changes_nothing_for_the_others",
             edits: &[edit(
                 "session/server/carry.rs",
                 "let reaches_itself = client == from || system == own && reaches_own;",
@@ -198,13 +198,13 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "KeepsNames",
             text: "Session: a client that has gone still hosts its names.",
-            shows_in: None,
+            shows_in: "session::tests::sessions_keep_their_promises_whatever_goes_wrong",
             edits: &[edit("session/server/look.rs", "if ranges > 0 {", "if ranges > 0 && !broken!(KeepsNames) {")],
         },
         Planted {
             name: "ForgetsGone",
             text: "Session: packages that waited for a client that has gone are not counted.",
-            shows_in: None,
+            shows_in: "session::tests::sessions_keep_their_promises_whatever_goes_wrong",
             edits: &[edit(
                 "session/server/look.rs",
                 "self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));",
@@ -216,7 +216,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "GreetsForEver",
             text: "Session: a connection without a hello stays.",
-            shows_in: None,
+            shows_in: "session::tests::ends::a_client_without_a_hello_is_closed_and_keeps_no_other_out",
             edits: &[edit(
                 "session/server/look.rs",
                 "State::Greeting => (since(member.began_ns) > GREETING_MAX_NS).then_some((Reason::Silent, \"no hello\")),",
@@ -227,7 +227,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "WaitsForSilent",
             text: "Session: a silent end stays connected.",
-            shows_in: None,
+            shows_in: "session::tests::ends::a_silent_end_is_gone",
             edits: &[
                 edit(
                     "session/client/mod.rs",
@@ -246,7 +246,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "TakesOtherCommon",
             text: "Session: another digest of what must be equal everywhere is accepted.",
-            shows_in: None,
+            shows_in: "session::tests::ends::a_client_with_another_digest_takes_no_part_and_is_told_both",
             edits: &[
                 edit(
                     "session/client/incoming.rs",
@@ -263,7 +263,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "TakesOtherSystems",
             text: "Session: another digest of what must be equal inside a system is accepted.",
-            shows_in: None,
+            shows_in: "session::tests::ends::a_client_with_another_digest_takes_no_part_and_is_told_both",
             edits: &[edit(
                 "session/server/intake.rs",
                 "Some(Difference { reason: Reason::System, digests: (hello.system_digest, digest), holder: holder.to_owned() })",
@@ -277,7 +277,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "RegistersOnce",
             text: "Session: a client that connects again does not register its names.",
-            shows_in: None,
+            shows_in: "session::tests::shares::what_the_file_gives_a_node_no_other_client_gets_where_nobody_shows_a_certificate",
             edits: &[edit(
                 "session/client/mod.rs",
                 r"self.state = State::Away { until_ns: now_ns + self.backoff.next_ns() };
@@ -291,7 +291,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "NeverBacksOff",
             text: "Session: a client tries again at once, however often it fails.",
-            shows_in: None,
+            shows_in: "session::client::backoff::tests::waits_double_up_to_a_limit_and_differ_between_clients",
             edits: &[edit(
                 "session/client/backoff.rs",
                 "let longest_ns = (FIRST_NS << self.failures).min(BACKOFF_MAX_NS);",
@@ -304,7 +304,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "RegistersAtOnce",
             text: "Session: every registration is processed, however many one client sends.",
-            shows_in: None,
+            shows_in: "session::tests::strain::of_many_registrations_of_one_client_the_first_and_the_last_are_looked_at",
             edits: &[edit(
                 "session/server/registering.rs",
                 "if is_its_turn {",
@@ -314,7 +314,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "NeverReplaces",
             text: "Session: packages of which only the newest counts all wait.",
-            shows_in: None,
+            shows_in: "session::tests::newest::of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first",
             edits: &[edit(
                 "queue/mod.rs",
                 "let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head))?;",
@@ -324,7 +324,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "ReplacesAllData",
             text: "Session: of all data only the newest counts.",
-            shows_in: None,
+            shows_in: "session::tests::newest::nothing_else_is_replaced",
             edits: &[edit(
                 "queue/mod.rs",
                 "is_data && head.options.has(Options::NEWEST)",
@@ -334,7 +334,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "ForgetsReplaced",
             text: "Session: a replaced package is not counted.",
-            shows_in: None,
+            shows_in: "session::tests::newest::of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first",
             edits: &[edit(
                 "session/outgoing.rs",
                 r"if is_taken {
@@ -346,7 +346,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "LosesItsPlace",
             text: "Session: a package that replaces an older one waits behind all others.",
-            shows_in: None,
+            shows_in: "session::tests::newest::of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first",
             edits: &[edit(
                 "session/outgoing.rs",
                 "let is_taken = queue.replace(older, newer, body, gives_way(newer.sender, fates));",
@@ -361,7 +361,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "LooksAtFirst",
             text: "Session: a stale package behind a fresh one is not found.",
-            shows_in: None,
+            shows_in: "session::tests::newest::what_stands_behind_a_fresh_one_is_given_up_in_time",
             edits: &[edit(
                 "session/outgoing.rs",
                 "} else if !counts_newest(head) {",
@@ -371,7 +371,7 @@ pub(crate) const SESSION: Group = Group {
         Planted {
             name: "AsksLast",
             text: "Session: a request for the time waits behind packages that have not begun to leave.",
-            shows_in: None,
+            shows_in: "session::client::asking::tests::a_server_that_was_not_asked_yet_is_not_silent_as_long_as_the_stream_moves",
             edits: &[
                 edit(
                     "session/client/asking.rs",

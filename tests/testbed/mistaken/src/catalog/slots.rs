@@ -9,7 +9,7 @@ pub(crate) const IN_SLOT: Group = Group {
         Planted {
             name: "OvertakesInSlot",
             text: "Outbound: in a slot a package that fits leaves before a more important one that does not.",
-            shows_in: None,
+            shows_in: "outbound::tests::slot::nothing_overtakes_what_is_more_important_and_does_not_fit",
             edits: &[edit(
                 "outbound/datagram.rs",
                 "if self.in_slots {",
@@ -19,7 +19,7 @@ pub(crate) const IN_SLOT: Group = Group {
         Planted {
             name: "OverrunsSlot",
             text: "Outbound: more leaves than the slot has room for.",
-            shows_in: None,
+            shows_in: "outbound::tests::slot::a_datagram_leaves_only_if_it_fits",
             edits: &[edit(
                 "outbound/slot.rs",
                 "let room_bytes = room_bytes.min(self.datagram_bytes);",
@@ -29,7 +29,7 @@ pub(crate) const IN_SLOT: Group = Group {
         Planted {
             name: "AnyCompany",
             text: "Outbound: a datagram in a slot also carries packages that are less important than one for another peer.",
-            shows_in: None,
+            shows_in: "outbound::tests::slot::company_is_no_less_important_than_what_waits_for_others",
             edits: &[edit(
                 "outbound/slot.rs",
                 "let others = self.queue.first_level_besides(peer).unwrap_or(LEVELS as u8);",
@@ -42,7 +42,7 @@ pub(crate) const IN_SLOT: Group = Group {
         Planted {
             name: "ForgetsMailbox",
             text: "Outbound: a datagram in a slot also carries packages that are less important than one in the mailbox.",
-            shows_in: None,
+            shows_in: "outbound::tests::slot::company_is_no_less_important_than_what_waits_in_the_mailbox",
             edits: &[edit(
                 "outbound/slot.rs",
                 "let behind = behind.map_or(LEVELS as u8, |first| self.level(first));",
@@ -59,7 +59,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "NoLateGate",
             text: "Time slots: no wake-up is too late.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::what_is_late_is_not_sent",
             edits: &[edit(
                 "tdma/scheduler.rs",
                 "if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS) {",
@@ -69,7 +69,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "SendsWhenUnsure",
             text: "Time slots: a node sends however far off its clock may be.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::silence_begins_right_above_the_allowance",
             edits: &[
                 edit(
                     "tdma/scheduler.rs",
@@ -86,7 +86,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "IgnoresGuard",
             text: "Time slots: a window ends where its guard does.",
-            shows_in: None,
+            shows_in: "tdma::tests::arithmetic::windows_end_where_their_guard_begins",
             edits: &[edit(
                 "tdma/table.rs",
                 "let guard_ns = self.guard_ns;",
@@ -96,7 +96,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "LeadTooLong",
             text: "Time slots: calls are made earlier than frames need to reach the wire.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::no_frame_starts_before_its_slot",
             edits: &[edit(
                 "tdma/lead.rs",
                 "self.median_ns.min(self.least[0]).min(self.least[1])",
@@ -106,7 +106,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "ForgetsHandedOver",
             text: "Time slots: bytes already handed over do not count for what still fits.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::what_was_handed_over_counts",
             edits: &[edit(
                 "tdma/tx_window.rs",
                 "self.free_ns.max(at_once_ns)",
@@ -116,7 +116,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "ReplacementCalibrates",
             text: "Time slots: a replacement's Sync is taken for the master's.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::a_replacement_is_a_sign_of_life_and_nothing_else",
             edits: &[edit(
                 "time/clock/slots.rs",
                 "Ok(())",
@@ -129,7 +129,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "ReplacesHeard",
             text: "Time slots: a backup master sends although the master's Sync came.",
-            shows_in: None,
+            shows_in: "tdma::tests::scenes::a_master_dies_and_no_slot_is_lost",
             edits: &[edit(
                 "time/clock/slots.rs",
                 "State::Slave(master) => self.may_synchronise() && is_missing(&master),",
@@ -139,7 +139,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "SyncInForeignWindow",
             text: "Time slots: a master sends Syncs in its slots.",
-            shows_in: None,
+            shows_in: "tdma::tests::scenes::a_master_dies_and_no_slot_is_lost",
             edits: &[edit(
                 "time/clock/slots.rs",
                 "Allowed::Slot => self.take_draft(|draft| !(replies_wait && is_reply(draft))),",
@@ -154,7 +154,7 @@ pub(crate) const SLOTS: Group = Group {
         Planted {
             name: "KeepsOwnTime",
             text: "Time slots: a node that yields to another master keeps its own time.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::a_node_that_turns_while_the_first_master_lives_is_not_sure",
             edits: &[edit(
                 "time/clock/slots.rs",
                 "slots.unsure |= contested || (!is_measured && is_other);",
@@ -171,7 +171,7 @@ pub(crate) const JOINING: Group = Group {
         Planted {
             name: "BeginsAtOnce",
             text: "Time slots: a node that starts begins a time without listening first.",
-            shows_in: None,
+            shows_in: "tdma::tests::overheard::a_node_that_hears_unverified_frames_begins_no_time_for_a_while",
             edits: &[edit(
                 "time/election.rs",
                 "let (since_ns, patience_ns, last) = match self.state {",
@@ -184,7 +184,7 @@ pub(crate) const JOINING: Group = Group {
         Planted {
             name: "BeginsForEver",
             text: "Time slots: a node that begins a time never sends anything but Syncs.",
-            shows_in: None,
+            shows_in: "tdma::tests::tables::a_node_with_an_edited_file_beside_others_sends_nothing",
             edits: &[edit(
                 "time/clock/slots.rs",
                 "slots.beginning = slots.beginning.saturating_sub(1);",
@@ -194,7 +194,7 @@ pub(crate) const JOINING: Group = Group {
         Planted {
             name: "TrustsItself",
             text: "Time slots: a node's own time has no bound.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::silence_begins_right_above_the_allowance",
             edits: &[edit(
                 "time/clock/slots.rs",
                 "Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))",
@@ -207,7 +207,7 @@ pub(crate) const JOINING: Group = Group {
         Planted {
             name: "AsksTooSoon",
             text: "Time slots: a node that knows the time by overhearing asks before its slot begins.",
-            shows_in: None,
+            shows_in: "tdma::tests::single::a_node_listens_then_asks_then_sends",
             edits: &[edit(
                 "tdma/scheduler.rs",
                 "let begin_ns = estimate.first_ns(window.begin_ns)?;",
@@ -219,7 +219,7 @@ pub(crate) const JOINING: Group = Group {
         Planted {
             name: "NeverBeginsEpoch",
             text: "Time: a master ignores nodes that are too far off to follow it.",
-            shows_in: None,
+            shows_in: "tdma::tests::tables::a_node_that_does_not_hear_that_it_must_yield_silences_the_others",
             edits: &[edit(
                 "time/clock/master.rs",
                 "if request.far {",
@@ -236,7 +236,7 @@ pub(crate) const UNPROVEN: Group = Group {
         Planted {
             name: "IgnoresUnproven",
             text: "Time slots, sealed: a node begins a time whatever it hears of unverified peers.",
-            shows_in: None,
+            shows_in: "tdma::tests::overheard::a_node_that_hears_unverified_frames_begins_no_time_for_a_while",
             edits: &[
                 edit(
                     "time/unverified.rs",
@@ -256,7 +256,7 @@ pub(crate) const UNPROVEN: Group = Group {
         Planted {
             name: "WaitsForEver",
             text: "Time slots, sealed: it never begins a time while it hears any.",
-            shows_in: None,
+            shows_in: "tdma::tests::overheard::a_new_master_steps_back_until_patience_is_over",
             edits: &[edit(
                 "time/unverified.rs",
                 "first_ns.saturating_add(self.patience_ns)",
@@ -266,7 +266,7 @@ pub(crate) const UNPROVEN: Group = Group {
         Planted {
             name: "TakesUnproven",
             text: "Time slots, sealed: messages of unverified peers are taken as if they were verified.",
-            shows_in: None,
+            shows_in: "tdma::tests::overheard::a_hello_leaves_in_one_of_four_cycles_and_nothing_else",
             edits: &[edit(
                 "time/clock/overhearing.rs",
                 "let is_other = head.digest != self.settings.digest;",
@@ -279,7 +279,7 @@ pub(crate) const UNPROVEN: Group = Group {
         Planted {
             name: "TellsUnproven",
             text: "Time slots, sealed: more than hellos leave by the time of unverified peers.",
-            shows_in: None,
+            shows_in: "tdma::tests::overheard::a_hello_leaves_in_one_of_four_cycles_and_nothing_else",
             edits: &[edit(
                 "tdma/tx_window.rs",
                 "_ if self.carries == Carries::Hello => Allowed::Nothing,",
@@ -289,7 +289,7 @@ pub(crate) const UNPROVEN: Group = Group {
         Planted {
             name: "AsksWithoutPause",
             text: "Time slots, sealed: hellos leave in each slot by the time of unverified peers.",
-            shows_in: None,
+            shows_in: "tdma::tests::overheard::a_hello_leaves_in_one_of_four_cycles_and_nothing_else",
             edits: &[edit(
                 "tdma/scheduler.rs",
                 "self.hello_from_ns = tx_window.begin_ns.saturating_add(pause_ns);",
@@ -307,7 +307,7 @@ pub(crate) const UNSTEADY: Group = Group {
         Planted {
             name: "SleepsUnnoticed",
             text: "Time: a suspended computer goes unnoticed.",
-            shows_in: None,
+            shows_in: "time::steadiness::tests::a_computer_that_slept_is_not_believed_and_no_clock_of_it_is_called_slewed",
             edits: &[edit(
                 "time/steadiness.rs",
                 "Some(Unsteady::Slept { slept_ns })",
@@ -317,7 +317,7 @@ pub(crate) const UNSTEADY: Group = Group {
         Planted {
             name: "SlewsUnnoticed",
             text: "Time: a clock that another process slews goes unnoticed.",
-            shows_in: None,
+            shows_in: "time::steadiness::tests::a_clock_that_is_slewed_for_long_is_unsteady_all_the_time_and_believed_soon_after",
             edits: &[edit(
                 "time/steadiness.rs",
                 "let began = *self.began.get_or_insert(now);",
@@ -337,7 +337,7 @@ pub(crate) const TABLES: Group = Group {
         Planted {
             name: "DeafToOtherTables",
             text: "Time slots: messages of nodes with another configuration are ignored.",
-            shows_in: None,
+            shows_in: "tdma::tests::tables::a_node_with_an_edited_file_beside_others_sends_nothing",
             edits: &[
                 edit(
                     "time/clock/other_tables.rs",
@@ -363,7 +363,7 @@ pub(crate) const TABLES: Group = Group {
         Planted {
             name: "NeverYieldsToOthers",
             text: "Time slots: the node with the lesser claim goes on.",
-            shows_in: None,
+            shows_in: "tdma::tests::tables::of_two_tables_that_meet_one_goes_on",
             edits: &[edit(
                 "time/others.rs",
                 "if theirs > own || local_ns.saturating_sub(other.since_ns) > grace_ns {",

@@ -9,7 +9,7 @@ pub(crate) const TIME: Group = Group {
         Planted {
             name: "AnyReply",
             text: "Time: any reply is taken for the answer to the last request.",
-            shows_in: None,
+            shows_in: "time::tests::promises_hold_in_every_scene",
             edits: &[edit(
                 "time/clock/slave.rs",
                 "asked.find(|asked| asked.exchange.id == reply.id &&",
@@ -19,7 +19,7 @@ pub(crate) const TIME: Group = Group {
         Planted {
             name: "NoDrift",
             text: "Time: the bound does not grow with age.",
-            shows_in: None,
+            shows_in: "time::tests::promises_hold_in_every_scene",
             edits: &[edit(
                 "time/clock/slave.rs",
                 "if until_ns <= now_ns && self.is_held_over() {",
@@ -31,7 +31,7 @@ pub(crate) const TIME: Group = Group {
         Planted {
             name: "NoMasterError",
             text: "Time: the bound lacks the master's own.",
-            shows_in: None,
+            shows_in: "time::tests::promises_hold_in_every_scene",
             edits: &[edit(
                 "time/clock/slave.rs",
                 "off_ns.saturating_add(master.error_ns)",
@@ -41,7 +41,7 @@ pub(crate) const TIME: Group = Group {
         Planted {
             name: "Steps",
             text: "Time: the time is set within an epoch, in place of slewing.",
-            shows_in: None,
+            shows_in: "time::tests::promises_hold_in_every_scene",
             edits: &[edit(
                 "time/clock/slave.rs",
                 "if master.epoch > epoch {",
@@ -51,7 +51,7 @@ pub(crate) const TIME: Group = Group {
         Planted {
             name: "HalfBound",
             text: "Time: half of the half delay is taken for the bound.",
-            shows_in: None,
+            shows_in: "time::tests::nodes_agree_soon_and_are_as_exact_as_their_network",
             edits: &[edit(
                 "time/clock/slave.rs",
                 "let off_ns = above.max(below).unsigned_abs();",
@@ -61,7 +61,7 @@ pub(crate) const TIME: Group = Group {
         Planted {
             name: "OldSamples",
             text: "Time: measurements of an earlier master are kept.",
-            shows_in: None,
+            shows_in: "time::tests::promises_hold_in_every_scene",
             edits: &[edit(
                 "time/clock.rs",
                 "self.history.clear();",
@@ -73,7 +73,7 @@ pub(crate) const TIME: Group = Group {
         Planted {
             name: "Stubborn",
             text: "Time: a master never yields to another.",
-            shows_in: None,
+            shows_in: "time::tests::promises_hold_in_every_scene",
             edits: &[edit(
                 "time/clock/slave.rs",
                 "let heard = self.election.sync(head.from, head.incarnation, sync, received.ns, followed);",
@@ -92,7 +92,7 @@ pub(crate) const FOLLOWER: Group = Group {
     mistakes: &[Planted {
         name: "TakesSmallest",
         text: "Time: of answers that contradict each other the one with the smallest bound counts.",
-        shows_in: None,
+        shows_in: "time::follower::tests::two_times_that_cannot_both_be_true_are_a_contradiction_and_no_choice",
         edits: &[
             edit(
                 "session/estimate.rs",
