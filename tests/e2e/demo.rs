@@ -5,7 +5,7 @@ use crate::process::Running;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost::launcher::{Phase, launcher_of};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 

@@ -6,7 +6,7 @@ use crate::process::{Running, Said};
 use crate::systems::CLASSES;
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::path::PathBuf;
 
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";

@@ -9,7 +9,7 @@ use rohrpost::interface::DataPort;
 use rohrpost::interfaces::RouterInterface;
 use rohrpost::schema::Data;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::path::Path;
 use std::time::Duration;
 

@@ -5,7 +5,7 @@ use crate::harness::{PATIENCE, Place, Robot, probe, skipped, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use std::collections::HashSet;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! Drawings of whole demos, in files.
 
 use super::programs::{bridge, entities_of, ok, rerun, rows, rrd, search_path, timed_rows, times_ns};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;

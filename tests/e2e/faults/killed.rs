@@ -7,7 +7,7 @@ use crate::harness::{runs, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::{CallError, Class, Fault};
 use rohrpost_mailbox::{Loss, local};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::outbound::WAIT_MAX_NS;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

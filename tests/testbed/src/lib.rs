@@ -3,3 +3,4 @@
 #![forbid(unsafe_code)]
 
 pub mod sim;
+pub mod stall_detector;
