@@ -1,9 +1,6 @@
 //! Sessions in simulated networks: `ROHRPOST_SIM_SEEDS=1000` for more of them.
 
 mod admitted;
-#[allow(unreachable_pub, dead_code, reason = "public in the testbed, and more of it is used there")]
-#[path = "../../../../tests/testbed/src/sim/chance.rs"]
-mod chance;
 mod ends;
 mod ground;
 mod newest;

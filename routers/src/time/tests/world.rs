@@ -6,8 +6,8 @@ use crate::time::{Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettin
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rohrpost_mailbox::TimeRecord;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use rohrpost_testbed::sim::events::Events;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 mod check;
@@ -47,9 +47,7 @@ pub(super) struct World {
     masters: Vec<NodeIndex>,
     nodes: Vec<Node>,
     random: ChaCha8Rng,
-    events: BinaryHeap<Reverse<(u64, u64)>>,
-    bodies: BTreeMap<u64, Event>,
-    next_event: u64,
+    events: Events<Event>,
     terms: BTreeMap<u64, TermTime>,
     /// Which nodes hear which.
     cut: Vec<Vec<bool>>,
@@ -87,9 +85,7 @@ impl World {
             masters: masters.to_vec(),
             nodes: (0..nodes).map(|_| node(&mut random)).collect(),
             random,
-            events: BinaryHeap::new(),
-            bodies: BTreeMap::new(),
-            next_event: 0,
+            events: Events::default(),
             terms: BTreeMap::new(),
             cut: vec![vec![false; nodes.into()]; nodes.into()],
             replay: format!("seed {seed}, {nodes} nodes, interval {interval:?}"),
@@ -231,9 +227,7 @@ impl World {
     }
 
     fn push(&mut self, at: u64, event: Event) {
-        self.events.push(Reverse((at, self.next_event)));
-        self.bodies.insert(self.next_event, event);
-        self.next_event += 1;
+        self.events.push(at, event);
     }
 
     fn wake(&mut self, node: NodeIndex, at: u64) {
@@ -242,8 +236,7 @@ impl World {
     }
 
     fn step(&mut self) {
-        let Some(Reverse((at, number))) = self.events.pop() else { panic!("nothing happens any more") };
-        let event = self.bodies.remove(&number).unwrap();
+        let (at, event) = self.events.pop().expect("something happens");
         self.now = self.now.max(at);
         let frozen_until = |world: &Self, node: NodeIndex| world.nodes[usize::from(node)].frozen_until;
         match event {
