@@ -80,11 +80,11 @@ const SHARED_NAMES: &[(&str, &str, &str)] = &[
 ];
 
 /// How many other names of types a crate still shares; they may only become fewer.
-const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 1), ("routers/src", 48), ("tests/testbed/src", 3)];
+const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 1), ("routers/src", 1), ("tests/testbed/src", 3)];
 
 /// How many lines of a folder are still too wide, or have words that are not the field's; they may only become fewer.
 const WORDS_LEFT: &[(&str, usize)] = &[
-    ("cli/src", 7),
+    ("cli/src", 6),
     ("gui-bridge/src", 7),
     ("mailbox/proof", 49),
     ("mailbox/src", 119),
@@ -92,8 +92,8 @@ const WORDS_LEFT: &[(&str, usize)] = &[
     ("modules/schema", 2),
     ("modules/src", 108),
     ("modules/tests", 4),
-    ("routers/src", 182),
-    ("routers/tests", 17),
+    ("routers/src", 43),
+    ("routers/tests", 15),
     ("tests", 1),
     ("tests/e2e", 2),
     ("tests/testbed", 114),
@@ -120,8 +120,8 @@ const LONG: &[(&str, usize)] = &[
     ("routers/src/frame/mod.rs", 429),
     ("routers/src/outbound/mod.rs", 461),
     ("routers/src/outbound/tests/mod.rs", 461),
-    ("routers/src/queue/mod.rs", 407),
-    ("routers/src/session/client/mod.rs", 419),
+    ("routers/src/queue/mod.rs", 406),
+    ("routers/src/session/client/mod.rs", 414),
     ("routers/src/shell/socket.rs", 428),
     ("routers/src/time/clock.rs", 420),
     ("routers/src/time/clock/slots.rs", 437),

@@ -40,7 +40,7 @@ pub(super) struct Arguments {
     /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
     /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.
     #[arg(long, value_name = "TEXT", requires = "all")]
-    impair: Option<impair::Settings>,
+    impair: Option<impair::ImpairmentSettings>,
     /// No live table, only events.
     #[arg(long)]
     quiet: bool,

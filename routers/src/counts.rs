@@ -55,7 +55,7 @@ rohrpost_mailbox::causes! {
 pub struct Count(AtomicU64);
 
 impl Count {
-    /// As it stands.
+    /// The present number.
     pub fn get(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
@@ -79,7 +79,7 @@ pub struct Side {
     classes: Box<[ClassCounts]>,
 }
 
-/// Of one class.
+/// Counts of one class.
 #[derive(Default, Debug)]
 pub struct ClassCounts {
     /// Packages: taken from this node's senders; or come from other nodes, with those of which only fragments came.
@@ -183,7 +183,7 @@ pub struct PeerReceived {
     pub damaged: Count,
     /// Datagrams of another version or digest, or of an address that is not its; dropped.
     pub refused: Count,
-    /// Lives of it that were heard, without the first.
+    /// Incarnations of it that were heard, without the first.
     pub restarts: Count,
 }
 

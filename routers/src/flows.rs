@@ -57,9 +57,9 @@ impl Flow {
         installation.flows.iter().enumerate().filter_map(flow).collect()
     }
 
-    fn entries(&self, flow: u16) -> impl Iterator<Item = Entry> {
+    fn entries(&self, flow: u16) -> impl Iterator<Item = FlowEntry> {
         let pairs = self.from.iter().flat_map(|from| self.to.iter().map(move |to| (from, to)));
-        pairs.enumerate().map(move |(place, (from, to))| Entry {
+        pairs.enumerate().map(move |(place, (from, to))| FlowEntry {
             ends: (from.module().raw(), to.module().raw()),
             carries: self.carries,
             is_other: place > 0,
@@ -143,12 +143,12 @@ impl FlowCounts {
 #[derive(Debug)]
 pub struct Flows {
     /// By the names of both ends, then by what they carry (undeclared first), size and period.
-    entries: Box<[Entry]>,
+    entries: Box<[FlowEntry]>,
     counts: Box<[FlowCounts]>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-struct Entry {
+struct FlowEntry {
     ends: (u32, u32),
     carries: Option<Contents>,
     /// By another name than the declared one.
@@ -161,7 +161,7 @@ struct Entry {
 impl Flows {
     pub(crate) fn new(flows: &[Flow]) -> Self {
         let entries = flows.iter().zip(0..).flat_map(|(flow, index)| flow.entries(index));
-        let mut entries: Vec<Entry> = entries.collect();
+        let mut entries: Vec<FlowEntry> = entries.collect();
         entries.sort_unstable();
         // The other names of a process share the flows that are declared for it, unless they have their own.
         let declared: Vec<_> = entries.iter().filter(|entry| !entry.is_other).map(|entry| entry.ends).collect();
@@ -201,7 +201,7 @@ impl Flows {
 }
 
 /// Among flows without a declaration of what they carry.
-fn by_size<'a>(entries: &'a [Entry], head: &Head) -> Option<&'a Entry> {
+fn by_size<'a>(entries: &'a [FlowEntry], head: &Head) -> Option<&'a FlowEntry> {
     let largest = entries.last()?;
     let size = entries.iter().map(|entry| entry.size).find(|size| *size >= u32::from(head.len));
     let size = size.unwrap_or(largest.size);

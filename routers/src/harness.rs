@@ -6,8 +6,8 @@ use crate::counts::{Cause, Side};
 use crate::flows::Flow;
 use crate::frame::NodeIndex;
 use crate::inbound::{self, Datagram, Inbound};
-use crate::outbound::{Accepted, Outbound, Output, Package};
-use crate::report::{Deliver, Event, NotDelivered, Report};
+use crate::outbound::{Accepted, Outbound, OutboundStep, Package};
+use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
 use crate::settings::{NodeSettings, Settings};
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Name, Priority, Type};
@@ -75,7 +75,7 @@ pub(crate) fn head(to: Name, from: Name, priority: u8) -> Head {
 pub(crate) struct Log {
     pub(crate) lost: Vec<(Head, Vec<u8>, Cause)>,
     pub(crate) delivered: Vec<(NodeIndex, Head, Vec<u8>)>,
-    pub(crate) events: Vec<Event>,
+    pub(crate) events: Vec<RouterEvent>,
     /// What mailboxes say.
     pub(crate) closed: Option<NotDelivered>,
 }
@@ -107,7 +107,7 @@ impl Deliver for Log {
         Ok(())
     }
 
-    fn event(&mut self, event: Event) {
+    fn event(&mut self, event: RouterEvent) {
         self.events.push(event);
     }
 }
@@ -157,8 +157,8 @@ impl End {
     pub(crate) fn poll(&mut self, now_ns: u64) -> Result<(NodeIndex, Vec<u8>), u64> {
         let mut datagram = vec![0; self.settings.network.datagram_bytes_max];
         match self.outbound.poll(now_ns, &mut datagram, &mut self.log) {
-            Output::Send { to, bytes } => Ok((to, datagram[..bytes].to_vec())),
-            Output::Wait { until_ns } => Err(until_ns),
+            OutboundStep::Send { to, bytes } => Ok((to, datagram[..bytes].to_vec())),
+            OutboundStep::Wait { until_ns } => Err(until_ns),
         }
     }
 
@@ -180,7 +180,7 @@ impl End {
     pub(crate) fn refusals(&mut self, now_ns: u64) -> Vec<(IpAddr, Vec<u8>)> {
         let mut datagram = [0; 64];
         let mut all = Vec::new();
-        while let inbound::Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut datagram, &mut self.log) {
+        while let inbound::InboundStep::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut datagram, &mut self.log) {
             all.push((to, datagram[..bytes].to_vec()));
         }
         all

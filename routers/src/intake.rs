@@ -63,7 +63,7 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// For a router that begins now; no slot has come yet.
+    /// Estimate of a router that begins now; no slot has come yet.
     pub fn new(now_ns: u64) -> Self {
         Self { room_bytes: 0, least: Priority(u8::MAX), taken_ns: now_ns }
     }

@@ -4,7 +4,7 @@ use rohrpost_mailbox::{LATENCY_BUCKETS, Latency};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// As [`Latency`], shared: one thread writes, so a load and a store are enough for each number.
+/// A shared [`Latency`]: one thread writes, so a load and a store are enough for each number.
 #[derive(Debug)]
 pub struct Latencies {
     max_ns: AtomicU64,

@@ -1,7 +1,7 @@
 //! Whether a peer is reachable: the receiving half finds out; the sending half and others read.
 
 use crate::counts::Count;
-use crate::frame::{Alive, Reason};
+use crate::frame::{Alive, RefusalReason};
 use crate::report::Mismatch;
 
 /// Keep-alive interval to a peer without other traffic.
@@ -20,7 +20,7 @@ pub const REFUSED_FOR_NS: u64 = 3_000_000_000;
 
 /// Whether packages reach a peer, as far as is known.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum State {
+pub enum PeerLinkState {
     /// Just begun: nothing heard yet, and no time for it.
     Unknown,
     /// Heard, and it hears us or had no time yet to say.
@@ -67,20 +67,20 @@ pub struct Link {
 
 impl Link {
     /// Whether packages reach it, for a router that began at `started_ns`.
-    pub fn state(&self, started_ns: u64, now_ns: u64) -> State {
+    pub fn state(&self, started_ns: u64, now_ns: u64) -> PeerLinkState {
         let (heard_ns, refused_ns) = (self.heard_ns.get(), self.refused_ns.get());
         if refused_ns > 0 && refused_ns.saturating_add(REFUSED_FOR_NS) > now_ns {
-            return State::Refused(self.mismatch());
+            return PeerLinkState::Refused(self.mismatch());
         }
         if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns {
-            return State::Silent;
+            return PeerLinkState::Silent;
         }
         if heard_ns == 0 {
-            return State::Unknown;
+            return PeerLinkState::Unknown;
         }
         let denied_ns = self.denied_ns.get();
         let is_unheard = denied_ns != 0 && denied_ns.saturating_add(DENIED_FOR_NS) <= now_ns;
-        if is_unheard { State::Unheard } else { State::Alive }
+        if is_unheard { PeerLinkState::Unheard } else { PeerLinkState::Alive }
     }
 
     /// The report for it. `missing`: its datagrams that never came.
@@ -136,11 +136,11 @@ impl Link {
     fn mismatch(&self) -> Mismatch {
         let why = self.refused_why.get();
         let reason = match why >> 8 & 0xff {
-            1 => Reason::Version,
-            2 => Reason::Digest,
-            4 => Reason::Sealed,
-            5 => Reason::Key,
-            _ => Reason::Stranger,
+            1 => RefusalReason::Version,
+            2 => RefusalReason::Digest,
+            4 => RefusalReason::Sealed,
+            5 => RefusalReason::Key,
+            _ => RefusalReason::Stranger,
         };
         let digest = (why >> 16 & 1 == 1).then(|| self.refused_digest.get());
         Mismatch { reason, version: why as u8, digest }

@@ -57,7 +57,7 @@ const RT_SCOPE_LINK: u8 = 253;
 const RTN_UNICAST: u8 = 1;
 
 /// A device of a namespace, by its number there.
-pub(crate) type Device = u32;
+pub(crate) type DeviceIndex = u32;
 
 /// A netlink socket of one namespace.
 pub(crate) struct Netlink {
@@ -66,13 +66,13 @@ pub(crate) struct Netlink {
 }
 
 /// A request under construction.
-struct Message {
+struct NetlinkMessage {
     kind: u16,
     flags: u16,
     bytes: Vec<u8>,
 }
 
-impl Message {
+impl NetlinkMessage {
     fn new(kind: u16, flags: u16, fixed: &[u8]) -> Self {
         Self { kind, flags, bytes: [&[0; HEAD_BYTES], fixed].concat() }
     }
@@ -111,7 +111,7 @@ impl Message {
 }
 
 /// `struct ifinfomsg`.
-fn link(device: Device, flags: u32, change: u32) -> [u8; 16] {
+fn link(device: DeviceIndex, flags: u32, change: u32) -> [u8; 16] {
     let mut bytes = [0; 16];
     bytes[4..8].copy_from_slice(&device.to_ne_bytes());
     bytes[8..12].copy_from_slice(&flags.to_ne_bytes());
@@ -132,7 +132,7 @@ fn octets(address: IpAddr) -> Vec<u8> {
 }
 
 impl Netlink {
-    /// For the namespace that this thread is in.
+    /// A socket in the namespace of this thread.
     pub(crate) fn new() -> io::Result<Self> {
         let socket = socket(AddressFamily::Netlink, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::NetlinkRoute)?;
         setsockopt(&socket, sockopt::ReceiveTimeout, &PATIENCE)?;
@@ -140,8 +140,8 @@ impl Netlink {
     }
 
     /// Makes a bridge.
-    pub(crate) fn add_bridge(&mut self, device: Device, name: &str, mtu: u32) -> io::Result<()> {
-        let message = Message::new(RTM_NEWLINK, NLM_F_CREATE | NLM_F_EXCL, &link(device, 0, 0))
+    pub(crate) fn add_bridge(&mut self, device: DeviceIndex, name: &str, mtu: u32) -> io::Result<()> {
+        let message = NetlinkMessage::new(RTM_NEWLINK, NLM_F_CREATE | NLM_F_EXCL, &link(device, 0, 0))
             .text(IFLA_IFNAME, name)
             .number(IFLA_MTU, mtu)
             .nested(IFLA_LINKINFO, &[], |info| info.attribute(IFLA_INFO_KIND, b"bridge"));
@@ -151,13 +151,13 @@ impl Netlink {
     /// Makes a pair of veth: one end here, on a bridge, the other in another namespace.
     pub(crate) fn add_veth(
         &mut self,
-        own: End<'_>,
-        bridge: Device,
-        far: End<'_>,
+        own: VethEnd<'_>,
+        bridge: DeviceIndex,
+        far: VethEnd<'_>,
         namespace: &impl AsRawFd,
         mtu: u32,
     ) -> io::Result<()> {
-        let message = Message::new(RTM_NEWLINK, NLM_F_CREATE | NLM_F_EXCL, &link(own.device, 0, 0))
+        let message = NetlinkMessage::new(RTM_NEWLINK, NLM_F_CREATE | NLM_F_EXCL, &link(own.device, 0, 0))
             .text(IFLA_IFNAME, own.name)
             .number(IFLA_MTU, mtu)
             .number(IFLA_MASTER, bridge)
@@ -174,49 +174,49 @@ impl Netlink {
     }
 
     /// Sets a device up or down.
-    pub(crate) fn set_up(&mut self, device: Device, up: bool) -> io::Result<()> {
+    pub(crate) fn set_up(&mut self, device: DeviceIndex, up: bool) -> io::Result<()> {
         let flags = if up { IFF_UP } else { 0 };
-        self.ask(Message::new(RTM_NEWLINK, 0, &link(device, flags, IFF_UP))).map(drop)
+        self.ask(NetlinkMessage::new(RTM_NEWLINK, 0, &link(device, flags, IFF_UP))).map(drop)
     }
 
     /// Moves a port to a bridge.
-    pub(crate) fn set_bridge(&mut self, port: Device, bridge: Device) -> io::Result<()> {
-        self.ask(Message::new(RTM_NEWLINK, 0, &link(port, 0, 0)).number(IFLA_MASTER, bridge)).map(drop)
+    pub(crate) fn set_bridge(&mut self, port: DeviceIndex, bridge: DeviceIndex) -> io::Result<()> {
+        self.ask(NetlinkMessage::new(RTM_NEWLINK, 0, &link(port, 0, 0)).number(IFLA_MASTER, bridge)).map(drop)
     }
 
     /// Changes the largest packet.
-    pub(crate) fn set_mtu(&mut self, device: Device, mtu: u32) -> io::Result<()> {
-        self.ask(Message::new(RTM_NEWLINK, 0, &link(device, 0, 0)).number(IFLA_MTU, mtu)).map(drop)
+    pub(crate) fn set_mtu(&mut self, device: DeviceIndex, mtu: u32) -> io::Result<()> {
+        self.ask(NetlinkMessage::new(RTM_NEWLINK, 0, &link(device, 0, 0)).number(IFLA_MTU, mtu)).map(drop)
     }
 
     /// Gives a device an address. Neighbours share `prefix` bits with it, and are reached by the device; none: it has
     /// no neighbours.
-    pub(crate) fn add_address(&mut self, device: Device, address: IpAddr, prefix: Option<u8>) -> io::Result<()> {
+    pub(crate) fn add_address(&mut self, device: DeviceIndex, address: IpAddr, prefix: Option<u8>) -> io::Result<()> {
         let octets = octets(address);
         let prefix_bits = prefix.unwrap_or(8 * octets.len() as u8);
         let mut fixed = [0; 8];
         fixed[0..4].copy_from_slice(&[family(address), prefix_bits, IFA_F_NODAD, RT_SCOPE_UNIVERSE]);
         fixed[4..8].copy_from_slice(&device.to_ne_bytes());
-        let message = Message::new(RTM_NEWADDR, NLM_F_CREATE | NLM_F_EXCL, &fixed)
+        let message = NetlinkMessage::new(RTM_NEWADDR, NLM_F_CREATE | NLM_F_EXCL, &fixed)
             .attribute(IFA_LOCAL, &octets)
             .attribute(IFA_ADDRESS, &octets);
         self.ask(message).map(drop)
     }
 
     /// All addresses of a kind are reached by a device, directly.
-    pub(crate) fn add_route_to_all(&mut self, device: Device, like: IpAddr) -> io::Result<()> {
+    pub(crate) fn add_route_to_all(&mut self, device: DeviceIndex, like: IpAddr) -> io::Result<()> {
         let scope = if like.is_ipv4() { RT_SCOPE_LINK } else { RT_SCOPE_UNIVERSE };
         let fixed = [family(like), 0, 0, 0, RT_TABLE_MAIN, RTPROT_STATIC, scope, RTN_UNICAST, 0, 0, 0, 0];
-        self.ask(Message::new(RTM_NEWROUTE, NLM_F_CREATE | NLM_F_EXCL, &fixed).number(RTA_OIF, device)).map(drop)
+        self.ask(NetlinkMessage::new(RTM_NEWROUTE, NLM_F_CREATE | NLM_F_EXCL, &fixed).number(RTA_OIF, device)).map(drop)
     }
 
     /// One address is reached by a device, directly or through another.
-    pub(crate) fn add_route(&mut self, device: Device, to: IpAddr, through: Option<IpAddr>) -> io::Result<()> {
+    pub(crate) fn add_route(&mut self, device: DeviceIndex, to: IpAddr, through: Option<IpAddr>) -> io::Result<()> {
         let scope = if to.is_ipv4() && through.is_none() { RT_SCOPE_LINK } else { RT_SCOPE_UNIVERSE };
         let octets = octets(to);
         let bits = 8 * octets.len() as u8;
         let fixed = [family(to), bits, 0, 0, RT_TABLE_MAIN, RTPROT_STATIC, scope, RTN_UNICAST, 0, 0, 0, 0];
-        let message = Message::new(RTM_NEWROUTE, NLM_F_CREATE | NLM_F_EXCL, &fixed).attribute(RTA_DST, &octets);
+        let message = NetlinkMessage::new(RTM_NEWROUTE, NLM_F_CREATE | NLM_F_EXCL, &fixed).attribute(RTA_DST, &octets);
         let message = match through {
             Some(through) => message.attribute(RTA_GATEWAY, &self::octets(through)),
             None => message,
@@ -225,16 +225,16 @@ impl Netlink {
     }
 
     /// Whether a device carries packets: it is up, and so is its other end.
-    pub(crate) fn runs(&mut self, device: Device) -> io::Result<bool> {
-        let answer = self.ask(Message::new(RTM_GETLINK, 0, &link(device, 0, 0)))?;
+    pub(crate) fn runs(&mut self, device: DeviceIndex) -> io::Result<bool> {
+        let answer = self.ask(NetlinkMessage::new(RTM_GETLINK, 0, &link(device, 0, 0)))?;
         let flags = answer.get(HEAD_BYTES + 8..HEAD_BYTES + 12).and_then(|flags| flags.try_into().ok());
         Ok(u32::from_ne_bytes(flags.unwrap_or_default()) & IFF_RUNNING != 0)
     }
 
     /// Sends a request; returns the answer before its acknowledgement.
-    fn ask(&mut self, message: Message) -> io::Result<Vec<u8>> {
+    fn ask(&mut self, message: NetlinkMessage) -> io::Result<Vec<u8>> {
         self.sequence += 1;
-        let message = Message { flags: message.flags | NLM_F_ACK, ..message }.finish(self.sequence);
+        let message = NetlinkMessage { flags: message.flags | NLM_F_ACK, ..message }.finish(self.sequence);
         send(self.socket.as_raw_fd(), &message, MsgFlags::empty())?;
         let mut found = Vec::new();
         let mut buffer = vec![0; ANSWER_BYTES_MAX];
@@ -272,7 +272,7 @@ fn split(bytes: &[u8]) -> Option<(u16, u32, &[u8], &[u8])> {
 
 /// One end of a pair of veth.
 #[derive(Clone, Copy)]
-pub(crate) struct End<'a> {
-    pub(crate) device: Device,
+pub(crate) struct VethEnd<'a> {
+    pub(crate) device: DeviceIndex,
     pub(crate) name: &'a str,
 }

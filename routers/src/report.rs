@@ -1,7 +1,7 @@
 //! What the cores tell of: packages that go no further, and what happens to peers.
 
 use crate::counts::Cause;
-use crate::frame::{NodeIndex, Reason};
+use crate::frame::{NodeIndex, RefusalReason};
 use crate::security::NotOpened;
 use rohrpost_mailbox::{Head, SendError};
 use std::net::IpAddr;
@@ -31,7 +31,7 @@ pub trait Deliver: Report {
     fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered>;
 
     /// Something happened that people want to know of, each once until it is over.
-    fn event(&mut self, event: Event);
+    fn event(&mut self, event: RouterEvent);
 }
 
 /// Why a package is not in its mailbox.
@@ -60,9 +60,9 @@ impl From<SendError> for NotDelivered {
     }
 }
 
-/// What happens between routers.
+/// A change between routers that people are told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Event {
+pub enum RouterEvent {
     /// A peer is heard: for the first time, or after silence.
     Heard {
         /// Which.
@@ -83,7 +83,7 @@ pub enum Event {
         /// Which.
         peer: NodeIndex,
     },
-    /// We take nothing from whoever sent this.
+    /// Its sender is refused: we take nothing from it.
     Refused {
         /// Where it came from.
         source: IpAddr,
@@ -121,7 +121,7 @@ pub enum Event {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Mismatch {
     /// Why it is refused.
-    pub reason: Reason,
+    pub reason: RefusalReason,
     /// Wire version of the other end; ours is [`frame::VERSION`](crate::frame::VERSION).
     pub version: u8,
     /// Digest of the other end, where it was readable.

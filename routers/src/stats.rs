@@ -1,4 +1,4 @@
-//! What a router counts, for whoever wants to know: packages by class, losses by cause, peers.
+//! What a router counts: packages by class, losses by cause, peers.
 //!
 //! What is not real time has threads of its own ([`Stats::of_rest`]): they count its classes in the same places, and
 //! datagrams in their own.
@@ -44,7 +44,7 @@ pub struct Stats {
     pub on_wire_bytes: Count,
     /// When the router began, ns of the monotonic clock.
     pub started_ns: u64,
-    /// Of what is not real time: who knows which peers are there.
+    /// Of what is not real time: the counters that know which peers are there.
     knows: Option<Arc<Self>>,
 }
 
@@ -56,7 +56,7 @@ pub struct Stats {
 pub(crate) const YOUNG_NS: u64 = 500_000_000;
 
 impl Stats {
-    /// Of a router that begins now.
+    /// Counters of a router that begins now.
     pub fn new(settings: &Settings, now_ns: u64) -> Arc<Self> {
         Arc::new(Self {
             out: Arc::new(Side::new()),
@@ -73,7 +73,7 @@ impl Stats {
         })
     }
 
-    /// Of the same router, for the threads that carry what is not real time.
+    /// Counters of the same router, for the threads that carry what is not real time.
     pub fn of_rest(settings: &Settings, all: &Arc<Self>) -> Arc<Self> {
         let Self { out, inn, flows, started_ns, .. } = &**all;
         Arc::new(Self {
@@ -91,7 +91,7 @@ impl Stats {
         })
     }
 
-    /// Of a node; that of the own one stays empty.
+    /// Counters of a node; those of the own one stay empty.
     ///
     /// # Panics
     /// If there is no such node.
@@ -100,7 +100,7 @@ impl Stats {
     }
 
     /// Whether a peer is there.
-    pub fn state(&self, peer: NodeIndex, now_ns: u64) -> crate::link::State {
+    pub fn state(&self, peer: NodeIndex, now_ns: u64) -> crate::link::PeerLinkState {
         self.knows.as_deref().unwrap_or(self).peer(peer).link.state(self.started_ns, now_ns)
     }
 

@@ -14,7 +14,7 @@
 
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_routers::shell::clock::{ClockParts, ClockService, Skew, Snapshot};
+use rohrpost_routers::shell::clock::{ClockParts, ClockService, ClockSnapshot, Skew};
 use rohrpost_routers::time::{Exchange, Role, TimeSettings};
 use std::io::Write;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
@@ -89,7 +89,7 @@ impl Node {
         Self { service: service.unwrap(), skew, exchanges }
     }
 
-    fn snapshot(&self) -> Snapshot {
+    fn snapshot(&self) -> ClockSnapshot {
         self.service.state().snapshot()
     }
 
@@ -168,7 +168,7 @@ impl Errors {
 }
 
 /// The error of RTnet's formula, and of its four stamps taken by the kernel, for each of these exchanges.
-fn memoryless(exchanges: &[Exchange], skew: &Skew, master: &Snapshot, by_kernel: bool) -> Errors {
+fn memoryless(exchanges: &[Exchange], skew: &Skew, master: &ClockSnapshot, by_kernel: bool) -> Errors {
     let one_way = |e: &Exchange| {
         let (sent, here) =
             if by_kernel { (e.request_left.ns, e.sync_came.ns) } else { (e.request_sent_ns, e.reply_came.ns) };

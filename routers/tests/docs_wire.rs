@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_routers::frame::{Alive, Fragment, Frame, FrameHead, Kind, Reason, Refusal, VERSION};
+use rohrpost_routers::frame::{Alive, Fragment, Frame, FrameHead, FrameKind, Refusal, RefusalReason, VERSION};
 use rohrpost_routers::session::frame::HOPS_MAX;
-use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, GREETING_MAX_NS};
+use rohrpost_routers::session::{ASK_EVERY_NS, ENTRIES_MAX, FRAME_MAX_NS, HANDSHAKE_MAX_NS};
 use rohrpost_routers::session::{SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS, STALLED_AFTER_NS};
 use rohrpost_routers::time::Term;
-use rohrpost_routers::time::message::{Message, Reply, Request, Sync};
+use rohrpost_routers::time::message::{Reply, Request, Sync, TimeMessage};
 
 const PAGE: &str = include_str!("../../docs/src/wire.md");
 
@@ -26,7 +26,7 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 const HEAD: FrameHead = FrameHead {
-    kind: Kind::Packages,
+    kind: FrameKind::Packages,
     system: 1,
     from: 1,
     to: 0,
@@ -69,17 +69,17 @@ fn packages_have_the_documented_bytes() {
 fn a_fragment_has_the_documented_bytes() {
     let part = Fragment { first: 8, index: 1, count: 2, offset: 3, head: data(5), bytes: b"lo" };
     let rest = [&part.head_bytes()[..], part.bytes].concat();
-    let head = FrameHead { kind: Kind::Fragment, sequence: 9, ..HEAD };
+    let head = FrameHead { kind: FrameKind::Fragment, sequence: 9, ..HEAD };
     check("fragment", head, &rest, |frame| assert_eq!(frame, Frame::Fragment(part)));
 }
 
 #[test]
 fn what_carries_no_package_has_the_documented_bytes() {
     let alive = Alive { heard_incarnation: 987_654_321, heard_next: 41, heard_lost: 2 };
-    let head = FrameHead { kind: Kind::Alive, sequence: 10, ..HEAD };
+    let head = FrameHead { kind: FrameKind::Alive, sequence: 10, ..HEAD };
     check("alive", head, &alive.to_bytes(), |frame| assert_eq!(frame, Frame::Alive(alive)));
-    let refusal = Refusal { version: VERSION, reason: Reason::Digest, digest: HEAD.digest };
-    let head = FrameHead { kind: Kind::Refusal, ..HEAD };
+    let refusal = Refusal { version: VERSION, reason: RefusalReason::Digest, digest: HEAD.digest };
+    let head = FrameHead { kind: FrameKind::Refusal, ..HEAD };
     check("refusal", head, &refusal.to_bytes(), |frame| assert_eq!(frame, Frame::Refusal(refusal)));
 }
 
@@ -87,7 +87,7 @@ fn what_carries_no_package_has_the_documented_bytes() {
 fn time_has_the_documented_bytes() {
     const NOMINAL_NS: u64 = 1_700_000_000_000_000_000;
     let (term, epoch) = (Term::new(1, 0), 1);
-    let sync = Message::Sync(Sync {
+    let sync = TimeMessage::Sync(Sync {
         id: 99,
         cycle: 1_700_000_000,
         nominal_ns: NOMINAL_NS,
@@ -99,7 +99,7 @@ fn time_has_the_documented_bytes() {
         followed: true,
         replacement: false,
     });
-    let request = Message::Request(Request {
+    let request = TimeMessage::Request(Request {
         id: 99,
         sent_ns: 0,
         error_ns: 20_000,
@@ -109,7 +109,7 @@ fn time_has_the_documented_bytes() {
         far: false,
         timed: true,
     });
-    let reply = Message::Reply(Reply {
+    let reply = TimeMessage::Reply(Reply {
         id: 99,
         sync_ns: NOMINAL_NS + 9_000,
         request_ns: NOMINAL_NS + 250_000,
@@ -122,7 +122,7 @@ fn time_has_the_documented_bytes() {
         sync_by_kernel: true,
         request_by_kernel: true,
     });
-    let replacement = Message::Sync(Sync {
+    let replacement = TimeMessage::Sync(Sync {
         id: 99,
         cycle: 340_000_000_000,
         nominal_ns: NOMINAL_NS + 300_000,
@@ -141,7 +141,7 @@ fn time_has_the_documented_bytes() {
         let head = FrameHead { kind, from, to: if from == 1 { 0 } else { 1 }, sequence, ..HEAD };
         check(name, head, &message.to_bytes(), |frame| {
             let Frame::Time(rest) = frame else { panic!("{frame:?}") };
-            assert_eq!(Message::parse(kind, rest), Ok(message), "{name}");
+            assert_eq!(TimeMessage::parse(kind, rest), Ok(message), "{name}");
         });
     }
 }
@@ -150,7 +150,7 @@ fn time_has_the_documented_bytes() {
 fn sessions_close_after_the_documented_times() {
     let seconds = |ns: u64| format!("{} s", ns as f64 / 1e9);
     for (ns, words) in [
-        (GREETING_MAX_NS, "from its beginning to the welcome"),
+        (HANDSHAKE_MAX_NS, "from its beginning to the welcome"),
         (SILENT_AFTER_NS, "in which nothing came; in the middle of a frame 8 s"),
         (SILENT_AFTER_NS, "if also the oldest question of the client that was not answered left 2.5 s ago"),
         (STALLED_AFTER_NS, "in which the stream took nothing of what was ready"),

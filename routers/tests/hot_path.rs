@@ -15,10 +15,10 @@ use rohrpost_routers::counts::Cause;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::inbound::{Datagram, Inbound};
-use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
-use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
+use rohrpost_routers::outbound::{Accepted, Outbound, OutboundStep, Package};
+use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
 use rohrpost_routers::session::frame::Range;
-use rohrpost_routers::session::{ClientIndex, Table};
+use rohrpost_routers::session::{ClientIndex, RoutingTable};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::stats::Stats;
 use rohrpost_routers::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
@@ -94,7 +94,7 @@ impl Deliver for Counts {
         self.closed.map_or(Ok(()), Err)
     }
 
-    fn event(&mut self, _: Event) {}
+    fn event(&mut self, _: RouterEvent) {}
 }
 
 /// Two routers and a wire that now and then loses, copies and holds back.
@@ -145,7 +145,7 @@ impl Pair {
 
     fn leave(&mut self, now_ns: u64) {
         let mut datagram = [0; 1472];
-        while let Output::Send { bytes, .. } = self.out.poll(now_ns, &mut datagram, &mut self.counts) {
+        while let OutboundStep::Send { bytes, .. } = self.out.poll(now_ns, &mut datagram, &mut self.counts) {
             if self.datagrams % 31 == 30 {
                 self.out.unsent(&datagram[..bytes], &[], &mut self.counts);
             } else {
@@ -153,7 +153,7 @@ impl Pair {
             }
             self.wire(now_ns, &datagram[..bytes]);
         }
-        while let Output::Send { bytes, .. } = self.back.0.poll(now_ns, &mut datagram, &mut self.counts) {
+        while let OutboundStep::Send { bytes, .. } = self.back.0.poll(now_ns, &mut datagram, &mut self.counts) {
             let datagram = Datagram { source: address(1), arrived_ns: now_ns, bytes: &datagram[..bytes] };
             self.back.1.handle(now_ns, &datagram, &mut self.counts);
         }
@@ -301,7 +301,7 @@ fn a_clock_takes_nothing_from_the_heap() {
 
 #[test]
 fn the_host_of_a_name_at_the_tcp_router_is_looked_up_without_the_heap() {
-    let mut table = Table::default();
+    let mut table = RoutingTable::default();
     for client in 0..16 {
         let module = |index: usize| Range::module(Name::new(1 + client as u8, (index >> 8) as u8, index as u8, 0));
         table.register(ClientIndex(client), 1000, |_| true, (0..1000).map(module)).unwrap();

@@ -7,7 +7,7 @@
 pub mod counting;
 
 use counting::{CountingHeap, heap_uses};
-use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use rohrpost_routers::frame::{FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use rohrpost_routers::security::{
     HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection,
     RouterIdentity, Sealing, TAG_BYTES, Tally,
@@ -46,7 +46,7 @@ impl Router {
     fn greet(&mut self, now_ns: u64, hello: &mut [u8; HELLO_DATAGRAM_BYTES]) -> bool {
         let mut reply = [0; HELLO_DATAGRAM_BYTES];
         let Opened::Hello(head, greeting) = self.opening.open(hello).unwrap() else { panic!("no hello") };
-        let replied = self.handshake.greet(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
+        let replied = self.handshake.receive(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
         self.handshake.begin();
         *hello = reply;
         replied
@@ -71,8 +71,15 @@ fn sealing_and_opening_take_nothing_from_the_heap() {
         let (mut before, mut took) = (heap_uses(), Duration::ZERO);
         for number in 0..=PACKAGES {
             let begun = Instant::now();
-            let head =
-                FrameHead { kind: Kind::Packages, system: 1, from: 0, to: 1, digest: 7, incarnation: 100, sequence };
+            let head = FrameHead {
+                kind: FrameKind::Packages,
+                system: 1,
+                from: 0,
+                to: 1,
+                digest: 7,
+                incarnation: 100,
+                sequence,
+            };
             a.sealing.seal(&head, datagram).unwrap();
             let mut altered = [0; HEAD_BYTES + 1400 + TAG_BYTES];
             let altered = &mut altered[..datagram.len()];

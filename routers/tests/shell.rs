@@ -11,9 +11,9 @@ use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::{Kind, Label, Name, Options, Receiver, SendError, Shape, Type, local};
 use rohrpost_network::Security;
 use rohrpost_routers::counts::Cause;
-use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind as FrameKind};
+use rohrpost_routers::frame::{FrameHead, FrameKind, HEAD_BYTES};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
-use rohrpost_routers::link::State;
+use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
 use rohrpost_routers::stats::Stats;
@@ -35,7 +35,7 @@ impl Side {
         self.shell.as_ref().unwrap()
     }
 
-    fn sees(&self, peer: u8) -> State {
+    fn sees(&self, peer: u8) -> PeerLinkState {
         self.shell().stats().state(peer, monotonic_ns())
     }
 }
@@ -84,7 +84,7 @@ fn an_undeliverable_command_comes_back_and_says_why() {
             "a mailbox that the module has not"
         );
         pair.sides[1].shell = None;
-        until("node 1 is silent", || pair.sides[0].sees(1) == State::Silent);
+        until("node 1 is silent", || pair.sides[0].sees(1) == PeerLinkState::Silent);
         assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callsilent");
         // Data are counted, and nobody is told.
         let data = rohrpost_mailbox::Label { kind: Type::data(1), ..label(replies.name(), 90, u16::MAX) };
@@ -131,14 +131,14 @@ fn a_router_with_another_digest_is_refused_by_both_and_taken_when_it_is_mended()
     pair.sides[1].start();
     for (side, theirs) in [(0, 8), (1, 7)] {
         until("each refuses the other", || match pair.sides[side].sees(1 - side as u8) {
-            State::Refused(mismatch) => mismatch.digest == Some(theirs),
+            PeerLinkState::Refused(mismatch) => mismatch.digest == Some(theirs),
             _ => false,
         });
     }
     assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callrefused");
     pair.sides[1].settings.digest = 7;
     pair.sides[1].start();
-    until("they hear each other", || (0..2).all(|side| pair.sides[side].sees(1 - side as u8) == State::Alive));
+    until("they hear each other", || (0..2).all(|side| pair.sides[side].sees(1 - side as u8) == PeerLinkState::Alive));
 }
 
 #[test]

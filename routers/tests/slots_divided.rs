@@ -10,7 +10,7 @@ use common::process::{Router, be_a_router};
 use common::talk::{Listeners, talk};
 use common::{Capture, Crossed, MASTERS, Segment, assert_kept, name, table, validate};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
-use rohrpost_routers::link::State;
+use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::time::Role;
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::sync::{Arc, Weak};
@@ -118,7 +118,7 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         let united_ns = monotonic_ns();
         segment.wait_until("all send", |segment| {
             let lonely = &segment.stations[usize::from(LONELY)];
-            let is_heard = |own: &u8| lonely.shell().stats().state(*own, monotonic_ns()) == State::Alive;
+            let is_heard = |own: &u8| lonely.shell().stats().state(*own, monotonic_ns()) == PeerLinkState::Alive;
             lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
         });
         segment.wait_until("it yields to the followed master", |segment| lonely(segment).master == Some(OTHERS[0]));

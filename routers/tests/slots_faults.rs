@@ -9,7 +9,7 @@ use common::relay::Relay;
 use common::talk::{Listeners, PAUSE, talk, talkers};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
-use rohrpost_routers::frame::Kind;
+use rohrpost_routers::frame::FrameKind;
 use rohrpost_routers::shell::Failure;
 use rohrpost_routers::tdma::Silent;
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
@@ -71,7 +71,7 @@ fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_an
         let mut listeners = Listeners::new(&segment);
         talk(&segment, &mut listeners, &[0, 1], 100);
         let crossed = capture.end();
-        let speaks = |kind| matches!(kind, Kind::Alive | Kind::Packages);
+        let speaks = |kind| matches!(kind, FrameKind::Alive | FrameKind::Packages);
         assert!(crossed.iter().any(|frame| frame.from == 2), "it asks for the time");
         assert!(!crossed.iter().any(|frame| frame.from == 2 && speaks(frame.kind)), "and says nothing else");
 
@@ -162,7 +162,7 @@ fn stays_master_without_syncs(segment: &Segment) -> bool {
             }
         });
         // Without another sign of life the backup would take over after three cycles.
-        let relay = Relay::start(segment, backup.own, Duration::ZERO, |head| head.kind == Kind::Sync);
+        let relay = Relay::start(segment, backup.own, Duration::ZERO, |head| head.kind == FrameKind::Sync);
         segment
             .wait_until("it has stood in for many cycles", |_| stood_in() > began + 6 || backup.clock().term != term);
         let clock = backup.clock();

@@ -12,7 +12,7 @@ use common::talk::{Listeners, PAUSE, Talker, talkers};
 use common::{Capture, MASTERS, Segment, assert_kept};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::monotonic_ns;
-use rohrpost_routers::link::State;
+use rohrpost_routers::link::PeerLinkState;
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::io::Write;
 use std::sync::Arc;
@@ -65,7 +65,7 @@ impl Scene {
             let stats = witness.shell().stats();
             let is_heard = |own: &u8| {
                 let is_new = stats.peer(*own).link.heard_ns.get() > since_ns;
-                is_new && stats.state(*own, monotonic_ns()) == State::Alive
+                is_new && stats.state(*own, monotonic_ns()) == PeerLinkState::Alive
             };
             witness.slots().silent.is_none() && MASTERS.iter().all(is_heard)
         });

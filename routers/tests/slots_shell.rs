@@ -7,7 +7,7 @@ mod common;
 
 use common::talk::{Listeners, PAUSE, talkers};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, assert_kept, validate};
-use rohrpost_routers::frame::Kind;
+use rohrpost_routers::frame::FrameKind;
 use rohrpost_routers::time::Role;
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::time::Instant;
@@ -31,7 +31,7 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
         }
         listeners.hear_all(&all, &(0..ROUNDS).collect::<Vec<_>>());
         let crossed = capture.end();
-        for kind in [Kind::Packages, Kind::Sync, Kind::Request, Kind::Reply] {
+        for kind in [FrameKind::Packages, FrameKind::Sync, FrameKind::Request, FrameKind::Reply] {
             assert!(crossed.iter().any(|frame| frame.kind == kind), "{kind:?} crossed the bridge");
         }
         assert_kept("with a master", &crossed, &time);
@@ -103,14 +103,14 @@ fn a_refusal_waits_for_a_slot() {
             for node in [0, 1] {
                 stranger.send_to(&common::of_another_digest(2, node), common::at(node)).unwrap();
             }
-            let seen = common::frames(&stranger, &mut heard).filter(|kind| *kind == Kind::Refusal).count();
+            let seen = common::frames(&stranger, &mut heard).filter(|kind| *kind == FrameKind::Refusal).count();
             if seen > 0 {
                 break seen;
             }
             assert!(began.elapsed() < PATIENCE, "nobody refuses");
         };
         let mut crossed = capture.end();
-        crossed.retain(|frame| frame.kind == Kind::Refusal);
+        crossed.retain(|frame| frame.kind == FrameKind::Refusal);
         assert!(crossed.len() >= refusals);
         let kept = validate(&crossed, &time);
         assert!(kept.outside.is_empty(), "{kept:?}");

@@ -21,7 +21,7 @@ use common::{
 use rohrpost_config::{Installation, bounds};
 use rohrpost_mailbox::{Receiver, Sender, TimeRecord, monotonic_ns};
 use rohrpost_network::{LATE, Tdma, Tunnel};
-use rohrpost_routers::tdma::Table;
+use rohrpost_routers::tdma::SlotTable;
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -200,7 +200,7 @@ impl<'a> Bridge<'a> {
         let heads = crossed.iter().flat_map(|frame| frame.heads.iter().map(move |head| (frame, head)));
         let flows = heads.filter(|(frame, head)| head.from == module(frame.from));
         let packages = flows.map(|(frame, head)| ((frame.from, head.to.instance(), head.id), frame.at_ns)).collect();
-        let table = Table::new(&table(), &MASTERS, 0, NODES, 28);
+        let table = SlotTable::new(&table(), &MASTERS, 0, NODES, 28);
         let kept = crossed.iter().filter_map(|frame| {
             let at_ns = time.at(frame.at_ns).ns;
             let owner = table.owner(at_ns).or_else(|| table.owner(at_ns + table.allowance_ns()))?;
@@ -214,7 +214,7 @@ impl<'a> Bridge<'a> {
     /// How long each package took, and whether all slots were kept that it could have taken.
     fn latencies(&self, flow: usize, published: &[u64]) -> Vec<(u64, bool)> {
         let (from, to, _) = FLOWS[flow];
-        let slots = Table::new(&table(), &MASTERS, from, NODES, 28);
+        let slots = SlotTable::new(&table(), &MASTERS, from, NODES, 28);
         let numbered = (0..).zip(published);
         // One that the capture has missed says nothing.
         let seen =

@@ -11,7 +11,7 @@ use common::{PATIENCE, Side, Words, label, router};
 use rohrpost_mailbox::{Name, Node, Shape, monotonic_ns};
 use rohrpost_network::Route;
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_routers::link::State;
+use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::{Parts, Shell};
 use std::io::Write;
@@ -121,9 +121,9 @@ fn a_way_that_stands_still_keeps_nobody_else_waiting() {
                 let _ = flood.send(&label(module(0), 100, 0), &[&[7; 1400]]);
             }
             goes(1);
-            assert_ne!(shells[2].stats().state(0, monotonic_ns()), State::Silent, "a living node says so");
+            assert_ne!(shells[2].stats().state(0, monotonic_ns()), PeerLinkState::Silent, "a living node says so");
         }
-        assert_eq!(shells[2].stats().state(0, monotonic_ns()), State::Alive, "and was heard all the while");
+        assert_eq!(shells[2].stats().state(0, monotonic_ns()), PeerLinkState::Alive, "and was heard all the while");
         assert!(run(&lab, "ip link del slow0"), "the stall ends");
         goes(0);
     }

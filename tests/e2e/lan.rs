@@ -9,7 +9,7 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Head, monotonic_ns};
-use rohrpost_routers::frame::{FrameHead, Kind};
+use rohrpost_routers::frame::{FrameHead, FrameKind};
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
@@ -321,7 +321,7 @@ fn net_shows_what_was_refused_and_what_to_do() {
     let port = installation.network.unwrap().port;
     let router_of_arm = UdpSocket::bind((arm, 0)).unwrap();
     let head = FrameHead {
-        kind: Kind::Packages,
+        kind: FrameKind::Packages,
         system: installation.system.id,
         from: 1,
         to: 0,

@@ -7,9 +7,9 @@ use nix::sys::epoll::{Epoll, EpollEvent, EpollFlags};
 use rohrpost_mailbox::{Head, Name, Options, Priority, Type, monotonic_ns};
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
-use rohrpost_routers::session::client::{Client, ClientSettings, Event, Host, Output, Package};
+use rohrpost_routers::session::client::{Client, ClientEvent, ClientHost, ClientPackage, ClientSettings, ClientStep};
 use rohrpost_routers::session::frame::{Carried, Range};
-use rohrpost_routers::session::{Answers, Cause};
+use rohrpost_routers::session::{Cause, ErrorReplies};
 use rohrpost_routers::tcp::{ClientSeal, Moved, Stream};
 use std::net::SocketAddr;
 
@@ -81,7 +81,7 @@ impl Guest {
             house.tally.sent.add(1);
         }
         let mut inbox = Inbox { house, expected: &mut self.expected, wrong: None };
-        self.client.send(now_ns, &Package { head, body, published_ns: now_ns, hops: 0 }, &mut inbox);
+        self.client.send(now_ns, &ClientPackage { head, body, published_ns: now_ns, hops: 0 }, &mut inbox);
         self.act(house, now_ns)
     }
 
@@ -117,10 +117,10 @@ impl Guest {
         loop {
             let mut inbox = Inbox { house, expected: &mut self.expected, wrong: None };
             match self.client.poll(now_ns, &mut inbox) {
-                Output::Wait { .. } => return inbox.wrong.map_or(Ok(()), Err),
-                Output::Connect => self.connect(house)?,
-                Output::Write => self.write(house)?,
-                Output::Close => return Err(Failure::Failed(format!("guest {} lost its connection", self.index))),
+                ClientStep::Wait { .. } => return inbox.wrong.map_or(Ok(()), Err),
+                ClientStep::Connect => self.connect(house)?,
+                ClientStep::Write => self.write(house)?,
+                ClientStep::Close => return Err(Failure::Failed(format!("guest {} lost its connection", self.index))),
             }
         }
     }
@@ -191,13 +191,13 @@ struct Inbox<'a> {
     wrong: Option<Failure>,
 }
 
-impl Answers for Inbox<'_> {
+impl ErrorReplies for Inbox<'_> {
     fn answer(&mut self, _: &[u8], _: Cause, _: Option<&str>, _: &mut Vec<u8>) -> bool {
         false
     }
 }
 
-impl Host for Inbox<'_> {
+impl ClientHost for Inbox<'_> {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
         let (now_ns, house) = (monotonic_ns(), self.house);
         match read(carried.body, *self.expected) {
@@ -218,10 +218,10 @@ impl Host for Inbox<'_> {
         Ok(())
     }
 
-    fn event(&mut self, event: Event<'_>) {
+    fn event(&mut self, event: ClientEvent<'_>) {
         match event {
-            Event::Up => {}
-            Event::Refused(refusal) => self.wrong = Some(Failure::of("refused", refusal)),
+            ClientEvent::Up => {}
+            ClientEvent::Refused(refusal) => self.wrong = Some(Failure::of("refused", refusal)),
             other => self.wrong = Some(Failure::Failed(format!("{other:?}"))),
         }
     }

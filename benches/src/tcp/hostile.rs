@@ -3,7 +3,7 @@
 use super::tally::Tally;
 use crate::harness::{Child, Failure, Shared};
 use nix::sys::socket::{AddressFamily, SockFlag, SockType, SockaddrIn, bind, connect, setsockopt, socket, sockopt};
-use rohrpost_routers::session::frame::{Hello, Message};
+use rohrpost_routers::session::frame::{SessionHello, SessionMessage};
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
 use std::time::{Duration, Instant};
@@ -96,7 +96,7 @@ fn reach(to: SocketAddr) -> std::io::Result<TcpStream> {
 fn hello() -> Vec<u8> {
     let mut bytes = Vec::new();
     let digest = 0x0bad;
-    let hello = Hello {
+    let hello = SessionHello {
         system: 9,
         reaches_own: false,
         common: digest,
@@ -106,7 +106,7 @@ fn hello() -> Vec<u8> {
         asked_ns: 0,
         name: "nobody",
     };
-    Message::Hello(hello).write(&mut bytes);
+    SessionMessage::Hello(hello).write(&mut bytes);
     bytes
 }
 

@@ -3,7 +3,7 @@
 use super::pace::Pace;
 use crate::harness::Failure;
 use nix::sys::socket::{setsockopt, sockopt};
-use rohrpost_routers::session::frame::Message;
+use rohrpost_routers::session::frame::SessionMessage;
 use rohrpost_routers::tcp::{Moved, Stream};
 
 /// Period of packages to it: a MiB a second.
@@ -34,7 +34,7 @@ impl Stalled {
     pub(super) fn next_due(&mut self, now_ns: u64) -> Result<Option<u64>, Failure> {
         if self.signs.next_due(now_ns).is_some() {
             let mut sign = Vec::new();
-            Message::Ask(now_ns).write(&mut sign);
+            SessionMessage::Ask(now_ns).write(&mut sign);
             if let Moved::Over(_) = self.stream.write(&sign, false) {
                 return Err(Failure::Failed("the stalled session was closed before the turn was over".into()));
             }

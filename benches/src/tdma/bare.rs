@@ -10,7 +10,7 @@ use crate::Failure;
 use crate::harness::{Child, Gate, Samples, Shared, rest};
 use rohrpost_mailbox::{monotonic_ns, sys};
 use rohrpost_routers::driver::spin_ns;
-use rohrpost_routers::tdma::{GATE_NS, Kind, Window};
+use rohrpost_routers::tdma::{GATE_NS, Window, WindowKind};
 use rohrpost_routers::time::TIME_BYTES;
 use std::time::Duration;
 
@@ -100,7 +100,7 @@ fn wake_up(plan: &Plan, own: u8, ready: &Gate, said: &Said) -> Result<(), Failur
         };
         from_ns = window.begin_ns + 1;
         let late_ns = late_ns(&window, spin_ns);
-        let is_slot = matches!(window.kind, Kind::Slot { .. });
+        let is_slot = matches!(window.kind, WindowKind::Slot { .. });
         if is_slot {
             said.late_us.push(late_ns as f64 / 1000.0);
         }

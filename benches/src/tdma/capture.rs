@@ -8,7 +8,7 @@ use crate::harness::{Child, Gate, Shared, Zeroable};
 use rohrpost_mailbox::{Name, Type};
 use rohrpost_routers::frame::Frame;
 use rohrpost_routers::lab;
-use rohrpost_routers::time::message::Message;
+use rohrpost_routers::time::message::TimeMessage;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -191,9 +191,9 @@ fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
             }
             FrameKind::Packages
         }
-        Frame::Time(rest) => match Message::parse(head.kind, rest) {
-            Ok(Message::Sync(sync)) if sync.replacement => FrameKind::Replacement,
-            Ok(Message::Sync(_)) => FrameKind::Sync,
+        Frame::Time(rest) => match TimeMessage::parse(head.kind, rest) {
+            Ok(TimeMessage::Sync(sync)) if sync.replacement => FrameKind::Replacement,
+            Ok(TimeMessage::Sync(_)) => FrameKind::Sync,
             _ => FrameKind::Said,
         },
         Frame::Alive(_) | Frame::Refusal(_) => FrameKind::Said,

@@ -4,7 +4,7 @@ use super::capture::{Crossed, FrameKind};
 use super::stage::NODES;
 use crate::statistics::median;
 use rohrpost_mailbox::TimeRecord;
-use rohrpost_routers::tdma::{Kind, Table, Window};
+use rohrpost_routers::tdma::{SlotTable, Window, WindowKind};
 
 /// What became of the frames of some cycles.
 #[derive(Clone, Default, Debug)]
@@ -25,7 +25,7 @@ impl Kept {
     /// A frame is its sender's if it begins in a window of the sender or in the guard behind, or so little before that
     /// the guard of the slot before still covers it. Any other is outside. Its offset is that from the nearest slot of
     /// its sender, if it could be the first of that. `tables`: as each node reads them.
-    pub fn of(frames: &[Crossed], tables: &[Table], time: &TimeRecord) -> Self {
+    pub fn of(frames: &[Crossed], tables: &[SlotTable], time: &TimeRecord) -> Self {
         let mut kept = Self { frames: frames.len(), ..Self::default() };
         let mut nodes: [Sender; NODES as usize] = Default::default();
         for frame in frames {
@@ -74,13 +74,13 @@ impl Sender {
     /// Offset of a frame from the beginning of its slot, µs; negative if before. None if it is not the first, or is in
     /// no slot.
     fn first_in(&mut self, window: Window, at_ns: u64) -> Option<f64> {
-        let is_first = self.last.replace(window) != Some(window) && matches!(window.kind, Kind::Slot { .. });
+        let is_first = self.last.replace(window) != Some(window) && matches!(window.kind, WindowKind::Slot { .. });
         is_first.then(|| at_ns.wrapping_sub(window.begin_ns).cast_signed() as f64 / 1000.0)
     }
 }
 
 /// The slot of a table's node that begins closest to a moment; it has one in each cycle.
-fn nearest_slot(table: &Table, at_ns: u64) -> Option<Window> {
+fn nearest_slot(table: &SlotTable, at_ns: u64) -> Option<Window> {
     let around = [at_ns.saturating_sub(table.cycle_ns()), at_ns].map(|from_ns| table.next_slot(from_ns));
     around.into_iter().flatten().min_by_key(|slot| slot.begin_ns.abs_diff(at_ns))
 }

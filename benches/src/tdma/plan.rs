@@ -6,7 +6,7 @@ use crate::lan::router::{ROUTER, SYSTEM};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Class, Name};
 use rohrpost_routers::settings::Settings;
-use rohrpost_routers::tdma::Table;
+use rohrpost_routers::tdma::SlotTable;
 use std::path::Path;
 
 /// Name of the installation.
@@ -86,19 +86,19 @@ impl Plan {
     ///
     /// # Errors
     /// As [`Self::installation`].
-    pub fn table(&self, own: u8) -> Result<Table, Failure> {
+    pub fn table(&self, own: u8) -> Result<SlotTable, Failure> {
         let installation = self.installation()?;
         let settings = Settings::new(&installation, &Place::Node(own).name(), 1)
             .map_err(|error| Failure::of("configuration", error))?;
         let tdma = installation.tdma.as_ref().ok_or_else(|| Failure::Failed("a plan without slots".into()))?;
-        Ok(Table::new(tdma, installation.time.masters(), own, NODES, settings.overhead_bytes()))
+        Ok(SlotTable::new(tdma, installation.time.masters(), own, NODES, settings.overhead_bytes()))
     }
 
     /// The slots, as each node reads them.
     ///
     /// # Errors
     /// As [`Self::installation`].
-    pub fn tables(&self) -> Result<Vec<Table>, Failure> {
+    pub fn tables(&self) -> Result<Vec<SlotTable>, Failure> {
         (0..NODES).map(|own| self.table(own)).collect()
     }
 

@@ -7,7 +7,7 @@ use super::stage::NODES;
 use crate::Failure;
 use crate::harness::interrupted;
 use rohrpost_mailbox::{SystemClock, TimeRecord, monotonic_ns};
-use rohrpost_routers::tdma::{Kind, Table, Window};
+use rohrpost_routers::tdma::{SlotTable, Window, WindowKind};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
@@ -129,14 +129,14 @@ fn await_new_master(
 }
 
 /// Slots of a node that begin in this part of system time, in which it sent nothing.
-fn unused(frames: &[Crossed], table: &Table, time: &TimeRecord, of: &std::ops::Range<u64>) -> u64 {
+fn unused(frames: &[Crossed], table: &SlotTable, time: &TimeRecord, of: &std::ops::Range<u64>) -> u64 {
     let its = frames.iter().filter(|frame| frame.from == table.own());
     let window = |frame: &Crossed| -> Option<Window> {
         let at_ns = time.at(frame.at_ns).ns;
         let owners = [at_ns, at_ns + table.allowance_ns()].map(|ns| table.owner(ns));
         owners.into_iter().flatten().find(|owner| owner.node == table.own()).map(|owner| owner.window)
     };
-    let is_meant = |window: &Window| matches!(window.kind, Kind::Slot { .. }) && of.contains(&window.begin_ns);
+    let is_meant = |window: &Window| matches!(window.kind, WindowKind::Slot { .. }) && of.contains(&window.begin_ns);
     let used: HashSet<Window> = its.filter_map(window).filter(is_meant).collect();
     table.slots_between(of.start, of.end).saturating_sub(used.len() as u64)
 }

@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     /// Faults of the network between them: loss, delay, jitter, duplicate, reorder, rate, corrupt, seed. For nodes that
     /// are reached only by TCP, a loss becomes a delay of that package and of all packages behind it.
     #[arg(long, value_name = "TEXT", requires = "nodes")]
-    pub(super) impair: Option<impair::Settings>,
+    pub(super) impair: Option<impair::ImpairmentSettings>,
     /// Another configuration.
     #[arg(long, value_name = "FILE", conflicts_with = "log")]
     pub(super) config: Option<PathBuf>,

@@ -4,7 +4,7 @@ use super::sealed_capture::SealedCapture;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::lab::Crossing;
 use rohrpost_routers::time::Term;
-use rohrpost_routers::time::message::{Message, Sync};
+use rohrpost_routers::time::message::{Sync, TimeMessage};
 use std::collections::VecDeque;
 
 /// The oldest are dropped first. On a busy computer, a backup master stands in for about one cycle in some hundred.
@@ -47,7 +47,7 @@ impl Masters {
 
     /// Records a datagram, if it is one of time.
     pub(super) fn note(&mut self, crossing: &Crossing<'_>) {
-        if let Some((head, Message::Sync(sync))) = self.capture.hear(crossing.datagram) {
+        if let Some((head, TimeMessage::Sync(sync))) = self.capture.hear(crossing.datagram) {
             self.told(head.from, crossing.at_ns, &sync);
         }
     }

@@ -8,7 +8,7 @@ use rohrpost_routers::frame::FrameHead;
 use rohrpost_routers::security::{Opening, PeerSessions, Port, RouterIdentity, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::time::TIME_BYTES;
-use rohrpost_routers::time::message::Message;
+use rohrpost_routers::time::message::TimeMessage;
 
 /// The incarnation of an observer that sends nothing.
 const MUTE: u64 = 1;
@@ -32,14 +32,14 @@ impl SealedCapture {
     }
 
     /// Parses a datagram of time, sealed or not.
-    pub(super) fn hear(&mut self, datagram: &[u8]) -> Option<(FrameHead, Message)> {
+    pub(super) fn hear(&mut self, datagram: &[u8]) -> Option<(FrameHead, TimeMessage)> {
         if let Ok((head, rest)) = FrameHead::parse(datagram) {
-            return Some((head, Message::parse(head.kind, rest).ok()?));
+            return Some((head, TimeMessage::parse(head.kind, rest).ok()?));
         }
         let mut sealed = [0; TIME_BYTES + TAG_BYTES];
         sealed.copy_from_slice(datagram.get(..TIME_BYTES + TAG_BYTES).filter(|whole| whole.len() == datagram.len())?);
         let ear = (0..self.nodes.len()).find(|node| self.nodes[*node].is_strange(&sealed))?;
         let (head, rest) = self.nodes[ear].overhear(&mut sealed).ok()?;
-        Some((head, Message::parse(head.kind, rest).ok()?))
+        Some((head, TimeMessage::parse(head.kind, rest).ok()?))
     }
 }

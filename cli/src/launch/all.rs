@@ -127,7 +127,7 @@ impl<'a> LaunchedNodes<'a> {
     pub(crate) fn begin(
         installation: Arc<Installation>,
         lab: Lab,
-        bad: Option<impair::Settings>,
+        bad: Option<impair::ImpairmentSettings>,
         speech: &'a Speech,
     ) -> Result<Self, Failure> {
         let (sender, happenings) = sync_channel(LINES_MAX);
@@ -149,7 +149,7 @@ impl<'a> LaunchedNodes<'a> {
         &mut self,
         index: usize,
         executable: &Path,
-        bad: Option<impair::Settings>,
+        bad: Option<impair::ImpairmentSettings>,
         sender: &SyncSender<NodeEvent>,
     ) -> Result<(), Failure> {
         let name = self.installation.nodes[index].name.clone();

@@ -60,7 +60,7 @@ mod tests {
     use super::*;
     use rohrpost::wire::append;
     use rohrpost_modules::call::ReplyEnvelope;
-    use rohrpost_routers::frame::Reason;
+    use rohrpost_routers::frame::RefusalReason;
     use rohrpost_routers::report::Mismatch;
 
     fn encoded() -> Encoded {
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn each_reported_cause_has_a_fault_with_a_remedy() {
         let call = CallEnvelope { interface: 1, incarnation: 7, sequence: 9, valid_for_us: 1, age_us: 0 }.to_bytes();
-        let mismatch = Some(Mismatch { reason: Reason::Digest, version: 1, digest: Some(0xabc) });
+        let mismatch = Some(Mismatch { reason: RefusalReason::Digest, version: 1, digest: Some(0xabc) });
         for (cause, words) in [
             (Cause::NoRoute, "same configuration"),
             (Cause::RoutersOwn, "no router knows a way there"),

@@ -8,7 +8,7 @@ use rohrpost_mailbox::{Class, Latency, Priority, monotonic_ns};
 use rohrpost_network::LEVELS;
 use rohrpost_routers::counts::{Cause, ClassCounts, Count, PeerReceived, PeerSent};
 use rohrpost_routers::frame::NodeIndex;
-use rohrpost_routers::link::State;
+use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::security::{Port, Rejection};
 use rohrpost_routers::shell::{Failure, Shell, difference};
 use rohrpost_routers::stats::{PeerStats, Stats};
@@ -71,14 +71,14 @@ fn link(shell: &Shell, peer: NodeIndex, now_ns: u64) -> PeerLink {
         node: node.name.clone(),
         address: node.address.to_string(),
         state: match state {
-            State::Unknown => LinkState::Unknown,
-            State::Alive => LinkState::Alive,
-            State::Silent => LinkState::Silent,
-            State::Unheard => LinkState::Unheard,
-            State::Refused(_) => LinkState::Refused,
+            PeerLinkState::Unknown => LinkState::Unknown,
+            PeerLinkState::Alive => LinkState::Alive,
+            PeerLinkState::Silent => LinkState::Silent,
+            PeerLinkState::Unheard => LinkState::Unheard,
+            PeerLinkState::Refused(_) => LinkState::Refused,
         },
         why: match state {
-            State::Refused(mismatch) => difference(&mismatch, settings.digest),
+            PeerLinkState::Refused(mismatch) => difference(&mismatch, settings.digest),
             _ => String::new(),
         },
         heard_ms: heard_ns.map(|at_ns| now_ns.saturating_sub(at_ns) / 1_000_000),

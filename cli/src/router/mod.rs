@@ -98,7 +98,7 @@ impl Module for RouterModule {
 }
 
 /// The network faults that a test requests.
-pub(super) fn impairment() -> Result<Option<impair::Settings>, ModuleError> {
+pub(super) fn impairment() -> Result<Option<impair::ImpairmentSettings>, ModuleError> {
     let text = std::env::var(impair::ENVIRONMENT).unwrap_or_default();
     if text.is_empty() {
         return Ok(None);

@@ -3,12 +3,12 @@
 use rohrpost::interfaces::{SlotState, SlotUse, TunnelState};
 use rohrpost_routers::driver::Used;
 use rohrpost_routers::shell::Shell;
-use rohrpost_routers::shell::slots::State;
+use rohrpost_routers::shell::slots::SlotStatus;
 use rohrpost_routers::shell::tunnel::Passed;
-use rohrpost_routers::tdma::Kind;
+use rohrpost_routers::tdma::WindowKind;
 
 /// The present state.
-pub(super) fn of(shell: &Shell, slots: &State) -> SlotState {
+pub(super) fn of(shell: &Shell, slots: &SlotStatus) -> SlotState {
     let (settings, seen) = (shell.settings(), slots.snapshot());
     let (counts, syncs) = (seen.counts, seen.counts.syncs);
     SlotState {
@@ -50,8 +50,8 @@ fn tunnel(passed: &Passed) -> TunnelState {
 fn used(used: &Used) -> SlotUse {
     SlotUse {
         slot: match used.window.kind {
-            Kind::Slot { index } => Some(index),
-            Kind::Synchronisation { .. } => None,
+            WindowKind::Slot { index } => Some(index),
+            WindowKind::Synchronisation { .. } => None,
         },
         begin_ns: used.window.begin_ns,
         end_ns: used.window.end_ns,

@@ -8,7 +8,7 @@ use rohrpost_config::Node;
 use rohrpost_mailbox::{monotonic_ns, realtime_ns};
 use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::session::server::{Names, OwnNode, OwnNodes, ServerSettings};
-use rohrpost_routers::tcp::{Member, ServerParts, ServerSeal, ServerShell};
+use rohrpost_routers::tcp::{MemberSnapshot, ServerParts, ServerSeal, ServerShell};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -47,7 +47,7 @@ impl Module for ServerModule {
             own_nodes: OwnNodes::new(installation.nodes.iter().map(own)),
             incarnation: realtime_ns().max(1),
             clients_max: tcp.clients,
-            greetings_max: tcp.clients.max(HANDSHAKES_MIN),
+            handshakes_max: tcp.clients.max(HANDSHAKES_MIN),
             quota_bytes: tcp.quota_bytes,
             levels: levels(tcp),
         };
@@ -75,12 +75,12 @@ impl Module for ServerModule {
                 refused: seen.refused,
                 refusal: seen.refusal,
                 crowded: BeyondCrowded {
-                    greetings: seen.crowded.greetings,
+                    greetings: seen.crowded.handshakes,
                     clients: seen.crowded.clients,
                     ranges: seen.crowded.ranges,
                     packages: seen.crowded_packages,
                 },
-                overtaken: seen.overtaken,
+                overtaken: seen.superseded,
                 held_lines: seen.held,
                 classes: classes(&seen.classes),
             },
@@ -95,9 +95,9 @@ const HANDSHAKES_MIN: u16 = 64;
 /// Ranges per report: with the names of their clients they fit in a package.
 const HOSTS_MAX: usize = 512;
 
-fn hosts(members: &[Member]) -> BeyondHosts {
+fn hosts(members: &[MemberSnapshot]) -> BeyondHosts {
     let all = members.iter().flat_map(|member| member.hosts.iter().map(move |range| (range, member)));
-    let host = |((first, last), member): (&(Name, Name), &Member)| BeyondHost {
+    let host = |((first, last), member): (&(Name, Name), &MemberSnapshot)| BeyondHost {
         first: first.raw(),
         last: last.raw(),
         client: member.name.clone(),
@@ -107,7 +107,7 @@ fn hosts(members: &[Member]) -> BeyondHosts {
     BeyondHosts { more: ranges.saturating_sub(hosts.len() as u64), hosts }
 }
 
-fn client(member: Member) -> BeyondClient {
+fn client(member: MemberSnapshot) -> BeyondClient {
     BeyondClient {
         name: member.name,
         address: member.peer,

@@ -18,7 +18,7 @@ struct Rule {
 }
 
 impl Access {
-    /// As configuration has it.
+    /// Rules as in the configuration.
     pub fn new(rules: &[config::Access]) -> Self {
         let rule = |access: &config::Access| {
             let mut callers = [0; 4];

@@ -1,5 +1,5 @@
-//! The one point of admission: what comes from another node, from another system, or by the TCP router is judged here
-//! before it reaches a mailbox.
+//! The one point of admission: what comes from another node, from another system, or by the TCP router is validated
+//! here before it reaches a mailbox.
 //!
 //! ```text
 //!  LAN ─▶ Inbound ──────────┐                                    ┌─▶ the mailbox, with the priority that it may have
@@ -24,14 +24,14 @@ use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER};
 use rohrpost_mailbox::{Class, Head, Kind, Name, Priority, Type, local};
 use rohrpost_network::Tunnel;
 
-/// Of a router of the LAN: takes IP packets from the same mailbox of other nodes.
+/// Mailbox of a router for IP packets from the same mailbox of other nodes.
 pub const TUNNEL: u8 = 4;
 /// Type of an IP packet.
 pub const PACKET: Type = Type::data(1);
 /// An IP packet goes behind all packages of modules.
 pub(crate) const PACKET_PRIORITY: Priority = Priority(0);
 
-/// What of configuration the judgement needs. The default refuses nothing but what is wrong in itself.
+/// The part of configuration that admission needs. The default refuses nothing but what is wrong in itself.
 #[derive(Clone, Debug, Default)]
 pub struct Admission {
     /// Which classes may command which.
@@ -64,7 +64,7 @@ pub enum ArrivalPath {
 
 /// Why a package is not admitted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Refused {
+pub enum NotAdmitted {
     /// Its sender is not hosted where it came from.
     ForeignName,
     /// It is from or for a router's own mailbox, or for a router of another system.
@@ -75,29 +75,29 @@ pub enum Refused {
     NotAllowed,
 }
 
-impl From<Refused> for counts::Cause {
-    fn from(why: Refused) -> Self {
+impl From<NotAdmitted> for counts::Cause {
+    fn from(why: NotAdmitted) -> Self {
         match why {
-            Refused::ForeignName => Self::ForeignName,
-            Refused::RoutersOwn => Self::RoutersOwn,
-            Refused::BadPacket => Self::BadPacket,
-            Refused::NotAllowed => Self::NotAllowed,
+            NotAdmitted::ForeignName => Self::ForeignName,
+            NotAdmitted::RoutersOwn => Self::RoutersOwn,
+            NotAdmitted::BadPacket => Self::BadPacket,
+            NotAdmitted::NotAllowed => Self::NotAllowed,
         }
     }
 }
 
-impl From<Refused> for session::Cause {
-    fn from(why: Refused) -> Self {
+impl From<NotAdmitted> for session::Cause {
+    fn from(why: NotAdmitted) -> Self {
         match why {
-            Refused::ForeignName => Self::Foreign,
-            Refused::RoutersOwn | Refused::BadPacket => Self::RoutersOwn,
-            Refused::NotAllowed => Self::NotAllowed,
+            NotAdmitted::ForeignName => Self::Foreign,
+            NotAdmitted::RoutersOwn | NotAdmitted::BadPacket => Self::RoutersOwn,
+            NotAdmitted::NotAllowed => Self::NotAllowed,
         }
     }
 }
 
 impl Admission {
-    /// As configuration has it for a node.
+    /// Admission for a node, as in the configuration.
     pub fn new(installation: &Installation, node: &str) -> Self {
         let tunnel = installation.tdma.as_ref().and_then(|tdma| tdma.tunnel);
         Self {
@@ -112,26 +112,26 @@ impl Admission {
     ///
     /// # Errors
     /// Why not.
-    pub fn validate(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), Refused> {
+    pub fn validate(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), NotAdmitted> {
         let is_reply = matches!(head.kind.kind(), Kind::Reply(_));
         match way {
             ArrivalPath::Lan { is_its_name: false, .. } => {
-                return Err(Refused::ForeignName);
+                return Err(NotAdmitted::ForeignName);
             }
             // In our own names the server itself speaks: it says that a module of ours is not there.
             ArrivalPath::Beyond { is_our_name } if is_our_name && !is_reply || !head.from.is_mailbox() => {
-                return Err(Refused::ForeignName);
+                return Err(NotAdmitted::ForeignName);
             }
             ArrivalPath::Lan { .. } | ArrivalPath::Beyond { .. } => {}
         }
         // A reply in the name of such a mailbox says that it takes nothing.
         if self.is_routers_own(head.to) || self.is_routers_own(head.from) && !is_reply {
-            self.judge_routers_own(way, head, body)?;
+            self.validate_routers_own(way, head, body)?;
         }
         if self.is_across_systems(way, head) {
-            return Err(Refused::RoutersOwn);
+            return Err(NotAdmitted::RoutersOwn);
         }
-        if self.access.allows(head) { Ok(()) } else { Err(Refused::NotAllowed) }
+        if self.access.allows(head) { Ok(()) } else { Err(NotAdmitted::NotAllowed) }
     }
 
     /// Whether a body is an IP packet from the tunnel's address of a node to ours.
@@ -155,7 +155,7 @@ impl Admission {
 
     /// From and to the mailboxes of routers nothing comes but IP packets by the LAN, from each node with its own
     /// address.
-    fn judge_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), Refused> {
+    fn validate_routers_own(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), NotAdmitted> {
         let node = match way {
             ArrivalPath::Lan { node, .. } => Some(node),
             ArrivalPath::Beyond { .. } => None,
@@ -166,8 +166,8 @@ impl Admission {
             && self.tunnel_end(head.to).is_some()
             && head.kind == PACKET;
         match node.filter(|_| is_tunnel) {
-            None => Err(Refused::RoutersOwn),
-            Some(node) if !self.is_packet_of(node, body) => Err(Refused::BadPacket),
+            None => Err(NotAdmitted::RoutersOwn),
+            Some(node) if !self.is_packet_of(node, body) => Err(NotAdmitted::BadPacket),
             Some(_) => Ok(()),
         }
     }

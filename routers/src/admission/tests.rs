@@ -6,7 +6,7 @@ const ROUTER: Class = Class(250);
 const TCP: Class = Class(64);
 const TUNNEL_NET: Tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
 
-/// Of node 0, with a tunnel, where only class 100 may command class 200.
+/// Admission of node 0, with a tunnel, where only class 100 may command class 200.
 fn admission() -> Admission {
     let rule = config::Access { class: Class(200), callers: vec![Class(100)], line: 7 };
     Admission { access: Access::new(&[rule]), router: Some(ROUTER), tcp: Some(TCP), tunnel: Some((TUNNEL_NET, 0)) }
@@ -22,7 +22,7 @@ fn lan(node: NodeIndex) -> ArrivalPath {
 
 const BEYOND: ArrivalPath = ArrivalPath::Beyond { is_our_name: false };
 
-fn judged(way: ArrivalPath, kind: Type, from: Name, to: Name) -> Result<(), Refused> {
+fn judged(way: ArrivalPath, kind: Type, from: Name, to: Name) -> Result<(), NotAdmitted> {
     admission().validate(way, &Head { to, from, kind, ..Head::default() }, &[])
 }
 
@@ -39,7 +39,7 @@ fn a_sender_under_a_name_of_another_is_refused() {
         (BEYOND, name(255, 60, 1, 1), false, "all systems"),
         (BEYOND, name(2, 0, 1, 1), false, "no class"),
     ] {
-        let expected = if is_admitted { Ok(()) } else { Err(Refused::ForeignName) };
+        let expected = if is_admitted { Ok(()) } else { Err(NotAdmitted::ForeignName) };
         assert_eq!(judged(way, Type::data(1), from, yours), expected, "{why}");
     }
 }
@@ -49,7 +49,7 @@ fn the_mailboxes_of_routers_take_nothing_and_their_modules_are_as_any() {
     let tool = name(1, 32, 40, 1);
     for class in [ROUTER.0, TCP.0] {
         for local in 0..=u8::MAX {
-            let expected = if local < local::TRANSIT { Ok(()) } else { Err(Refused::RoutersOwn) };
+            let expected = if local < local::TRANSIT { Ok(()) } else { Err(NotAdmitted::RoutersOwn) };
             for way in [lan(1), BEYOND] {
                 let (to, kinds) = (name(1, class, 0, local), [Type::command(16), Type::reply(16), Type::data(1)]);
                 for kind in kinds {
@@ -74,7 +74,7 @@ fn of_another_systems_routers_the_tcp_router_alone_is_for_all() {
         (1, name(1, ROUTER.0, 0, 0), true, "the same of the LAN's router"),
         (2, name(1, 90, 0, 0), true, "a module"),
     ] {
-        let expected = if is_admitted { Ok(()) } else { Err(Refused::RoutersOwn) };
+        let expected = if is_admitted { Ok(()) } else { Err(NotAdmitted::RoutersOwn) };
         assert_eq!(judged(BEYOND, Type::command(4), name(from, 32, 40, 1), to), expected, "{why}");
     }
     let answer = judged(BEYOND, Type::reply(4), name(2, TCP.0, TCP_SERVER, 0), name(1, 32, 40, 1));
@@ -92,7 +92,7 @@ fn only_classes_that_are_listed_may_command_by_whichever_way() {
         (Type::data(1), 90, 2, true),
         (Type::reply(16), 90, 1, true),
     ] {
-        let (expected, to) = (if is_admitted { Ok(()) } else { Err(Refused::NotAllowed) }, name(1, 200, 0, local));
+        let (expected, to) = (if is_admitted { Ok(()) } else { Err(NotAdmitted::NotAllowed) }, name(1, 200, 0, local));
         assert_eq!(judged(lan(1), kind, name(1, from, 1, 1), to), expected, "{kind:?} to {to}, by the LAN");
         assert_eq!(judged(BEYOND, kind, name(2, from, 1, 1), to), expected, "{kind:?} to {to}, by the TCP router");
     }
@@ -104,7 +104,7 @@ fn packets_of_the_tunnel_come_from_the_node_with_their_address() {
     let end = |node| name(1, ROUTER.0, node, TUNNEL);
     let packet = v4(theirs, ours, b"payload");
     let head = Head { to: end(0), from: end(1), kind: PACKET, ..Head::default() };
-    let (own, bad) = (Err(Refused::RoutersOwn), Err(Refused::BadPacket));
+    let (own, bad) = (Err(NotAdmitted::RoutersOwn), Err(NotAdmitted::BadPacket));
     for (way, head, body, expected, why) in [
         (lan(1), head, packet.clone(), Ok(()), "as it should be"),
         (lan(1), head, v4(TUNNEL_NET.address(2), ours, b""), bad, "the address of a third node"),

@@ -1,6 +1,6 @@
 //! A datagram that was made for a slot and missed it.
 
-use crate::frame::{Fragment, Kind, NodeIndex};
+use crate::frame::{Fragment, FrameKind, NodeIndex};
 use crate::outbound::kind_of_own;
 use rohrpost_mailbox::Head;
 use rohrpost_network::{LEVEL_NOT_REAL_TIME, Network};
@@ -8,15 +8,15 @@ use rohrpost_network::{LEVEL_NOT_REAL_TIME, Network};
 /// It waits for another slot at most so long.
 pub const HELD_NS_MAX: u64 = 100_000_000;
 
-/// For whom it is, and where it lies in the buffer: at its beginning.
+/// Its receiver and its length; it stands at the beginning of the buffer.
 #[derive(Clone, Copy)]
-pub(super) struct Held {
+pub(super) struct HeldDatagram {
     pub(super) to: NodeIndex,
     pub(super) bytes: usize,
     pub(super) made_ns: u64,
 }
 
-impl Held {
+impl HeldDatagram {
     pub(super) fn is_old(&self, now_ns: u64) -> bool {
         now_ns.saturating_sub(self.made_ns) > HELD_NS_MAX
     }
@@ -27,8 +27,8 @@ impl Held {
 pub(super) fn is_real_time(datagram: &[u8], network: &Network) -> bool {
     let Some((kind, _, rest)) = kind_of_own(datagram) else { return false };
     let head = match kind {
-        Kind::Packages => Head::from_bytes(rest).ok(),
-        Kind::Fragment => Fragment::parse(rest).ok().map(|part| part.head),
+        FrameKind::Packages => Head::from_bytes(rest).ok(),
+        FrameKind::Fragment => Fragment::parse(rest).ok().map(|part| part.head),
         // What routers say to each other has its place before all packages.
         _ => None,
     };
@@ -59,7 +59,7 @@ mod tests {
             let mut first = true;
             while let Some((_, bytes)) = end.outbound.poll_slot(START, (1472, &mut datagram), None, &mut end.log) {
                 let (frame, rest) = FrameHead::parse(&datagram[..bytes]).unwrap();
-                let (says, rest_bytes) = (frame.kind == Kind::Alive, rest.len());
+                let (says, rest_bytes) = (frame.kind == FrameKind::Alive, rest.len());
                 // As it is where it is to be sealed.
                 datagram[HEAD_BYTES - 4..HEAD_BYTES].fill(0);
                 assert!(!says || rest_bytes == ALIVE_BYTES && is_real_time(&datagram[..bytes], &network));
@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn it_does_not_wait_for_ever() {
-        let held = Held { to: 1, bytes: 10, made_ns: START };
+        let held = HeldDatagram { to: 1, bytes: 10, made_ns: START };
         assert!(!held.is_old(START + HELD_NS_MAX) && held.is_old(START + HELD_NS_MAX + 1));
     }
 }

@@ -3,7 +3,7 @@
 use crate::tdma::{TransmitWindow, Window};
 use crate::time::Stamp;
 
-/// So many windows are remembered.
+/// Number of windows that are remembered.
 pub const WINDOWS: usize = 16;
 
 /// A window that was used.

@@ -1,7 +1,7 @@
 //! Sends in time slots: the whole logic of the thread that does, without thread, clock, mailbox and socket.
 //!
 //! ```text
-//!            Platform: clocks, mailbox, sockets, Clock             SlotDriver: when to wake, what to take, make, hand over
+//!            Platform: clocks, mailbox, sockets, Clock             SlotDriver: when to wake, take, make, hand over
 //!  shell ──▶ real ones, one thread: poll, sleep, poll …     ──▶    the same code
 //!  sim   ──▶ virtual ones, events: poll, plan a wake-up …   ──▶
 //! ```

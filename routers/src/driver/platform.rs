@@ -6,7 +6,7 @@ use crate::intake::Transit;
 use crate::outbound::Outbound;
 use crate::report::Report;
 use crate::stats::Stats;
-use crate::tdma::{Planned, SlotScheduler, TransmitWindow, Verdict};
+use crate::tdma::{Planned, SlotScheduler, TransmitWindow, WindowVerdict};
 use crate::time::{Clock, SentId, Stamp, Step, TIME_BYTES};
 
 /// The system took a datagram neither to send nor to keep it: its packages are lost.
@@ -22,11 +22,11 @@ pub trait Platform {
     fn monotonic_ns(&self) -> u64;
     /// What is known of system time.
     fn clock(&self) -> &Clock;
-    /// The same, to be changed; and in which the half that receives counts.
+    /// The clock, to be changed, and the counters of the receiving half.
     fn time(&mut self) -> (&mut Clock, &Stats);
     /// The router's mailbox, and the queue behind it.
     fn transit(&mut self) -> impl Transit;
-    /// The queue; and who is told of what it loses.
+    /// The queue, and the receiver of reports on what it loses.
     fn queue(&mut self) -> (&mut Outbound, impl Report);
     /// Hands over the datagram in the first `bytes` of a buffer, which has room for a seal behind them.
     ///
@@ -58,7 +58,7 @@ pub enum SlotEvent<'a> {
     /// The clock was asked between windows, when it may send nothing.
     Idle(&'a Step),
     /// It was time for a window.
-    Judged(&'a Planned, &'a Verdict),
+    Decided(&'a Planned, &'a WindowVerdict),
     /// A hello leaves in this window by what is only overheard.
     AnsweredOverheard(&'a TransmitWindow),
     /// A datagram of packages was made.

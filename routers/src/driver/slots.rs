@@ -8,14 +8,14 @@
 //!                                       stamps, datagrams of time ─▶ Clock
 //! ```
 
-use super::held::{self, Held};
+use super::held::{self, HeldDatagram};
 use super::log::WindowLog;
 use super::platform::{NotSent, Platform, SlotEvent};
 use super::timing::{LAST_LOOK_NS, LOOK_BURST, NAP_NS, SLEEP_NS_MAX, TIDY_NS};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::intake::{Intake, MAKING_NS, QUIET_NS, Transit};
 use crate::outbound::Outbound;
-use crate::tdma::{Carries, Kind, Next, Planned, SlotScheduler, TransmitWindow, Verdict};
+use crate::tdma::{Carries, Next, Planned, SlotScheduler, TransmitWindow, WindowKind, WindowVerdict};
 use crate::time::{Allowed, SentId, Step, TIME_BYTES};
 use rohrpost_network::Network;
 
@@ -29,7 +29,7 @@ pub struct SlotDriver {
     /// Room for the largest datagram, and its seal.
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
-    held: Option<Held>,
+    held: Option<HeldDatagram>,
     phase: Phase,
     /// When the socket of time was read last, local ns.
     looked_ns: u64,
@@ -42,7 +42,7 @@ pub struct SlotDriver {
     log: WindowLog,
 }
 
-/// What to do until it is polled again.
+/// What to do until the next poll.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SlotStep {
     /// Sleep, ns from now on.
@@ -57,7 +57,7 @@ pub enum SlotStep {
     },
 }
 
-/// What it waits for.
+/// What the driver waits for.
 #[derive(Clone, Copy)]
 enum Phase {
     /// Nothing has been planned.
@@ -81,7 +81,7 @@ struct First {
 }
 
 impl SlotDriver {
-    /// Of a router that begins at `now_ns`. `datagram`: room for the largest, and its seal.
+    /// The driver of a router that begins at `now_ns`. `datagram`: room for the largest, and its seal.
     pub fn new(network: Network, nodes: usize, scheduler: SlotScheduler, datagram: Box<[u8]>, now_ns: u64) -> Self {
         Self {
             network,
@@ -116,8 +116,8 @@ impl SlotDriver {
             Phase::Sleeps(Some(planned)) => {
                 self.look(on);
                 self.open(on, &planned);
-                // Who is to send only if a Sync is missing looks for it once more.
-                let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
+                // A node that sends only if a Sync is missing looks for that Sync once more.
+                let is_slot = matches!(planned.window.kind, WindowKind::Slot { .. });
                 let looks = !is_slot && planned.call_ns.saturating_sub(on.local_ns()) > 2 * LAST_LOOK_NS;
                 self.phase = Phase::Spins { planned, looks };
             }
@@ -158,8 +158,8 @@ impl SlotDriver {
         }
     }
 
-    /// Between windows: sees to it that nothing waits in vain, and that the mailbox has room. Whoever is silent waits
-    /// for datagrams of time; others read them once a cycle at least.
+    /// Between windows: drops what waits in vain, and keeps room in the mailbox. A silent node waits for datagrams of
+    /// time; others read them once a cycle at least.
     fn between(&mut self, on: &mut impl Platform, is_silent: bool, wake_ns: u64) {
         let now_ns = on.monotonic_ns();
         self.tidied_ns = now_ns;
@@ -198,7 +198,7 @@ impl SlotDriver {
     /// Awake for a slot, it takes from the mailbox what that has room for.
     fn open(&mut self, on: &mut impl Platform, planned: &Planned) {
         on.happened(SlotEvent::Awake(planned));
-        if let (Kind::Slot { .. }, None) = (planned.window.kind, self.scheduler.silent()) {
+        if let (WindowKind::Slot { .. }, None) = (planned.window.kind, self.scheduler.silent()) {
             let sends_ns = planned.end_ns.saturating_sub(planned.begin_ns);
             self.intake.open(on.monotonic_ns(), self.scheduler.table().wire().bytes_in(sends_ns));
         }
@@ -228,8 +228,8 @@ impl SlotDriver {
     fn window(&mut self, on: &mut impl Platform, planned: &Planned) {
         let called_ns = on.local_ns();
         let verdict = self.scheduler.validate(planned, called_ns, on.clock());
-        on.happened(SlotEvent::Judged(planned, &verdict));
-        if let Verdict::Send(tx_window) = verdict {
+        on.happened(SlotEvent::Decided(planned, &verdict));
+        if let WindowVerdict::Send(tx_window) = verdict {
             self.use_window(on, tx_window, called_ns);
         }
         self.intake.close();
@@ -281,7 +281,7 @@ impl SlotDriver {
     fn send_packages(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
         self.drop_if_old(on);
         while let Some(made) = self.next_datagram(on, tx_window) {
-            let (Held { to, bytes, .. }, now_ns) = (made, on.local_ns());
+            let (HeldDatagram { to, bytes, .. }, now_ns) = (made, on.local_ns());
             if !tx_window.fits(now_ns, bytes) {
                 self.missed(on, made);
                 break;
@@ -295,7 +295,7 @@ impl SlotDriver {
 
     /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread
     /// stands still meanwhile.
-    fn next_datagram(&mut self, on: &mut impl Platform, tx_window: &TransmitWindow) -> Option<Held> {
+    fn next_datagram(&mut self, on: &mut impl Platform, tx_window: &TransmitWindow) -> Option<HeldDatagram> {
         if let Some(held) = self.held.take() {
             return Some(held);
         }
@@ -310,12 +310,12 @@ impl SlotDriver {
         let (to, bytes) = outbound.poll_slot(made_ns, (room_bytes, &mut self.datagram[..]), behind, &mut report)?;
         drop(report);
         on.happened(SlotEvent::Made);
-        Some(Held { to, bytes, made_ns })
+        Some(HeldDatagram { to, bytes, made_ns })
     }
 
     /// The thread stood still with a datagram in its hand. It goes first in the next slot, unless it is not real time:
     /// then it would keep up what is, and is lost.
-    fn missed(&mut self, on: &mut impl Platform, made: Held) {
+    fn missed(&mut self, on: &mut impl Platform, made: HeldDatagram) {
         let datagram = &self.datagram[..made.bytes];
         let held = held::is_real_time(datagram, &self.network);
         on.happened(SlotEvent::Missed { datagram, held });
@@ -327,8 +327,7 @@ impl SlotDriver {
         }
     }
 
-    /// What was made and found no slot for long is lost: whoever sent it counts on that nothing arrives that is much
-    /// older than it may be.
+    /// A datagram that was made and found no slot for long is lost: its sender relies on a limit of age.
     fn drop_if_old(&mut self, on: &mut impl Platform) {
         let now_ns = on.monotonic_ns();
         if let Some(held) = self.held.take_if(|held| held.is_old(now_ns)) {
@@ -372,7 +371,7 @@ impl SlotDriver {
     }
 }
 
-/// One in a slot: whoever brings refusals or hellos about must not take the slots of packages.
+/// At most one in a slot: a peer that provokes refusals or hellos must not take the slots of packages.
 fn answer(on: &mut impl Platform, tx_window: &mut TransmitWindow) {
     let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
     let overheard = if asks { on.clock().overheard(now_ns) } else { None };

@@ -5,7 +5,7 @@ use rohrpost_network::TRANSIT_LOOK;
 /// The thread wakes up so much before the call, to read what came and to spin. Measured on a virtual machine with both
 /// processors busy: it wakes up 50 µs late on average, and to read takes 30 µs.
 const SPIN_NS_MAX: u64 = 150_000;
-/// Of the cycle, at most this part for each window: short cycles leave less time for it.
+/// Spinning for one window takes at most this fraction of the cycle: short cycles leave less time for it.
 const SPIN_CYCLES: u64 = 20;
 /// Syncs that came since it woke up are looked for so long before the call: to read one takes some microseconds.
 pub(super) const LAST_LOOK_NS: u64 = 50_000;
@@ -16,11 +16,11 @@ pub(super) const NAP_NS: u64 = 1_000_000;
 pub(super) const SLEEP_NS_MAX: u64 = NAP_NS + NAP_NS / 4;
 const _: () = assert!(
     (SLEEP_NS_MAX + SPIN_NS_MAX) as u128 <= TRANSIT_LOOK.as_nanos(),
-    "who declares flows counts on it, that what waits does not overflow meanwhile"
+    "declared flows rely on it: what waits does not overflow meanwhile"
 );
-/// So many datagrams of time, and one for each node, are read at a look: to read one takes some microseconds.
+/// Datagrams of time that are read at a look, besides one for each node: reading one takes some microseconds.
 pub(super) const LOOK_BURST: usize = 16;
-/// To see to what waits takes less than this, unless much does.
+/// Handling what waits takes less than this, unless much waits.
 pub(super) const TIDY_NS: u64 = 250_000;
 
 /// How long before the call the thread that sends in time slots is to wake up, ns; then it spins.

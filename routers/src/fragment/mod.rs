@@ -25,7 +25,7 @@ pub enum Change {
 
 /// A complete package.
 #[derive(Debug)]
-pub struct Whole<'a> {
+pub struct CompletePackage<'a> {
     /// Its head.
     pub head: Head,
     /// Sequence of the datagram with its first fragment: its place in the order.
@@ -69,7 +69,7 @@ impl Reassembly {
         part: &Fragment<'_>,
         is_late: impl FnOnce() -> bool,
         mut tell: impl FnMut(&Head, &[u8], Change),
-    ) -> Option<Whole<'_>> {
+    ) -> Option<CompletePackage<'_>> {
         let is_its = |partial: &Partial| partial.first == part.first;
         let known = self.partial.iter().position(|partial| partial.is_used && is_its(partial));
         let at = match known {
@@ -91,7 +91,7 @@ impl Reassembly {
         if !is_late {
             self.delivers(&head, first);
         }
-        Some(Whole { head, first, is_late, body: &self.partial[at].body })
+        Some(CompletePackage { head, first, is_late, body: &self.partial[at].body })
     }
 
     /// A package of the datagram with this sequence is delivered: incomplete packages of its flow that began before it

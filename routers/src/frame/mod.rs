@@ -31,7 +31,7 @@ pub type NodeIndex = u8;
 /// Kind of a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
-pub enum Kind {
+pub enum FrameKind {
     /// Whole packages, one after the other.
     Packages = 1,
     /// A fragment of a package.
@@ -52,7 +52,7 @@ pub enum Kind {
     Reply = 19,
 }
 
-impl Kind {
+impl FrameKind {
     pub(crate) const ALL: [Self; 9] = [
         Self::Packages,
         Self::Fragment,
@@ -70,7 +70,7 @@ impl Kind {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FrameHead {
     /// What it is.
-    pub kind: Kind,
+    pub kind: FrameKind,
     /// System of sender and receiver.
     pub system: u8,
     /// Node that sent it.
@@ -143,10 +143,10 @@ impl FrameHead {
         if b[CHECK] != check(b, &[rest]).to_le_bytes() {
             return Err(BadFrame::Damaged("the check differs"));
         }
-        if b[2] != VERSION && b[3] != Kind::Refusal as u8 {
+        if b[2] != VERSION && b[3] != FrameKind::Refusal as u8 {
             return Err(BadFrame::Version(b[2]));
         }
-        let kind = Kind::ALL.into_iter().find(|kind| *kind as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
+        let kind = FrameKind::ALL.into_iter().find(|it| *it as u8 == b[3]).ok_or(BadFrame::Damaged("unknown kind"))?;
         let head = Self {
             kind,
             system: b[4],
@@ -179,7 +179,7 @@ pub(crate) fn place_of(datagram: &[u8]) -> (NodeIndex, u64) {
 pub(crate) const DIGEST_AT: u32 = 8;
 
 /// The first four bytes of a datagram of a kind, of this version.
-pub(crate) fn beginning(kind: Kind) -> [u8; 4] {
+pub(crate) fn beginning(kind: FrameKind) -> [u8; 4] {
     [MAGIC[0], MAGIC[1], VERSION, kind as u8]
 }
 
@@ -233,15 +233,15 @@ impl<'a> Frame<'a> {
         Ok((head, Self::read(head.kind, datagram[2], rest)?))
     }
 
-    /// The same for the rest after a head, as a router of a `version` wrote it.
-    pub(crate) fn read(kind: Kind, version: u8, rest: &'a [u8]) -> Result<Self, BadFrame> {
+    /// Reads the rest after a head, as a router of a `version` wrote it.
+    pub(crate) fn read(kind: FrameKind, version: u8, rest: &'a [u8]) -> Result<Self, BadFrame> {
         Ok(match kind {
-            Kind::Packages => Self::Packages(Packages::check(rest)?),
-            Kind::Fragment => Self::Fragment(Fragment::parse(rest)?),
-            Kind::Alive => Self::Alive(Alive::parse(rest)?),
-            Kind::Refusal => Self::Refusal(Refusal::parse(version, rest)?),
-            Kind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
-            Kind::Sync | Kind::WarmUp | Kind::Request | Kind::Reply => Self::Time(rest),
+            FrameKind::Packages => Self::Packages(Packages::check(rest)?),
+            FrameKind::Fragment => Self::Fragment(Fragment::parse(rest)?),
+            FrameKind::Alive => Self::Alive(Alive::parse(rest)?),
+            FrameKind::Refusal => Self::Refusal(Refusal::parse(version, rest)?),
+            FrameKind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
+            FrameKind::Sync | FrameKind::WarmUp | FrameKind::Request | FrameKind::Reply => Self::Time(rest),
         })
     }
 }
@@ -375,7 +375,7 @@ impl Alive {
 /// Why a peer takes nothing from this node.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
-pub enum Reason {
+pub enum RefusalReason {
     /// Another version of the wire format; the refusal's own version byte is theirs.
     Version = 1,
     /// Another configuration.
@@ -394,7 +394,7 @@ pub struct Refusal {
     /// Wire version of the refusing router: the third byte of all its datagrams.
     pub version: u8,
     /// Why.
-    pub reason: Reason,
+    pub reason: RefusalReason,
     /// Digest of the refusing router.
     pub digest: u64,
 }
@@ -410,7 +410,7 @@ impl Refusal {
 
     fn parse(version: u8, rest: &[u8]) -> Result<Self, BadFrame> {
         let b: &[u8; REFUSAL_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("a refusal has 16 bytes"))?;
-        let reasons = [Reason::Version, Reason::Digest, Reason::Stranger, Reason::Sealed];
+        let reasons = [RefusalReason::Version, RefusalReason::Digest, RefusalReason::Stranger, RefusalReason::Sealed];
         let reason = reasons.into_iter().find(|reason| *reason as u8 == b[0]);
         let reason = reason.filter(|_| b[1..8] == [0; 7]).ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
         Ok(Self { version, reason, digest: long(b, 8) })

@@ -2,11 +2,11 @@ use super::*;
 use proptest::prelude::*;
 use rohrpost_mailbox::{Name, Priority};
 
-fn frame_head(kind: Kind) -> FrameHead {
+fn frame_head(kind: FrameKind) -> FrameHead {
     FrameHead { kind, system: 1, from: 2, to: 3, digest: 4, incarnation: 5, sequence: 6 }
 }
 
-fn datagram(kind: Kind, rest: &[u8]) -> Vec<u8> {
+fn datagram(kind: FrameKind, rest: &[u8]) -> Vec<u8> {
     [&frame_head(kind).to_bytes(&[rest]), rest].concat()
 }
 
@@ -32,42 +32,42 @@ fn fragment(index: u16, count: u16, offset: u32, len: u16, bytes: usize) -> Vec<
 #[test]
 fn what_is_written_reads_back() {
     let rest = [package(b"one"), package(b""), package(b"three")].concat();
-    let bytes = datagram(Kind::Packages, &rest);
+    let bytes = datagram(FrameKind::Packages, &rest);
     let (head, frame) = Frame::parse(&bytes).unwrap();
-    assert_eq!(head, frame_head(Kind::Packages));
+    assert_eq!(head, frame_head(FrameKind::Packages));
     let Frame::Packages(packages) = frame else { panic!("{frame:?}") };
     let bodies: Vec<&[u8]> = packages.map(|(_, body)| body).collect();
     assert_eq!(bodies, [&b"one"[..], b"", b"three"]);
 
     let alive = Alive { heard_incarnation: 1, heard_next: 2, heard_lost: 3 };
-    let bytes = datagram(Kind::Alive, &alive.to_bytes());
-    assert_eq!(Frame::parse(&bytes), Ok((frame_head(Kind::Alive), Frame::Alive(alive))));
+    let bytes = datagram(FrameKind::Alive, &alive.to_bytes());
+    assert_eq!(Frame::parse(&bytes), Ok((frame_head(FrameKind::Alive), Frame::Alive(alive))));
 
-    for reason in [Reason::Version, Reason::Digest, Reason::Stranger] {
+    for reason in [RefusalReason::Version, RefusalReason::Digest, RefusalReason::Stranger] {
         let refusal = Refusal { version: VERSION, reason, digest: 99 };
-        let bytes = datagram(Kind::Refusal, &refusal.to_bytes());
-        assert_eq!(Frame::parse(&bytes), Ok((frame_head(Kind::Refusal), Frame::Refusal(refusal))));
+        let bytes = datagram(FrameKind::Refusal, &refusal.to_bytes());
+        assert_eq!(Frame::parse(&bytes), Ok((frame_head(FrameKind::Refusal), Frame::Refusal(refusal))));
     }
-    let bytes = datagram(Kind::Sync, b"of time");
-    assert_eq!(Frame::parse(&bytes), Ok((frame_head(Kind::Sync), Frame::Time(b"of time"))));
+    let bytes = datagram(FrameKind::Sync, b"of time");
+    assert_eq!(Frame::parse(&bytes), Ok((frame_head(FrameKind::Sync), Frame::Time(b"of time"))));
 }
 
 #[test]
 fn the_check_covers_all_parts_alike() {
-    let whole = frame_head(Kind::Packages).to_bytes(&[b"one and two"]);
-    assert_eq!(frame_head(Kind::Packages).to_bytes(&[b"one ", b"", b"and two"]), whole);
+    let whole = frame_head(FrameKind::Packages).to_bytes(&[b"one and two"]);
+    assert_eq!(frame_head(FrameKind::Packages).to_bytes(&[b"one ", b"", b"and two"]), whole);
 }
 
 #[test]
 fn what_is_wrong_says_why() {
     let damaged = |why| Err(BadFrame::Damaged(why));
     let changed = |at: usize, to: u8| {
-        let mut bytes = datagram(Kind::Packages, &package(b"body"));
+        let mut bytes = datagram(FrameKind::Packages, &package(b"body"));
         bytes[at] = to;
         bytes
     };
-    let long_sequence = FrameHead { sequence: SEQUENCE_MAX + 1, ..frame_head(Kind::Sync) }.to_bytes(&[]).to_vec();
-    let no_incarnation = FrameHead { incarnation: 0, ..frame_head(Kind::Sync) }.to_bytes(&[]).to_vec();
+    let long_sequence = FrameHead { sequence: SEQUENCE_MAX + 1, ..frame_head(FrameKind::Sync) }.to_bytes(&[]).to_vec();
+    let no_incarnation = FrameHead { incarnation: 0, ..frame_head(FrameKind::Sync) }.to_bytes(&[]).to_vec();
     for (bytes, why) in [
         (vec![], Err(BadFrame::Foreign)),
         (b"Rp".to_vec(), Err(BadFrame::Foreign)),
@@ -79,14 +79,14 @@ fn what_is_wrong_says_why() {
         (checked(changed(7, 1)), Err(BadFrame::Sealed)),
         (no_incarnation, damaged("incarnation 0")),
         (long_sequence, damaged("a sequence that no router reaches")),
-        (datagram(Kind::Packages, &[]), damaged("a package is cut short")),
-        (datagram(Kind::Packages, &package(b"body")[..19]), damaged("a package is cut short")),
-        (datagram(Kind::Packages, &[package(b"body"), vec![1]].concat()), damaged("a package is cut short")),
-        (datagram(Kind::Alive, &[0; 23]), damaged("an alive frame has 24 bytes")),
-        (datagram(Kind::Refusal, &[1; 15]), damaged("a refusal has 16 bytes")),
-        (datagram(Kind::Refusal, &[0; 16]), damaged("unknown reason of a refusal")),
-        (datagram(Kind::Refusal, &[1; 16]), damaged("unknown reason of a refusal")),
-        (datagram(Kind::Fragment, &[0; 31]), damaged("a fragment is cut short")),
+        (datagram(FrameKind::Packages, &[]), damaged("a package is cut short")),
+        (datagram(FrameKind::Packages, &package(b"body")[..19]), damaged("a package is cut short")),
+        (datagram(FrameKind::Packages, &[package(b"body"), vec![1]].concat()), damaged("a package is cut short")),
+        (datagram(FrameKind::Alive, &[0; 23]), damaged("an alive frame has 24 bytes")),
+        (datagram(FrameKind::Refusal, &[1; 15]), damaged("a refusal has 16 bytes")),
+        (datagram(FrameKind::Refusal, &[0; 16]), damaged("unknown reason of a refusal")),
+        (datagram(FrameKind::Refusal, &[1; 16]), damaged("unknown reason of a refusal")),
+        (datagram(FrameKind::Fragment, &[0; 31]), damaged("a fragment is cut short")),
     ] {
         assert_eq!(Frame::parse(&bytes).map(|_| ()), why, "{bytes:02x?}");
     }
@@ -94,8 +94,8 @@ fn what_is_wrong_says_why() {
 
 #[test]
 fn a_refusal_is_read_in_every_version() {
-    let refusal = Refusal { version: 77, reason: Reason::Version, digest: 99 };
-    let mut bytes = datagram(Kind::Refusal, &refusal.to_bytes());
+    let refusal = Refusal { version: 77, reason: RefusalReason::Version, digest: 99 };
+    let mut bytes = datagram(FrameKind::Refusal, &refusal.to_bytes());
     bytes[2] = 77;
     assert_eq!(Frame::parse(&checked(bytes)).map(|(_, frame)| frame), Ok(Frame::Refusal(refusal)));
 }
@@ -120,7 +120,7 @@ fn fragments_that_cannot_be_are_refused() {
         (0, 257, 0, 257, 1, false, "more parts than are taken"),
         (255, 256, 255, 256, 1, true, "as many as are taken"),
     ] {
-        let bytes = datagram(Kind::Fragment, &fragment(index, count, offset, len, bytes));
+        let bytes = datagram(FrameKind::Fragment, &fragment(index, count, offset, len, bytes));
         assert_eq!(Frame::parse(&bytes).is_ok(), sound, "{why}");
     }
 }
@@ -129,7 +129,7 @@ proptest! {
     #[test]
     fn no_bytes_bring_it_down(bytes: Vec<u8>, kind in 0u8..24) {
         let _ = Frame::parse(&bytes);
-        let mut bytes = [&frame_head(Kind::Packages).to_bytes(&[]), &bytes[..]].concat();
+        let mut bytes = [&frame_head(FrameKind::Packages).to_bytes(&[]), &bytes[..]].concat();
         bytes[3] = kind;
         let _ = Frame::parse(&checked(bytes)).map(|(_, frame)| if let Frame::Packages(packages) = frame {
             assert!(packages.count() > 0);
@@ -138,7 +138,7 @@ proptest! {
 
     #[test]
     fn a_flipped_bit_is_noticed(body: Vec<u8>, bit: prop::sample::Index) {
-        let mut bytes = datagram(Kind::Packages, &package(&body[..body.len().min(1000)]));
+        let mut bytes = datagram(FrameKind::Packages, &package(&body[..body.len().min(1000)]));
         let bit = bit.index(bytes.len() * 8);
         bytes[bit / 8] ^= 1 << (bit % 8);
         prop_assert!(Frame::parse(&bytes).is_err());

@@ -7,23 +7,23 @@
 //! A segment that is lost, or changed, is sent again after a retransmission time, and what is behind it waits with it.
 //! One that is held back makes the others wait as well. Copies are nothing to a stream.
 
-use super::{BYTES_MAX, Drawn, Settings, nanos};
+use super::{BYTES_MAX, Drawn, ImpairmentSettings, nanos};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
-/// What is sent at a time, bytes.
+/// Size of a segment, bytes.
 const SEGMENT_BYTES: usize = 1448;
-/// A segment is sent again after this time and the way there and back; after twice that the next time, and so on.
+/// A segment is sent again after this time and the round trip; after twice that the next time, and so on.
 const SENT_AGAIN_NS: u64 = 200_000_000;
-/// So often at most: nobody waits for a stream for so long.
+/// Retransmissions at most: nobody waits longer for a stream.
 const TRIES_MAX: u32 = 16;
-/// What waits to be sent: so much as leaves in this time, and no less than a segment.
+/// Limit of what waits to be sent: what leaves in this time, and no less than a segment.
 const WAITS_NS: u64 = 20_000_000;
 
 /// Bytes on their way.
 pub struct BandwidthQueue {
-    settings: Settings,
+    settings: ImpairmentSettings,
     random: ChaCha8Rng,
     /// When the line has sent what it was given.
     free_ns: u64,
@@ -37,7 +37,7 @@ pub struct BandwidthQueue {
 
 impl BandwidthQueue {
     /// `stream` tells users of one seed apart.
-    pub fn new(settings: Settings, stream: u64) -> Self {
+    pub fn new(settings: ImpairmentSettings, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
         random.set_stream(stream);
         let (on_way, bytes) = (VecDeque::new(), VecDeque::new());
@@ -74,7 +74,7 @@ impl BandwidthQueue {
 
     /// How much later a segment arrives because it did not at once, ns.
     fn again_ns(&mut self, first: &Drawn) -> u64 {
-        let Settings { loss, corrupt, delay, .. } = self.settings;
+        let ImpairmentSettings { loss, corrupt, delay, .. } = self.settings;
         let fails = |drawn: &Drawn| loss.holds(drawn.loss) || corrupt.holds(drawn.corrupt);
         let (mut fails_now, mut later_ns) = (fails(first), 0);
         for tries in 0..TRIES_MAX {
@@ -155,7 +155,7 @@ mod tests {
             ("loss=1%,seed=3", 1 << 20, 200, 1500, "sent again, most of them once, all at the same time"),
             ("corrupt=1%,seed=3", 1 << 20, 200, 1500, "a sum is wrong, and it is sent again"),
             ("reorder=5%,seed=3", 1 << 20, 1, 2, "the others wait for what was held back"),
-            ("duplicate=50%", 1 << 20, 0, 0, "copies are dropped"),
+            ("duplicate=50%", 1 << 20, 0, 0, "duplicates are dropped"),
         ] {
             let (_, took_ns) = carry(text, bytes);
             assert!((least_ms * MS..=most_ms * MS).contains(&took_ns), "{text}: {took_ns} ns: {why}");

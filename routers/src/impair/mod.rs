@@ -1,9 +1,9 @@
-//! A bad network between a router and its socket, from a seed: loss, delay, jitter, copies, changed order, a slow line,
-//! changed bits. And what the same network is to a stream: a [`BandwidthQueue`].
+//! A bad network between a router and its socket, from a seed: loss, delay, jitter, duplicates, changed order, a slow
+//! line, changed bits. And what the same network is to a stream: a [`BandwidthQueue`].
 //!
 //! ```text
 //!  push ──▶ lost? ──▶ line of `rate` ──▶ delay ± jitter ──▶ held back? ──▶ changed bit? ──▶ due, in order of time ──▶ poll
-//!                                                                            └─ copied? ──▶ once more, a little later
+//!                                                                            └─ duplicated? ──▶ once more, a little later
 //! ```
 //!
 //! Each fault can be had alone: jitter never changes the order (as queues of switches do not), only `reorder` does.
@@ -15,7 +15,7 @@ mod bandwidth_queue;
 mod text;
 
 pub use bandwidth_queue::BandwidthQueue;
-pub use text::SettingsError;
+pub use text::ImpairmentSettingsError;
 
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -32,18 +32,18 @@ pub const BYTES_MAX: usize = 16 << 20;
 /// No delay or jitter is longer.
 pub const DELAY_MAX: Duration = Duration::from_secs(10);
 
-/// What is held back, or copied, comes at most so much later; twice the delay, if that is longer.
+/// Longest extra delay of what is held back or duplicated; twice the delay, if that is longer.
 const LATER_NS: u64 = 2_000_000;
 
-/// A part of all datagrams, in millionths.
+/// Probability that something happens to a datagram, in millionths.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Share(u32);
+pub struct Probability(u32);
 
-impl Share {
+impl Probability {
     /// All of them, in millionths.
     pub const ALL: u32 = 1_000_000;
 
-    /// So many in a million; more than [`ALL`](Self::ALL) is all.
+    /// This many in a million; more than [`ALL`](Self::ALL) is all.
     pub const fn per_million(millionths: u32) -> Self {
         Self(if millionths > Self::ALL { Self::ALL } else { millionths })
     }
@@ -54,53 +54,53 @@ impl Share {
 }
 
 /// How bad the network is. The text form, `loss=5%,delay=2ms,seed=7`, has each key at most once, in any order; see
-/// [`Settings::from_str`].
+/// [`ImpairmentSettings::from_str`].
 ///
 /// ```
-/// # use rohrpost_routers::impair::Settings;
-/// let settings: Settings = "loss=5%,delay=2ms,jitter=1ms,rate=10MiB,seed=7".parse().unwrap();
+/// # use rohrpost_routers::impair::ImpairmentSettings;
+/// let settings: ImpairmentSettings = "loss=5%,delay=2ms,jitter=1ms,rate=10MiB,seed=7".parse().unwrap();
 /// assert_eq!(settings.to_string(), "loss=5%,delay=2ms,jitter=1ms,rate=10MiB,seed=7");
-/// let wrong = "loss=5".parse::<Settings>().unwrap_err();
+/// let wrong = "loss=5".parse::<ImpairmentSettings>().unwrap_err();
 /// assert_eq!(wrong.to_string(), "`loss=5`: write a share from 0% to 100%, such as loss=5%");
 /// ```
 ///
-/// [`Settings::from_str`]: std::str::FromStr::from_str
+/// [`ImpairmentSettings::from_str`]: std::str::FromStr::from_str
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Settings {
+pub struct ImpairmentSettings {
     /// Never arrive.
-    pub loss: Share,
+    pub loss: Probability,
     /// How long all are on their way, on top of the real one.
     pub delay: Duration,
     /// More or less than that, evenly spread; never less than nothing.
     pub jitter: Duration,
     /// Arrive twice.
-    pub duplicate: Share,
+    pub duplicate: Probability,
     /// Are held back, so that later ones go before them.
-    pub reorder: Share,
+    pub reorder: Probability,
     /// Bytes a second that the line carries; others wait.
     pub rate_bytes_s: Option<u64>,
     /// Have one bit changed.
-    pub corrupt: Share,
+    pub corrupt: Probability,
     /// What is drawn follows from it.
     pub seed: u64,
 }
 
-impl Default for Settings {
+impl Default for ImpairmentSettings {
     fn default() -> Self {
         Self {
-            loss: Share::default(),
+            loss: Probability::default(),
             delay: Duration::ZERO,
             jitter: Duration::ZERO,
-            duplicate: Share::default(),
-            reorder: Share::default(),
+            duplicate: Probability::default(),
+            reorder: Probability::default(),
             rate_bytes_s: None,
-            corrupt: Share::default(),
+            corrupt: Probability::default(),
             seed: 1,
         }
     }
 }
 
-impl Settings {
+impl ImpairmentSettings {
     /// When the line has sent so many bytes that it began then.
     fn sent_ns(&self, begin_ns: u64, bytes: usize) -> u64 {
         let Some(rate) = self.rate_bytes_s else { return begin_ns };
@@ -118,9 +118,9 @@ impl Settings {
     }
 }
 
-/// What became of the datagrams so far. Pushed + copied = passed + lost + full + those still on their way.
+/// What became of the datagrams so far. Pushed + duplicated = passed + lost + full + those still on their way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Counts {
+pub struct ImpairmentCounts {
     /// Given to [`Impairment::push`].
     pub pushed: u64,
     /// Given out by [`Impairment::poll`].
@@ -129,17 +129,17 @@ pub struct Counts {
     pub lost: u64,
     /// Lost because too many were on their way.
     pub full: u64,
-    /// Second copies made.
-    pub copied: u64,
+    /// Duplicates made.
+    pub duplicated: u64,
     /// Held back.
     pub held_back: u64,
     /// Changed.
     pub corrupted: u64,
 }
 
-/// What [`Impairment::poll`] says.
+/// Next step, from [`Impairment::poll`].
 #[derive(PartialEq, Eq, Debug)]
-pub enum Output<'a, T> {
+pub enum ImpairmentStep<'a, T> {
     /// This one has arrived; ask again.
     Send {
         /// Where it was to go.
@@ -156,7 +156,7 @@ pub enum Output<'a, T> {
 
 /// Datagrams on a bad way. `T` says where each is to go.
 pub struct Impairment<T> {
-    settings: Settings,
+    settings: ImpairmentSettings,
     random: ChaCha8Rng,
     /// When the line has sent what it was given.
     line_free_ns: u64,
@@ -165,13 +165,13 @@ pub struct Impairment<T> {
     on_way: BinaryHeap<Reverse<(u64, u64, usize)>>,
     /// Ones that are due at the same time keep their order.
     count: u64,
-    slots: Vec<Slot<T>>,
+    slots: Vec<PoolEntry<T>>,
     free: Vec<usize>,
     bytes: usize,
-    counts: Counts,
+    counts: ImpairmentCounts,
 }
 
-struct Slot<T> {
+struct PoolEntry<T> {
     to: Option<T>,
     datagram: Vec<u8>,
 }
@@ -204,7 +204,7 @@ fn part(whole: u64, drawn: u32) -> u64 {
 impl<T: Clone> Impairment<T> {
     /// `stream` tells users of one seed apart: each socket of each node has its own, or all would lose the same
     /// datagrams.
-    pub fn new(settings: Settings, stream: u64) -> Self {
+    pub fn new(settings: ImpairmentSettings, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
         random.set_stream(stream);
         Self {
@@ -217,7 +217,7 @@ impl<T: Clone> Impairment<T> {
             slots: Vec::new(),
             free: Vec::new(),
             bytes: 0,
-            counts: Counts::default(),
+            counts: ImpairmentCounts::default(),
         }
     }
 
@@ -239,7 +239,7 @@ impl<T: Clone> Impairment<T> {
         }
         let bit = self.settings.corrupt.holds(drawn.corrupt).then_some(drawn.bit);
         if self.settings.duplicate.holds(drawn.duplicate) {
-            self.counts.copied += 1;
+            self.counts.duplicated += 1;
             let copy_due_ns = due_ns.saturating_add(self.settings.later_ns(drawn.copy_later));
             self.hold(copy_due_ns, to.clone(), datagram, None);
         }
@@ -247,13 +247,13 @@ impl<T: Clone> Impairment<T> {
     }
 
     /// The next that has arrived by now, or when to ask again.
-    pub fn poll(&mut self, now_ns: u64) -> Output<'_, T> {
+    pub fn poll(&mut self, now_ns: u64) -> ImpairmentStep<'_, T> {
         loop {
             let Some(Reverse((due_ns, _, index))) = self.on_way.peek().copied() else {
-                return Output::Wait { until_ns: u64::MAX };
+                return ImpairmentStep::Wait { until_ns: u64::MAX };
             };
             if due_ns > now_ns {
-                return Output::Wait { until_ns: due_ns };
+                return ImpairmentStep::Wait { until_ns: due_ns };
             }
             self.on_way.pop();
             self.free.push(index);
@@ -262,12 +262,12 @@ impl<T: Clone> Impairment<T> {
             let datagram = &self.slots[index].datagram;
             self.bytes -= datagram.len();
             self.counts.passed += 1;
-            return Output::Send { to, datagram };
+            return ImpairmentStep::Send { to, datagram };
         }
     }
 
     /// What became of all so far.
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> ImpairmentCounts {
         self.counts
     }
 
@@ -283,7 +283,7 @@ impl<T: Clone> Impairment<T> {
             return;
         }
         let index = self.free.pop().unwrap_or_else(|| {
-            self.slots.push(Slot { to: None, datagram: Vec::new() });
+            self.slots.push(PoolEntry { to: None, datagram: Vec::new() });
             self.slots.len() - 1
         });
         let slot = &mut self.slots[index];

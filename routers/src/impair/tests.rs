@@ -1,22 +1,22 @@
 use super::*;
 use proptest::prelude::*;
 
-fn settings(text: &str) -> Settings {
+fn settings(text: &str) -> ImpairmentSettings {
     text.parse().unwrap()
 }
 
 /// Pushes datagrams numbered from 0, one every `period_ns`, and gives what arrives, and when.
-fn arrivals(text: &str, stream: u64, datagrams: u32, period_ns: u64) -> (Vec<(u64, u32)>, Counts) {
+fn arrivals(text: &str, stream: u64, datagrams: u32, period_ns: u64) -> (Vec<(u64, u32)>, ImpairmentCounts) {
     let mut way = Impairment::new(settings(text), stream);
     let mut arrived = Vec::new();
     let mut now_ns = 0;
     let mut pushed = 0;
     loop {
         match way.poll(now_ns) {
-            Output::Send { to: (), datagram } => {
+            ImpairmentStep::Send { to: (), datagram } => {
                 arrived.push((now_ns, u32::from_le_bytes(datagram[..4].try_into().unwrap())));
             }
-            Output::Wait { until_ns } => {
+            ImpairmentStep::Wait { until_ns } => {
                 assert!(until_ns > now_ns, "what is due is given out");
                 let push_ns = if pushed < datagrams { u64::from(pushed) * period_ns } else { u64::MAX };
                 if push_ns.min(until_ns) == u64::MAX {
@@ -40,7 +40,7 @@ fn numbers(arrived: &[(u64, u32)]) -> Vec<u32> {
 fn without_faults_all_arrive_at_once_and_in_order() {
     let (arrived, counts) = arrivals("", 0, 100, 10);
     assert!(arrived.iter().enumerate().all(|(at, arrival)| *arrival == (10 * at as u64, at as u32)));
-    assert_eq!(counts, Counts { pushed: 100, passed: 100, ..Counts::default() });
+    assert_eq!(counts, ImpairmentCounts { pushed: 100, passed: 100, ..ImpairmentCounts::default() });
 }
 
 #[test]
@@ -49,8 +49,8 @@ fn shares_are_what_they_say() {
     assert_eq!(arrived.len() as u64 + counts.lost, 100_000);
     assert!((4_800..5_200).contains(&counts.lost), "{counts:?}");
     let (arrived, counts) = arrivals("duplicate=1%", 0, 100_000, 1000);
-    assert_eq!(arrived.len() as u64, 100_000 + counts.copied);
-    assert!((900..1_100).contains(&counts.copied), "{counts:?}");
+    assert_eq!(arrived.len() as u64, 100_000 + counts.duplicated);
+    assert!((900..1_100).contains(&counts.duplicated), "{counts:?}");
     let (_, counts) = arrivals("corrupt=0.1%", 0, 100_000, 1000);
     assert!((60..140).contains(&counts.corrupted), "{counts:?}");
     let (arrived, _) = arrivals("loss=100%", 0, 1000, 1000);
@@ -69,17 +69,17 @@ fn jitter_spreads_evenly_and_keeps_the_order() {
 }
 
 #[test]
-fn what_is_held_back_is_overtaken_and_nothing_else() {
+fn what_is_held_back_is_reordered_and_nothing_else() {
     let (arrived, counts) = arrivals("delay=1ms,reorder=5%", 0, 10_000, 100_000);
     assert_eq!(arrived.len(), 10_000);
     assert!((400..600).contains(&counts.held_back), "{counts:?}");
     let mut highest = 0;
-    let overtaken = numbers(&arrived).into_iter().filter(|number| {
+    let reordered = numbers(&arrived).into_iter().filter(|number| {
         highest = highest.max(*number);
         *number < highest
     });
-    let overtaken = overtaken.count() as u64;
-    assert!(overtaken > counts.held_back / 2 && overtaken <= counts.held_back, "{overtaken} of {}", counts.held_back);
+    let reordered = reordered.count() as u64;
+    assert!(reordered > counts.held_back / 2 && reordered <= counts.held_back, "{reordered} of {}", counts.held_back);
 }
 
 #[test]
@@ -96,12 +96,12 @@ fn a_changed_datagram_differs_in_one_bit() {
     let datagram = [0x5A; 64];
     for round in 0..100 {
         way.push(round, 7, &datagram);
-        let Output::Send { to, datagram: changed } = way.poll(round) else { panic!("it is due") };
+        let ImpairmentStep::Send { to, datagram: changed } = way.poll(round) else { panic!("it is due") };
         let bits: u32 = datagram.iter().zip(changed).map(|(a, b)| (a ^ b).count_ones()).sum();
         assert_eq!((to, bits, changed.len()), (7, 1, 64));
     }
     way.push(100, 7, &[]);
-    assert_eq!(way.poll(100), Output::Send { to: 7, datagram: &[] }, "nothing in it can change");
+    assert_eq!(way.poll(100), ImpairmentStep::Send { to: 7, datagram: &[] }, "nothing in it can change");
 }
 
 #[test]
@@ -140,9 +140,9 @@ fn too_many_on_their_way_are_counted_and_forgotten() {
         way.push(0, (), &[0; 60_000]);
     }
     assert!(way.on_way() * 60_000 <= BYTES_MAX && way.counts().full >= 9);
-    assert_eq!(way.poll(999_999_999), Output::Wait { until_ns: 1_000_000_000 });
+    assert_eq!(way.poll(999_999_999), ImpairmentStep::Wait { until_ns: 1_000_000_000 });
     let mut passed = 0;
-    while let Output::Send { .. } = way.poll(1_000_000_000) {
+    while let ImpairmentStep::Send { .. } = way.poll(1_000_000_000) {
         passed += 1;
     }
     assert_eq!(passed, BYTES_MAX / 60_000);
@@ -166,26 +166,26 @@ fn mistakes_say_what_is_right() {
         ("rate=0B", "`rate=0B`: write bytes a second with their unit (B, KiB, MiB), such as rate=10MiB"),
         ("seed=x", "`seed=x`: write a whole number, such as seed=7"),
     ] {
-        assert_eq!(text.parse::<Settings>().unwrap_err().to_string(), message);
+        assert_eq!(text.parse::<ImpairmentSettings>().unwrap_err().to_string(), message);
     }
 }
 
 proptest! {
     #[test]
     fn what_is_written_reads_back(
-        shares in proptest::array::uniform4(0..=Share::ALL),
+        shares in proptest::array::uniform4(0..=Probability::ALL),
         delay_us in 0u64..=10_000_000, jitter_us in 0u64..=10_000_000,
-        rate in proptest::option::of(1u64..), seed: u64,
+        rate_bytes_s in proptest::option::of(1u64..), seed: u64,
     ) {
-        let [loss, duplicate, reorder, corrupt] = shares.map(Share::per_million);
+        let [loss, duplicate, reorder, corrupt] = shares.map(Probability::per_million);
         let (delay, jitter) = (Duration::from_micros(delay_us), Duration::from_micros(jitter_us));
-        let settings = Settings { loss, delay, jitter, duplicate, reorder, rate_bytes_s: rate, corrupt, seed };
+        let settings = ImpairmentSettings { loss, delay, jitter, duplicate, reorder, rate_bytes_s, corrupt, seed };
         prop_assert_eq!(settings.to_string().parse(), Ok(settings));
     }
 
     #[test]
     fn no_text_brings_it_down(text in "[a-z0-9=,.%]{0,40}|.*") {
-        let _ = text.parse::<Settings>();
+        let _ = text.parse::<ImpairmentSettings>();
     }
 
     /// Whatever is pushed and whenever, everything is accounted for.
@@ -197,9 +197,9 @@ proptest! {
         for (wait_ns, bytes) in steps {
             now_ns += wait_ns;
             way.push(now_ns, (), &vec![0; bytes]);
-            while let Output::Send { .. } = way.poll(now_ns) {}
-            let Counts { pushed, passed, lost, full, copied, .. } = way.counts();
-            prop_assert_eq!(pushed + copied, passed + lost + full + way.on_way() as u64);
+            while let ImpairmentStep::Send { .. } = way.poll(now_ns) {}
+            let ImpairmentCounts { pushed, passed, lost, full, duplicated, .. } = way.counts();
+            prop_assert_eq!(pushed + duplicated, passed + lost + full + way.on_way() as u64);
         }
     }
 }

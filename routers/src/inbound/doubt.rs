@@ -16,12 +16,12 @@ const WITHIN_NS: u64 = 2_000_000_000;
 /// Doubted claims of one peer.
 #[derive(Debug, Default)]
 pub(super) struct Doubt {
-    claims: [Claim; KEPT],
+    claims: [DoubtedClaim; KEPT],
     next: usize,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Claim {
+struct DoubtedClaim {
     /// 0: nothing.
     incarnation: u64,
     sequence: u64,
@@ -32,17 +32,18 @@ impl Doubt {
     /// Whether another datagram has confirmed this claim: of the same incarnation, and sent shortly before or
     /// reordered. If none has, this one is remembered.
     pub(super) fn is_confirmed(&mut self, now_ns: u64, head: &FrameHead) -> bool {
-        let says_so =
-            |claims: &Claim| claims.incarnation == head.incarnation && claims.sequence.abs_diff(head.sequence) < WINDOW;
+        let says_so = |claims: &DoubtedClaim| {
+            claims.incarnation == head.incarnation && claims.sequence.abs_diff(head.sequence) < WINDOW
+        };
         let known =
             self.claims.iter().position(|claims| says_so(claims) && now_ns.saturating_sub(claims.at_ns) <= WITHIN_NS);
         if let Some(place) = known.filter(|place| self.claims[*place].sequence != head.sequence) {
-            self.claims[place] = Claim::default();
+            self.claims[place] = DoubtedClaim::default();
             return true;
         }
         let place = known.unwrap_or(self.next);
         self.next = if known.is_none() { (self.next + 1) % KEPT } else { self.next };
-        self.claims[place] = Claim { incarnation: head.incarnation, sequence: head.sequence, at_ns: now_ns };
+        self.claims[place] = DoubtedClaim { incarnation: head.incarnation, sequence: head.sequence, at_ns: now_ns };
         false
     }
 }

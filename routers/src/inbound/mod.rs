@@ -16,7 +16,7 @@ pub use window::{REORDER_MAX, WINDOW};
 
 use crate::admission::capped;
 use crate::counts::Cause;
-use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, Reason, VERSION};
+use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, RefusalReason, VERSION};
 use crate::report::{Deliver, Mismatch};
 use crate::settings::Settings;
 use crate::stats::Stats;
@@ -49,7 +49,7 @@ pub struct Datagram<'a> {
 
 /// Envelope of a datagram that was opened: as [`Datagram`] has it.
 #[derive(Clone, Copy, Debug)]
-pub struct Came {
+pub struct Envelope {
     /// Source address.
     pub source: IpAddr,
     /// Arrival.
@@ -58,9 +58,9 @@ pub struct Came {
     pub bytes: usize,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Inbound::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Output {
+pub enum InboundStep {
     /// Send the first bytes of the buffer to the packages' port of an address, then ask again.
     Refuse {
         /// The address.
@@ -89,7 +89,7 @@ pub struct Inbound {
 }
 
 impl Inbound {
-    /// For the router of `settings.own`.
+    /// State for the router of `settings.own`.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         Self {
             peers: settings.nodes.iter().map(|_| PeerReceiver::default()).collect(),
@@ -105,7 +105,7 @@ impl Inbound {
     /// Handles any datagram.
     pub fn handle(&mut self, now_ns: u64, datagram: &Datagram<'_>, deliver: &mut impl Deliver) {
         let Datagram { source, arrived_ns, bytes } = *datagram;
-        let came = Came { source, arrived_ns, bytes: bytes.len() };
+        let came = Envelope { source, arrived_ns, bytes: bytes.len() };
         match Frame::parse(datagram.bytes) {
             Ok((_, Frame::Refusal(refusal))) => self.refused_by(now_ns, source, &refusal, deliver),
             Ok((_, Frame::Time(_))) | Err(BadFrame::Foreign) => self.stats.foreign.add(1),
@@ -114,23 +114,23 @@ impl Inbound {
                 Some(mismatch) => self.refuse(now_ns, source, mismatch, deliver),
             },
             Err(BadFrame::Version(version)) => {
-                let mismatch = Mismatch { reason: Reason::Version, version, digest: None };
+                let mismatch = Mismatch { reason: RefusalReason::Version, version, digest: None };
                 self.refuse(now_ns, source, mismatch, deliver);
             }
             Err(BadFrame::Sealed) => {
-                let mismatch = Mismatch { reason: Reason::Sealed, version: VERSION, digest: None };
+                let mismatch = Mismatch { reason: RefusalReason::Sealed, version: VERSION, digest: None };
                 self.refuse(now_ns, source, mismatch, deliver);
             }
             Err(BadFrame::Damaged(_)) => self.damaged(source),
         }
     }
 
-    /// The same for one that was sealed, and opened: `text` is what follows its head, `first` the first sequence that
+    /// Handles a datagram that was sealed, and opened: `text` is what follows its head, `first` the first sequence that
     /// counts of its incarnation.
     pub fn handle_opened(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         (head, text, first): (&FrameHead, &[u8], u64),
         deliver: &mut impl Deliver,
     ) {
@@ -157,7 +157,7 @@ impl Inbound {
     }
 
     /// Whether an incarnation of a peer with this head may begin: it may if all that must be equal is.
-    pub(crate) fn may_greet(
+    pub(crate) fn may_handshake(
         &mut self,
         now_ns: u64,
         source: IpAddr,
@@ -197,16 +197,16 @@ impl Inbound {
     ///
     /// # Panics
     /// If it has not.
-    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], deliver: &mut impl Deliver) -> Output {
+    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], deliver: &mut impl Deliver) -> InboundStep {
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, deliver);
         }
         if self.must_refuse
             && let Some((to, reason)) = self.due(now_ns)
         {
-            return Output::Refuse { to, bytes: self.refusal(to, reason, datagram) };
+            return InboundStep::Refuse { to, bytes: self.refusal(to, reason, datagram) };
         }
-        Output::Wait { until_ns: self.sweep_ns }
+        InboundStep::Wait { until_ns: self.sweep_ns }
     }
 
     /// Packages with missing fragments.
@@ -214,11 +214,11 @@ impl Inbound {
         self.peers.iter().map(|peer| peer.reassembly.len() as u64).sum()
     }
 
-    /// `first`: see [`PeerReceiver::lives`].
+    /// `first`: see [`PeerReceiver::is_present`].
     fn take(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         (head, first): (&FrameHead, Option<u64>),
         frame: Frame<'_>,
         deliver: &mut impl Deliver,
@@ -227,7 +227,7 @@ impl Inbound {
         let way = PeerContext { from, stats: &self.stats, peer: self.stats.peer(from) };
         let peer = &mut self.peers[usize::from(from)];
         let is_other = first.is_none() && self.stats.is_other_incarnation(from, head.incarnation);
-        if is_other || !peer.lives(now_ns, head, first, &way, deliver) {
+        if is_other || !peer.is_present(now_ns, head, first, &way, deliver) {
             return way.peer.received.old.add(1);
         }
         if !peer.is_new(head.sequence, &way) {

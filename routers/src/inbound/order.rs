@@ -7,7 +7,7 @@
 //! So it is checked when it begins, and [`Reassembly`](crate::fragment::Reassembly) notes whether a newer package of
 //! its flow goes before it.
 
-use crate::fragment::Whole;
+use crate::fragment::CompletePackage;
 use rohrpost_mailbox::Head;
 
 const GROUPS: usize = 64;
@@ -32,13 +32,13 @@ pub(super) struct Order {
 #[derive(Clone, Copy, Debug, Default)]
 struct Group {
     /// One more than the last delivered position; 0: empty.
-    places: [(u64, Flow); PLACES],
+    places: [(u64, FlowKey); PLACES],
     /// One more than the highest forgotten position.
     floor: u64,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-struct Flow {
+struct FlowKey {
     names: u64,
     priority: u8,
 }
@@ -64,7 +64,7 @@ impl Order {
     }
 
     /// Whether a package that came in fragments is late; if it is not, it is the newest of its flow.
-    pub(super) fn is_whole_late(&mut self, whole: &Whole<'_>) -> bool {
+    pub(super) fn is_whole_late(&mut self, whole: &CompletePackage<'_>) -> bool {
         let position = position(whole.first, 0);
         let is_late = whole.is_late;
         if !is_late {
@@ -100,9 +100,9 @@ impl Order {
 }
 
 /// The flow of a package, and its group.
-fn place(head: &Head) -> (Flow, usize) {
+fn place(head: &Head) -> (FlowKey, usize) {
     let names = u64::from(head.to.raw()) << 32 | u64::from(head.from.raw());
-    let flow = Flow { names, priority: head.priority.0 };
+    let flow = FlowKey { names, priority: head.priority.0 };
     // The golden ratio spreads names that have bits in common.
     let spread = (names ^ u64::from(flow.priority) << 24).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     (flow, (spread >> 58) as usize % GROUPS)

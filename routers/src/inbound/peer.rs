@@ -2,12 +2,12 @@
 
 use super::doubt::Doubt;
 use super::order::{Order, sequence_of};
-use super::window::{Arrival, WINDOW, Window};
+use super::window::{Arrival, SequenceWindow, WINDOW};
 use crate::counts::Cause;
 use crate::fragment::{Change, Reassembly};
-use crate::frame::{Alive, FrameHead, NodeIndex, Reason};
-use crate::link::{REFUSED_FOR_NS, SILENT_AFTER_NS, State};
-use crate::report::{Deliver, Event, Mismatch, NotDelivered};
+use crate::frame::{Alive, FrameHead, NodeIndex, RefusalReason};
+use crate::link::{PeerLinkState, REFUSED_FOR_NS, SILENT_AFTER_NS};
+use crate::report::{Deliver, Mismatch, NotDelivered, RouterEvent};
 use crate::stats::{PeerStats, Stats};
 use rohrpost_mailbox::{Head, Throttle};
 use std::net::IpAddr;
@@ -32,7 +32,7 @@ pub(super) struct PeerReceiver {
     restarts_told: Throttle,
     old: [PastIncarnation; OLD_KEPT],
     old_next: usize,
-    pub(super) window: Window,
+    pub(super) window: SequenceWindow,
     pub(super) order: Order,
     pub(super) reassembly: Reassembly,
     pub(super) refusing: Refusing,
@@ -43,7 +43,7 @@ pub(super) struct PeerReceiver {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Refusing {
     /// Receiver and reason of a refusal that is due.
-    pub(super) due: Option<(IpAddr, Reason)>,
+    pub(super) due: Option<(IpAddr, RefusalReason)>,
     /// No refusal before this time, ns.
     pub(super) not_before_ns: u64,
     pub(super) told: Option<(IpAddr, Mismatch)>,
@@ -77,7 +77,7 @@ impl PeerReceiver {
     /// What it sent before it was over says nothing: that may be a duplicate from the wire or a replay. Unauthenticated
     /// claims need a second datagram: see [`Doubt`]. `first`: where datagrams are sealed, the handshake has shown that
     /// this incarnation is the present one, and that it counts from this sequence on.
-    pub(super) fn lives(
+    pub(super) fn is_present(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
@@ -95,7 +95,7 @@ impl PeerReceiver {
         if was.is_some() && !may_go_on {
             if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
-                deliver.event(Event::Twice { peer: way.from });
+                deliver.event(RouterEvent::Twice { peer: way.from });
             }
             return false;
         }
@@ -113,16 +113,16 @@ impl PeerReceiver {
             self.old[place] = PastIncarnation { incarnation: self.incarnation, next };
             self.told = PeerNotices { heard: true, twice: self.told.twice, ..PeerNotices::default() };
             if self.restarts_told.note(now_ns, RESTARTS_TOLD_NS).is_some() {
-                deliver.event(Event::Restarted { peer: way.from });
+                deliver.event(RouterEvent::Restarted { peer: way.from });
             }
         }
         self.window = match (first, was) {
             // What is missing from there on was sent to this incarnation of ours, and is lost.
-            (Some(first), _) => Window::going_on(first),
+            (Some(first), _) => SequenceWindow::going_on(first),
             // Earlier ones may have been delivered.
-            (None, Some(_)) => Window::going_on(head.sequence),
-            (None, None) if is_first => Window::joining(head.sequence),
-            (None, None) => Window::default(),
+            (None, Some(_)) => SequenceWindow::going_on(head.sequence),
+            (None, None) if is_first => SequenceWindow::joining(head.sequence),
+            (None, None) => SequenceWindow::default(),
         };
         (self.incarnation, self.began_ns, self.is_sure) = (head.incarnation, now_ns, !is_first);
         way.peer.link.incarnation.set(head.incarnation);
@@ -145,7 +145,7 @@ impl PeerReceiver {
             return false;
         }
         if is_behind {
-            self.window = Window::joining(head.sequence);
+            self.window = SequenceWindow::joining(head.sequence);
             self.order.clear();
         }
         self.is_sure = true;
@@ -174,12 +174,12 @@ impl PeerReceiver {
         if !self.told.heard {
             self.told = PeerNotices { heard: true, silent: false, ..self.told };
             link.begin(now_ns);
-            deliver.event(Event::Heard { peer: way.from });
+            deliver.event(RouterEvent::Heard { peer: way.from });
         }
         link.heard_ns.set(now_ns);
         match self.told.refuses {
             // It does not know our address; that says nothing of its own datagrams.
-            Some((Mismatch { reason: Reason::Stranger, .. }, until_ns)) if now_ns < until_ns => {}
+            Some((Mismatch { reason: RefusalReason::Stranger, .. }, until_ns)) if now_ns < until_ns => {}
             _ => {
                 self.told.refuses = None;
                 link.accept();
@@ -204,14 +204,14 @@ impl PeerReceiver {
         way.peer.link.next.set(self.window.next());
         match arrival {
             Arrival::Newest => return true,
-            Arrival::Overtaken => received.reordered.add(1),
+            Arrival::Reordered => received.reordered.add(1),
             Arrival::Returned => {
                 received.reordered.add(1);
                 received.returned.add(1);
             }
-            Arrival::Copy => received.duplicates.add(1),
+            Arrival::Duplicate => received.duplicates.add(1),
         }
-        arrival != Arrival::Copy
+        arrival != Arrival::Duplicate
     }
 
     /// Restarts the wait for it: this router could not have heard it.
@@ -226,13 +226,13 @@ impl PeerReceiver {
     pub(super) fn look_after(&mut self, now_ns: u64, way: &PeerContext<'_>, deliver: &mut impl Deliver) {
         let peer = way.from;
         let state = way.stats.state(peer, now_ns);
-        if state == State::Silent && !self.told.silent {
+        if state == PeerLinkState::Silent && !self.told.silent {
             self.told = PeerNotices { silent: true, heard: false, ..self.told };
-            deliver.event(Event::Silent { peer });
+            deliver.event(RouterEvent::Silent { peer });
         }
-        let is_unheard = state == State::Unheard;
+        let is_unheard = state == PeerLinkState::Unheard;
         if is_unheard && !self.told.unheard {
-            deliver.event(Event::Unheard { peer });
+            deliver.event(RouterEvent::Unheard { peer });
         }
         self.told.unheard = is_unheard;
     }

@@ -1,9 +1,9 @@
 //! Refusals: of which nodes datagrams are not taken, and how they learn of it, at most once a second each.
 
 use super::{Inbound, REFUSE_EVERY_NS};
-use crate::frame::{self, FrameHead, Kind, NodeIndex, Reason, Refusal};
-use crate::link::{SILENT_AFTER_NS, State};
-use crate::report::{Deliver, Event, Mismatch};
+use crate::frame::{self, FrameHead, FrameKind, NodeIndex, Refusal, RefusalReason};
+use crate::link::{PeerLinkState, SILENT_AFTER_NS};
+use crate::report::{Deliver, Mismatch, RouterEvent};
 use crate::settings::Settings;
 use std::net::IpAddr;
 
@@ -19,11 +19,11 @@ impl Inbound {
         let ours = &self.settings;
         let differs = |reason| Mismatch { reason, version: frame::VERSION, digest: Some(head.digest) };
         if head.digest != ours.digest {
-            return Some(differs(Reason::Digest));
+            return Some(differs(RefusalReason::Digest));
         }
         let is_there = self.is_address_of(head.from, source);
         let is_known = is_there && head.from != ours.own && head.to == ours.own && head.system == ours.system;
-        (!is_known).then(|| differs(Reason::Stranger))
+        (!is_known).then(|| differs(RefusalReason::Stranger))
     }
 
     pub(super) fn refuse(&mut self, now_ns: u64, source: IpAddr, mismatch: Mismatch, deliver: &mut impl Deliver) {
@@ -33,7 +33,7 @@ impl Inbound {
                 let stats = self.stats.peer(peer);
                 stats.received.refused.add(1);
                 // Sealed, it may be a replay of a peer's earlier configuration: a peer that is heard has ours by now.
-                if !self.settings.is_sealed() || self.stats.state(peer, now_ns) != State::Alive {
+                if !self.settings.is_sealed() || self.stats.state(peer, now_ns) != PeerLinkState::Alive {
                     stats.link.refuse(now_ns, mismatch);
                 }
                 &mut self.peers[usize::from(peer)].refusing
@@ -54,7 +54,7 @@ impl Inbound {
         let is_other = refusing.told != Some((source, mismatch)) && refusing.told_ns + OVER_NS < now_ns;
         if is_over || is_other {
             (refusing.told, refusing.told_ns) = (Some((source, mismatch)), now_ns);
-            deliver.event(Event::Refused { source, peer, mismatch });
+            deliver.event(RouterEvent::Refused { source, peer, mismatch });
         }
     }
 
@@ -62,7 +62,7 @@ impl Inbound {
     /// peer that neither sends nor receives: its callers learn the likely cause in place of silence, and nothing is
     /// lost by it.
     pub(crate) fn suspect(&self, now_ns: u64, peer: NodeIndex, mismatch: Mismatch) {
-        let is_away = matches!(self.stats.state(peer, now_ns), State::Silent | State::Refused(_));
+        let is_away = matches!(self.stats.state(peer, now_ns), PeerLinkState::Silent | PeerLinkState::Refused(_));
         if is_away {
             self.stats.peer(peer).link.refuse(now_ns, mismatch);
         }
@@ -72,7 +72,7 @@ impl Inbound {
         let Some(peer) = self.peer_at(source) else { return self.stats.foreign.add(1) };
         let mismatch = Mismatch { reason: refusal.reason, version: refusal.version, digest: Some(refusal.digest) };
         let stats = self.stats.peer(peer);
-        if refusal.reason == Reason::Digest {
+        if refusal.reason == RefusalReason::Digest {
             // Not doubted: two times on one wire are worse than none for a moment. A datagram with our configuration
             // ends it.
             stats.link.refuses_us(now_ns, refusal.digest);
@@ -85,11 +85,11 @@ impl Inbound {
         }
         stats.link.refuse(now_ns, mismatch);
         if self.peers[usize::from(peer)].is_refused_anew(now_ns, mismatch) {
-            deliver.event(Event::Refuses { peer, mismatch });
+            deliver.event(RouterEvent::Refuses { peer, mismatch });
         }
     }
 
-    pub(super) fn due(&mut self, now_ns: u64) -> Option<(IpAddr, Reason)> {
+    pub(super) fn due(&mut self, now_ns: u64) -> Option<(IpAddr, RefusalReason)> {
         let all = self.peers.iter_mut().map(|peer| &mut peer.refusing).chain([&mut self.strangers]);
         let mut waiting = false;
         for refusing in all {
@@ -103,16 +103,21 @@ impl Inbound {
         None
     }
 
-    pub(super) fn refusal(&self, to: IpAddr, reason: Reason, datagram: &mut [u8]) -> usize {
+    pub(super) fn refusal(&self, to: IpAddr, reason: RefusalReason, datagram: &mut [u8]) -> usize {
         write_refusal(&self.settings, self.peer_at(to), reason, datagram)
     }
 }
 
 /// Writes a refusal of this node to another, which is no node of ours if it has no number; returns its length.
-pub(crate) fn write_refusal(settings: &Settings, to: Option<NodeIndex>, reason: Reason, datagram: &mut [u8]) -> usize {
+pub(crate) fn write_refusal(
+    settings: &Settings,
+    to: Option<NodeIndex>,
+    reason: RefusalReason,
+    datagram: &mut [u8],
+) -> usize {
     let Settings { system, own, digest, incarnation, .. } = *settings;
     let to = to.unwrap_or(NodeIndex::MAX);
-    let head = FrameHead { kind: Kind::Refusal, system, from: own, to, digest, incarnation, sequence: 0 };
+    let head = FrameHead { kind: FrameKind::Refusal, system, from: own, to, digest, incarnation, sequence: 0 };
     let said = Refusal { version: frame::VERSION, reason, digest }.to_bytes();
     let end = frame::HEAD_BYTES + said.len();
     datagram[..frame::HEAD_BYTES].copy_from_slice(&head.to_bytes(&[&said]));

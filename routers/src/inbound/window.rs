@@ -17,16 +17,16 @@ pub(crate) enum Arrival {
     /// The newest.
     Newest,
     /// Newer ones came before it.
-    Overtaken,
+    Reordered,
     /// It had been counted as lost.
     Returned,
     /// It came before, or is too old to tell.
-    Copy,
+    Duplicate,
 }
 
 /// Sequences of one incarnation of one peer; at first all from 0 on are expected.
 #[derive(Debug, Default)]
-pub(crate) struct Window {
+pub(crate) struct SequenceWindow {
     next: u64,
     /// All below is decided.
     settled: u64,
@@ -37,16 +37,16 @@ pub(crate) struct Window {
     ticks: [u64; 2],
 }
 
-impl Window {
-    /// For an incarnation that may have begun long before us: earlier sequences are not missed. Near its beginning both
-    /// have just begun. Then missing sequences count as lost, even if nothing listened yet: a router sends to a peer of
-    /// which it knows nothing, so packages may have been in them, and each must be accounted for.
+impl SequenceWindow {
+    /// Window of an incarnation that may have begun long before us: earlier sequences are not missed. Near its start
+    /// both have just begun. Then missing sequences count as lost, even if nothing listened yet: a router sends to a
+    /// peer of which it knows nothing, so packages may have been in them, and each must be accounted for.
     pub(crate) fn joining(sequence: u64) -> Self {
         let start = if sequence < REORDER_MAX { 0 } else { sequence };
         Self { next: start, settled: start, start, ticks: [start; 2], ..Self::default() }
     }
 
-    /// For an incarnation that was heard before: earlier sequences have come.
+    /// Window of an incarnation that was heard before: earlier sequences have come.
     pub(crate) fn going_on(sequence: u64) -> Self {
         let came = [u64::MAX; (WINDOW / 64) as usize];
         Self { next: sequence, settled: sequence, start: sequence, came, ticks: [sequence; 2] }
@@ -63,15 +63,15 @@ impl Window {
             self.advance(sequence, lost);
             return Arrival::Newest;
         }
-        if self.is_copy(sequence) {
-            return Arrival::Copy;
+        if self.is_duplicate(sequence) {
+            return Arrival::Duplicate;
         }
         self.note(sequence);
-        if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Overtaken }
+        if (self.start..self.settled).contains(&sequence) { Arrival::Returned } else { Arrival::Reordered }
     }
 
     /// Whether a sequence came before, or is too old to tell.
-    pub(crate) fn is_copy(&self, sequence: u64) -> bool {
+    pub(crate) fn is_duplicate(&self, sequence: u64) -> bool {
         sequence < self.next && (self.next - sequence > WINDOW || self.has(sequence))
     }
 
@@ -90,11 +90,11 @@ impl Window {
     fn advance(&mut self, sequence: u64, lost: &mut u64) {
         let next = sequence + 1;
         // A sequence that leaves the window is decided before its bit is used again.
-        let judged = next.saturating_sub(REORDER_MAX);
-        *lost += self.settle(judged.min(self.next));
-        if judged > self.settled {
-            *lost += judged - self.settled;
-            self.settled = judged;
+        let settled = next.saturating_sub(REORDER_MAX);
+        *lost += self.settle(settled.min(self.next));
+        if settled > self.settled {
+            *lost += settled - self.settled;
+            self.settled = settled;
         }
         if next - self.next >= WINDOW {
             self.came = [0; (WINDOW / 64) as usize];

@@ -12,18 +12,18 @@
 
 use super::namespace::Namespace;
 use super::{DEVICE, FIRST_PORT, LAN, LOOPBACK, Lab, LabError, Node, NodeSpec, told};
-use crate::netlink::{Device, End};
+use crate::netlink::{DeviceIndex, VethEnd};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
 /// Above all ports of nodes.
-const FAR_BRIDGE: Device = 1000;
-const HOME_PORT: Device = FAR_BRIDGE + 1;
+const FAR_BRIDGE: DeviceIndex = 1000;
+const HOME_PORT: DeviceIndex = FAR_BRIDGE + 1;
 /// The second device of the node that is on both.
-const FAR: Device = LAN + 1;
+const FAR: DeviceIndex = LAN + 1;
 
 impl Lab {
-    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. Once
-    /// in the life of a lab.
+    /// Adds nodes that reach one node of the LAN, `home`, at this address and nothing else; so do its other nodes. To
+    /// be called once in a lab.
     ///
     /// # Errors
     /// As for [`Lab::new`].
@@ -33,7 +33,7 @@ impl Lab {
         told("set it up", hub.set_up(FAR_BRIDGE, true))?;
         let first = self.nodes.len();
         for (name, index) in names.iter().zip(1..) {
-            let port = FIRST_PORT + self.nodes.len() as Device;
+            let port = FIRST_PORT + self.nodes.len() as DeviceIndex;
             let spec = NodeSpec { name: (*name).into(), address: far_address(address, index) };
             self.nodes.push(Node { spec, namespace: Namespace::new()?, port });
         }
@@ -47,7 +47,7 @@ impl Lab {
     /// The second link of a node of the LAN; those from `first` on are beyond.
     fn join_home(&self, name: &str, address: IpAddr, first: usize) -> Result<(), LabError> {
         let home = self.node(name)?;
-        let (own, far) = (End { device: HOME_PORT, name: "home" }, End { device: FAR, name: "far" });
+        let (own, far) = (VethEnd { device: HOME_PORT, name: "home" }, VethEnd { device: FAR, name: "far" });
         let what = format!("join {name} to those beyond");
         let mut hub = self.hub.netlink()?;
         told(&what, hub.add_veth(own, FAR_BRIDGE, far, &home.namespace, self.mtu))?;
@@ -75,7 +75,7 @@ impl Lab {
     fn join_far(&self, index: usize) -> Result<(), LabError> {
         let Node { spec: NodeSpec { name: at, address }, namespace, port } = &self.nodes[index];
         let name = format!("n{index}");
-        let (own, far) = (End { device: *port, name: &name }, End { device: LAN, name: DEVICE });
+        let (own, far) = (VethEnd { device: *port, name: &name }, VethEnd { device: LAN, name: DEVICE });
         let mut hub = self.hub.netlink()?;
         told(&format!("make the link of {at}"), hub.add_veth(own, FAR_BRIDGE, far, namespace, self.mtu))?;
         told(&format!("set the link of {at} up"), hub.set_up(*port, true))?;
@@ -92,7 +92,7 @@ impl Lab {
     }
 }
 
-/// Of the networks that are set aside for tests of networks (RFC 2544, RFC 5180), so that no file has it.
+/// An address of the networks that are set aside for tests (RFC 2544, RFC 5180), so that no file has it.
 fn far_address(like: IpAddr, index: u8) -> IpAddr {
     match like {
         IpAddr::V4(_) => Ipv4Addr::new(198, 18, 0, index).into(),

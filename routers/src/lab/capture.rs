@@ -13,14 +13,14 @@ use std::net::IpAddr;
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::time::Duration;
 
-/// What may wait in the kernel until somebody looks.
+/// Buffer of the capture in the kernel, bytes.
 const RECEIVE_BYTES: usize = 64 << 20;
 /// The longest frame, and more.
 const FRAME_BYTES: usize = 1 << 16;
 const CONTROL_BYTES: usize = 128;
 /// Readings of two clocks; the closest pair counts.
 const READINGS: usize = 100;
-/// As `packet(7)` has it: leaves by this port, and was seen when it came by another.
+/// `PACKET_OUTGOING` of `packet(7)`: the packet leaves by this port, and was seen when it came by another.
 const OUTGOING: u8 = 4;
 const ETHERNET_BYTES: usize = 14;
 const UDP: u8 = 17;

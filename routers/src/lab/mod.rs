@@ -21,7 +21,7 @@ pub use capture::{Capture, Crossing};
 pub use error::LabError;
 pub use namespace::{Inside, become_able};
 
-use crate::netlink::{Device, End};
+use crate::netlink::{DeviceIndex, VethEnd};
 use error::RUNS_WITHIN;
 use namespace::Namespace;
 use std::io;
@@ -33,10 +33,10 @@ use std::time::{Duration, Instant};
 pub const DEVICE: &str = "lan";
 
 /// Numbers of devices, which each namespace counts for itself.
-const LOOPBACK: Device = 1;
-const LAN: Device = 2;
-const BRIDGE: Device = 2;
-const FIRST_PORT: Device = 3;
+const LOOPBACK: DeviceIndex = 1;
+const LAN: DeviceIndex = 2;
+const BRIDGE: DeviceIndex = 2;
+const FIRST_PORT: DeviceIndex = 3;
 const LOOK: Duration = Duration::from_millis(2);
 
 /// A node of a lab.
@@ -62,7 +62,7 @@ struct Node {
     spec: NodeSpec,
     namespace: Namespace,
     /// Its end of the link, in the hub.
-    port: Device,
+    port: DeviceIndex,
 }
 
 impl Lab {
@@ -73,8 +73,9 @@ impl Lab {
     /// When the system does not allow it, or lacks a part.
     pub fn new(nodes: &[NodeSpec], mtu: u16) -> Result<Self, LabError> {
         let hub = Namespace::new()?;
-        let node =
-            |(spec, port): (&NodeSpec, Device)| Ok(Node { spec: spec.clone(), namespace: Namespace::new()?, port });
+        let node = |(spec, port): (&NodeSpec, DeviceIndex)| {
+            Ok(Node { spec: spec.clone(), namespace: Namespace::new()?, port })
+        };
         let nodes = nodes.iter().zip(FIRST_PORT..).map(node).collect::<Result<Vec<_>, LabError>>()?;
         let lab = Self { nodes, hub, mtu: mtu.into() };
         lab.join()?;
@@ -91,7 +92,7 @@ impl Lab {
         told("set the bridge up", hub.set_up(BRIDGE, true))?;
         for (index, node) in self.nodes.iter().enumerate() {
             let (name, at) = (format!("n{index}"), &node.spec.name);
-            let (own, far) = (End { device: node.port, name: &name }, End { device: LAN, name: DEVICE });
+            let (own, far) = (VethEnd { device: node.port, name: &name }, VethEnd { device: LAN, name: DEVICE });
             told(&format!("make the link of {at}"), hub.add_veth(own, BRIDGE, far, &node.namespace, mtu))?;
             told(&format!("set the link of {at} up"), hub.set_up(node.port, true))?;
             self.set_up(node, node.spec.address)?;
@@ -157,7 +158,7 @@ impl Lab {
     /// # Errors
     /// As for [`Lab::cut`].
     pub fn divide(&self, nodes: &[&str]) -> Result<(), LabError> {
-        let (mut hub, second) = (self.hub.netlink()?, FIRST_PORT + self.nodes.len() as Device);
+        let (mut hub, second) = (self.hub.netlink()?, FIRST_PORT + self.nodes.len() as DeviceIndex);
         match hub.add_bridge(second, "second", self.mtu) {
             // Of an earlier division.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
@@ -175,7 +176,7 @@ impl Lab {
         self.move_to(nodes, BRIDGE)
     }
 
-    fn move_to(&self, nodes: &[&str], bridge: Device) -> Result<(), LabError> {
+    fn move_to(&self, nodes: &[&str], bridge: DeviceIndex) -> Result<(), LabError> {
         let mut hub = self.hub.netlink()?;
         for name in nodes {
             let node = self.node(name)?;

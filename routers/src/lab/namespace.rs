@@ -28,7 +28,7 @@ impl AsRawFd for Namespace {
 pub struct Inside {
     /// Where it comes from.
     outside: File,
-    /// Of this thread, and no other.
+    /// Belongs to this thread, and no other.
     _thread: PhantomData<*const ()>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::{DIRECT_HEAD_BYTES, KeepAlive, Outbound, Package, is_stale};
 use crate::counts::Cause;
-use crate::frame::{self, Fragment, FrameHead, Kind, NodeIndex};
+use crate::frame::{self, Fragment, FrameHead, FrameKind, NodeIndex};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
 use crate::queue::Place;
 use crate::report::Report;
@@ -25,7 +25,7 @@ impl Outbound {
         package: &Package<'_>,
     ) -> [u8; DIRECT_HEAD_BYTES] {
         let package_head = head.to_bytes();
-        let frame = self.head_bytes(Kind::Packages, peer, &[&package_head, package.body]);
+        let frame = self.head_bytes(FrameKind::Packages, peer, &[&package_head, package.body]);
         let mut bytes = [0; DIRECT_HEAD_BYTES];
         bytes[..frame::HEAD_BYTES].copy_from_slice(&frame);
         bytes[frame::HEAD_BYTES..].copy_from_slice(&package_head);
@@ -36,8 +36,8 @@ impl Outbound {
         bytes
     }
 
-    /// As many whole packages for a peer as fit, level by level between the two; returns the datagram's length. The
-    /// first one fits.
+    /// Packs as many whole packages for a peer as fit, level by level between the two; returns the datagram's length.
+    /// The first one fits.
     pub(super) fn pack(
         &mut self,
         now_ns: u64,
@@ -75,7 +75,7 @@ impl Outbound {
             self.left_queue(waiting.level);
             self.passed(peer, &waiting.head, waiting.published_ns);
         }
-        self.finish(now_ns, (Kind::Packages, Some(from)), peer, &mut datagram[..end])
+        self.finish(now_ns, (FrameKind::Packages, Some(from)), peer, &mut datagram[..end])
     }
 
     /// The next fragment of a package that does not fit in a datagram; returns its datagram's length.
@@ -98,7 +98,7 @@ impl Outbound {
             self.left_queue(waiting.level);
             self.passed(peer, &waiting.head, waiting.published_ns);
         }
-        self.finish(now_ns, (Kind::Fragment, Some(waiting.level)), peer, &mut datagram[..start + size])
+        self.finish(now_ns, (FrameKind::Fragment, Some(waiting.level)), peer, &mut datagram[..start + size])
     }
 
     /// A keep-alive for a peer; returns the datagram's length.
@@ -108,11 +108,17 @@ impl Outbound {
         let end = frame::HEAD_BYTES + told.len();
         datagram[frame::HEAD_BYTES..end].copy_from_slice(&told);
         self.peers[usize::from(peer)].tell_ns = now_ns + TELL_EVERY_NS;
-        self.finish(now_ns, (Kind::Alive, None), peer, &mut datagram[..end])
+        self.finish(now_ns, (FrameKind::Alive, None), peer, &mut datagram[..end])
     }
 
     /// Writes the head before the content: of this kind, with packages of this level first. Returns the length.
-    fn finish(&mut self, now_ns: u64, (kind, level): (Kind, Option<u8>), to: NodeIndex, datagram: &mut [u8]) -> usize {
+    fn finish(
+        &mut self,
+        now_ns: u64,
+        (kind, level): (FrameKind, Option<u8>),
+        to: NodeIndex,
+        datagram: &mut [u8],
+    ) -> usize {
         let (head, rest) = datagram.split_at_mut(frame::HEAD_BYTES);
         head.copy_from_slice(&self.head_bytes(kind, to, &[rest]));
         self.left(now_ns, to, datagram.len(), level);
@@ -120,7 +126,7 @@ impl Outbound {
     }
 
     /// The bytes before `rest`. The sealing code writes the check over the result of the cipher.
-    fn head_bytes(&self, kind: Kind, to: NodeIndex, rest: &[&[u8]]) -> [u8; frame::HEAD_BYTES] {
+    fn head_bytes(&self, kind: FrameKind, to: NodeIndex, rest: &[&[u8]]) -> [u8; frame::HEAD_BYTES] {
         let Settings { system, own, digest, incarnation, .. } = self.settings;
         let sequence = self.stats.peer(to).sent.datagrams.get();
         let head = FrameHead { kind, system, from: own, to, digest, incarnation, sequence };

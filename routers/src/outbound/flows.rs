@@ -38,7 +38,7 @@ impl Outbound {
         }
     }
 
-    /// Until now, ns, a slot was left out or cut short: for packages that were published before no bound holds.
+    /// A slot was left out or cut short before this time, ns: no bound holds for packages that were published before.
     pub fn slot_left_out(&mut self, now_ns: u64) {
         self.aboard.kept_since_ns = now_ns;
     }

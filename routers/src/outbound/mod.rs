@@ -9,9 +9,9 @@
 
 use crate::admission::capped;
 use crate::counts::Cause;
-use crate::frame::{self, Fragment, Kind, NodeIndex};
-use crate::link::State;
-use crate::queue::{Place, Queue, Waiting};
+use crate::frame::{self, Fragment, FrameKind, NodeIndex};
+use crate::link::PeerLinkState;
+use crate::queue::{Place, Queue, QueuedPackage};
 use crate::report::Report;
 use crate::security::PeerSessions;
 use crate::settings::Settings;
@@ -28,7 +28,7 @@ mod slot;
 
 use flows::Aboard;
 pub(crate) use own::kind_of_own;
-use pace::Pace;
+use pace::Pacer;
 
 /// Longest time from the publishing of a package to its leaving. "At most once" allows 2 s to its mailbox, so this
 /// leaves half a second for the wire and the other end.
@@ -49,7 +49,7 @@ pub struct Package<'a> {
     pub body: &'a [u8],
 }
 
-/// What became of a package.
+/// Result for a package that is handed over.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Accepted {
     /// Send these bytes and then the body, now, as one datagram.
@@ -65,9 +65,9 @@ pub enum Accepted {
     Lost,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Outbound::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Output {
+pub enum OutboundStep {
     /// Send the first bytes of the buffer as one datagram, then ask again.
     Send {
         /// Receiver.
@@ -88,7 +88,7 @@ pub struct Outbound {
     settings: Settings,
     stats: Arc<Stats>,
     queue: Queue,
-    pace: Pace,
+    pace: Pacer,
     levels: [u8; 256],
     /// Modules of this node by their numbers, sorted, and the quota of each.
     senders: Box<[(u32, u16)]>,
@@ -121,11 +121,11 @@ struct KeepAlive {
     quiet_until_ns: u64,
     tell_ns: u64,
     /// Its incarnation at the last look.
-    life: u64,
+    incarnation: u64,
 }
 
 impl Outbound {
-    /// For the router of `settings.own`. Takes all its memory now.
+    /// State for the router of `settings.own`. Takes all its memory now.
     pub fn new(settings: &Settings, stats: Arc<Stats>) -> Self {
         let groups = settings.senders.iter().enumerate();
         let names = groups.flat_map(|(index, names)| names.iter().map(move |name| (name.module().raw(), index as u16)));
@@ -134,7 +134,7 @@ impl Outbound {
         let others = settings.senders.len();
         Self {
             queue: Queue::new(others + 1, settings.nodes.len(), settings.network.quota_bytes),
-            pace: Pace::new(settings),
+            pace: Pacer::new(settings),
             levels: std::array::from_fn(|priority| settings.network.level(Priority(priority as u8))),
             senders: senders.into(),
             others: others as u16,
@@ -210,7 +210,8 @@ impl Outbound {
         {
             return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package) };
         }
-        let waiting = Waiting { head, published_ns: package.published_ns, peer, sender, level, ..Waiting::default() };
+        let waiting =
+            QueuedPackage { head, published_ns: package.published_ns, peer, sender, level, ..QueuedPackage::default() };
         let stats = &self.stats;
         let taken = self.queue.push(waiting, package.body, |gone, body| {
             stats.waiting[usize::from(gone.level)].take_back(1);
@@ -270,10 +271,10 @@ impl Outbound {
     ///
     /// # Panics
     /// If it has not.
-    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> Output {
+    pub fn poll(&mut self, now_ns: u64, datagram: &mut [u8], report: &mut impl Report) -> OutboundStep {
         let datagram = &mut datagram[..self.datagram_bytes];
         self.aboard.clear();
-        self.greet_new_sessions();
+        self.announce_to_new_sessions();
         self.look_at_what_is_real_time(now_ns);
         if now_ns >= self.sweep_ns {
             self.sweep(now_ns, report);
@@ -281,13 +282,13 @@ impl Outbound {
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {
-            return Output::Send { to: peer, bytes: self.alive(now_ns, peer, datagram) };
+            return OutboundStep::Send { to: peer, bytes: self.alive(now_ns, peer, datagram) };
         }
         let quiet_until_ns = if self.queue.is_empty() { self.alive_ns } else { self.alive_ns.min(self.sweep_ns) };
         while let Some(place) = self.queue.first_among(self.open()) {
             let waiting = *self.queue.at(place);
             if let Err(until_ns) = self.pace.may_leave(now_ns, waiting.level) {
-                return Output::Wait { until_ns: until_ns.min(quiet_until_ns) };
+                return OutboundStep::Wait { until_ns: until_ns.min(quiet_until_ns) };
             }
             if let Some(cause) = self.why_not(now_ns, waiting.peer, waiting.published_ns) {
                 self.drop_out(place, cause, report);
@@ -298,17 +299,17 @@ impl Outbound {
             } else {
                 self.pack(now_ns, (waiting.peer, waiting.level, LEVELS as u8), datagram, report)
             };
-            return Output::Send { to: waiting.peer, bytes };
+            return OutboundStep::Send { to: waiting.peer, bytes };
         }
         // A package for a peer without a session may become too old.
-        Output::Wait { until_ns: if self.queue.is_empty() { self.alive_ns } else { quiet_until_ns } }
+        OutboundStep::Wait { until_ns: if self.queue.is_empty() { self.alive_ns } else { quiet_until_ns } }
     }
 
     /// The socket did not take the last datagram; nor the body if it was [`Accepted::Send`].
     pub fn unsent(&mut self, datagram: &[u8], body: &[u8], report: &mut impl Report) {
         let Some((kind, peer, mut rest)) = kind_of_own(datagram) else { return };
         self.stats.peer(peer).sent.unsent.add(1);
-        if kind == Kind::Packages {
+        if kind == FrameKind::Packages {
             while let Ok(head) = Head::from_bytes(rest) {
                 rest = &rest[PACKAGE_HEAD_BYTES..];
                 let (inside, behind) = rest.split_at_checked(head.len.into()).unwrap_or((body, &[]));
@@ -316,7 +317,7 @@ impl Outbound {
                 rest = behind;
             }
         }
-        if kind == Kind::Fragment
+        if kind == FrameKind::Fragment
             && let Ok(part) = Fragment::parse(rest)
         {
             // Without this fragment the others are worth nothing.
@@ -355,10 +356,10 @@ impl Outbound {
     fn why_not(&self, now_ns: u64, peer: NodeIndex, published_ns: u64) -> Option<Cause> {
         match self.stats.state(peer, now_ns) {
             _ if is_stale(now_ns, published_ns) => Some(Cause::Stale),
-            State::Unknown | State::Alive => None,
-            State::Silent => Some(Cause::Silent),
-            State::Unheard => Some(Cause::Unheard),
-            State::Refused(_) => Some(Cause::Refused),
+            PeerLinkState::Unknown | PeerLinkState::Alive => None,
+            PeerLinkState::Silent => Some(Cause::Silent),
+            PeerLinkState::Unheard => Some(Cause::Unheard),
+            PeerLinkState::Refused(_) => Some(Cause::Refused),
         }
     }
 
@@ -389,7 +390,7 @@ impl Outbound {
     }
 
     /// A peer with a new session gets a keep-alive at once.
-    fn greet_new_sessions(&mut self) {
+    fn announce_to_new_sessions(&mut self) {
         let Some(all) = &self.peer_sessions else { return };
         let reached = all.reached();
         if reached != self.reached {
@@ -398,10 +399,10 @@ impl Outbound {
     }
 
     /// A peer in a new incarnation soon gets a keep-alive that it is heard: it may wait for that.
-    fn greet_new_incarnations(&mut self) {
+    fn announce_to_new_incarnations(&mut self) {
         for (peer, stats) in self.peers.iter_mut().zip(0..).map(|(peer, node)| (peer, self.stats.peer(node))) {
-            let life = stats.link.incarnation.get();
-            if std::mem::replace(&mut peer.life, life) != life {
+            let incarnation = stats.link.incarnation.get();
+            if std::mem::replace(&mut peer.incarnation, incarnation) != incarnation {
                 (peer.tell_ns, self.alive_ns) = (0, 0);
             }
         }
@@ -425,7 +426,7 @@ impl Outbound {
         frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.datagram_bytes
     }
 
-    fn is_large(&self, waiting: &Waiting) -> bool {
+    fn is_large(&self, waiting: &QueuedPackage) -> bool {
         DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.datagram_bytes
     }
 
@@ -443,7 +444,7 @@ impl Outbound {
     /// Drops packages that waited too long behind others, and those to peers that are gone.
     fn sweep(&mut self, now_ns: u64, report: &mut impl Report) {
         self.sweep_ns = now_ns + SWEEP_EVERY_NS;
-        self.greet_new_incarnations();
+        self.announce_to_new_incarnations();
         for peer in 0..self.settings.nodes.len() as NodeIndex {
             for level in 0..LEVELS as u8 {
                 while let Some(place) = self.queue.first_of(peer, level) {

@@ -11,7 +11,7 @@ const BURST_NS: u64 = 1_000_000;
 const FRACTION: u32 = 20;
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pace {
+pub(super) struct Pacer {
     /// Time that a byte takes, in 2^-20 ns.
     byte: u128,
     /// Headers of each datagram.
@@ -26,7 +26,7 @@ pub(super) struct Pace {
     level: u8,
 }
 
-impl Pace {
+impl Pacer {
     pub(super) fn new(settings: &Settings) -> Self {
         let byte = (1_000_000_000 << FRACTION) / u128::from(settings.network.rate_bytes_s.max(1));
         let overhead_bytes = settings.overhead_bytes();

@@ -10,7 +10,7 @@
 use super::datagram::PART_START;
 use super::{DIRECT_HEAD_BYTES, Outbound};
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
-use crate::queue::Waiting;
+use crate::queue::QueuedPackage;
 use crate::report::Report;
 use rohrpost_mailbox::Priority;
 use rohrpost_network::LEVELS;
@@ -32,7 +32,7 @@ impl Outbound {
         let room_bytes = room_bytes.min(self.datagram_bytes);
         let datagram = &mut datagram[..room_bytes];
         self.aboard.clear();
-        self.greet_new_sessions();
+        self.announce_to_new_sessions();
         if now_ns >= self.alive_ns
             && let Some(peer) = self.due(now_ns)
         {
@@ -76,7 +76,7 @@ impl Outbound {
     }
 
     /// Bytes of a package's own datagram; for a package in fragments, of its next.
-    fn takes_bytes(&self, waiting: &Waiting) -> usize {
+    fn takes_bytes(&self, waiting: &QueuedPackage) -> usize {
         let len = usize::from(waiting.head.len);
         if !self.is_large(waiting) {
             return DIRECT_HEAD_BYTES + len;

@@ -16,7 +16,7 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Hints(Box<[[u32; WAYS]]>);
 
 impl Hints {
-    /// For a queue of so many places.
+    /// Hints for a queue with this many places.
     pub(super) fn new(places: usize) -> Self {
         let sets = places.div_ceil(WAYS).next_power_of_two().min(SETS_MAX);
         Self(vec![[NONE; WAYS]; sets].into())

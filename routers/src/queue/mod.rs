@@ -22,16 +22,15 @@ use blocks::{BLOCK_BYTES, Blocks, Chain};
 use hints::Hints;
 use list::{List, Lists};
 use rohrpost_mailbox::{Head, Kind, Options};
-use rohrpost_network::LEVELS;
-use rohrpost_network::NODES_MAX;
-pub use shares::Share;
+use rohrpost_network::{LEVELS, NODES_MAX};
+pub use shares::QueueShare;
 use shares::Shares;
 
 const _: () = assert!(NODES_MAX <= 64, "a level's peers are the bits of a word");
 
 /// A package that waits, without its body.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Waiting {
+pub struct QueuedPackage {
     /// Its head, as it leaves.
     pub head: Head,
     /// When its sender published it, ns.
@@ -41,7 +40,7 @@ pub struct Waiting {
     /// The sender for its quota.
     pub sender: u16,
     /// Its sender and party in a shared queue.
-    pub share: Share,
+    pub share: QueueShare,
     /// Its level; 0 goes first.
     pub level: u8,
     /// How often it was forwarded, where that counts.
@@ -53,8 +52,8 @@ pub struct Waiting {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Entry {
-    waiting: Waiting,
+struct QueueEntry {
+    waiting: QueuedPackage,
     ticket: u64,
     body: Chain,
 }
@@ -66,7 +65,7 @@ pub struct Place(u32);
 /// The packages that wait.
 #[derive(Debug)]
 pub struct Queue {
-    entries: Box<[Entry]>,
+    entries: Box<[QueueEntry]>,
     blocks: Blocks,
     /// Links of both kinds of lists. A free entry is in `free`, through its peer's links.
     by_peer: Lists,
@@ -108,12 +107,12 @@ struct Sender {
 }
 
 impl Queue {
-    /// For so many senders and nodes. `quota_bytes` is what each sender may have waiting.
+    /// A queue for this many senders and nodes. `quota_bytes` is what each sender may have waiting.
     pub fn new(senders: usize, nodes: usize, quota_bytes: usize) -> Self {
         let quota_blocks = quota_bytes.div_ceil(BLOCK_BYTES);
         let count = quota_blocks * senders;
         let mut queue = Self {
-            entries: vec![Entry::default(); count].into(),
+            entries: vec![QueueEntry::default(); count].into(),
             blocks: Blocks::new(count),
             by_peer: Lists::new(count),
             by_sender: Lists::new(count),
@@ -167,15 +166,15 @@ impl Queue {
     /// Queues a package. Displaced packages are handed to `gone`. If nothing less important of the same sender can make
     /// room, the package itself is not taken.
     #[must_use]
-    pub fn push(&mut self, waiting: Waiting, body: &[u8], mut gone: impl FnMut(&Waiting, &[u8])) -> bool {
+    pub fn push(&mut self, waiting: QueuedPackage, body: &[u8], mut gone: impl FnMut(&QueuedPackage, &[u8])) -> bool {
         let needed = Blocks::needed(body.len());
-        if !self.make_room(usize::from(waiting.sender), waiting.level, needed, &mut gone) {
+        if !self.evict(usize::from(waiting.sender), waiting.level, needed, &mut gone) {
             return false;
         }
         // A package has at least one block, and there are as many places as blocks.
         let Some(place) = self.by_peer.take_first(&mut self.free) else { return false };
         let body = self.blocks.store(body);
-        self.entries[place as usize] = Entry { waiting, ticket: self.ticket, body };
+        self.entries[place as usize] = QueueEntry { waiting, ticket: self.ticket, body };
         if let Some(hints) = self.hints.as_mut().filter(|_| counts_newest(&waiting.head)) {
             hints.note(&waiting.head, place, |hint| self.entries[hint as usize].of_newest());
         }
@@ -200,10 +199,10 @@ impl Queue {
 
     /// The waiting package that this one replaces: both are of the same state, no fragment of it has left, and only the
     /// newest of such packages counts.
-    pub fn older(&self, newer: &Waiting) -> Option<Place> {
+    pub fn older(&self, newer: &QueuedPackage) -> Option<Place> {
         let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head))?;
         let is_older = |place: &u32| {
-            let Entry { waiting, .. } = &self.entries[*place as usize];
+            let QueueEntry { waiting, .. } = &self.entries[*place as usize];
             let is_alike = (waiting.sender, waiting.peer, waiting.level) == (newer.sender, newer.peer, newer.level);
             is_alike
                 && waiting.parts == 0
@@ -218,18 +217,18 @@ impl Queue {
     pub fn replace(
         &mut self,
         place: Place,
-        newer: Waiting,
+        newer: QueuedPackage,
         body: &[u8],
-        mut gone: impl FnMut(&Waiting, &[u8]),
+        mut gone: impl FnMut(&QueuedPackage, &[u8]),
     ) -> bool {
-        let Entry { body: old, .. } = self.entries[place.0 as usize];
+        let QueueEntry { body: old, .. } = self.entries[place.0 as usize];
         let needed = Blocks::needed(body.len());
         let (sender, level) = (usize::from(newer.sender), newer.level);
-        if !self.make_room(sender, level, needed.saturating_sub(old.blocks()), &mut gone) {
+        if !self.evict(sender, level, needed.saturating_sub(old.blocks()), &mut gone) {
             return false;
         }
         self.blocks.free(old);
-        let Entry { waiting, body: stored, .. } = &mut self.entries[place.0 as usize];
+        let QueueEntry { waiting, body: stored, .. } = &mut self.entries[place.0 as usize];
         (*waiting, *stored) = (newer, self.blocks.store(body));
         let changed = |blocks: u32| blocks + needed - old.blocks();
         let sender = &mut self.senders[sender];
@@ -239,9 +238,9 @@ impl Queue {
         true
     }
 
-    fn make_room(&mut self, sender: usize, level: u8, needed: u32, gone: &mut impl FnMut(&Waiting, &[u8])) -> bool {
+    fn evict(&mut self, sender: usize, level: u8, needed: u32, gone: &mut impl FnMut(&QueuedPackage, &[u8])) -> bool {
         if self.shares.is_some() {
-            return self.make_shared_room(sender, level, needed, gone);
+            return self.evict_shared(sender, level, needed, gone);
         }
         let own = &self.senders[sender];
         let lower = usize::from(level) + 1;
@@ -260,7 +259,7 @@ impl Queue {
     }
 
     /// Displaces the newest package of a sender's least important level, from `lower` on; false: there is none.
-    fn displace(&mut self, sender: usize, lower: usize, gone: &mut impl FnMut(&Waiting, &[u8])) -> bool {
+    fn displace(&mut self, sender: usize, lower: usize, gone: &mut impl FnMut(&QueuedPackage, &[u8])) -> bool {
         let Some(last) = self.senders[sender].levels[lower..].iter().rev().find_map(List::last) else { return false };
         let (waiting, beginning) = self.remove(Place(last));
         gone(&waiting, beginning);
@@ -272,7 +271,7 @@ impl Queue {
         self.first_among(u64::MAX)
     }
 
-    /// The same among packages for these peers, one bit each.
+    /// The first package of those for these peers, one bit each.
     pub fn first_among(&self, peers: u64) -> Option<Place> {
         if self.levels == 0 {
             return None;
@@ -306,7 +305,7 @@ impl Queue {
     }
 
     /// The package at a place.
-    pub fn at(&self, place: Place) -> &Waiting {
+    pub fn at(&self, place: Place) -> &QueuedPackage {
         &self.entries[place.0 as usize].waiting
     }
 
@@ -330,8 +329,8 @@ impl Queue {
     }
 
     /// Takes a package out, and returns it with the beginning of its body.
-    pub fn remove(&mut self, place: Place) -> (Waiting, &[u8]) {
-        let Entry { waiting, body, .. } = self.entries[place.0 as usize];
+    pub fn remove(&mut self, place: Place) -> (QueuedPackage, &[u8]) {
+        let QueueEntry { waiting, body, .. } = self.entries[place.0 as usize];
         let (peer, level) = (usize::from(waiting.peer), usize::from(waiting.level));
         self.by_peer.remove(&mut self.peers[peer][level], place.0);
         if self.peers[peer][level].first().is_none() {
@@ -369,7 +368,7 @@ impl Sender {
     }
 }
 
-impl Entry {
+impl QueueEntry {
     /// Its head, if only the newest of such packages counts.
     fn of_newest(&self) -> Option<&Head> {
         (self.body.blocks() > 0 && counts_newest(&self.waiting.head)).then_some(&self.waiting.head)

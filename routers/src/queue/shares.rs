@@ -8,14 +8,14 @@
 //!           least; senders that trust each other are one party, within which only importance counts
 //! ```
 
-use super::{Place, Queue, Sender, Waiting};
+use super::{Place, Queue, QueuedPackage, Sender};
 
 /// Bytes of a package on the line besides its body, about.
 const HEADS_BYTES: u64 = 32;
 
 /// The sender and the party of a package.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub struct Share {
+pub struct QueueShare {
     /// The sender, for memory.
     pub sender: u32,
     /// Its party, for the line.
@@ -86,7 +86,7 @@ impl Shares {
 impl Queue {
     /// The place of a sender; a free or a new one, if it has none. So there are at most as many as packages wait, and
     /// one.
-    pub fn sender_of(&mut self, share: Share) -> u16 {
+    pub fn sender_of(&mut self, share: QueueShare) -> u16 {
         let number = share.sender;
         let Some(shares) = &mut self.shares else { return 0 };
         let is_known = |(_, (known, _)): &(&Sender, &(u32, usize))| *known == number;
@@ -125,8 +125,8 @@ impl Queue {
     }
 
     /// Takes out a package that leaves.
-    pub fn serve(&mut self, place: Place) -> (Waiting, &[u8]) {
-        let Waiting { sender, head, .. } = self.entries[place.0 as usize].waiting;
+    pub fn serve(&mut self, place: Place) -> (QueuedPackage, &[u8]) {
+        let QueuedPackage { sender, head, .. } = self.entries[place.0 as usize].waiting;
         if let Some(shares) = &mut self.shares {
             let party = shares.senders[usize::from(sender)].1;
             shares.parties[party].served += u64::from(head.len) + HEADS_BYTES;
@@ -136,12 +136,12 @@ impl Queue {
 
     /// Makes room where all use one memory: from the sender that uses more than this one would, then from this one
     /// itself.
-    pub(super) fn make_shared_room(
+    pub(super) fn evict_shared(
         &mut self,
         sender: usize,
         level: u8,
         needed: u32,
-        gone: &mut impl FnMut(&Waiting, &[u8]),
+        gone: &mut impl FnMut(&QueuedPackage, &[u8]),
     ) -> bool {
         let (quota, lower) = (self.quota_blocks, usize::from(level) + 1);
         let own = self.senders[sender].used + needed;

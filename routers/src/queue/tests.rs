@@ -4,9 +4,9 @@ use rohrpost_mailbox::{Priority, Type};
 
 const QUOTA: usize = 16 * BLOCK_BYTES;
 
-fn waiting(id: u16, sender: u16, peer: NodeIndex, level: u8, len: usize) -> Waiting {
+fn waiting(id: u16, sender: u16, peer: NodeIndex, level: u8, len: usize) -> QueuedPackage {
     let head = Head { id, len: len as u16, priority: Priority(255 - level * 8), ..Head::default() };
-    Waiting { head, peer, sender, level, ..Waiting::default() }
+    QueuedPackage { head, peer, sender, level, ..QueuedPackage::default() }
 }
 
 /// Queues a package; returns what was displaced for it, or itself.
@@ -24,7 +24,7 @@ fn push(queue: &mut Queue, id: u16, sender: u16, level: u8, len: usize) -> Vec<u
 fn drain(queue: &mut Queue) -> Vec<u16> {
     let next = |queue: &mut Queue| {
         let place = queue.first()?;
-        let Waiting { head, .. } = *queue.at(place);
+        let QueuedPackage { head, .. } = *queue.at(place);
         let mut body = vec![0; head.len.into()];
         queue.read(place, &mut body);
         assert!(body.iter().all(|byte| *byte == head.id as u8), "the body is its own");
@@ -111,8 +111,8 @@ fn levels_of_a_peer_are_found_one_after_the_other() {
 
 /// Queues a package of a party's sender in a shared queue; returns what was displaced for it, or itself.
 fn push_shared(queue: &mut Queue, id: u16, (party, sender): (u32, u32), level: u8) -> Vec<u16> {
-    let share = Share { sender, party };
-    let new = Waiting { share, sender: queue.sender_of(share), ..waiting(id, 0, 0, level, 200) };
+    let share = QueueShare { sender, party };
+    let new = QueuedPackage { share, sender: queue.sender_of(share), ..waiting(id, 0, 0, level, 200) };
     let mut gone = Vec::new();
     let taken = queue.push(new, &[0; 200], |waiting, _| gone.push(waiting.head.id));
     gone.extend((!taken).then_some(id));
@@ -180,13 +180,13 @@ fn a_party_that_begins_to_wait_has_no_credit() {
 /// A slow and simple model of the queue's promises.
 #[derive(Default)]
 struct Model {
-    waiting: Vec<Waiting>,
+    waiting: Vec<QueuedPackage>,
 }
 
 impl Model {
-    fn push(&mut self, new: Waiting) -> Vec<u16> {
-        let blocks = |waiting: &Waiting| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
-        let of_sender = |waiting: &&Waiting| waiting.sender == new.sender;
+    fn push(&mut self, new: QueuedPackage) -> Vec<u16> {
+        let blocks = |waiting: &QueuedPackage| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
+        let of_sender = |waiting: &&QueuedPackage| waiting.sender == new.sender;
         let used: usize = self.waiting.iter().filter(of_sender).map(blocks).sum();
         let yielding: usize =
             self.waiting.iter().filter(of_sender).filter(|other| other.level > new.level).map(blocks).sum();
@@ -207,17 +207,17 @@ impl Model {
         Some(self.pop_first()?.head.id)
     }
 
-    fn pop_first(&mut self) -> Option<Waiting> {
+    fn pop_first(&mut self) -> Option<QueuedPackage> {
         let at = (0..self.waiting.len()).min_by_key(|at| (self.waiting[*at].level, *at))?;
         Some(self.waiting.remove(at))
     }
 
-    /// Of one sender; returns what was displaced, by `first`.
-    fn push_newest(&mut self, new: Waiting) -> Vec<u64> {
-        let blocks = |waiting: &Waiting| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
-        let state = |waiting: &Waiting| (waiting.level, waiting.head.id);
+    /// Pushes a package of one sender; returns what was displaced, by `first`.
+    fn push_newest(&mut self, new: QueuedPackage) -> Vec<u64> {
+        let blocks = |waiting: &QueuedPackage| usize::from(waiting.head.len).div_ceil(BLOCK_BYTES).max(1);
+        let state = |waiting: &QueuedPackage| (waiting.level, waiting.head.id);
         let older = self.waiting.iter().position(|old| counts_newest(&new.head) && state(old) == state(&new));
-        let yields = |waiting: &&Waiting| waiting.level > new.level;
+        let yields = |waiting: &&QueuedPackage| waiting.level > new.level;
         let used: usize = self.waiting.iter().map(blocks).sum();
         let kept = used - self.waiting.iter().filter(yields).map(blocks).sum::<usize>();
         let more = older.map_or(blocks(&new), |at| blocks(&new).saturating_sub(blocks(&self.waiting[at])));
@@ -271,11 +271,11 @@ proptest! {
                 options: if state < 3 { Options::NEWEST } else { Options::default() },
                 ..Head::default()
             };
-            let sender = queue.sender_of(Share::default());
-            let new = Waiting { head, level, sender, first: tag as u64, ..Waiting::default() };
+            let sender = queue.sender_of(QueueShare::default());
+            let new = QueuedPackage { head, level, sender, first: tag as u64, ..QueuedPackage::default() };
             let body = vec![tag as u8; len];
             let mut gone = Vec::new();
-            let tell = |waiting: &Waiting, _: &[u8]| gone.push(waiting.first);
+            let tell = |waiting: &QueuedPackage, _: &[u8]| gone.push(waiting.first);
             let taken = match queue.older(&new) {
                 Some(older) => queue.replace(older, new, &body, tell),
                 None => queue.push(new, &body, tell),
@@ -283,7 +283,7 @@ proptest! {
             gone.extend((!taken).then_some(tag as u64));
             prop_assert_eq!(gone, model.push_newest(new));
             if take && let Some(place) = queue.first() {
-                let Waiting { head, first, .. } = *queue.at(place);
+                let QueuedPackage { head, first, .. } = *queue.at(place);
                 let mut body = vec![0; head.len.into()];
                 queue.read(place, &mut body);
                 prop_assert!(body.iter().all(|byte| *byte == first as u8));

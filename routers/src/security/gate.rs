@@ -2,14 +2,14 @@
 //! not known.
 
 use super::handshake::Handshake;
-use super::opening::{Greeting, Opened, Opening};
+use super::opening::{Opened, OpenedHello, Opening};
 use super::peer_sessions::{PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::tally::Tally;
 use crate::frame::{self, BadFrame, FrameHead, NodeIndex};
-use crate::inbound::{Came, Inbound};
+use crate::inbound::{Envelope, Inbound};
 use crate::link::SILENT_AFTER_NS;
-use crate::report::{Deliver, Event, Mismatch};
+use crate::report::{Deliver, Mismatch, RouterEvent};
 use crate::stats::Stats;
 use std::sync::Arc;
 
@@ -45,13 +45,14 @@ pub struct Gate {
     /// None at a port without handshakes: the port of packages finds out which incarnations live.
     handshake: Option<Handshake>,
     tally: Tally,
-    peers: Box<[Asked]>,
+    peers: Box<[ChallengeSchedule]>,
     /// Nobody is to be asked before this, ns.
     look_ns: u64,
 }
 
+/// What decides when a peer is challenged again.
 #[derive(Clone, Copy, Default)]
-struct Asked {
+struct ChallengeSchedule {
     /// When it was asked last, ns; none: never.
     at_ns: Option<u64>,
     /// When its present incarnation began, ns.
@@ -66,7 +67,7 @@ impl Gate {
         Self::of(all, Port::Packages, Some(Handshake::new(all, seed)))
     }
 
-    /// One at the port of what is not real time, in the thread that receives there.
+    /// A gate at the port of what is not real time, in the thread that receives there.
     pub fn of_rest(all: &Arc<PeerSessions>) -> Self {
         Self::of(all, Port::Rest, None)
     }
@@ -76,7 +77,7 @@ impl Gate {
             opening: Opening::new(all, port),
             handshake,
             tally: Tally::new(all.rejections(port)),
-            peers: vec![Asked::default(); all.router.nodes.into()].into(),
+            peers: vec![ChallengeSchedule::default(); all.router.nodes.into()].into(),
             all: all.clone(),
             look_ns: 0,
         }
@@ -87,7 +88,7 @@ impl Gate {
     pub fn take(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         datagram: &mut [u8],
         inbound: &mut Inbound,
         deliver: &mut impl Deliver,
@@ -102,16 +103,16 @@ impl Gate {
             Ok(Opened::Frame(head, text)) => {
                 inbound.handle_opened(now_ns, came, (&head, text, self.first(head.from)), deliver);
             }
-            Ok(Opened::Hello(head, greeting)) => {
+            Ok(Opened::Hello(head, opened)) => {
                 if let Some(handshake) = &mut self.handshake
-                    && inbound.may_greet(now_ns, came.source, &head, deliver)
+                    && inbound.may_handshake(now_ns, came.source, &head, deliver)
                 {
-                    let greeted = handshake.greet(now_ns, &head, &greeting, reply);
-                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: greeted.begins };
-                    return greeted.reply_bytes.map(said);
+                    let outcome = handshake.receive(now_ns, &head, &opened, reply);
+                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: outcome.begins };
+                    return outcome.reply_bytes.map(said);
                 }
                 if inbound.is_of_other(came.source, &head) {
-                    return self.greet_other(now_ns, &head, &greeting, inbound, reply);
+                    return self.answer_other(now_ns, &head, &opened, inbound, reply);
                 }
             }
             Err(NotOpened::Bad(why @ (BadFrame::Foreign | BadFrame::Damaged(_) | BadFrame::Sealed))) => {
@@ -127,22 +128,22 @@ impl Gate {
 
     /// Tells a peer with another configuration so, in a sealed reply. Without it each end would take the other's
     /// datagrams for replays.
-    fn greet_other(
+    fn answer_other(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &Greeting,
+        opened: &OpenedHello,
         inbound: &Inbound,
         reply: &mut [u8],
     ) -> Option<Said> {
-        let greeted = self.handshake.as_mut()?.greet_other(now_ns, head, greeting, reply);
-        if greeted.proves && greeting.hello.next[Port::Time as usize] > 0 {
+        let outcome = self.handshake.as_mut()?.receive_other(now_ns, head, opened, reply);
+        if outcome.proves && opened.hello.next[Port::Time as usize] > 0 {
             inbound.tells_other(now_ns, head);
         }
-        greeted.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
+        outcome.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
     }
 
-    /// From which sequence on the present incarnation of a peer is heard; what is missing from there on is lost.
+    /// First sequence of a peer's present incarnation that counts; what is missing from there on is lost.
     pub fn first(&self, peer: NodeIndex) -> u64 {
         self.opening.first(peer)
     }
@@ -166,7 +167,7 @@ impl Gate {
         began.is_some()
     }
 
-    /// The next question that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
+    /// The next challenge that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
     pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
         if now_ns < self.look_ns || self.handshake.is_none() {
             return None;
@@ -183,7 +184,7 @@ impl Gate {
     }
 
     fn is_to_be_asked(&mut self, peer: NodeIndex, now_ns: u64, stats: &Stats) -> bool {
-        let Asked { at_ns, began_ns, missed_since_ns } = &mut self.peers[usize::from(peer)];
+        let ChallengeSchedule { at_ns, began_ns, missed_since_ns } = &mut self.peers[usize::from(peer)];
         let is_over = |every_ns| at_ns.is_none_or(|at_ns| at_ns + every_ns <= now_ns);
         if !self.all.is_peer(peer) || !is_over(DOUBT_EVERY_NS) {
             return false;
@@ -201,7 +202,7 @@ impl Gate {
     fn reject(
         &mut self,
         now_ns: u64,
-        came: &Came,
+        came: &Envelope,
         rejection: Rejection,
         why: NotOpened,
         inbound: &Inbound,
@@ -213,7 +214,7 @@ impl Gate {
             inbound.suspect(now_ns, peer, Mismatch { reason, version, digest: None });
         }
         if let Some(datagrams) = self.tally.note(now_ns, peer, rejection) {
-            deliver.event(Event::Rejected { source, peer, why, datagrams });
+            deliver.event(RouterEvent::Rejected { source, peer, why, datagrams });
         }
     }
 }

@@ -1,15 +1,15 @@
 //! Finds out by challenge and response which incarnations live. A peer that has not answered takes no state.
 
 use super::hello::Hello;
-use super::opening::Greeting;
+use super::opening::OpenedHello;
 use super::peer_sessions::{PeerIncarnation, PeerSessions};
 use crate::frame::{FrameHead, NodeIndex};
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use std::sync::Arc;
 
-/// Questions of one peer that are answered in [`PER_NS`], at most: recorded ones that are sent again must not cost more
-/// than they are worth. Of more than half as many, a random share is.
+/// Challenges of one peer that are answered in [`PER_NS`], at most: replayed ones must not cost much. Of more than half
+/// as many, a random share is.
 pub const ANSWERS_MAX: u32 = 10;
 /// See [`ANSWERS_MAX`].
 pub const PER_NS: u64 = 100_000_000;
@@ -22,22 +22,22 @@ pub const CHALLENGE_MAX_NS: u64 = 2 * DRAW_EVERY_NS;
 pub struct Handshake {
     all: Arc<PeerSessions>,
     random: ChaCha20Rng,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerHandshake]>,
     /// An incarnation that has shown that it lives, and has not begun.
     begins: Option<(NodeIndex, PeerIncarnation)>,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Peer {
+struct PeerHandshake {
     /// When the present challenge was drawn, ns.
     drawn_ns: u64,
     /// The challenge before it, and when that was drawn; 0: none.
     before: (u64, u64),
-    questions: Questions,
+    challenges: ChallengeRate,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Questions {
+struct ChallengeRate {
     since_ns: u64,
     came: u32,
     answered: u32,
@@ -47,7 +47,7 @@ struct Questions {
 
 /// What a hello brought about.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Greeted {
+pub struct HelloOutcome {
     /// The peer has shown that it lives.
     pub proves: bool,
     /// An incarnation of the peer begins, with [`Handshake::begin`].
@@ -59,7 +59,7 @@ pub struct Greeted {
 impl Handshake {
     /// There is one. `seed` comes from a source of random numbers that is fit for keys; each incarnation has another.
     pub fn new(all: &Arc<PeerSessions>, seed: [u8; 32]) -> Self {
-        let peers = vec![Peer::default(); all.router.nodes.into()].into();
+        let peers = vec![PeerHandshake::default(); all.router.nodes.into()].into();
         let mut handshake = Self { all: all.clone(), random: ChaCha20Rng::from_seed(seed), peers, begins: None };
         (0..all.router.nodes).for_each(|peer| handshake.draw(0, peer));
         handshake
@@ -68,26 +68,38 @@ impl Handshake {
     /// Takes a hello that was opened, if all else in its head is as it must be. `datagram` has room for a hello of
     /// [`HELLO_DATAGRAM_BYTES`](super::HELLO_DATAGRAM_BYTES). If an incarnation begins by it, [`Self::begin`] when the
     /// reply has left.
-    pub fn greet(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
-        self.take(now_ns, head, greeting, true, datagram)
+    pub fn receive(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        opened: &OpenedHello,
+        datagram: &mut [u8],
+    ) -> HelloOutcome {
+        self.take(now_ns, head, opened, true, datagram)
     }
 
     /// The same for a peer with another digest: no incarnation begins. A challenge is answered, so that its sender
     /// knows that this node lives, and by which configuration.
-    pub fn greet_other(&mut self, now_ns: u64, head: &FrameHead, greeting: &Greeting, datagram: &mut [u8]) -> Greeted {
-        self.take(now_ns, head, greeting, false, datagram)
+    pub fn receive_other(
+        &mut self,
+        now_ns: u64,
+        head: &FrameHead,
+        opened: &OpenedHello,
+        datagram: &mut [u8],
+    ) -> HelloOutcome {
+        self.take(now_ns, head, opened, false, datagram)
     }
 
     fn take(
         &mut self,
         now_ns: u64,
         head: &FrameHead,
-        greeting: &Greeting,
+        opened: &OpenedHello,
         may_begin: bool,
         datagram: &mut [u8],
-    ) -> Greeted {
+    ) -> HelloOutcome {
         self.begin();
-        let (peer, Greeting { hello, key }) = (head.from, *greeting);
+        let (peer, OpenedHello { hello, key }) = (head.from, *opened);
         self.refresh(now_ns, peer);
         let proves = self.is_answer(now_ns, peer, hello.answer);
         let begins = may_begin && proves && self.all.incarnation(peer) != Some(head.incarnation);
@@ -99,13 +111,13 @@ impl Handshake {
         if begins {
             self.begins = Some((peer, PeerIncarnation { incarnation: head.incarnation, key, next: hello.next }));
         }
-        let is_question = hello.answer == 0;
+        let is_challenge = hello.answer == 0;
         // Only a living peer can answer a challenge, and only once: such replies need no limit.
-        let may = hello.challenge != 0 && (proves || is_question && self.may_answer(now_ns, peer));
+        let may = hello.challenge != 0 && (proves || is_challenge && self.may_answer(now_ns, peer));
         // A peer that has proved that it lives gets the final response; any other must prove it first.
-        let challenge = if is_question { self.all.challenge(peer) } else { 0 };
+        let challenge = if is_challenge { self.all.challenge(peer) } else { 0 };
         let reply = Hello { challenge, answer: hello.challenge, next: self.all.next(peer) };
-        Greeted { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
+        HelloOutcome { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
 
     /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the
@@ -139,17 +151,17 @@ impl Handshake {
 
     /// In a flood each challenge has the same chance, not only the first: one of them may come from a living peer.
     fn may_answer(&mut self, now_ns: u64, peer: NodeIndex) -> bool {
-        let questions = &mut self.peers[usize::from(peer)].questions;
-        let passed_ns = now_ns.saturating_sub(questions.since_ns);
+        let challenges = &mut self.peers[usize::from(peer)].challenges;
+        let passed_ns = now_ns.saturating_sub(challenges.since_ns);
         if passed_ns >= PER_NS {
-            let came_before = if passed_ns < 2 * PER_NS { questions.came } else { 0 };
-            *questions = Questions { since_ns: now_ns, came_before, ..Questions::default() };
+            let came_before = if passed_ns < 2 * PER_NS { challenges.came } else { 0 };
+            *challenges = ChallengeRate { since_ns: now_ns, came_before, ..ChallengeRate::default() };
         }
-        questions.came = questions.came.saturating_add(1);
+        challenges.came = challenges.came.saturating_add(1);
         let share = ANSWERS_MAX / 2;
-        let is_drawn = questions.came_before <= share || self.random.next_u32() % questions.came_before < share;
-        let may = is_drawn && questions.answered < ANSWERS_MAX;
-        questions.answered += u32::from(may);
+        let is_drawn = challenges.came_before <= share || self.random.next_u32() % challenges.came_before < share;
+        let may = is_drawn && challenges.answered < ANSWERS_MAX;
+        challenges.answered += u32::from(may);
         may
     }
 }

@@ -1,20 +1,20 @@
 //! What a hello says: 32 bytes behind the head.
 //!
 //! ```text
-//!            challenge   answer
-//!  question     a          0       do you live?
-//!  answer       b          a       I do; do you?
-//!  last word    0          b       I do
+//!                   challenge   answer
+//!  challenge           a          0       shows nothing yet
+//!  response            b          a       its sender lives now
+//!  final response      0          b       the other one lives now, too
 //! ```
 
 pub use rohrpost_network::HELLO_BYTES;
 
-/// "This incarnation of mine asks whether you live", the answer to that, or the last word.
+/// A challenge of an incarnation to a peer, the response to it, or the final response.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hello {
     /// A response to it proves that its sender lives now; 0: no response is wanted.
     pub challenge: u64,
-    /// The challenge that this answers; 0: it is a question.
+    /// The challenge that this responds to; 0: to none.
     pub answer: u64,
     /// From which sequence on the receiver is to take what this incarnation sends it: of packages, and of time.
     pub next: [u64; 2],

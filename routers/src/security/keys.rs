@@ -29,7 +29,7 @@ impl InstallationKey {
         Self { id, secret: Salt::new(HKDF_SHA256, SALT).extract(bytes) }
     }
 
-    /// By which people see that two nodes have the same key; it says nothing of the key itself.
+    /// Shows people that two nodes have the same key, and nothing of the key itself.
     pub fn fingerprint(&self) -> [u8; 8] {
         let mut bytes = [0; 8];
         let okm = self.secret.expand(&[b"fingerprint"], FingerprintLength);
@@ -91,7 +91,7 @@ impl KeyRing {
         Seal::new(LessSafeKey::new(UnboundKey::from(okm)))
     }
 
-    /// The same of every key.
+    /// Derives a seal from every key.
     pub(super) fn derive_all(&self, of: &Binding) -> Vec<Seal> {
         (0..self.len()).map(|place| self.derive(place, of)).collect()
     }
@@ -113,13 +113,13 @@ pub(super) enum Purpose {
 
 /// One end of a direction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct End {
+pub(super) struct Endpoint {
     pub(super) node: NodeIndex,
     /// Its incarnation; 0: any.
     pub(super) incarnation: u64,
 }
 
-impl End {
+impl Endpoint {
     /// Whatever incarnation the node has.
     pub(super) fn any(node: NodeIndex) -> Self {
         Self { node, incarnation: 0 }
@@ -131,8 +131,8 @@ impl End {
 pub(super) struct Binding {
     pub(super) purpose: Purpose,
     pub(super) system: u8,
-    pub(super) from: End,
-    pub(super) to: End,
+    pub(super) from: Endpoint,
+    pub(super) to: Endpoint,
 }
 
 impl Binding {

@@ -28,6 +28,7 @@
 mod gate;
 mod handshake;
 mod hello;
+mod hello_queue;
 mod keys;
 mod opening;
 mod peer_sessions;
@@ -37,20 +38,19 @@ mod seal;
 mod sealing;
 mod tally;
 mod unverified;
-mod waiting;
 
 pub use gate::{ASK_EVERY_NS, Gate, Said};
-pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Greeted, Handshake, PER_NS};
+pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Handshake, HelloOutcome, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
+pub use hello_queue::{HELLO_SLOT_BYTES, HelloQueue};
 pub use keys::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
-pub use opening::{Greeting, Opened, Opening};
+pub use opening::{Opened, OpenedHello, Opening};
 pub use peer_sessions::{PeerSessions, Port, RouterIdentity};
 pub use random::{NoRandom, random};
 pub use rejection::{NotOpened, Rejection};
 pub use seal::TAG_BYTES;
-pub use sealing::{Sealing, Unacquainted};
+pub use sealing::{NoSession, Sealing};
 pub use tally::{Rejections, TELL_EVERY_NS, Tally};
-pub use waiting::{HELLO_SLOT_BYTES, Waiting};
 
 /// Bytes of a datagram that carries a hello.
 pub const HELLO_DATAGRAM_BYTES: usize = crate::frame::HEAD_BYTES + HELLO_BYTES + TAG_BYTES;

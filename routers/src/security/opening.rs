@@ -2,13 +2,13 @@
 
 use super::HELLO_DATAGRAM_BYTES;
 use super::hello::Hello;
-use super::keys::End;
+use super::keys::Endpoint;
 use super::peer_sessions::{Known, PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::seal::{self, Seal};
 use super::unverified::UnverifiedIncarnations;
-use crate::frame::{FrameHead, Kind, NodeIndex};
-use crate::inbound::window::{Arrival, Window};
+use crate::frame::{FrameHead, FrameKind, NodeIndex};
+use crate::inbound::window::{Arrival, SequenceWindow};
 use std::sync::Arc;
 
 /// A datagram with a valid seal.
@@ -17,12 +17,12 @@ pub enum Opened<'a> {
     /// Of the peer's present incarnation to our present one, and not opened before: its head and what was sealed.
     Frame(FrameHead, &'a [u8]),
     /// Of some incarnation of the peer, perhaps long ago: for the [`Handshake`](super::Handshake) alone.
-    Hello(FrameHead, Greeting),
+    Hello(FrameHead, OpenedHello),
 }
 
 /// A hello as it came.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Greeting {
+pub struct OpenedHello {
     /// What it says.
     pub hello: Hello,
     /// Place of its key.
@@ -33,15 +33,15 @@ pub struct Greeting {
 pub struct Opening {
     all: Arc<PeerSessions>,
     port: Port,
-    peers: Box<[Known<Heard>]>,
+    peers: Box<[Known<HeardIncarnation>]>,
     /// By node: incarnations of it that are not known to live.
     overheard: Box<[UnverifiedIncarnations]>,
     /// By node; the one that was heard last stands first.
     past: Box<[[Past; PAST]]>,
 }
 
-/// Lives of a peer that took turns: of so many it is remembered what was opened of them at the port of what is not real
-/// time.
+/// Incarnations of a peer that took turns: so many are remembered, each with what was opened of it at the port of what
+/// is not real time.
 const PAST: usize = 4;
 
 /// An incarnation that was heard at that port, and from which sequence on it is heard when it is taken for the present
@@ -53,18 +53,18 @@ struct Past {
 }
 
 /// A peer's present incarnation as it is heard.
-struct Heard {
+struct HeardIncarnation {
     incarnation: u64,
     /// By the place of the key: which of two the peer seals with is its choice.
     seals: Vec<Seal>,
     /// From this sequence on it is heard. At the port of what is not real time no hello says it: then it is that of
     /// what is opened first.
     first: Option<u64>,
-    window: Window,
+    window: SequenceWindow,
 }
 
 impl Opening {
-    /// For a port; there is one.
+    /// State for a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
         let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
         let overheard = (0..all.router.nodes).map(|_| UnverifiedIncarnations::default()).collect();
@@ -102,7 +102,7 @@ impl Opening {
         if !is_there(head.from) {
             return Err(Rejection::Address.into());
         }
-        if head.kind == Kind::Hello {
+        if head.kind == FrameKind::Hello {
             return Ok(Opened::Hello(head, self.hello(&head, key, datagram)?));
         }
         let past = &mut self.past[usize::from(head.from)];
@@ -111,13 +111,13 @@ impl Opening {
             all.doubt(head.from);
             Rejection::OtherIncarnation
         })?;
-        if heard.window.is_copy(head.sequence) {
+        if heard.window.is_duplicate(head.sequence) {
             return Err(Rejection::Replay.into());
         }
         let text = heard.seals[key].open(seal::of_sequence(head.sequence), datagram).ok_or(Rejection::Forged)?;
         // What the network lost is another's to count.
         let arrival = heard.window.arrive(head.sequence, &mut 0);
-        debug_assert!(arrival != Arrival::Copy);
+        debug_assert!(arrival != Arrival::Duplicate);
         heard.first.get_or_insert(head.sequence);
         if self.port == Port::Rest {
             past[0].next = heard.window.next();
@@ -129,7 +129,7 @@ impl Opening {
     /// known: then it can be overheard.
     pub fn is_strange(&mut self, datagram: &[u8]) -> bool {
         let Ok((head, _)) = FrameHead::read(datagram) else { return false };
-        let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != Kind::Hello;
+        let is_theirs = self.port == Port::Time && self.is_ours(&head) && head.kind != FrameKind::Hello;
         let heard = |opening: &mut Self| {
             let Self { peers, overheard, past, all, port } = opening;
             let heard = Self::heard(peers, overheard, &mut past[usize::from(head.from)], all, *port, head.from);
@@ -170,7 +170,7 @@ impl Opening {
         self.all.doubt(head.from);
         let all = &self.all;
         let text = self.overheard[usize::from(head.from)].open((&head, key), datagram, || {
-            let peer = End { node: head.from, incarnation: head.incarnation };
+            let peer = Endpoint { node: head.from, incarnation: head.incarnation };
             all.keys.derive(key, &all.binding(Port::Time, peer, all.own()))
         });
         Ok((head, text.ok_or(Rejection::Forged)?))
@@ -188,7 +188,7 @@ impl Opening {
         self.peers[usize::from(peer)].made.as_ref().and_then(|heard| heard.first).unwrap_or(0)
     }
 
-    fn hello(&self, head: &FrameHead, key: usize, datagram: &mut [u8]) -> Result<Greeting, Rejection> {
+    fn hello(&self, head: &FrameHead, key: usize, datagram: &mut [u8]) -> Result<OpenedHello, Rejection> {
         if self.port != Port::Packages {
             return Err(Rejection::NotOurs);
         }
@@ -198,19 +198,19 @@ impl Opening {
         let number = u32::try_from(head.sequence).map_err(|_| Rejection::Forged)?;
         let seal = self.all.hello_from(head.from, key);
         let text = seal.open(seal::of_hello(head.incarnation, number), datagram).ok_or(Rejection::Forged)?;
-        Ok(Greeting { hello: Hello::parse(text).ok_or(Rejection::Forged)?, key })
+        Ok(OpenedHello { hello: Hello::parse(text).ok_or(Rejection::Forged)?, key })
     }
 
     fn heard<'a>(
-        peers: &'a mut [Known<Heard>],
+        peers: &'a mut [Known<HeardIncarnation>],
         overheard: &[UnverifiedIncarnations],
         past: &mut [Past; PAST],
         all: &PeerSessions,
         port: Port,
         from: NodeIndex,
-    ) -> Option<&'a mut Heard> {
+    ) -> Option<&'a mut HeardIncarnation> {
         peers[usize::from(from)].of(all, from, |session| {
-            let peer = End { node: from, incarnation: session.incarnation };
+            let peer = Endpoint { node: from, incarnation: session.incarnation };
             let from = match port {
                 // What is sealed there is sealed to this incarnation of ours: all of it may be opened, and once.
                 Port::Rest => remembered(past, session.incarnation),
@@ -219,11 +219,11 @@ impl Opening {
                     session.next[port as usize].max(overheard[usize::from(from)].next(session.incarnation))
                 }
             };
-            Heard {
+            HeardIncarnation {
                 incarnation: session.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
                 first: (port != Port::Rest).then_some(from),
-                window: Window::going_on(from),
+                window: SequenceWindow::going_on(from),
             }
         })
     }

@@ -1,11 +1,11 @@
 //! Tracks each peer's authenticated incarnation. One thread writes; senders and the clock read.
 
 use super::hello::Hello;
-use super::keys::{Binding, End, KeyRing, Purpose};
+use super::keys::{Binding, Endpoint, KeyRing, Purpose};
 use super::seal::{self, Seal};
 use super::tally::Rejections;
 use super::{HELLO_BYTES, HELLO_DATAGRAM_BYTES};
-use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use crate::frame::{FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use crate::settings::Settings;
 use rohrpost_mailbox::SeqCount;
 use std::fmt;
@@ -75,7 +75,7 @@ pub(super) struct PeerIncarnation {
 pub struct PeerSessions {
     pub(super) router: RouterIdentity,
     pub(super) keys: KeyRing,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerSession]>,
     /// Peers of which an incarnation is known, one bit each.
     known: AtomicU64,
     /// One bit for each peer with datagrams of another incarnation than the known one.
@@ -92,15 +92,15 @@ impl fmt::Debug for PeerSessions {
     }
 }
 
-/// A peer.
-struct Peer {
+/// Keys, challenge and counters of one peer.
+struct PeerSession {
     /// By the place of the key.
     hello_to: Vec<Seal>,
     hello_from: Vec<Seal>,
     session: Published,
     /// What it must answer for an incarnation of it to begin.
     challenge: AtomicU64,
-    /// Questions to it.
+    /// Challenges to it.
     asked: AtomicU32,
     /// Hellos of this incarnation to it.
     hellos: AtomicU64,
@@ -116,10 +116,10 @@ impl PeerSessions {
     pub fn new(router: RouterIdentity, keys: KeyRing) -> Arc<Self> {
         assert_ne!(router.incarnation, 0, "an incarnation is not 0");
         let seals = |from, to| {
-            let (from, to) = (End::any(from), End::any(to));
+            let (from, to) = (Endpoint::any(from), Endpoint::any(to));
             keys.derive_all(&Binding { purpose: Purpose::Hello, system: router.system, from, to })
         };
-        let peer = |node| Peer {
+        let peer = |node| PeerSession {
             hello_to: seals(router.own, node),
             hello_from: seals(node, router.own),
             session: Published::default(),
@@ -228,13 +228,13 @@ impl PeerSessions {
     /// Key between two incarnations. Time is sealed to the node instead: a node that joins time slots must hear it
     /// before anybody knows that it lives, and takes nothing for proven that was said before the hello by which the
     /// other's incarnation began.
-    pub(super) fn binding(&self, port: Port, from: End, to: End) -> Binding {
-        let to = if port == Port::Time { End::any(to.node) } else { to };
+    pub(super) fn binding(&self, port: Port, from: Endpoint, to: Endpoint) -> Binding {
+        let to = if port == Port::Time { Endpoint::any(to.node) } else { to };
         Binding { purpose: port.purpose(), system: self.router.system, from, to }
     }
 
-    pub(super) fn own(&self) -> End {
-        End { node: self.router.own, incarnation: self.router.incarnation }
+    pub(super) fn own(&self) -> Endpoint {
+        Endpoint { node: self.router.own, incarnation: self.router.incarnation }
     }
 
     pub(super) fn hello_from(&self, peer: NodeIndex, key: usize) -> &Seal {
@@ -244,12 +244,12 @@ impl PeerSessions {
     /// A challenge to a peer, with one of its keys after the other: which of them the peer has is not known. None
     /// as long as no incarnation of it could take an answer.
     pub(super) fn ask(&self, peer: NodeIndex, datagram: &mut [u8]) -> Option<usize> {
-        let question = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
-        if question.challenge == 0 {
+        let hello = Hello { challenge: self.challenge(peer), answer: 0, next: self.next(peer) };
+        if hello.challenge == 0 {
             return None;
         }
         let asked = self.peer(peer).asked.fetch_add(1, Ordering::Relaxed) as usize;
-        Some(self.hello(peer, asked % self.keys.len(), question, datagram))
+        Some(self.hello(peer, asked % self.keys.len(), hello, datagram))
     }
 
     /// The sequences that come next: of packages, and of time.
@@ -269,20 +269,20 @@ impl PeerSessions {
         let datagram = &mut datagram[..HELLO_DATAGRAM_BYTES];
         let RouterIdentity { system, own, digest, incarnation, .. } = self.router;
         let sequence = number.into();
-        let head = FrameHead { kind: Kind::Hello, system, from: own, to: peer, digest, incarnation, sequence };
+        let head = FrameHead { kind: FrameKind::Hello, system, from: own, to: peer, digest, incarnation, sequence };
         head.write(self.keys.id(key), datagram);
         datagram[HEAD_BYTES..HEAD_BYTES + HELLO_BYTES].copy_from_slice(&hello.to_bytes());
         self.peer(peer).hello_to[key].close(seal::of_hello(incarnation, number), datagram);
         HELLO_DATAGRAM_BYTES
     }
 
-    /// As if so many hellos had been said to a peer.
+    /// Pretends that this many hellos were sent to a peer.
     #[cfg(test)]
     pub(super) fn has_said(&self, peer: NodeIndex, hellos: u64) {
         self.peer(peer).hellos.store(hellos, Ordering::Relaxed);
     }
 
-    fn peer(&self, peer: NodeIndex) -> &Peer {
+    fn peer(&self, peer: NodeIndex) -> &PeerSession {
         &self.peers[usize::from(peer)]
     }
 }

@@ -7,7 +7,7 @@ use ring::rand::{SecureRandom, SystemRandom};
 #[error("the system has no random numbers (getrandom); is this a kernel before 3.17?")]
 pub struct NoRandom;
 
-/// So many random bytes. Just after booting it waits until there are any.
+/// Random bytes. Just after booting it waits until there are any.
 ///
 /// # Errors
 /// [`NoRandom`]

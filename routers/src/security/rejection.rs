@@ -1,6 +1,6 @@
 //! Why a datagram was not opened.
 
-use crate::frame::{BadFrame, Reason};
+use crate::frame::{BadFrame, RefusalReason};
 
 /// Why a datagram is not taken, in the order in which it is found out.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
@@ -53,11 +53,11 @@ impl Rejection {
 
     /// What it tells of a peer from which nothing else comes, if it is of that: anybody can write a peer's address on a
     /// datagram.
-    pub const fn reason(self) -> Option<Reason> {
+    pub const fn reason(self) -> Option<RefusalReason> {
         match self {
-            Self::Unsealed => Some(Reason::Sealed),
-            Self::OtherKey | Self::Forged => Some(Reason::Key),
-            Self::Version => Some(Reason::Version),
+            Self::Unsealed => Some(RefusalReason::Sealed),
+            Self::OtherKey | Self::Forged => Some(RefusalReason::Key),
+            Self::Version => Some(RefusalReason::Version),
             Self::NotOurs | Self::OtherIncarnation | Self::Replay | Self::Address => None,
         }
     }

@@ -33,14 +33,14 @@ impl Seal {
     }
 }
 
-/// Of a key that one incarnation has: its datagrams are counted.
+/// Nonce for a key of one incarnation: the number of the datagram.
 pub(super) fn of_sequence(sequence: u64) -> [u8; NONCE_LEN] {
     let mut nonce = [0; NONCE_LEN];
     nonce[4..].copy_from_slice(&sequence.to_le_bytes());
     nonce
 }
 
-/// Of a key that all incarnations of a node have: which incarnation, and its how manieth hello.
+/// Nonce for a key of all incarnations of a node: the incarnation, and the number of its hello.
 pub(super) fn of_hello(incarnation: u64, number: u32) -> [u8; NONCE_LEN] {
     let mut nonce = [0; NONCE_LEN];
     nonce[..8].copy_from_slice(&incarnation.to_le_bytes());

@@ -1,15 +1,15 @@
 //! The half that seals: one for each port, in the thread that sends there.
 
-use super::keys::End;
+use super::keys::Endpoint;
 use super::peer_sessions::{Known, PeerSessions, Port};
 use super::seal::{self, Seal};
 use crate::frame::{self, FrameHead, NodeIndex};
 use std::sync::Arc;
 
-/// No incarnation of the peer is known to live, so there is nobody to seal to.
+/// No incarnation of the peer has answered a challenge yet, so nothing can be sealed to it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("no router has answered there yet")]
-pub struct Unacquainted;
+pub struct NoSession;
 
 /// Seals datagrams of one port.
 pub struct Sealing {
@@ -21,7 +21,7 @@ pub struct Sealing {
     strangers: Box<[Vec<Seal>]>,
 }
 
-/// To a peer's present incarnation.
+/// Seal to a peer's present incarnation.
 struct PeerSeal {
     /// Place of the key.
     key: usize,
@@ -33,16 +33,16 @@ struct PeerSeal {
 const OTHER_KEY_EVERY: u64 = 4;
 
 impl Sealing {
-    /// For a port; there is one.
+    /// State for a port; there is one.
     pub fn new(all: &Arc<PeerSessions>, port: Port) -> Self {
         let peers = (0..all.router.nodes).map(|_| Known::default()).collect();
         Self { peers, strangers: Box::default(), all: all.clone(), port }
     }
 
-    /// For time in time slots: seals to each node that has a key, known or not. A node that joins must hear time before
+    /// Seals time in time slots, to each node that has a key, known or not. A node that joins must hear time before
     /// it may send a challenge.
     pub fn of_slots(all: &Arc<PeerSessions>) -> Self {
-        let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), End::any(node)));
+        let seals = |node| all.keys.derive_all(&all.binding(Port::Time, all.own(), Endpoint::any(node)));
         Self { strangers: (0..all.router.nodes).map(seals).collect(), ..Self::new(all, Port::Time) }
     }
 
@@ -54,19 +54,19 @@ impl Sealing {
     ///
     /// # Panics
     /// If a sequence of the head was sealed before.
-    pub fn seal(&mut self, head: &FrameHead, datagram: &mut [u8]) -> Result<(), Unacquainted> {
+    pub fn seal(&mut self, head: &FrameHead, datagram: &mut [u8]) -> Result<(), NoSession> {
         head.write(0, datagram);
         self.close(datagram)
     }
 
-    /// The same for a datagram with a written head, with a check or without.
+    /// Seals a datagram with a written head, with a check or without.
     ///
     /// # Errors
     /// [`Unacquainted`]: ask first.
     ///
     /// # Panics
     /// If a sequence of the head was sealed before, or there is no head.
-    pub fn close(&mut self, datagram: &mut [u8]) -> Result<(), Unacquainted> {
+    pub fn close(&mut self, datagram: &mut [u8]) -> Result<(), NoSession> {
         let (to, sequence) = frame::place_of(datagram);
         let port = self.port;
         let all = &self.all;
@@ -76,7 +76,7 @@ impl Sealing {
                 let key = Self::key_to_stranger(way.map(|way| way.key), seals.len(), sequence);
                 (key, &seals[key])
             }
-            None => way.map(|way| (way.key, &way.seal)).ok_or(Unacquainted)?,
+            None => way.map(|way| (way.key, &way.seal)).ok_or(NoSession)?,
         };
         all.use_up(port, to, sequence);
         frame::write_key(all.keys.id(key), datagram);
@@ -113,7 +113,7 @@ impl Sealing {
         to: NodeIndex,
     ) -> Option<&'a mut PeerSeal> {
         peers[usize::from(to)].of(all, to, |session| {
-            let peer = End { node: to, incarnation: session.incarnation };
+            let peer = Endpoint { node: to, incarnation: session.incarnation };
             let seal = all.keys.derive(session.key, &all.binding(port, all.own(), peer));
             PeerSeal { key: session.key, seal }
         })

@@ -6,7 +6,7 @@ use crate::frame::NodeIndex;
 use rohrpost_mailbox::Throttle;
 use std::sync::Arc;
 
-/// Of each node something is told so often at most, ns; of all addresses that no node has together, too.
+/// Shortest interval between two reports on one node, ns; all addresses that no node has count as one.
 pub const TELL_EVERY_NS: u64 = 1_000_000_000;
 
 /// Counts of one port: by the node with the source address, which any sender can forge.
@@ -39,7 +39,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// For a port; there is one.
+    /// Tally of a port; there is one.
     pub fn new(counts: &Arc<Rejections>) -> Self {
         Self { told: vec![Throttle::default(); counts.sources.len()].into(), counts: counts.clone() }
     }

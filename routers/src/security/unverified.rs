@@ -51,7 +51,7 @@ impl UnverifiedIncarnations {
         Some(text)
     }
 
-    /// From which sequence on nothing of an incarnation was overheard.
+    /// First sequence of an incarnation from which on nothing was overheard.
     pub(super) fn next(&self, incarnation: u64) -> u64 {
         let mut entries = self.0.iter().flatten();
         entries.find(|entry| entry.incarnation == incarnation).map_or(0, |entry| entry.next)

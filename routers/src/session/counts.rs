@@ -67,13 +67,13 @@ impl From<NotDelivered> for Cause {
 
 /// What passed, and what did not, by class.
 #[derive(Debug)]
-pub struct Counts {
-    classes: Box<[ClassCounts]>,
+pub struct SessionCounts {
+    classes: Box<[SessionClassCounts]>,
 }
 
-/// Of one class.
+/// Counts of one class.
 #[derive(Default, Debug)]
-pub struct ClassCounts {
+pub struct SessionClassCounts {
     /// Packages that came; one to all systems once for each of them.
     pub packages: Count,
     /// Of these, handed to the next connection; at a client, delivered.
@@ -83,7 +83,7 @@ pub struct ClassCounts {
     lost: [Count; Cause::ALL.len()],
 }
 
-impl ClassCounts {
+impl SessionClassCounts {
     /// Packages lost for a cause.
     pub fn lost(&self, cause: Cause) -> u64 {
         self.lost[cause as usize].get()
@@ -100,20 +100,20 @@ impl ClassCounts {
     }
 }
 
-impl Default for Counts {
+impl Default for SessionCounts {
     fn default() -> Self {
-        Self { classes: (0..=u8::MAX).map(|_| ClassCounts::default()).collect() }
+        Self { classes: (0..=u8::MAX).map(|_| SessionClassCounts::default()).collect() }
     }
 }
 
-impl Counts {
+impl SessionCounts {
     /// What a class did.
-    pub fn class(&self, priority: Priority) -> &ClassCounts {
+    pub fn class(&self, priority: Priority) -> &SessionClassCounts {
         &self.classes[usize::from(priority.0)]
     }
 
     /// All classes that did something, the most urgent first.
-    pub fn classes(&self) -> impl Iterator<Item = (Priority, &ClassCounts)> {
+    pub fn classes(&self) -> impl Iterator<Item = (Priority, &SessionClassCounts)> {
         let all = self.classes.iter().enumerate().rev();
         all.filter(|(_, class)| class.packages.get() > 0).map(|(index, class)| (Priority(index as u8), class))
     }

@@ -29,14 +29,14 @@ pub struct Bounded {
 /// What one client knows of the clocks of one incarnation of the server.
 #[derive(Clone, Debug, Default)]
 pub struct ServerClockEstimate {
-    kept: [Option<Sample>; KEPT],
+    kept: [Option<RoundTripSample>; KEPT],
     next: usize,
     /// Answers that were read.
     answers: u64,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Sample {
+struct RoundTripSample {
     answer: TimeAnswer,
     /// Our clock when it was read, ns.
     heard_ns: u64,
@@ -44,7 +44,7 @@ struct Sample {
     ways_ns: u64,
 }
 
-impl Sample {
+impl RoundTripSample {
     /// How far off the server's session clock may be by now, ns.
     fn error_ns(&self, now_ns: u64) -> u64 {
         let age_ns = now_ns.saturating_sub(self.heard_ns) + self.ways_ns;
@@ -54,7 +54,7 @@ impl Sample {
     }
 }
 
-impl Sample {
+impl RoundTripSample {
     /// The server's session clock by this exchange, ns.
     fn session_ns(&self, now_ns: u64) -> u64 {
         let heard_ns = self.answer.left_ns.saturating_add(self.ways_ns / 2);
@@ -68,7 +68,7 @@ impl ServerClockEstimate {
         let there_ns = answer.left_ns - answer.came_ns;
         let Some(ways_ns) = now_ns.checked_sub(answer.asked_ns) else { return false };
         // Clocks of different pace may make the way seem shorter than nothing.
-        let sample = Sample { answer: *answer, heard_ns: now_ns, ways_ns: ways_ns.saturating_sub(there_ns) };
+        let sample = RoundTripSample { answer: *answer, heard_ns: now_ns, ways_ns: ways_ns.saturating_sub(there_ns) };
         if self.contradicts(now_ns, &sample) {
             self.forget();
         }
@@ -84,7 +84,7 @@ impl ServerClockEstimate {
     }
 
     /// Whether one that is kept and this one cannot both be true: one of both ends slept, or was slewed.
-    fn contradicts(&self, now_ns: u64, sample: &Sample) -> bool {
+    fn contradicts(&self, now_ns: u64, sample: &RoundTripSample) -> bool {
         let mut kept = self.kept.iter().flatten();
         kept.any(|other| {
             let apart_ns = other.session_ns(now_ns).abs_diff(sample.session_ns(now_ns));
@@ -97,7 +97,7 @@ impl ServerClockEstimate {
         self.answers
     }
 
-    /// The shortest way there and back of those that are kept, ns.
+    /// The shortest round trip of those that are kept, ns.
     pub fn round_trip_ns(&self) -> Option<u64> {
         self.kept.iter().flatten().map(|sample| sample.ways_ns).min()
     }
@@ -112,7 +112,7 @@ impl ServerClockEstimate {
     pub fn system(&self, now_ns: u64) -> Option<TimeRecord> {
         let known = || self.kept.iter().flatten().filter(|sample| sample.answer.error_ns < ERROR_UNKNOWN_NS);
         let epoch = known().map(|sample| sample.answer.epoch).max()?;
-        let whole_error_ns = |sample: &Sample| sample.error_ns(now_ns).saturating_add(sample.answer.error_ns);
+        let whole_error_ns = |sample: &RoundTripSample| sample.error_ns(now_ns).saturating_add(sample.answer.error_ns);
         let best = known().filter(|sample| sample.answer.epoch == epoch).min_by_key(|sample| whole_error_ns(sample))?;
         Some(TimeRecord {
             epoch,

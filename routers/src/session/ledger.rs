@@ -1,14 +1,14 @@
 //! What becomes of packages that leave an end of a session: counted, and the answers that are due.
 
-use super::counts::{Cause, Counts};
+use super::counts::{Cause, SessionCounts};
 use super::outgoing::Fates;
 use super::server::Principals;
-use super::{Answers, answer_to};
+use super::{ErrorReplies, answer_to};
 use rohrpost_mailbox::Head;
 
-/// Of one connection, while something is done with what leaves by it.
+/// Accounts for what leaves by one connection.
 pub(super) struct Ledger<'a, H> {
-    counts: &'a Counts,
+    counts: &'a SessionCounts,
     host: &'a mut H,
     /// The client for which they are, where that is known.
     holder: Option<&'a str>,
@@ -18,7 +18,7 @@ pub(super) struct Ledger<'a, H> {
 }
 
 impl<'a, H> Ledger<'a, H> {
-    pub(super) fn new(counts: &'a Counts, host: &'a mut H, holder: Option<&'a str>) -> Self {
+    pub(super) fn new(counts: &'a SessionCounts, host: &'a mut H, holder: Option<&'a str>) -> Self {
         Self { counts, host, holder, principals: None, answers: Vec::new() }
     }
 
@@ -33,7 +33,7 @@ impl<'a, H> Ledger<'a, H> {
     }
 }
 
-impl<H: Answers> Fates for Ledger<'_, H> {
+impl<H: ErrorReplies> Fates for Ledger<'_, H> {
     fn passed(&mut self, head: &Head) {
         self.counts.passed(head.priority);
     }

@@ -25,10 +25,10 @@ pub mod server;
 mod splitter;
 mod table;
 
-pub use counts::{Cause, ClassCounts, Counts};
+pub use counts::{Cause, SessionClassCounts, SessionCounts};
 pub use estimate::{Bounded, ServerClockEstimate};
 pub use outgoing::BATCH_BYTES;
-pub use table::{Conflict, ENTRIES_MAX, Table};
+pub use table::{Conflict, ENTRIES_MAX, RoutingTable};
 
 use rohrpost_mailbox::{Head, Kind, Name, Options, Type};
 
@@ -50,15 +50,15 @@ pub const SILENT_AFTER_NS: u64 = 3_500_000_000;
 pub const SLOW_SILENT_AFTER_NS: u64 = 8_000_000_000;
 /// An end that has taken nothing of what is ready for so long is gone.
 pub const STALLED_AFTER_NS: u64 = 10_000_000_000;
-/// From the beginning of a connection to its welcome, at most; however busily bytes come.
-pub const GREETING_MAX_NS: u64 = 5_000_000_000;
-/// From the first byte of a frame to its last, at most.
+/// Longest time from the beginning of a connection to its welcome; however busily bytes come.
+pub const HANDSHAKE_MAX_NS: u64 = 5_000_000_000;
+/// Longest time from the first byte of a frame to its last.
 pub const FRAME_MAX_NS: u64 = 30_000_000_000;
-/// What time alone brings about is looked for this often.
+/// Interval between two looks for what only the passing of time changes.
 pub const LOOK_EVERY_NS: u64 = 100_000_000;
 
-/// Writes the answers to commands that go no further: what a fault looks like is not the routers' business.
-pub trait Answers {
+/// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.
+pub trait ErrorReplies {
     /// Appends the answer to a command with a body that begins with these bytes. `holder`: the client that it was for.
     /// False: it gets none.
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool;
@@ -71,7 +71,7 @@ fn answer_to(
     call: &[u8],
     why: Cause,
     holder: Option<&str>,
-    answers: &mut impl Answers,
+    answers: &mut impl ErrorReplies,
 ) -> Option<(Head, Vec<u8>)> {
     let Kind::Command(number) = head.kind.kind() else { return None };
     let is_answered = head.from.is_mailbox() && head.to.is_mailbox() && why.told().is_some();

@@ -10,8 +10,8 @@
 
 use super::WAIT_MAX_NS;
 use super::counts::Cause;
-use super::frame::{Carried, HEAD_BYTES, Message};
-use crate::queue::{Place, Queue, Share, Waiting, counts_newest};
+use super::frame::{Carried, HEAD_BYTES, SessionMessage};
+use crate::queue::{Place, Queue, QueueShare, QueuedPackage, counts_newest};
 use rohrpost_mailbox::Head;
 use rohrpost_network::LEVELS;
 
@@ -32,7 +32,7 @@ pub(super) struct Parcel<'a> {
     /// 0 goes first.
     pub(super) level: u8,
     /// The share of memory and rate that it counts to.
-    pub(super) share: Share,
+    pub(super) share: QueueShare,
 }
 
 /// Learns what becomes of packages.
@@ -47,7 +47,7 @@ pub(super) trait Fates {
     fn crowded(&mut self, _sender: u32) {}
 }
 
-/// Of one connection, or of the one that comes next.
+/// What leaves by a connection, or by the next one.
 #[derive(Debug)]
 pub(super) struct Outgoing {
     ready: Vec<u8>,
@@ -82,7 +82,7 @@ impl Outgoing {
         }
     }
 
-    /// So many bytes are made ready at a time from now on, but no more than [`BATCH_BYTES`].
+    /// Makes this many bytes ready at a time from now on, but no more than [`BATCH_BYTES`].
     pub(super) fn set_batch(&mut self, bytes: usize) {
         self.batch_bytes = bytes.min(BATCH_BYTES);
     }
@@ -126,13 +126,13 @@ impl Outgoing {
     }
 
     /// Appends a frame that is no package. The caller bounds how many.
-    pub(super) fn say(&mut self, message: &Message<'_>) {
+    pub(super) fn say(&mut self, message: &SessionMessage<'_>) {
         message.write(&mut self.ready);
     }
 
     /// The same, before all packages that have not begun to leave. What has left when [`sent`](Self::sent) has come so
     /// far.
-    pub(super) fn hurry(&mut self, message: &Message<'_>) -> u64 {
+    pub(super) fn hurry(&mut self, message: &SessionMessage<'_>) -> u64 {
         let mut frame = Vec::new();
         message.write(&mut frame);
         let at = self.next_frame().max(self.hurried);
@@ -155,7 +155,8 @@ impl Outgoing {
         let quota_bytes = self.quota_bytes;
         let queue = self.queue.get_or_insert_with(|| Box::new(Queue::shared(quota_bytes)));
         let sender = queue.sender_of(share);
-        let waiting = Waiting { head: *head, published_ns, hops, level, sender, share, ..Waiting::default() };
+        let waiting =
+            QueuedPackage { head: *head, published_ns, hops, level, sender, share, ..QueuedPackage::default() };
         let is_taken = match queue.older(&waiting) {
             Some(older) => replace(queue, older, waiting, body, fates),
             None => queue.push(waiting, body, gives_way(sender, fates)),
@@ -172,7 +173,7 @@ impl Outgoing {
         while self.ready().len() < self.batch_bytes
             && let Some(place) = queue.first_shared(self.batch_bytes as u64)
         {
-            let Waiting { head, published_ns, hops, share, .. } = *queue.at(place);
+            let QueuedPackage { head, published_ns, hops, share, .. } = *queue.at(place);
             if is_stale(now_ns, published_ns) {
                 let (waiting, beginning) = queue.remove(place);
                 fates.lost(&waiting.head, beginning, Cause::Stale);
@@ -198,7 +199,7 @@ impl Outgoing {
             let mut next = queue.first_of(0, level);
             while let Some(place) = next {
                 next = queue.behind(place);
-                let Waiting { head, published_ns, .. } = queue.at(place);
+                let QueuedPackage { head, published_ns, .. } = queue.at(place);
                 if is_stale(now_ns, *published_ns) {
                     let (waiting, beginning) = queue.remove(place);
                     fates.lost(&waiting.head, beginning, cause);
@@ -224,7 +225,7 @@ impl Outgoing {
         }
     }
 
-    /// Of `ready`, where the first frame begins of which nothing was taken.
+    /// Offset in `ready` of the first frame of which nothing was taken.
     fn next_frame(&self) -> usize {
         let mut at = self.begun;
         while let Some(length) = self.ready[at..].first_chunk().filter(|_| at < self.taken) {
@@ -247,13 +248,13 @@ impl Outgoing {
         let Parcel { head, body, published_ns, hops, .. } = *parcel;
         // 0 says that nobody knows.
         let published_ns = published_ns.saturating_add_signed(shift_ns).max(1);
-        self.say(&Message::Package(Carried { hops, published_ns, head: *head, body }));
+        self.say(&SessionMessage::Package(Carried { hops, published_ns, head: *head, body }));
         fates.passed(head);
     }
 }
 
 /// Lets a package wait in the place of an older one; whether it is taken.
-fn replace(queue: &mut Queue, older: Place, newer: Waiting, body: &[u8], fates: &mut impl Fates) -> bool {
+fn replace(queue: &mut Queue, older: Place, newer: QueuedPackage, body: &[u8], fates: &mut impl Fates) -> bool {
     let head = queue.at(older).head;
     let is_taken = queue.replace(older, newer, body, gives_way(newer.sender, fates));
     if is_taken {
@@ -262,13 +263,13 @@ fn replace(queue: &mut Queue, older: Place, newer: Waiting, body: &[u8], fates: 
     is_taken
 }
 
-/// What becomes of those that give way to a package of this sender.
-fn gives_way(sender: u16, fates: &mut impl Fates) -> impl FnMut(&Waiting, &[u8]) {
+/// Accounts for packages that give way to one of this sender.
+fn gives_way(sender: u16, fates: &mut impl Fates) -> impl FnMut(&QueuedPackage, &[u8]) {
     move |gone, beginning| lose(gone, beginning, gone.sender != sender, fates)
 }
 
 /// Lost for lack of room. `for_others`: since it would be more than its sender's part of it.
-fn lose(waiting: &Waiting, body: &[u8], for_others: bool, fates: &mut impl Fates) {
+fn lose(waiting: &QueuedPackage, body: &[u8], for_others: bool, fates: &mut impl Fates) {
     fates.crowded(waiting.share.sender);
     fates.lost(&waiting.head, body, if for_others { Cause::Share } else { Cause::Full });
 }

@@ -1,7 +1,7 @@
 //! Cuts a stream of bytes into frames, wherever it is split. Memory grows with what came, never with what a head
 //! promises.
 
-use super::frame::{BadFrame, FrameHead, HEAD_BYTES, is_tls};
+use super::frame::{BadSessionFrame, HEAD_BYTES, SessionFrameHead, is_tls};
 
 /// One direction of one connection.
 #[derive(Debug, Default)]
@@ -22,7 +22,7 @@ impl Splitter {
         now_ns: u64,
         length_max: usize,
         input: &mut &'b [u8],
-    ) -> Result<Option<(FrameHead, &'a [u8])>, BadFrame> {
+    ) -> Result<Option<(SessionFrameHead, &'a [u8])>, BadSessionFrame> {
         if self.is_done {
             self.is_done = false;
             // What one large frame took is not kept for ever.
@@ -41,7 +41,7 @@ impl Splitter {
         }
         self.take(HEAD_BYTES, input);
         let Some(bytes) = self.partial.first_chunk() else { return Ok(None) };
-        let head = FrameHead::parse(bytes, length_max)?;
+        let head = SessionFrameHead::parse(bytes, length_max)?;
         self.take(HEAD_BYTES + head.length, input);
         self.is_done = self.partial.len() == HEAD_BYTES + head.length;
         Ok(self.is_done.then(|| (head, &self.partial[HEAD_BYTES..])))
@@ -72,17 +72,17 @@ impl Splitter {
     }
 }
 
-type Whole<'a> = (FrameHead, &'a [u8], &'a [u8]);
+type CompleteFrame<'a> = (SessionFrameHead, &'a [u8], &'a [u8]);
 
-fn whole(input: &[u8], length_max: usize) -> Result<Option<Whole<'_>>, BadFrame> {
+fn whole(input: &[u8], length_max: usize) -> Result<Option<CompleteFrame<'_>>, BadSessionFrame> {
     let Some((head, rest)) = input.split_first_chunk::<HEAD_BYTES>() else { return Ok(None) };
-    let head = FrameHead::parse(head, length_max)?;
+    let head = SessionFrameHead::parse(head, length_max)?;
     Ok(rest.split_at_checked(head.length).map(|(frame, rest)| (head, frame, rest)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::{LENGTH_MAX, Message};
+    use super::super::frame::{LENGTH_MAX, SessionMessage};
     use super::*;
     use proptest::prelude::*;
 
@@ -93,14 +93,18 @@ mod tests {
         assert_eq!(splitter.next(7, LENGTH_MAX, &mut &bytes[..]), Ok(None));
         assert!(splitter.bytes() < 64 && splitter.waits_since() == Some(7));
         let mut splitter = Splitter::default();
-        assert_eq!(splitter.next(0, 0xfffe, &mut &bytes[..]), Err(BadFrame::TooLong(0xffff)), "told from the head");
+        assert_eq!(
+            splitter.next(0, 0xfffe, &mut &bytes[..]),
+            Err(BadSessionFrame::TooLong(0xffff)),
+            "told from the head"
+        );
     }
 
     proptest! {
         #[test]
         fn frames_come_out_however_the_stream_is_split(asked: Vec<u64>, cuts: Vec<proptest::sample::Index>) {
             let mut stream = Vec::new();
-            asked.iter().for_each(|asked_ns| Message::Ask(*asked_ns).write(&mut stream));
+            asked.iter().for_each(|asked_ns| SessionMessage::Ask(*asked_ns).write(&mut stream));
             let mut cuts: Vec<usize> = cuts.iter().map(|cut| cut.index(stream.len() + 1)).collect();
             cuts.extend([0, stream.len()]);
             cuts.sort_unstable();
@@ -108,8 +112,8 @@ mod tests {
             for piece in cuts.windows(2) {
                 let mut input = &stream[piece[0]..piece[1]];
                 while let Some((head, rest)) = splitter.next(0, LENGTH_MAX, &mut input).unwrap() {
-                    match Message::parse(head, rest) {
-                        Ok(Message::Ask(asked_ns)) => found.push(asked_ns),
+                    match SessionMessage::parse(head, rest) {
+                        Ok(SessionMessage::Ask(asked_ns)) => found.push(asked_ns),
                         other => prop_assert!(false, "{other:?}"),
                     }
                 }

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 /// The ranges of all clients.
 #[derive(Debug)]
-pub struct Table {
+pub struct RoutingTable {
     /// By their first name. None has a name in common with another.
     ranges: BTreeMap<Name, Hosted>,
     /// The same, by host.
@@ -49,13 +49,13 @@ pub struct Conflict {
 pub const ENTRIES_MAX: usize = 64 * 1024;
 const _: () = assert!(ENTRIES_MAX >= 8 * RANGES_MAX, "one client is far from filling it");
 
-impl Default for Table {
+impl Default for RoutingTable {
     fn default() -> Self {
         Self { ranges: BTreeMap::new(), of_client: BTreeMap::new(), of_system: [0; 256], systems: Vec::new() }
     }
 }
 
-impl Table {
+impl RoutingTable {
     /// A client hosts these names and no others; all of them or, if it may not, what it hosted before. Ranges that lie
     /// in others of its own are part of these. `may`: whether it may host a range, and `room`: ranges that it may host
     /// at most.

@@ -3,7 +3,7 @@
 use super::sender_cache::SenderCache;
 use crate::counts::Cause;
 use crate::frame::NodeIndex;
-use crate::link::State;
+use crate::link::PeerLinkState;
 use crate::report::Mismatch;
 use crate::settings::Settings;
 use crate::stats::Stats;
@@ -37,8 +37,8 @@ pub trait Faults: Send + Sync {
     fn write(&self, call: &[u8], why: &Undelivered<'_>, answer: &mut Vec<u8>) -> bool;
 }
 
-/// Replies on behalf of modules that cannot.
-pub(super) struct Answers {
+/// Sends error replies on behalf of modules that cannot reply.
+pub(super) struct ErrorReplier {
     settings: Arc<Settings>,
     stats: Arc<Stats>,
     faults: Arc<dyn Faults>,
@@ -48,7 +48,7 @@ pub(super) struct Answers {
     body: Vec<u8>,
 }
 
-impl Answers {
+impl ErrorReplier {
     pub(super) fn new(
         settings: &Arc<Settings>,
         stats: &Arc<Stats>,
@@ -99,7 +99,7 @@ impl Answers {
         let settings = self.settings.clone();
         let node = peer.and_then(|peer| settings.nodes.get(usize::from(peer)));
         let mismatch = peer.and_then(|peer| match self.stats.state(peer, monotonic_ns()) {
-            State::Refused(mismatch) => Some(mismatch),
+            PeerLinkState::Refused(mismatch) => Some(mismatch),
             _ => None,
         });
         let rule = settings.admission.access.line(head.to.class()).filter(|_| cause == Cause::NotAllowed);
@@ -145,7 +145,7 @@ mod tests {
 
     /// A router that began this long ago, ns, the mailbox of a caller on its node, and its own, for callers on others.
     struct Fixture {
-        answers: Answers,
+        answers: ErrorReplier,
         replies: Receiver,
         transit: Receiver,
         _folder: tempfile::TempDir,
@@ -162,8 +162,13 @@ mod tests {
             // A beginning that never is over.
             let started_ns = age_ns.map_or(u64::MAX, |age_ns| monotonic_ns() - age_ns);
             let faults: Arc<dyn Faults> = Arc::new(Words);
-            let answers =
-                Answers::new(&settings, &Stats::new(&settings, started_ns), &faults, &participant, self::transit());
+            let answers = ErrorReplier::new(
+                &settings,
+                &Stats::new(&settings, started_ns),
+                &faults,
+                &participant,
+                self::transit(),
+            );
             Self { answers, replies, transit, _folder: folder }
         }
 

@@ -8,7 +8,7 @@
 //! A program of the classic packet filter: it needs no rights, and costs some nanoseconds a datagram. It checks the
 //! address alone. A datagram with a forged node's address passes, and is checked like any other.
 
-use crate::frame::{self, Kind};
+use crate::frame::{self, FrameKind};
 use crate::security::TAG_BYTES;
 use crate::time::TIME_BYTES;
 use socket2::{SockFilter, SockRef};
@@ -41,11 +41,11 @@ pub(super) fn take_only_from(socket: &impl AsFd, addresses: &[IpAddr]) -> io::Re
     SockRef::from(socket).attach_filter(&program(addresses))
 }
 
-/// The same for a socket of time. It also takes, from anywhere, frames of time with another digest than this: a node
+/// Filters a socket of time. It also takes, from anywhere, frames of time with another digest than this: a node
 /// that hears these must know it, and refuse. Forged frames of that form are read, too.
 ///
 /// # Errors
-/// As [`take_only_from`].
+/// Like [`take_only_from`], for datagrams of time.
 pub(super) fn take_time_only_from(socket: &impl AsFd, addresses: &[IpAddr], digest: u64) -> io::Result<()> {
     let mut program = program(addresses);
     // In place of the verdict for all others.
@@ -58,7 +58,7 @@ pub(super) fn take_time_only_from(socket: &impl AsFd, addresses: &[IpAddr], dige
 fn time_of_others(digest: u64) -> [SockFilter; 12] {
     const UDP_HEAD: u32 = 8;
     let lengths = [TIME_BYTES, TIME_BYTES + TAG_BYTES].map(|bytes| UDP_HEAD + bytes as u32);
-    let [first, last] = [Kind::Sync, Kind::Reply].map(frame::beginning).map(u32::from_be_bytes);
+    let [first, last] = [FrameKind::Sync, FrameKind::Reply].map(frame::beginning).map(u32::from_be_bytes);
     let [low, high] = [0, 32].map(|shift| ((digest >> shift) as u32).swap_bytes());
     [
         SockFilter::new(LOAD_LENGTH, 0, 0, 0),
@@ -76,7 +76,7 @@ fn time_of_others(digest: u64) -> [SockFilter; 12] {
     ]
 }
 
-/// One address after the other, each word by word.
+/// Compares with one address after the other, each word by word.
 fn program(addresses: &[IpAddr]) -> Vec<SockFilter> {
     let of_one = |address: &IpAddr| {
         let (place, bytes) = match address {
@@ -109,7 +109,7 @@ mod tests {
     const PEER: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 2);
     const STRANGER: Ipv4Addr = Ipv4Addr::new(127, 0, 0, 3);
 
-    /// As many nodes as there may be; those in `last` come after all others.
+    /// The largest possible number of nodes; those in `last` come after all others.
     fn nodes(last: &[IpAddr]) -> Vec<IpAddr> {
         let many = (0..NODES_MAX as u8 - last.len() as u8).map(|node| IpAddr::V4(Ipv4Addr::new(127, 9, 9, node)));
         many.chain(last.iter().copied()).collect()
@@ -184,14 +184,14 @@ mod tests {
         };
         inside.set_nonblocking(true).unwrap();
         for (name, datagram, is_taken) in [
-            ("another low half", frame(Kind::Sync, DIGEST ^ 1), true),
-            ("another high half", frame(Kind::Reply, DIGEST ^ 1 << 63), true),
-            ("sealed", [frame(Kind::Request, 3), vec![0; TAG_BYTES]].concat(), true),
-            ("this configuration", frame(Kind::Sync, DIGEST), false),
-            ("packages", frame(Kind::Packages, 3), false),
-            ("a hello", frame(Kind::Hello, 3), false),
-            ("too long", [frame(Kind::Sync, 3), vec![0]].concat(), false),
-            ("too short", frame(Kind::Sync, 3)[..TIME_BYTES - 1].to_vec(), false),
+            ("another low half", frame(FrameKind::Sync, DIGEST ^ 1), true),
+            ("another high half", frame(FrameKind::Reply, DIGEST ^ 1 << 63), true),
+            ("sealed", [frame(FrameKind::Request, 3), vec![0; TAG_BYTES]].concat(), true),
+            ("this configuration", frame(FrameKind::Sync, DIGEST), false),
+            ("packages", frame(FrameKind::Packages, 3), false),
+            ("a hello", frame(FrameKind::Hello, 3), false),
+            ("too long", [frame(FrameKind::Sync, 3), vec![0]].concat(), false),
+            ("too short", frame(FrameKind::Sync, 3)[..TIME_BYTES - 1].to_vec(), false),
             ("junk", vec![0x5a; TIME_BYTES], false),
         ] {
             // Loopback: it has come, or is dropped, when this returns.

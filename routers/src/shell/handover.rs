@@ -96,7 +96,7 @@ impl Giver {
         }
     }
 
-    /// From now on its bell is rung when it may take again.
+    /// Has its bell rung when it may take again.
     pub(super) fn wants_room(&self) {
         // ORDERING: SeqCst, before the load of `empty`. At least one side sees the other: this one, or the one that
         // returns a batch.

@@ -7,7 +7,7 @@
 use rohrpost_mailbox::Name;
 
 /// Names with a bit each.
-pub(crate) struct Hosted {
+pub(crate) struct HostedNames {
     /// First and last name of each range, and where its bits begin; sorted.
     ranges: Box<[(u32, u32, usize)]>,
     absent: Box<[u64]>,
@@ -15,7 +15,7 @@ pub(crate) struct Hosted {
     epoch: u32,
 }
 
-impl Hosted {
+impl HostedNames {
     /// None of these ranges overlaps another. Takes all its memory now.
     pub(crate) fn new(ranges: &[(Name, Name)]) -> Self {
         let mut sorted = ranges.to_vec();
@@ -61,7 +61,7 @@ mod tests {
     fn each_name_of_the_node_is_looked_for_once_and_no_other_ever() {
         let whole = |class, first, last| (Name::new(1, class, first, 0), Name::new(1, class, last, u8::MAX));
         let ranges = [whole(200, 0, 0), whole(32, 40, 47), whole(200, 3, 3)];
-        let mut hosted = Hosted::new(&ranges);
+        let mut hosted = HostedNames::new(&ranges);
         let all: Vec<Name> = ranges.iter().flat_map(|(a, b)| (a.raw()..=b.raw()).map(Name::from_raw)).collect();
         for epoch in [0, 1, 7] {
             for name in &all {
@@ -78,6 +78,6 @@ mod tests {
             }
         }
         assert!(all.iter().all(|name| hosted.may_be_there(*name, 8)), "and those of others mark none of these");
-        assert!(!Hosted::new(&[]).may_be_there(all[0], 0));
+        assert!(!HostedNames::new(&[]).may_be_there(all[0], 0));
     }
 }

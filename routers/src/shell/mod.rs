@@ -48,19 +48,19 @@ use crate::impair;
 use crate::inbound::Inbound;
 use crate::outbound::Outbound;
 use crate::security::{
-    self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing, Waiting,
+    self, Gate, HelloQueue, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing,
 };
 use crate::settings::Settings;
 use crate::stats::Stats;
-use crate::tdma::{SlotScheduler, Table};
-use answers::Answers;
+use crate::tdma::{SlotScheduler, SlotTable};
+use answers::ErrorReplier;
 use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
 use news::News;
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
 use rx_thread::{PackageDelivery, RxThread};
 use sender_cache::SenderCache;
 use sending::Sending;
-use slots::Slots;
+use slots::SlotThread;
 use socket::InSocket;
 use std::io;
 use std::os::fd::OwnedFd;
@@ -69,7 +69,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use threads::Shared;
 use tx_thread::TxThread;
-use wire::Wire;
+use wire::PeerSockets;
 
 /// Why a router did not start.
 #[derive(Debug, thiserror::Error)]
@@ -116,7 +116,7 @@ pub struct Parts<'a> {
     /// Its sockets, if they are kept for it ([`listen`]), in that order; it makes the missing ones.
     pub sockets: Vec<OwnedFd>,
     /// A bad network between it and its sockets.
-    pub impair: Option<impair::Settings>,
+    pub impair: Option<impair::ImpairmentSettings>,
     /// Its clock; none unless time comes from a master.
     pub clock: Option<ClockParts>,
 }
@@ -133,7 +133,7 @@ pub struct Shell {
     /// The socket for packages comes first.
     sockets: Vec<Arc<InSocket>>,
     clock: Option<Arc<ClockState>>,
-    slots: Option<Arc<slots::State>>,
+    slots: Option<Arc<slots::SlotStatus>>,
     tunnel: Option<Arc<tunnel::Passed>>,
     /// Where datagrams are sealed.
     peer_sessions: Option<Arc<PeerSessions>>,
@@ -151,7 +151,7 @@ impl Shell {
         Self::start_with(parts, None)
     }
 
-    /// The same for a router that seals its datagrams, and takes only sealed ones. It draws a new incarnation instead
+    /// Starts a router that seals its datagrams, and takes only sealed ones. It draws a new incarnation instead
     /// of the one in its settings: two runs with one incarnation would have one key.
     ///
     /// # Errors
@@ -201,13 +201,13 @@ impl Shell {
         let transit = sender.receiver(via, transit::shape())?;
         node.set_routes(via, &transit::ranges(&settings.routes))?;
         let shared = Arc::new(Shared::new(&sender));
-        let answers = |participant| Answers::new(&settings, &stats, &faults, participant, via);
+        let answers = |participant| ErrorReplier::new(&settings, &stats, &faults, participant, via);
         let sealing = all.as_ref().map(|all| Sealing::new(all, Port::Packages));
         let sending = Sending {
             outbound,
             stats: stats.clone(),
             answers: answers(&sender),
-            wire: Wire::new(&settings, settings.network.port, sealing, impair, &failures),
+            wire: PeerSockets::new(&settings, settings.network.port, sealing, impair, &failures),
             datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
         };
         let mut tx_thread =
@@ -254,11 +254,11 @@ impl Shell {
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
             tx_thread.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
             shell.begin("tx", move || {
-                if let Err(error) = threads::schedule(threads::DEPARTURES_FIFO) {
+                if let Err(error) = threads::schedule(threads::TX_FIFO) {
                     tracing::warn!(
                         "the router's threads run as modules do, and not before them: {error}; allow it with a limit \
                          `rtprio` of {} for this user (limits.conf) or CAP_SYS_NICE",
-                        threads::ARRIVALS_FIFO
+                        threads::RX_FIFO
                     );
                 }
                 tx_thread.run();
@@ -266,7 +266,7 @@ impl Shell {
         }
         shell.begin("rx", move || {
             // A refusal was reported by the other.
-            let _ = threads::schedule(threads::ARRIVALS_FIFO);
+            let _ = threads::schedule(threads::RX_FIFO);
             rx_thread.run();
         })?;
         Ok(shell)
@@ -282,15 +282,15 @@ impl Shell {
         let settings = self.settings.clone();
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
-        let table = Table::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
+        let table = SlotTable::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
         let works = Works::new(clock)?.sealed_in_slots(self.peer_sessions.as_ref()).in_slots(table.for_clock());
         let spin_ns = spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(slots::ANSWERS);
-        let hellos = self.peer_sessions.as_ref().map(Waiting::new);
+        let hellos = self.peer_sessions.as_ref().map(HelloQueue::new);
         let line = slots::AnswerQueue::new(waiting, hellos, self.sockets[0].clone(), settings.clone());
         let scheduler = SlotScheduler::new(table, spin_ns);
         let own = slots::Own { router: name, nodes: settings.nodes.len(), network: settings.network };
-        let slots = Slots::new(own, tx_thread, works, scheduler, line);
+        let slots = SlotThread::new(own, tx_thread, works, scheduler, line);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(answers)
@@ -327,7 +327,7 @@ impl Shell {
     }
 
     /// State of the time slots, if there are any.
-    pub fn slots(&self) -> Option<&Arc<slots::State>> {
+    pub fn slots(&self) -> Option<&Arc<slots::SlotStatus>> {
         self.slots.as_ref()
     }
 

@@ -4,14 +4,14 @@
 //! thread receives at that port. So the kernel separates both kinds before any thread runs, and a flood of one takes no
 //! room or time from the other.
 
-use super::answers::{Answers, Faults};
+use super::answers::{ErrorReplier, Faults};
 use super::handover::{Giver, Taker, Waited, handover};
 use super::rx_thread::{PackageDelivery, RxThread};
 use super::sender_cache::SenderCache;
 use super::sending::Sending;
 use super::socket::{InSocket, REST_BYTES};
 use super::threads::{Shared, schedule_below};
-use super::wire::Wire;
+use super::wire::PeerSockets;
 use super::{Shell, ShellError, transit};
 use crate::impair;
 use crate::inbound::Inbound;
@@ -38,7 +38,7 @@ pub(super) struct Rest {
 }
 
 impl Rest {
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(mut self) {
         while !self.shared.ends() {
             self.take();
@@ -76,7 +76,7 @@ impl Shell {
         &mut self,
         (node, name): (&Arc<Node>, Name),
         faults: &Arc<dyn Faults>,
-        (socket, impair): (Option<OwnedFd>, Option<impair::Settings>),
+        (socket, impair): (Option<OwnedFd>, Option<impair::ImpairmentSettings>),
     ) -> Result<Option<Giver>, ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
         if !settings.parts_rest() {
@@ -94,14 +94,14 @@ impl Shell {
         let [sender, receiver] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         // The real-time half knows whether a peer is there.
         let via = transit::name(name);
-        let answers = |participant| Answers::new(&settings, &self.stats, faults, participant, via);
+        let answers = |participant| ErrorReplier::new(&settings, &self.stats, faults, participant, via);
         let (giver, taker) = handover(&shared);
         let sealing = all.map(|all| Sealing::new(all, Port::Rest));
         let sending = Sending {
             outbound,
             stats: stats.clone(),
             answers: answers(&sender),
-            wire: Wire::new(&settings, port, sealing, impair, &self.failures),
+            wire: PeerSockets::new(&settings, port, sealing, impair, &self.failures),
             datagram: vec![0; settings.network.datagram_bytes_max + settings.network.security.tag_bytes()].into(),
         };
         let rx_thread = RxThread {

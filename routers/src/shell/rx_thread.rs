@@ -1,7 +1,7 @@
 //! The thread that reads the socket and puts packages from other nodes into the mailboxes of this one.
 
 use super::ages::Ages;
-use super::answers::Answers;
+use super::answers::ErrorReplier;
 use super::news::News;
 use super::sender_cache::SenderCache;
 use super::slots::{Answer, REFUSAL_BYTES};
@@ -9,8 +9,8 @@ use super::socket::{InSocket, Received};
 use super::threads::{Awake, Shared};
 use crate::counts::Cause;
 use crate::frame::NodeIndex;
-use crate::inbound::{Came, Datagram, Inbound, Output, SOCKET_MAX_NS};
-use crate::report::{Deliver, Event, NotDelivered, Report};
+use crate::inbound::{Datagram, Envelope, Inbound, InboundStep, SOCKET_MAX_NS};
+use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
 use crate::security::{Gate, HELLO_DATAGRAM_BYTES, Said};
 use crate::settings::Settings;
 use crate::stats::Stats;
@@ -44,7 +44,7 @@ pub(super) struct RxThread {
 }
 
 impl RxThread {
-    /// Until the socket is closed.
+    /// Runs until the socket is closed.
     pub(super) fn run(mut self) {
         let (mut datagram, mut refusal) = (vec![0; DATAGRAM_BYTES], [0; REFUSAL_BYTES]);
         let (mut awake, mut ring_ns, mut seen_dropped) = (Awake::default(), 0, 0);
@@ -68,12 +68,12 @@ impl RxThread {
                         self.stats.dropped.add(dropped.wrapping_sub(seen_dropped).into());
                         seen_dropped = dropped;
                     }
-                    let came = Came { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
+                    let came = Envelope { source, arrived_ns: now_ns.saturating_sub(waited_ns), bytes };
                     self.take(now_ns, &came, &mut datagram[..bytes]);
                 }
             }
             self.ask(now_ns);
-            while let Output::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.delivery) {
+            while let InboundStep::Refuse { to, bytes } = self.inbound.poll(now_ns, &mut refusal, &mut self.delivery) {
                 match &self.answers {
                     _ if self.is_rest => {}
                     // Without room in the queue it is lost, and sent again a second later.
@@ -89,10 +89,10 @@ impl RxThread {
         }
     }
 
-    fn take(&mut self, now_ns: u64, came: &Came, datagram: &mut [u8]) {
+    fn take(&mut self, now_ns: u64, came: &Envelope, datagram: &mut [u8]) {
         let Self { inbound, delivery, guard, .. } = self;
         let Some(gate) = guard else {
-            let Came { source, arrived_ns, .. } = *came;
+            let Envelope { source, arrived_ns, .. } = *came;
             return inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: datagram }, delivery);
         };
         let mut reply = [0; REFUSAL_BYTES];
@@ -108,11 +108,11 @@ impl RxThread {
 
     /// Sends challenges to peers without a session or without a sign of life, where datagrams are sealed.
     fn ask(&mut self, now_ns: u64) {
-        let mut question = [0; REFUSAL_BYTES];
+        let mut challenge = [0; REFUSAL_BYTES];
         while let Some(gate) = &mut self.guard
-            && let Some(said) = gate.ask(now_ns, &self.stats, &mut question)
+            && let Some(said) = gate.ask(now_ns, &self.stats, &mut challenge)
         {
-            self.say(said, question);
+            self.say(said, challenge);
         }
     }
 
@@ -132,7 +132,7 @@ impl RxThread {
 /// Delivers packages, and replies for undeliverable ones.
 pub(super) struct PackageDelivery {
     pub(super) sender_cache: SenderCache,
-    pub(super) answers: Answers,
+    pub(super) answers: ErrorReplier,
     /// None where another thread reports the same.
     pub(super) news: Option<News>,
     pub(super) ages: Arc<Ages>,
@@ -158,7 +158,7 @@ impl Deliver for PackageDelivery {
         Err(error.into())
     }
 
-    fn event(&mut self, event: Event) {
+    fn event(&mut self, event: RouterEvent) {
         self.news.iter().for_each(|news| news.event(event));
     }
 }

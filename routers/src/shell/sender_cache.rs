@@ -1,6 +1,6 @@
 //! Open mailboxes that a thread of the router sends to: a search in a small table replaces a system call.
 
-use super::hosted::Hosted;
+use super::hosted::HostedNames;
 use rohrpost_mailbox::{Head, Label, Name, Participant, SendError, Sender};
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ const ABSENT_MAX: usize = 64;
 /// Where packages may go.
 enum Reach {
     /// To mailboxes that configuration gives this node: packages from other nodes must not go back.
-    Here(Hosted),
+    Here(HostedNames),
     /// Also through this node's own router. Programs of this node choose the names. The absent ones hold while the
     /// registry has this epoch.
     Everywhere { absent: Vec<Name>, epoch: u32 },
@@ -38,12 +38,12 @@ pub(crate) struct SenderCache {
 }
 
 impl SenderCache {
-    /// To mailboxes of this node alone, of these ranges.
+    /// A cache for mailboxes of this node alone, of these ranges.
     pub(crate) fn here(participant: &Arc<Participant>, hosts: &[(Name, Name)]) -> Self {
-        Self::new(participant, Reach::Here(Hosted::new(hosts)))
+        Self::new(participant, Reach::Here(HostedNames::new(hosts)))
     }
 
-    /// To all mailboxes that are reached.
+    /// A cache for all mailboxes that are reached.
     pub(crate) fn everywhere(participant: &Arc<Participant>) -> Self {
         Self::new(participant, Reach::Everywhere { absent: Vec::with_capacity(ABSENT_MAX), epoch: 0 })
     }
@@ -64,7 +64,7 @@ impl SenderCache {
         self.send_by(head.to, head, body)
     }
 
-    /// The same through a mailbox that is known to lead there: only that one is looked up.
+    /// Sends through a mailbox that is known to lead there: only that one is looked up.
     pub(crate) fn send_by(&mut self, router: Name, head: &Head, body: &[u8]) -> Result<(), SendError> {
         let Head { to, from, kind, id, priority, options, .. } = *head;
         let at = match self.sender_cache.binary_search_by_key(&router, |way| way.to) {

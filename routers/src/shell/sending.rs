@@ -1,11 +1,11 @@
 //! State of a thread that sends as packages come: a queue, and the sockets.
 
-use super::answers::Answers;
+use super::answers::ErrorReplier;
 use super::failure::Failure;
-use super::wire::Wire;
+use super::wire::PeerSockets;
 use crate::counts::Cause;
 use crate::frame::NodeIndex;
-use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, Output, Package};
+use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, OutboundStep, Package};
 use crate::report::Report;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, monotonic_ns};
@@ -16,13 +16,13 @@ use std::sync::Arc;
 pub(super) struct Sending {
     pub(super) outbound: Outbound,
     pub(super) stats: Arc<Stats>,
-    pub(super) answers: Answers,
-    pub(super) wire: Wire,
+    pub(super) answers: ErrorReplier,
+    pub(super) wire: PeerSockets,
     /// Room for the largest datagram.
     pub(super) datagram: Box<[u8]>,
 }
 
-impl Report for Answers {
+impl Report for ErrorReplier {
     fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
         self.answer(peer, head, body, cause, None);
     }
@@ -57,12 +57,12 @@ impl Sending {
         self.wire.retry(now_ns);
         self.outbound.pass_over(self.wire.full().0);
         match self.outbound.poll(now_ns, &mut self.datagram, &mut self.answers) {
-            Output::Send { to, bytes } => {
+            OutboundStep::Send { to, bytes } => {
                 let sent = self.wire.send_made(monotonic_ns(), to, &mut self.datagram, bytes);
                 settle(sent, &mut self.outbound, (&self.datagram[..bytes], &[]), &mut self.answers);
                 None
             }
-            Output::Wait { until_ns } => Some(until_ns.min(self.wire.full().1)),
+            OutboundStep::Wait { until_ns } => Some(until_ns.min(self.wire.full().1)),
         }
     }
 
@@ -73,7 +73,12 @@ impl Sending {
 }
 
 /// Reports the result for the last datagram, and for its body if it left without a copy.
-fn settle(sent: Result<(), Failure>, outbound: &mut Outbound, (datagram, body): (&[u8], &[u8]), answers: &mut Answers) {
+fn settle(
+    sent: Result<(), Failure>,
+    outbound: &mut Outbound,
+    (datagram, body): (&[u8], &[u8]),
+    answers: &mut ErrorReplier,
+) {
     if sent.is_err_and(Failure::is_loss) {
         outbound.unsent(datagram, body, answers);
     } else if outbound.is_measured() {

@@ -209,7 +209,7 @@ pub(super) struct OutSocket {
 }
 
 impl OutSocket {
-    /// With a send buffer of at least this many bytes, and at least the default.
+    /// A socket with a send buffer of at least this many bytes, and at least the default.
     pub(super) fn new(own: IpAddr, peer: SocketAddr, waiting_bytes: usize) -> Self {
         Self { own, peer, waiting_bytes, socket: connect(own, peer, waiting_bytes).ok() }
     }

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Of the sending thread. Above every module: a router that waits for a module delays other modules' packages.
-pub(super) const DEPARTURES_FIFO: u8 = FIFO_MAX + 9;
-/// Of the receiving thread: a flood of outgoing packages must not keep answers from coming in. It sleeps when the
-/// socket is empty.
-pub(super) const ARRIVALS_FIFO: u8 = DEPARTURES_FIFO + 1;
+/// Priority of the sending thread, above every module: a router that waits for a module delays other modules' packages.
+pub(super) const TX_FIFO: u8 = FIFO_MAX + 9;
+/// Priority of the receiving thread: a flood of outgoing packages must not keep answers from coming in. It sleeps when
+/// the socket is empty.
+pub(super) const RX_FIFO: u8 = TX_FIFO + 1;
 /// A thread that has not slept for this long sleeps for a short time. A flood could keep a router awake forever, and it
 /// runs above all modules. So the modules on its processor get a part of each of these spans, and the kernel, which
 /// kills real-time processes that never sleep (RLIMIT_RTTIME), has no reason to.

@@ -58,13 +58,13 @@ pub struct Passed {
     pub refused: Count,
 }
 
-/// Its end in the kernel.
-pub(super) struct Device {
+/// The device in the kernel.
+pub(super) struct TunDevice {
     file: File,
     mtu: usize,
 }
 
-impl Device {
+impl TunDevice {
     /// Makes it, in the network that the calling thread is in, and gives it the node's address.
     pub(super) fn open(settings: &Settings, tunnel: &Tunnel) -> io::Result<Self> {
         // In one datagram, never in fragments.
@@ -86,7 +86,7 @@ impl Device {
 /// State of both threads.
 struct Common {
     shared: Arc<Shared>,
-    device: Device,
+    device: TunDevice,
     passed: Arc<Passed>,
 }
 
@@ -128,7 +128,7 @@ pub(super) fn ends(
     shared: &Arc<Shared>,
     [sender, receiver]: &[Arc<Participant>; 2],
 ) -> Result<(Out, In, Arc<Passed>), TunnelError> {
-    let device = Device::open(settings, tunnel)?;
+    let device = TunDevice::open(settings, tunnel)?;
     let passed = Arc::new(Passed::default());
     let common = |device| Common { shared: shared.clone(), device, passed: passed.clone() };
     let shape = Shape { slots: SLOTS, body_bytes_max: MTU_MAX as u16, ..Shape::default() };

@@ -32,7 +32,7 @@ pub(super) struct TxThread {
 }
 
 impl TxThread {
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(mut self) {
         let mut awake = Awake::default();
         while !self.shared.ends() {

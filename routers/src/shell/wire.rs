@@ -31,7 +31,7 @@ const DATAGRAM_KEPT_BYTES: usize = 512;
 const SLOT_BYTES_MAX: usize = 16 << 20;
 
 /// The sockets to all peers, and their failures.
-pub(super) struct Wire {
+pub(super) struct PeerSockets {
     /// By node; none for the own one.
     sockets: Box<[Option<OutSocket>]>,
     sealing: Option<Sealing>,
@@ -49,12 +49,12 @@ pub(super) struct Wire {
     whole: Vec<u8>,
 }
 
-impl Wire {
+impl PeerSockets {
     pub(super) fn new(
         settings: &Arc<Settings>,
         port: u16,
         sealing: Option<Sealing>,
-        impair: Option<impair::Settings>,
+        impair: Option<impair::ImpairmentSettings>,
         failures: &Arc<Failures>,
     ) -> Self {
         let own = settings.nodes[usize::from(settings.own)].address;
@@ -120,8 +120,8 @@ impl Wire {
         loop {
             let Some(impairment) = &mut self.impairment else { return u64::MAX };
             match impairment.poll(now_ns) {
-                impair::Output::Wait { until_ns } => return until_ns,
-                impair::Output::Send { to, datagram } => {
+                impair::ImpairmentStep::Wait { until_ns } => return until_ns,
+                impair::ImpairmentStep::Send { to, datagram } => {
                     self.whole.clear();
                     self.whole.extend_from_slice(datagram);
                     let whole = std::mem::take(&mut self.whole);

@@ -8,7 +8,7 @@
 //! The client and its kernel see what they would see of such a network: what a line does not carry yet is not read, so
 //! that it waits where it was sent from. When the client closes, what has not arrived at the server by then is gone.
 
-use crate::impair::{BandwidthQueue, Settings};
+use crate::impair::{BandwidthQueue, ImpairmentSettings};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use rohrpost_mailbox::monotonic_ns;
 use socket2::{Domain, Protocol, Socket, Type};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// What sockets hold of what the line has not taken yet: what it carries in so long.
+/// Limit of what sockets buffer before the line: what the line carries in this time.
 const HELD: Duration = Duration::from_millis(50);
 const HELD_BYTES_MIN: usize = 4 * 1024;
 const HELD_BYTES_MAX: usize = 256 * 1024;
@@ -39,11 +39,11 @@ pub(super) struct BadLine {
 }
 
 impl BadLine {
-    /// To a server.
+    /// Begins a line to a server.
     ///
     /// # Errors
     /// What the system says.
-    pub(super) fn begin(server: SocketAddr, settings: Settings) -> io::Result<Self> {
+    pub(super) fn begin(server: SocketAddr, settings: ImpairmentSettings) -> io::Result<Self> {
         let listener = Socket::new(Domain::IPV4, Type::STREAM, Some(Protocol::TCP))?;
         hold(&listener, &settings)?;
         listener.bind(&SocketAddr::from((Ipv4Addr::LOCALHOST, 0)).into())?;
@@ -51,7 +51,7 @@ impl BadLine {
         listener.set_nonblocking(true)?;
         let listener = TcpListener::from(listener);
         let (near, ends) = (listener.local_addr()?, Arc::new(AtomicBool::new(false)));
-        let work = Work { server, settings, listener, ends: ends.clone(), connections: 0 };
+        let work = BadLineThread { server, settings, listener, ends: ends.clone(), connections: 0 };
         std::thread::Builder::new().name("tcp-bad-line".into()).spawn(move || work.run())?;
         Ok(Self { near, ends })
     }
@@ -69,22 +69,22 @@ impl Drop for BadLine {
 }
 
 /// A socket that holds little, if the line carries little.
-fn hold(socket: &Socket, settings: &Settings) -> io::Result<()> {
+fn hold(socket: &Socket, settings: &ImpairmentSettings) -> io::Result<()> {
     let Some(rate) = settings.rate_bytes_s else { return Ok(()) };
     let bytes = usize::try_from(rate.saturating_mul(HELD.as_millis() as u64) / 1000).unwrap_or(HELD_BYTES_MAX);
     socket.set_recv_buffer_size(bytes.clamp(HELD_BYTES_MIN, HELD_BYTES_MAX))?;
     socket.set_tcp_mss(SEGMENT_BYTES)
 }
 
-struct Work {
+struct BadLineThread {
     server: SocketAddr,
-    settings: Settings,
+    settings: ImpairmentSettings,
     listener: TcpListener,
     ends: Arc<AtomicBool>,
     connections: u64,
 }
 
-impl Work {
+impl BadLineThread {
     fn run(mut self) {
         while !self.ends.load(Ordering::Acquire) {
             let mut listens = [PollFd::new(self.listener.as_fd(), PollFlags::POLLIN)];
@@ -106,7 +106,7 @@ impl Work {
         }
     }
 
-    /// Until one of the two ends closes, or is gone.
+    /// Carries bytes until one of the two ends closes, or is gone.
     fn carry(&mut self, near: &TcpStream) -> io::Result<()> {
         near.set_nonblocking(true)?;
         near.set_nodelay(true)?;

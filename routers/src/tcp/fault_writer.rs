@@ -1,6 +1,6 @@
 //! Answers in the name of modules that are not reached, as the routers of the LAN write them.
 
-use crate::session::{Answers, Cause};
+use crate::session::{Cause, ErrorReplies};
 use crate::shell::{Faults, Undelivered};
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ impl FaultWriter {
     }
 }
 
-impl Answers for FaultWriter {
+impl ErrorReplies for FaultWriter {
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
         let Some(cause) = why.told() else { return false };
         let node = Some(holder.unwrap_or(&self.beyond));

@@ -1,22 +1,22 @@
 //! Lines about what others bring about: of one cause at most one a second, with how many were held back, so that nobody
 //! can fill a log.
 
-use crate::session::frame::Reason;
+use crate::session::frame::SessionRefusalReason;
 
-/// Of one cause one line is said in so long.
+/// Interval between two lines of one cause.
 const EVERY_NS: u64 = 1_000_000_000;
 /// Clients of a robot come and go together: so many are named one by one.
 const AT_ONCE: u32 = 16;
 
-/// What a line is about.
+/// Subject of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
     /// A client takes part.
     Joined,
     /// It does not any more.
-    Left(Option<Reason>),
+    Left(Option<SessionRefusalReason>),
     /// A connection may not take part.
-    Refused(Reason),
+    Refused(SessionRefusalReason),
     /// It cannot be sealed.
     Unsealed,
     /// A client may not host what it says.
@@ -118,7 +118,7 @@ mod tests {
         for at_ms in 0..3500_u64 {
             let now_ns = 5 * S + at_ms * 1_000_000;
             let line = format!("connection {at_ms}");
-            said.extend(hush.line(now_ns, Topic::Refused(Reason::Damaged), &line));
+            said.extend(hush.line(now_ns, Topic::Refused(SessionRefusalReason::Damaged), &line));
             if at_ms % 200 == 0 {
                 said.extend(hush.next_held(now_ns).map(|(_, line)| line));
             }
@@ -132,7 +132,7 @@ mod tests {
         let (_, last) = hush.next_held(30 * S).unwrap();
         assert!(last.starts_with("connection 3499 (498 more"), "{last}");
         assert_eq!(hush.next_held(30 * S), None);
-        assert_eq!(hush.line(30 * S + 1, Topic::Refused(Reason::Damaged), "one"), None, "just said one");
+        assert_eq!(hush.line(30 * S + 1, Topic::Refused(SessionRefusalReason::Damaged), "one"), None, "just said one");
     }
 
     #[test]
@@ -140,7 +140,7 @@ mod tests {
         let mut hush = Hush::default();
         let joined = (0..40).filter(|_| hush.line(S, Topic::Joined, "joins").is_some()).count();
         assert_eq!(joined, AT_ONCE as usize);
-        for topic in [Topic::Unsealed, Topic::Objected, Topic::Left(None), Topic::Refused(Reason::Full)] {
+        for topic in [Topic::Unsealed, Topic::Objected, Topic::Left(None), Topic::Refused(SessionRefusalReason::Full)] {
             assert!(hush.line(S, topic, "first of its cause").is_some());
         }
     }

@@ -1,5 +1,5 @@
-//! How fast a connection takes bytes, and how many of them the kernel is to hold by that: what it holds can be
-//! overtaken by nothing.
+//! Measures how fast a connection takes bytes, and limits by that how many of them the kernel buffers: nothing more
+//! important can pass them.
 //!
 //! ```text
 //!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if always wanted
@@ -10,30 +10,29 @@
 
 use crate::session::BATCH_BYTES;
 
-/// What the kernel may keep before it has sent it: what leaves in so long.
+/// Limits what the kernel has not sent yet: what leaves in this time.
 const UNSENT_NS: u64 = 250_000_000;
-/// The same and what is under way to the other end: what leaves in so long, or in twice the way there and back. With
-/// less than that way takes in, the connection would be no faster than what is held, and so on ever less; twice that
-/// lets it grow.
+/// The same and what is under way to the other end: what leaves in so long, or in two round trips. With less than one
+/// round trip the limit itself would slow the connection down, more and more; two let it grow.
 const HELD_NS: u64 = 1_000_000_000;
 const UNSENT_BYTES_MIN: u64 = 4 * 1024;
 const UNSENT_BYTES_MAX: u64 = 32 * 1024;
-/// Until the rate is known.
+/// Limit while the rate is unknown.
 const UNSENT_BYTES_FIRST: u64 = 2 * 1024;
 const HELD_BYTES_MIN: u64 = 4 * 1024;
 /// Faster connections have as much on the way as the kernel thinks good.
 const HELD_BYTES_MAX: u64 = 192 * 1024;
-/// Of one that was bound and is fast again: more than any kernel grants, so the most that this one does.
+/// For a connection that was limited and is fast again: more than any kernel grants, so the most that this one does.
 const HELD_BYTES_FREE: u64 = 64 * 1024 * 1024;
-/// With less, a second and more lies between a byte and word of it, however little the kernel holds.
+/// Below this rate a byte is acknowledged after a second or more, however little the kernel holds.
 const SLOW_BYTES_S: u64 = 64 * 1024;
-/// The rate is that over so long, or over the way there and back, or over so many bytes: at first a connection takes
-/// more than leaves.
+/// The rate is that over so long, or over a round trip, or over so many bytes: at first a connection takes more than
+/// leaves.
 const WINDOW_NS: u64 = 500_000_000;
 const WINDOW_BYTES: u64 = 256 * 1024;
 const SECOND_NS: u128 = 1_000_000_000;
 
-/// What the kernel is to hold of a connection.
+/// Limits of what the kernel holds of a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Holding {
     /// Bytes that have not been sent.
@@ -42,9 +41,9 @@ pub(super) struct Holding {
     pub(super) held: Option<u64>,
 }
 
-/// Of one connection.
+/// Pace of one connection, as measured.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(super) struct ConnectionPace {
     /// When it was full first, ns; since then it was wanted all the time.
     full_ns: Option<u64>,
     /// Bytes taken since then.
@@ -53,18 +52,18 @@ pub(super) struct Pace {
     rate: Option<u64>,
     /// It holds less than the kernel likes.
     is_bound: bool,
-    /// The shortest way there and back so far, ns: what waits on a slow line makes later ones longer.
+    /// The shortest round trip so far, ns: what waits on a slow line makes later ones longer.
     round_trip_ns: Option<u64>,
     unsent: u64,
 }
 
-impl Default for Pace {
+impl Default for ConnectionPace {
     fn default() -> Self {
         Self { full_ns: None, taken: 0, rate: None, is_bound: false, round_trip_ns: None, unsent: UNSENT_BYTES_FIRST }
     }
 }
 
-impl Pace {
+impl ConnectionPace {
     /// What the kernel may keep before it has sent it.
     pub(super) fn unsent_bytes(&self) -> usize {
         self.unsent as usize
@@ -85,7 +84,7 @@ impl Pace {
         (self.unsent < UNSENT_BYTES_MAX).then_some(self.unsent as usize)
     }
 
-    /// The way there and back took so long, ns, as far as that is known.
+    /// A round trip took so long, ns, as far as that is known.
     pub(super) fn set_round_trip(&mut self, took_ns: Option<u64>) {
         self.round_trip_ns = self.round_trip_ns.into_iter().chain(took_ns).min();
     }
@@ -140,7 +139,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     /// A connection that is always full, at so many bytes a ms; what it was told last.
-    fn run(pace: &mut Pace, from_ms: u64, ms: u64, bytes_ms: usize) -> Option<Holding> {
+    fn run(pace: &mut ConnectionPace, from_ms: u64, ms: u64, bytes_ms: usize) -> Option<Holding> {
         let mut last = None;
         for at in from_ms..from_ms + ms {
             last = pace.wrote(bytes_ms, false, || at * MS).or(last);
@@ -156,7 +155,7 @@ mod tests {
             (60, 15 * 1024, Some(60 * 1024), "half a Mbit/s"),
             (10_000, 32 * 1024, None, "fast: the kernel knows best"),
         ] {
-            let mut pace = Pace::default();
+            let mut pace = ConnectionPace::default();
             assert_eq!(pace.batch_bytes(), BATCH_BYTES, "as long as nothing is known");
             let told = run(&mut pace, 0, 2000, bytes_ms).unwrap();
             assert_eq!(
@@ -172,13 +171,13 @@ mod tests {
 
     #[test]
     fn a_connection_is_soon_fast_again_after_a_pause_and_not_slow_for_lack_of_data() {
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         run(&mut pace, 0, 2000, 1000);
         // It takes nothing for seven seconds.
         assert!(pace.wrote(0, false, || 9000 * MS).unwrap().unsent < UNSENT_BYTES_MAX / 2);
         run(&mut pace, 9000, 2000, 1000);
         assert!(pace.rate > Some(900_000) && pace.piece_bytes().is_none(), "{pace:?}");
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         for at in 0..100 {
             assert_eq!(pace.wrote(10, false, || at * 200 * MS), None, "it had all that there was in between");
             pace.wrote(10, true, || at * 200 * MS);
@@ -189,7 +188,7 @@ mod tests {
     /// A line that carries so many bytes a ms, so long there and back, of which no more is under way than is held: what
     /// is held at the end.
     fn run_held(bytes_ms: u64, round_trip_ms: u64) -> u64 {
-        let (mut pace, mut held) = (Pace::default(), 8 * 1024);
+        let (mut pace, mut held) = (ConnectionPace::default(), 8 * 1024);
         pace.set_round_trip(Some(round_trip_ms * MS));
         for round in 0..40 {
             let bytes = held.min(bytes_ms * round_trip_ms);
@@ -214,7 +213,7 @@ mod tests {
 
     #[test]
     fn what_was_bound_in_a_pause_is_free_when_it_is_fast_again() {
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         run(&mut pace, 0, 2000, 1000);
         let paused = pace.wrote(0, false, || 9000 * MS).unwrap();
         assert!(paused.held.is_some_and(|held| held < HELD_BYTES_MAX), "{paused:?}");
@@ -224,7 +223,7 @@ mod tests {
 
     #[test]
     fn what_takes_all_at_once_is_fast() {
-        let mut pace = Pace::default();
+        let mut pace = ConnectionPace::default();
         let told: Vec<_> = (0..9).filter_map(|_| pace.wrote(65_000, true, || unreachable!())).collect();
         let unsent: Vec<_> = told.iter().map(|holding| holding.unsent).collect();
         assert_eq!((unsent, pace.piece_bytes()), (vec![4096, 8192, 16_384, 32_768], None));

@@ -24,7 +24,7 @@ use std::sync::Arc;
 const REALM: &str = "rohrpost";
 const ROUTER: &str = "tcp-router";
 const SYSTEM: &str = "system-";
-/// What the name of an authority begins with.
+/// The name of an authority begins with this.
 pub const PREFIX: &str = "Rohrpost installation ";
 /// The authority that has signed all of an installation.
 pub const AUTHORITY: &str = "ca";
@@ -146,15 +146,15 @@ pub fn is_about(certificate: &Path, public: &[u8]) -> bool {
     })
 }
 
-/// What a client begins its connections with.
+/// TLS configuration of a client.
 #[derive(Clone, Debug)]
 pub struct ClientSeal(Arc<ClientConfig>);
 
-/// What the server begins its connections with.
+/// TLS configuration of the server.
 #[derive(Clone, Debug)]
 pub struct ServerSeal(Arc<ServerConfig>);
 
-/// What lies in the folder for one holder.
+/// Files of one holder in the folder.
 struct Files {
     folder: PathBuf,
     roots: Arc<RootCertStore>,

@@ -1,11 +1,11 @@
 //! State of a client and the server, as their threads last stored it, for the thread that publishes it.
 
 use crate::session::server::Crowded;
-use crate::session::{Cause, Counts};
+use crate::session::{Cause, SessionCounts};
 use rohrpost_mailbox::{Name, Priority, TimeRecord};
 use std::sync::{Mutex, PoisonError};
 
-/// So often it is said anew.
+/// Interval between two snapshots.
 pub(super) const SAY_EVERY_NS: u64 = 200_000_000;
 
 /// Members that are said one by one: with what else is said they must fit into a package.
@@ -13,7 +13,7 @@ pub const MEMBERS_MAX: usize = 300;
 /// Ranges of a client that are told by name.
 pub(super) const HOSTS_MAX: usize = 64;
 
-/// What a class did at one end.
+/// Counts of one class at one end.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Class {
     /// The class's priority.
@@ -30,8 +30,8 @@ pub struct Class {
 
 impl Class {
     /// All classes that did something.
-    pub(super) fn all(counts: &Counts) -> Vec<Self> {
-        let class = |(priority, counts): (Priority, &crate::session::ClassCounts)| {
+    pub(super) fn all(counts: &SessionCounts) -> Vec<Self> {
+        let class = |(priority, counts): (Priority, &crate::session::SessionClassCounts)| {
             let lost = Cause::ALL.into_iter().map(|cause| (cause, counts.lost(cause))).filter(|(_, count)| *count > 0);
             Self {
                 priority,
@@ -82,16 +82,16 @@ impl Outage {
     }
 }
 
-/// A client, as it sees itself.
+/// A client's link to its server, as the client sees it.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Link {
+pub struct ClientLink {
     /// Whether it takes part.
     pub state: LinkState,
     /// Why not, as it was last told; empty if it does.
     pub why: String,
     /// Connections so far.
     pub connections: u64,
-    /// Shortest way there and back of late, ns.
+    /// Shortest recent round trip, ns.
     pub round_trip_ns: Option<u64>,
     /// How far off system time by the server is at most, ns; none if the server does not know it.
     pub time_error_ns: Option<u64>,
@@ -109,7 +109,7 @@ pub struct Link {
 
 /// A client, as the server sees it.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Member {
+pub struct MemberSnapshot {
     /// Its name; before its hello, where it comes from.
     pub name: String,
     /// Where it comes from.
@@ -136,7 +136,7 @@ pub struct Member {
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Members {
     /// Connections that are there; of many the first.
-    pub members: Vec<Member>,
+    pub members: Vec<MemberSnapshot>,
     /// Connections besides these.
     pub more: u64,
     /// Clients that took part and do not any more.
@@ -150,14 +150,14 @@ pub struct Members {
     /// Packages of those that were lost.
     pub crowded_packages: u64,
     /// Registrations that a later one of the same client took the place of before they were looked at.
-    pub overtaken: u64,
+    pub superseded: u64,
     /// Lines that were not said one by one, since there were too many of their cause.
     pub held: u64,
     /// What went through.
     pub classes: Vec<Class>,
 }
 
-/// What one thread says, and others read: a few times a second.
+/// A value that one thread replaces, and others read, a few times a second.
 #[derive(Debug, Default)]
 pub(super) struct LatestValue<T>(Mutex<T>);
 

@@ -1,6 +1,6 @@
 //! One connection of a session: bytes in and out, sealed or not, without waiting.
 
-use super::pace::{Holding, Pace};
+use super::pace::{ConnectionPace, Holding};
 use super::seal::{Holder, Sealed};
 use nix::libc;
 use rohrpost_mailbox::monotonic_ns;
@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 
-/// What came of reading or writing.
+/// Result of reading or writing.
 #[derive(Debug)]
 pub enum Moved {
     /// So many bytes, at least one.
@@ -25,7 +25,7 @@ pub enum Moved {
 pub struct Stream {
     socket: Paced,
     sealed: Option<Sealed>,
-    pace: Pace,
+    pace: ConnectionPace,
 }
 
 /// A socket. Before each piece the kernel is asked whether it holds enough already: it checks itself only before it
@@ -79,11 +79,11 @@ impl Stream {
         Self::new(socket.into(), sealed)
     }
 
-    /// One that was accepted.
+    /// A stream of an accepted connection.
     pub(super) fn new(socket: TcpStream, sealed: Option<Sealed>) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         socket.set_nodelay(true)?;
-        let pace = Pace::default();
+        let pace = ConnectionPace::default();
         SockRef::from(&socket).set_tcp_notsent_lowat(pace.unsent_bytes() as u32)?;
         Ok(Self { socket: Paced { socket, piece_bytes: pace.piece_bytes() }, sealed, pace })
     }
@@ -132,7 +132,7 @@ impl Stream {
         }
     }
 
-    /// The way there and back takes so long, ns, as far as that is known.
+    /// The round trip, ns, as far as that is known.
     pub(super) fn set_round_trip(&mut self, round_trip_ns: Option<u64>) {
         self.pace.set_round_trip(round_trip_ns);
     }

@@ -41,8 +41,8 @@ mod tests;
 mod tx_window;
 pub mod wire;
 
-pub use scheduler::{Counts, Next, Planned, Silent, SlotScheduler, Verdict};
-pub use table::{Kind, Owner, Table, UNPROVEN_CYCLES, Window};
+pub use scheduler::{Next, Planned, Silent, SlotCounts, SlotScheduler, WindowVerdict};
+pub use table::{Owner, SlotTable, UNPROVEN_CYCLES, Window, WindowKind};
 pub use tx_window::{Carries, TransmitWindow};
 pub use wire::Wire;
 

@@ -2,7 +2,7 @@
 
 use super::GATE_NS;
 use super::lead::Lead;
-use super::table::{Kind, Table, UNPROVEN_CYCLES, Window};
+use super::table::{SlotTable, UNPROVEN_CYCLES, Window, WindowKind};
 use super::tx_window::{Carries, TransmitWindow};
 use crate::frame::NodeIndex;
 use crate::time::{Clock, JOINING_SYNCS, Role, Stamp, SyncCounts, TIME_BYTES, TimeEstimate, Unsteady};
@@ -94,7 +94,7 @@ fn named(node: Option<NodeIndex>) -> String {
 
 /// The decision on a window at its call.
 #[derive(Clone, Debug)]
-pub enum Verdict {
+pub enum WindowVerdict {
     /// Use it.
     Send(TransmitWindow),
     /// The clock was slewed meanwhile, or the node follows another time: ask for the next window anew.
@@ -109,7 +109,7 @@ pub enum Verdict {
 
 /// Counters of this node's slots, and of synchronisation, since the start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Counts {
+pub struct SlotCounts {
     /// Slots in which something was sent.
     pub used: u64,
     /// Slots in which nothing had to be sent.
@@ -137,10 +137,10 @@ pub struct Counts {
 /// Decides when this node sends. Holds no clock: the caller passes it.
 #[derive(Debug)]
 pub struct SlotScheduler {
-    table: Table,
+    table: SlotTable,
     spin_ns: u64,
     lead: Lead,
-    counts: Counts,
+    counts: SlotCounts,
     role: Role,
     silent: Option<Silent>,
     /// Slots before this are counted, system time of this epoch; none without time.
@@ -151,12 +151,12 @@ pub struct SlotScheduler {
 
 impl SlotScheduler {
     /// `spin_ns`: the wake-up comes this much earlier, to spin until the call.
-    pub fn new(table: Table, spin_ns: u64) -> Self {
+    pub fn new(table: SlotTable, spin_ns: u64) -> Self {
         Self {
             table,
             spin_ns,
             lead: Lead::default(),
-            counts: Counts::default(),
+            counts: SlotCounts::default(),
             role: Role::Listening,
             silent: Some(Silent::NoTime),
             done: None,
@@ -165,7 +165,7 @@ impl SlotScheduler {
     }
 
     /// The slots.
-    pub fn table(&self) -> &Table {
+    pub fn table(&self) -> &SlotTable {
         &self.table
     }
 
@@ -174,19 +174,19 @@ impl SlotScheduler {
         self.silent
     }
 
-    /// From the call to the wire, ns: the median, and the lead.
+    /// Time from the call to the wire, ns: the median, and the lead.
     pub fn lead_ns(&self) -> (u64, u64) {
         (self.lead.median_ns(), self.lead.ns())
     }
 
     /// Counters of slots so far.
-    pub fn counts(&self, clock: &Clock) -> Counts {
-        Counts { syncs: clock.sync_counts(), ..self.counts }
+    pub fn counts(&self, clock: &Clock) -> SlotCounts {
+        SlotCounts { syncs: clock.sync_counts(), ..self.counts }
     }
 
     /// Slots since the start without packages, though some may have waited.
     pub fn left_out(&self) -> u64 {
-        let Counts { late, skipped, silent, .. } = self.counts;
+        let SlotCounts { late, skipped, silent, .. } = self.counts;
         late + skipped + silent
     }
 
@@ -223,19 +223,19 @@ impl SlotScheduler {
 
     /// Whether a planned window may be used. Call it at the window's call time, after the clock has all received
     /// datagrams. Once for each window, unless it is early.
-    pub fn validate(&mut self, planned: &Planned, now_ns: u64, clock: &Clock) -> Verdict {
+    pub fn validate(&mut self, planned: &Planned, now_ns: u64, clock: &Clock) -> WindowVerdict {
         let verdict = self.look(planned, now_ns, clock);
-        let is_slot = matches!(planned.window.kind, Kind::Slot { .. });
+        let is_slot = matches!(planned.window.kind, WindowKind::Slot { .. });
         match &verdict {
-            Verdict::Early => return verdict,
+            WindowVerdict::Early => return verdict,
             // A window of an unverified time does not count as progress by another.
             _ if planned.carries == Carries::Hello => {
                 self.hello_from_ns = planned.end_ns;
                 return verdict;
             }
-            Verdict::Late if is_slot => self.counts.late += 1,
-            Verdict::Late => self.counts.synchronisations_late += 1,
-            Verdict::Silent(_) if is_slot => self.counts.silent += 1,
+            WindowVerdict::Late if is_slot => self.counts.late += 1,
+            WindowVerdict::Late => self.counts.synchronisations_late += 1,
+            WindowVerdict::Silent(_) if is_slot => self.counts.silent += 1,
             _ => {}
         }
         self.done = self.done.map(|(epoch, _)| (epoch, planned.window.begin_ns + 1));
@@ -251,7 +251,7 @@ impl SlotScheduler {
             let pause_ns = UNPROVEN_CYCLES * self.table.cycle_ns();
             self.hello_from_ns = tx_window.begin_ns.saturating_add(pause_ns);
         }
-        if let Kind::Slot { .. } = tx_window.window.kind {
+        if let WindowKind::Slot { .. } = tx_window.window.kind {
             *match (tx_window.carries, tx_window.datagrams()) {
                 (Carries::Time | Carries::Hello, _) => &mut self.counts.silent,
                 (Carries::All, 0) => &mut self.counts.empty,
@@ -338,40 +338,40 @@ impl SlotScheduler {
         Some(Planned { window, wake_ns: call_ns.saturating_sub(self.spin_ns), call_ns, begin_ns, end_ns, carries })
     }
 
-    fn look(&self, planned: &Planned, now_ns: u64, clock: &Clock) -> Verdict {
+    fn look(&self, planned: &Planned, now_ns: u64, clock: &Clock) -> WindowVerdict {
         let window = planned.window;
         let (estimate, carries) = match self.reckon(now_ns, clock) {
             Ok(sure) => sure,
-            Err(why) => return Verdict::Silent(why),
+            Err(why) => return WindowVerdict::Silent(why),
         };
         // Windows of an unverified time and of a verified one differ.
         if (carries == Carries::Hello) != (planned.carries == Carries::Hello) {
-            return Verdict::Early;
+            return WindowVerdict::Early;
         }
         // No such window after an epoch began in another time.
-        let Some(planned) = self.plan(window, &estimate, carries) else { return Verdict::Late };
+        let Some(planned) = self.plan(window, &estimate, carries) else { return WindowVerdict::Late };
         if now_ns < planned.call_ns {
-            return Verdict::Early;
+            return WindowVerdict::Early;
         }
-        let is_slot = matches!(window.kind, Kind::Slot { .. });
+        let is_slot = matches!(window.kind, WindowKind::Slot { .. });
         if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS) {
-            return Verdict::Late;
+            return WindowVerdict::Late;
         }
         let (bound_ns, allowance_ns) = (estimate.bound_ns(planned.end_ns), self.table.allowance_ns());
         if bound_ns > allowance_ns {
-            return Verdict::Silent(Silent::BoundTooLarge { bound_ns, allowance_ns });
+            return WindowVerdict::Silent(Silent::BoundTooLarge { bound_ns, allowance_ns });
         }
         let goes_by_own = carries == Carries::All || clock.is_beginning();
         let synchronises = goes_by_own && clock.synchronises(window.cycle);
         let carries = match window.kind {
-            Kind::Slot { .. } if clock.is_beginning() => return Verdict::Silent(Silent::Beginning),
-            Kind::Slot { .. } => carries,
-            Kind::Synchronisation { .. } if synchronises => Carries::Time,
-            Kind::Synchronisation { .. } => return Verdict::Idle,
+            WindowKind::Slot { .. } if clock.is_beginning() => return WindowVerdict::Silent(Silent::Beginning),
+            WindowKind::Slot { .. } => carries,
+            WindowKind::Synchronisation { .. } if synchronises => Carries::Time,
+            WindowKind::Synchronisation { .. } => return WindowVerdict::Idle,
         };
         let Planned { begin_ns, end_ns, .. } = planned;
         let tx_window = TransmitWindow::new(window, begin_ns, end_ns, carries, self.lead.ns(), *self.table.wire());
         // A Sync may leave anywhere in its window: it contains its own time.
-        if is_slot || tx_window.fits(now_ns, TIME_BYTES) { Verdict::Send(tx_window) } else { Verdict::Late }
+        if is_slot || tx_window.fits(now_ns, TIME_BYTES) { WindowVerdict::Send(tx_window) } else { WindowVerdict::Late }
     }
 }

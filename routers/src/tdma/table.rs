@@ -16,12 +16,12 @@ use rohrpost_network::Tdma;
 use rohrpost_network::TimeShare;
 use std::time::Duration;
 
-/// By an unverified time a hello leaves in one of this many cycles, since that time may be wrong.
+/// While the time is unverified, a hello leaves in one of this many cycles, since that time may be wrong.
 pub const UNPROVEN_CYCLES: u64 = 4;
 
 /// Purpose of a window.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum Kind {
+pub enum WindowKind {
     /// Synchronisation by the master at this place in their order.
     Synchronisation {
         /// From 0.
@@ -38,7 +38,7 @@ pub enum Kind {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Window {
     /// Purpose.
-    pub kind: Kind,
+    pub kind: WindowKind,
     /// Counts cycles of system time since 1970.
     pub cycle: u64,
     /// The first frame is on the wire no earlier than this, system ns.
@@ -60,7 +60,7 @@ pub struct Owner {
 
 /// The slots of a system, and this node's windows among them.
 #[derive(Clone, Debug)]
-pub struct Table {
+pub struct SlotTable {
     own: NodeIndex,
     masters: Vec<NodeIndex>,
     cycle_ns: u64,
@@ -80,7 +80,7 @@ struct Slot {
     phase: u64,
 }
 
-impl Table {
+impl SlotTable {
     /// The table of `nodes` nodes as `own` sees it. `masters` in their order. `heads_bytes`: bytes of IP and UDP
     /// headers for each datagram, see [`Settings::overhead_bytes`](crate::settings::Settings::overhead_bytes).
     pub fn new(tdma: &Tdma, masters: &[NodeIndex], own: NodeIndex, nodes: u8, heads_bytes: usize) -> Self {
@@ -113,7 +113,7 @@ impl Table {
         self.masters.iter().position(|master| *master == self.own).map(|rank| rank as u8)
     }
 
-    /// From the beginning of one cycle to that of the next, ns.
+    /// Time from the beginning of one cycle to that of the next, ns.
     pub fn cycle_ns(&self) -> u64 {
         self.cycle_ns
     }
@@ -211,7 +211,7 @@ impl Table {
 
     fn synchronisation(&self, rank: u8, cycle: u64) -> Option<Window> {
         self.window(
-            Kind::Synchronisation { rank },
+            WindowKind::Synchronisation { rank },
             cycle,
             u64::from(rank) * self.synchronisation_ns,
             self.synchronisation_ns,
@@ -219,11 +219,11 @@ impl Table {
     }
 
     fn slot_window(&self, index: usize, slot: &Slot, cycle: u64) -> Option<Window> {
-        self.window(Kind::Slot { index: index as u16 }, cycle, slot.offset_ns, slot.length_ns)
+        self.window(WindowKind::Slot { index: index as u16 }, cycle, slot.offset_ns, slot.length_ns)
     }
 
     /// None after the year 2554.
-    fn window(&self, kind: Kind, cycle: u64, offset_ns: u64, length_ns: u64) -> Option<Window> {
+    fn window(&self, kind: WindowKind, cycle: u64, offset_ns: u64, length_ns: u64) -> Option<Window> {
         let begin_ns = cycle.checked_mul(self.cycle_ns)?.checked_add(offset_ns)?;
         let guard_ns = self.guard_ns;
         let end_ns = begin_ns.checked_add(length_ns.saturating_sub(guard_ns))?;

@@ -1,7 +1,7 @@
 //! One window in use: what still fits in it.
 
 use super::LATE_NS;
-use super::table::{Kind, Window};
+use super::table::{Window, WindowKind};
 use super::wire::Wire;
 use crate::time::Allowed;
 use rohrpost_network::HAND_OVER;
@@ -76,7 +76,7 @@ impl TransmitWindow {
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
 
-    /// From the handover of a datagram now until its last bit is at the other computer, behind a store-and-forward
+    /// Time from the handover of a datagram now until its last bit is at the other computer, behind a store-and-forward
     /// switch, ns. `to_wire_ns`: how long it takes to the wire, unless that is busy for longer.
     pub fn arrives_after_ns(&self, now_ns: u64, datagram_bytes: usize, to_wire_ns: u64) -> u64 {
         self.free_ns.saturating_sub(now_ns).max(to_wire_ns) + 2 * self.wire.ns(datagram_bytes)
@@ -122,10 +122,10 @@ impl TransmitWindow {
 
     /// Whether a hello may leave in it.
     pub fn carries_hello(&self) -> bool {
-        matches!(self.window.kind, Kind::Slot { .. })
+        matches!(self.window.kind, WindowKind::Slot { .. })
     }
 
-    /// Whether a refusal may leave in it: who is not sure of the time sends nothing but questions.
+    /// Whether a refusal may leave in it: a node that is not sure of the time sends nothing but hellos.
     pub fn carries_refusal(&self) -> bool {
         self.carries_hello() && self.carries == Carries::All
     }
@@ -134,10 +134,10 @@ impl TransmitWindow {
     pub fn allowed(&self) -> Allowed {
         match self.window.kind {
             _ if self.carries == Carries::Hello => Allowed::Nothing,
-            Kind::Synchronisation { .. } => {
+            WindowKind::Synchronisation { .. } => {
                 Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns }
             }
-            Kind::Slot { .. } => Allowed::Slot,
+            WindowKind::Slot { .. } => Allowed::Slot,
         }
     }
 }

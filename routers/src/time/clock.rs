@@ -8,9 +8,9 @@ mod slots;
 mod steady;
 
 use super::clock_model::{ClockModel, EVEN_PPB};
-use super::election::{Election, Origin, State};
+use super::election::{Election, ElectionState, Origin};
 use super::history::{History, RATE_MAX};
-use super::message::{Message, Request};
+use super::message::{Request, TimeMessage};
 use super::others::Others;
 use super::steadiness::Steadiness;
 use super::types::{Exchange, Ignored, Reading, Role, SentId, Step, TimeSettings};
@@ -20,7 +20,7 @@ use rohrpost_mailbox::{TimeRecord, TimeSource};
 use std::collections::VecDeque;
 
 pub use slots::Allowed;
-use slots::Slots;
+use slots::SlotClock;
 
 /// Exchanges in an interval, and the shortest pause between two with one slave.
 const EXCHANGES: u64 = 8;
@@ -99,7 +99,7 @@ pub struct Clock {
     /// Whether the local clock keeps its limits.
     steadiness: Steadiness,
     /// State for time slots; none in free mode.
-    slots: Option<Box<Slots>>,
+    slots: Option<Box<SlotClock>>,
 }
 
 impl Clock {
@@ -157,7 +157,7 @@ impl Clock {
         if !self.is_ours(head) {
             return Err(Ignored::Stranger);
         }
-        let message = Message::parse(head.kind, rest)?;
+        let message = TimeMessage::parse(head.kind, rest)?;
         self.others.agrees(head.from);
         if self.is_parted(now_ns) {
             return Err(Ignored::OtherTable);
@@ -166,13 +166,13 @@ impl Clock {
             return Err(Ignored::Unsteady);
         }
         match message {
-            Message::WarmUp => {
+            TimeMessage::WarmUp => {
                 self.hears(head.from, head.incarnation, received.ns);
                 Ok(())
             }
-            Message::Sync(sync) => self.sync(now_ns, received, head, &sync),
-            Message::Request(request) => self.request(received, head.from, &request),
-            Message::Reply(reply) => self.reply(now_ns, received, head, &reply),
+            TimeMessage::Sync(sync) => self.sync(now_ns, received, head, &sync),
+            TimeMessage::Request(request) => self.request(received, head.from, &request),
+            TimeMessage::Reply(reply) => self.reply(now_ns, received, head, &reply),
         }
     }
 
@@ -190,7 +190,7 @@ impl Clock {
         }
         let mut asked = self.asked.iter_mut();
         if let Some(asked) = asked.find(|asked| asked.exchange.id != 0 && asked.sequence == id.sequence)
-            && let State::Slave(master) = self.election.state()
+            && let ElectionState::Slave(master) = self.election.state()
             && master.node == id.to
         {
             asked.exchange.request_left = stamp;
@@ -238,9 +238,9 @@ impl Clock {
     /// The role of this node.
     pub fn role(&self) -> Role {
         match self.election.state() {
-            State::Listening => Role::Listening,
-            State::Slave(_) => Role::Slave,
-            State::Master(_) => Role::Master,
+            ElectionState::Listening => Role::Listening,
+            ElectionState::Slave(_) => Role::Slave,
+            ElectionState::Master(_) => Role::Master,
         }
     }
 
@@ -248,27 +248,27 @@ impl Clock {
     /// when it is measured.
     pub fn term(&self) -> Term {
         match self.election.state() {
-            State::Listening => Term::NONE,
-            State::Slave(master) => master.term,
-            State::Master(term) => term,
+            ElectionState::Listening => Term::NONE,
+            ElectionState::Slave(master) => master.term,
+            ElectionState::Master(term) => term,
         }
     }
 
     /// The master that this node follows, or itself.
     pub fn master(&self) -> Option<NodeIndex> {
         match self.election.state() {
-            State::Listening => None,
-            State::Slave(master) => Some(master.node),
-            State::Master(_) => Some(self.settings.own),
+            ElectionState::Listening => None,
+            ElectionState::Slave(master) => Some(master.node),
+            ElectionState::Master(_) => Some(self.settings.own),
         }
     }
 
     /// When the master was last heard, local ns; for a master itself, now.
     pub fn heard_ns(&self, now_ns: u64) -> Option<u64> {
         match self.election.state() {
-            State::Listening => None,
-            State::Slave(master) => Some(master.heard_ns),
-            State::Master(_) => Some(now_ns),
+            ElectionState::Listening => None,
+            ElectionState::Slave(master) => Some(master.heard_ns),
+            ElectionState::Master(_) => Some(now_ns),
         }
     }
 
@@ -324,7 +324,7 @@ impl Clock {
         }
         let origin = self.origin(now_ns);
         if let Some(term) = self.election.takes_over(now_ns, origin) {
-            self.reign(now_ns, term, origin);
+            self.become_master(now_ns, term, origin);
         }
     }
 
@@ -337,12 +337,12 @@ impl Clock {
         }
     }
 
-    /// Drafts what is due without a question.
+    /// Drafts what is due without a request.
     fn draft(&mut self, now_ns: u64) {
         match self.election.state() {
-            State::Listening => self.draft_hello(now_ns),
-            State::Slave(_) => {}
-            State::Master(_) => {
+            ElectionState::Listening => self.draft_hello(now_ns),
+            ElectionState::Slave(_) => {}
+            ElectionState::Master(_) => {
                 let due = (0..self.settings.nodes)
                     .filter(|node| *node != self.settings.own)
                     .find(|node| self.slaves[usize::from(*node)].next_ns <= now_ns);
@@ -367,12 +367,12 @@ impl Clock {
         let role_ns = match self.election.state() {
             // In time slots others plan its windows.
             _ if self.slots.is_some() => None,
-            State::Master(_) => {
+            ElectionState::Master(_) => {
                 let others = self.slaves.iter().enumerate().filter(|(node, _)| *node != usize::from(self.settings.own));
                 others.map(|(_, slave)| slave.next_ns).min()
             }
-            State::Listening => Some(self.hello_ns),
-            State::Slave(_) => None,
+            ElectionState::Listening => Some(self.hello_ns),
+            ElectionState::Slave(_) => None,
         };
         let bound_ns = self.is_held_over().then_some(self.stated.0);
         let election_ns = self.election.deadline_ns(now_ns, self.origin(now_ns));
@@ -390,11 +390,11 @@ impl Clock {
     ) -> Option<Option<SentId>> {
         let sequence = self.sequences[usize::from(to)];
         let message = match draft {
-            Draft::WarmUp => Message::WarmUp,
-            Draft::Sync { nominal_ns } => Message::Sync(self.write_sync(now_ns, to, nominal_ns, sequence)?),
-            Draft::Replacement { nominal_ns } => Message::Sync(self.write_replacement(now_ns, nominal_ns)?),
-            Draft::Request { id } => Message::Request(self.write_request(now_ns, id, sequence)?),
-            Draft::Reply { id, came } => Message::Reply(self.write_reply(now_ns, to, id, came)?),
+            Draft::WarmUp => TimeMessage::WarmUp,
+            Draft::Sync { nominal_ns } => TimeMessage::Sync(self.write_sync(now_ns, to, nominal_ns, sequence)?),
+            Draft::Replacement { nominal_ns } => TimeMessage::Sync(self.write_replacement(now_ns, nominal_ns)?),
+            Draft::Request { id } => TimeMessage::Request(self.write_request(now_ns, id, sequence)?),
+            Draft::Reply { id, came } => TimeMessage::Reply(self.write_reply(now_ns, to, id, came)?),
         };
         self.sequences[usize::from(to)] += 1;
         let TimeSettings { system, own: from, digest, incarnation, .. } = self.settings;
@@ -402,7 +402,7 @@ impl Clock {
         let rest = message.to_bytes();
         datagram[..HEAD_BYTES].copy_from_slice(&head.to_bytes(&[&rest]));
         datagram[HEAD_BYTES..].copy_from_slice(&rest);
-        let stamped = matches!(message, Message::Sync(_) | Message::Request(Request { id: 1.., .. }));
+        let stamped = matches!(message, TimeMessage::Sync(_) | TimeMessage::Request(Request { id: 1.., .. }));
         Some(stamped.then_some(SentId { to, sequence }))
     }
 }

@@ -1,4 +1,4 @@
-//! Election of the master: the order of candidates, the silence that ends a reign, and which of two masters yields.
+//! Election of the master: the order of candidates, the silence that ends a term, and which of two masters yields.
 
 use super::message::{Request, Sync};
 use super::unverified::UnverifiedPeers;
@@ -43,7 +43,7 @@ pub(super) struct Followed {
 
 /// Election state of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum State {
+pub(super) enum ElectionState {
     /// Hears no master.
     Listening,
     Slave(Followed),
@@ -53,7 +53,7 @@ pub(super) enum State {
 
 /// What a Sync changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Heard {
+pub(super) enum SyncOutcome {
     /// Late, a duplicate, or from a master that must yield.
     Ignored,
     /// From the master that this node follows.
@@ -73,7 +73,7 @@ pub(super) struct Election {
     begins_after_ns: u64,
     /// A node that has not heard its master for this long turns to a later one, even if that has no followers yet.
     succeeded_after_ns: u64,
-    state: State,
+    state: ElectionState,
     /// Since when no master is heard, and which one was heard last.
     quiet_since_ns: u64,
     lost: Option<NodeIndex>,
@@ -100,7 +100,7 @@ impl Election {
             deaf_ns: DEAF_NS_MIN,
             begins_after_ns: 0,
             succeeded_after_ns: u64::MAX,
-            state: State::Listening,
+            state: ElectionState::Listening,
             quiet_since_ns: now_ns,
             lost: None,
             highest: Term::NONE,
@@ -112,7 +112,7 @@ impl Election {
         }
     }
 
-    /// Sets the delays that depend on slots. A slave needs `intervals` to ask; question and answer wait for slots, so a
+    /// Sets the delays that depend on slots. A slave needs `intervals` to ask; request and reply wait for slots, so a
     /// master must not be replaced earlier for not answering. A new time begins only after no time was heard for long
     /// enough. A successor sends before the silence of its master is over.
     pub(super) fn asks_after(&mut self, intervals: u64, asks_every_ns: u64) {
@@ -122,7 +122,7 @@ impl Election {
         self.begins_after_ns = BEGINS_AFTER_NS.saturating_add(self.interval_ns.saturating_mul(intervals));
     }
 
-    pub(super) fn state(&self) -> State {
+    pub(super) fn state(&self) -> ElectionState {
         self.state
     }
 
@@ -176,10 +176,10 @@ impl Election {
         sync: &Sync,
         received_ns: u64,
         followed: bool,
-    ) -> Heard {
+    ) -> SyncOutcome {
         self.speaks_of(sync.term, sync.epoch);
         if self.masters.get(usize::from(sync.term.rank())) != Some(&from) {
-            return Heard::Ignored;
+            return SyncOutcome::Ignored;
         }
         let (term, began, epoch) = (sync.term, sync.began, sync.epoch);
         let (error_ns, id) = (sync.error_ns, sync.id);
@@ -196,43 +196,43 @@ impl Election {
             id,
         };
         let heard = match self.state {
-            State::Listening => Heard::Turned,
-            State::Master(own) if theirs.claim() > (followed, own) => Heard::Turned,
-            State::Master(own) => {
+            ElectionState::Listening => SyncOutcome::Turned,
+            ElectionState::Master(own) if theirs.claim() > (followed, own) => SyncOutcome::Turned,
+            ElectionState::Master(own) => {
                 // The other will yield. A higher own term: no node that heard the other takes this one for older.
                 if let (true, Some(rank)) = (theirs.term > own, self.rank()) {
-                    self.state = State::Master(self.next_term(rank));
+                    self.state = ElectionState::Master(self.next_term(rank));
                 }
-                Heard::Ignored
+                SyncOutcome::Ignored
             }
-            State::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
+            ElectionState::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
                 if id <= master.id || term < master.term {
-                    Heard::Ignored
+                    SyncOutcome::Ignored
                 } else if began != master.began {
-                    Heard::Turned
+                    SyncOutcome::Turned
                 } else {
-                    Heard::Followed
+                    SyncOutcome::Followed
                 }
             }
-            State::Slave(master) if theirs.claim() > master.claim() => Heard::Turned,
-            State::Slave(master) if theirs.term > master.term && self.is_succeeded(&master, received_ns) => {
-                Heard::Turned
+            ElectionState::Slave(master) if theirs.claim() > master.claim() => SyncOutcome::Turned,
+            ElectionState::Slave(master) if theirs.term > master.term && self.is_succeeded(&master, received_ns) => {
+                SyncOutcome::Turned
             }
-            State::Slave(_) => Heard::Ignored,
+            ElectionState::Slave(_) => SyncOutcome::Ignored,
         };
         match (heard, self.state) {
-            (Heard::Ignored, _) => {}
-            (Heard::Followed, State::Slave(before)) if !sync.followed => {
-                self.state = State::Slave(Followed { answered_ns: before.answered_ns, ..theirs });
+            (SyncOutcome::Ignored, _) => {}
+            (SyncOutcome::Followed, ElectionState::Slave(before)) if !sync.followed => {
+                self.state = ElectionState::Slave(Followed { answered_ns: before.answered_ns, ..theirs });
             }
-            _ => self.state = State::Slave(theirs),
+            _ => self.state = ElectionState::Slave(theirs),
         }
         heard
     }
 
     /// The master's answer repeats, more recently, what its Sync said.
     pub(super) fn reply(&mut self, epoch: u64, error_ns: u64, received_ns: u64) {
-        if let State::Slave(master) = &mut self.state {
+        if let ElectionState::Slave(master) = &mut self.state {
             (master.epoch, master.error_ns, master.answered_ns) = (master.epoch.max(epoch), error_ns, received_ns);
         }
     }
@@ -240,7 +240,7 @@ impl Election {
     /// A frame other than a Sync came. If it is from this node's master: when that was last heard, local ns.
     pub(super) fn speaks(&mut self, from: NodeIndex, incarnation: u64, received_ns: u64) -> Option<u64> {
         match &mut self.state {
-            State::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
+            ElectionState::Slave(master) if (master.node, master.incarnation) == (from, incarnation) => {
                 master.heard_ns = master.heard_ns.max(received_ns);
                 Some(master.heard_ns)
             }
@@ -259,10 +259,10 @@ impl Election {
     /// A node asks and names its term. A master with an older term begins another, so that its term is the latest.
     pub(super) fn is_told(&mut self, request: &Request) {
         self.speaks_of(request.term, request.epoch);
-        if let (State::Master(own), Some(rank)) = (self.state, self.rank())
+        if let (ElectionState::Master(own), Some(rank)) = (self.state, self.rank())
             && request.term > own
         {
-            self.state = State::Master(self.next_term(rank));
+            self.state = ElectionState::Master(self.next_term(rank));
         }
     }
 
@@ -280,7 +280,7 @@ impl Election {
     /// incarnations; with keys this node hears these only after a handshake.
     pub(super) fn may_be_forgotten(&self, stood_ns: u64) -> bool {
         let is_alone = self.masters.len() < 2;
-        matches!(self.state, State::Master(_)) && !is_alone && stood_ns > self.begins_after_ns
+        matches!(self.state, ElectionState::Master(_)) && !is_alone && stood_ns > self.begins_after_ns
     }
 
     /// Another node that has time sent in place of the master.
@@ -296,17 +296,17 @@ impl Election {
     /// Whether this node, as a master, would yield to a Sync if its sender is verified.
     pub(super) fn would_yield(&self, from: NodeIndex, sync: &Sync, followed: bool) -> bool {
         let is_masters = self.masters.get(usize::from(sync.term.rank())) == Some(&from) && !sync.replacement;
-        matches!(self.state, State::Master(own) if is_masters && (sync.followed, sync.term) > (followed, own))
+        matches!(self.state, ElectionState::Master(own) if is_masters && (sync.followed, sync.term) > (followed, own))
     }
 
     /// This node is no master any more, and hears none.
     pub(super) fn steps_back(&mut self, now_ns: u64) {
-        (self.state, self.quiet_since_ns, self.lost) = (State::Listening, now_ns, None);
+        (self.state, self.quiet_since_ns, self.lost) = (ElectionState::Listening, now_ns, None);
     }
 
     /// Whether this node must wait before it listens.
     pub(super) fn waits(&self, now_ns: u64) -> bool {
-        self.state == State::Listening && self.quiet_since_ns > now_ns
+        self.state == ElectionState::Listening && self.quiet_since_ns > now_ns
     }
 
     /// The wait is over: it listens from now on.
@@ -320,7 +320,7 @@ impl Election {
     }
 
     fn next_term(&mut self, rank: u8) -> Term {
-        let own = if let State::Master(own) = self.state { own } else { Term::NONE };
+        let own = if let ElectionState::Master(own) = self.state { own } else { Term::NONE };
         let next = Term::new(self.highest.max(own).round().saturating_add(1), rank);
         self.highest = next;
         next
@@ -328,11 +328,11 @@ impl Election {
 
     /// Whether the master that this node follows fell silent.
     pub(super) fn falls_silent(&mut self, now_ns: u64) -> bool {
-        let State::Slave(master) = self.state else { return false };
+        let ElectionState::Slave(master) = self.state else { return false };
         let heard_ns = master.heard_ns.max(self.awake_since_ns);
         let silent = now_ns.saturating_sub(heard_ns) >= self.silence_ns();
         if silent {
-            self.state = State::Listening;
+            self.state = ElectionState::Listening;
             (self.quiet_since_ns, self.lost) = (heard_ns, Some(master.node));
         }
         silent
@@ -349,7 +349,7 @@ impl Election {
     /// Takes over without a check: the caller knows that it is this node's turn.
     pub(super) fn succeeds(&mut self) -> Option<Term> {
         let term = self.next_term(self.rank()?);
-        self.state = State::Master(term);
+        self.state = ElectionState::Master(term);
         Some(term)
     }
 
@@ -357,12 +357,12 @@ impl Election {
     pub(super) fn deadline_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
         let takeover_ns = self.takeover_ns(now_ns, origin);
         match self.state {
-            State::Slave(master) => {
+            ElectionState::Slave(master) => {
                 let heard_ns = master.heard_ns.max(self.awake_since_ns);
                 let silent_ns = heard_ns.saturating_add(self.silence_ns());
                 Some(takeover_ns.map_or(silent_ns, |takeover_ns| takeover_ns.min(silent_ns)))
             }
-            State::Listening | State::Master(_) => takeover_ns,
+            ElectionState::Listening | ElectionState::Master(_) => takeover_ns,
         }
     }
 
@@ -370,23 +370,23 @@ impl Election {
     fn takeover_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
         self.rank()?;
         let (since_ns, patience_ns, last) = match self.state {
-            State::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
-            State::Slave(master) => (master.answered_ns, self.silence_ns().max(self.deaf_ns), Some(master.node)),
-            State::Master(_) => return None,
+            ElectionState::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
+            ElectionState::Slave(of) => (of.answered_ns, self.silence_ns().max(self.deaf_ns), Some(of.node)),
+            ElectionState::Master(_) => return None,
         };
         // A node without time waits for one that has time.
         let recently_ns = self.interval_ns.saturating_mul(4);
         let others_timed = self.timed_heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) < recently_ns);
         let waits = if others_timed && origin != Origin::Own { self.masters.len() } else { 0 };
         // A node that cannot hear others until they are verified lets a node that began earlier finish the handshake.
-        let is_deaf = (origin, self.state) == (Origin::New, State::Listening) && self.apart_ns > 0;
+        let is_deaf = (origin, self.state) == (Origin::New, ElectionState::Listening) && self.apart_ns > 0;
         let apart_ns = if is_deaf { self.apart_ns.saturating_add(self.begins_after_ns) } else { self.interval_ns };
         let staggered_ns = self.interval_ns.saturating_mul(waits as u64);
         let staggered_ns = staggered_ns.saturating_add(apart_ns.saturating_mul(self.before(last) as u64));
         let takes_over_ns = since_ns.max(self.awake_since_ns).saturating_add(patience_ns);
         let begins_ns = match (origin, self.begins_after_ns, self.state) {
             (Origin::Own | Origin::Heard, _, _) | (_, 0, _) => 0,
-            (Origin::New, begins_ns, State::Slave(master)) => master.heard_ns.saturating_add(begins_ns),
+            (Origin::New, begins_ns, ElectionState::Slave(master)) => master.heard_ns.saturating_add(begins_ns),
             (Origin::New, begins_ns, _) => {
                 let heard_ns = self.timed_heard_ns.unwrap_or(0).max(self.overheard_ns);
                 since_ns.max(heard_ns).saturating_add(begins_ns)

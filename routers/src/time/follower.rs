@@ -10,7 +10,7 @@ use rohrpost_mailbox::TimeRecord;
 /// The first answers are often slow; the line begins after this many.
 const HEARD_MIN: u8 = 4;
 /// The line is slewed to an answer within this time, or longer if that would be too fast.
-const MEND_NS: u64 = 2_000_000_000;
+const SLEW_NS: u64 = 2_000_000_000;
 
 /// The node's estimate of system time.
 #[derive(Debug)]
@@ -59,7 +59,7 @@ impl Follower {
             }
             // The line continues where it is more exact.
             if whole_ns < self.line.error_ns(now_ns) {
-                self.line.bend(now_ns, by_ns, MEND_NS, EVEN_PPB, whole_ns, drift_ns_s);
+                self.line.bend(now_ns, by_ns, SLEW_NS, EVEN_PPB, whole_ns, drift_ns_s);
             }
             return;
         }

@@ -14,20 +14,20 @@ const SLOPES: usize = GUESS_BUCKETS * (GUESS_BUCKETS - 1) / 2;
 /// A bucket is left out of the guess if its best delay is this many times the best of all, and this much more.
 const WAITED_TIMES: i64 = 2;
 const WAITED_NS: i64 = 1_000;
-/// As a fraction of 1.
+/// [`RATE_MAX_PPB`] as a fraction of 1.
 pub(super) const RATE_MAX: f64 = RATE_MAX_PPB as f64 * 1e-9;
 /// Per nanosecond, so that times a span in ns it is a rate.
 const WANDER: f64 = WANDER_PPB_S as f64 * 1e-18;
 
 /// One exchange: `system − local` lay between these when the local clock showed this.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(super) struct Sample {
+pub(super) struct OffsetSample {
     pub(super) local_ns: u64,
     pub(super) low_ns: i64,
     pub(super) high_ns: i64,
 }
 
-impl Sample {
+impl OffsetSample {
     pub(super) fn width_ns(&self) -> i64 {
         self.high_ns.saturating_sub(self.low_ns)
     }
@@ -55,7 +55,7 @@ pub(super) struct Estimate {
 pub(super) struct History {
     bucket_ns: u64,
     /// Oldest first; the last is still being filled.
-    buckets: Vec<Sample>,
+    buckets: Vec<OffsetSample>,
     samples: u32,
     /// How fast a sample widens with age when the narrowest is chosen.
     fade: f64,
@@ -71,7 +71,7 @@ impl History {
         self.samples = 0;
     }
 
-    /// From now on samples widen by this fraction of their age.
+    /// Widens samples by this fraction of their age from now on.
     pub(super) fn fades(&mut self, fade: f64) {
         self.fade = fade;
     }
@@ -86,7 +86,7 @@ impl History {
         self.buckets.iter().map(|sample| sample.width_ns().unsigned_abs()).min()
     }
 
-    pub(super) fn add(&mut self, sample: Sample) {
+    pub(super) fn add(&mut self, sample: OffsetSample) {
         self.samples = self.samples.saturating_add(1);
         let bucket = sample.local_ns / self.bucket_ns;
         match self.buckets.last_mut() {
@@ -111,7 +111,7 @@ impl History {
         let newest = self.buckets.last()?;
         let (rate_low, rate_high) = self.rate_interval(local_ns)?;
         let (low_ns, high_ns) = self.interval(local_ns, rate_low, rate_high)?;
-        let mut recent = [Sample::default(); GUESS_BUCKETS];
+        let mut recent = [OffsetSample::default(); GUESS_BUCKETS];
         let recent = self.recent(&mut recent);
         let rate = self.slope(recent).unwrap_or(usual_rate).clamp(rate_low, rate_high);
         let mut guesses = [0.0; GUESS_BUCKETS];
@@ -126,11 +126,12 @@ impl History {
 
     /// The newest buckets, without those in which all frames were delayed: these say little of where in their interval
     /// the truth is.
-    fn recent<'a>(&self, room: &'a mut [Sample; GUESS_BUCKETS]) -> &'a [Sample] {
+    fn recent<'a>(&self, room: &'a mut [OffsetSample; GUESS_BUCKETS]) -> &'a [OffsetSample] {
         let newest = &self.buckets[self.buckets.len().saturating_sub(GUESS_BUCKETS)..];
-        let narrowest_ns = newest.iter().map(Sample::width_ns).min().unwrap_or(0);
-        let waited =
-            |sample: &&Sample| sample.width_ns() > narrowest_ns.saturating_mul(WAITED_TIMES).saturating_add(WAITED_NS);
+        let narrowest_ns = newest.iter().map(OffsetSample::width_ns).min().unwrap_or(0);
+        let waited = |sample: &&OffsetSample| {
+            sample.width_ns() > narrowest_ns.saturating_mul(WAITED_TIMES).saturating_add(WAITED_NS)
+        };
         let mut count = 0;
         for (place, sample) in room.iter_mut().zip(newest.iter().filter(|sample| !waited(sample))) {
             *place = *sample;
@@ -140,7 +141,7 @@ impl History {
     }
 
     /// Theil and Sen: the median of the slopes between all pairs.
-    fn slope(&self, recent: &[Sample]) -> Option<f64> {
+    fn slope(&self, recent: &[OffsetSample]) -> Option<f64> {
         let (mut slopes, mut count) = ([0.0; SLOPES], 0);
         for (at, later) in recent.iter().enumerate() {
             for earlier in &recent[..at] {

@@ -14,7 +14,7 @@
 //! sender's page.
 
 use super::Term;
-use crate::frame::{BadFrame, Kind};
+use crate::frame::{BadFrame, FrameKind};
 pub use rohrpost_network::TIME_BYTES as MESSAGE_BYTES;
 
 /// Times lie before the year 2262, so that differences of two fit in 64 bits.
@@ -30,7 +30,7 @@ const REQUEST_BY_KERNEL: u8 = 2;
 
 /// A datagram of time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Message {
+pub enum TimeMessage {
     /// From the master: its present time.
     Sync(Sync),
     /// Empty: it warms the path for the next frame.
@@ -66,7 +66,7 @@ pub struct Sync {
     pub replacement: bool,
 }
 
-/// A slave's question; with id 0 it only says that the sender hears no master.
+/// A slave's request; with id 0 it only says that the sender hears no master.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Request {
     /// Of the [`Sync`]; 0: hears no master.
@@ -114,20 +114,20 @@ pub struct Reply {
     pub request_by_kernel: bool,
 }
 
-impl Message {
+impl TimeMessage {
     /// The kind of frame that carries it.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> FrameKind {
         match self {
-            Self::Sync(_) => Kind::Sync,
-            Self::WarmUp => Kind::WarmUp,
-            Self::Request(_) => Kind::Request,
-            Self::Reply(_) => Kind::Reply,
+            Self::Sync(_) => FrameKind::Sync,
+            Self::WarmUp => FrameKind::WarmUp,
+            Self::Request(_) => FrameKind::Request,
+            Self::Reply(_) => FrameKind::Reply,
         }
     }
 
     /// The bytes behind the frame's head.
     pub fn to_bytes(&self) -> [u8; MESSAGE_BYTES] {
-        let mut fields = Fields::default();
+        let mut fields = MessageFields::default();
         match *self {
             Self::WarmUp => {}
             Self::Sync(m) => {
@@ -151,23 +151,23 @@ impl Message {
     ///
     /// # Errors
     /// [`BadFrame::Damaged`]
-    pub fn parse(kind: Kind, rest: &[u8]) -> Result<Self, BadFrame> {
-        let fields = Fields::parse(rest)?;
+    pub fn parse(kind: FrameKind, rest: &[u8]) -> Result<Self, BadFrame> {
+        let fields = MessageFields::parse(rest)?;
         let [id, a, b, c, error_ns, epoch, term, began] = fields.words;
         let has = |flag: u8| fields.flags & flag != 0;
         let (term, began) = (Term(term), Term(began));
         let message = match kind {
-            Kind::WarmUp => Self::WarmUp,
-            Kind::Sync => {
+            FrameKind::WarmUp => Self::WarmUp,
+            FrameKind::Sync => {
                 let (cycle, nominal_ns, sent_ns) = (a, b, c);
                 let (followed, replacement) = (has(FOLLOWED), has(REPLACEMENT));
                 Self::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, followed, replacement })
             }
-            Kind::Request => {
+            FrameKind::Request => {
                 let (eager, far, timed) = (has(EAGER), has(FAR), has(TIMED));
                 Self::Request(Request { id, sent_ns: c, error_ns, epoch, term, eager, far, timed })
             }
-            Kind::Reply => Self::Reply(Reply {
+            FrameKind::Reply => Self::Reply(Reply {
                 id,
                 sync_ns: a,
                 request_ns: b,
@@ -180,7 +180,7 @@ impl Message {
                 sync_by_kernel: has(SYNC_BY_KERNEL),
                 request_by_kernel: has(REQUEST_BY_KERNEL),
             }),
-            Kind::Packages | Kind::Fragment | Kind::Alive | Kind::Refusal | Kind::Hello => {
+            FrameKind::Packages | FrameKind::Fragment | FrameKind::Alive | FrameKind::Refusal | FrameKind::Hello => {
                 return Err(BadFrame::Damaged("no frame of time"));
             }
         };
@@ -215,13 +215,13 @@ fn flag(is: bool, bit: u8) -> u8 {
 
 /// The table above, without names.
 #[derive(Default)]
-struct Fields {
+struct MessageFields {
     words: [u64; 8],
     flags: u8,
     doubt_ns: u32,
 }
 
-impl Fields {
+impl MessageFields {
     fn to_bytes(&self) -> [u8; MESSAGE_BYTES] {
         let mut bytes = [0; MESSAGE_BYTES];
         for (place, word) in bytes.chunks_exact_mut(8).zip(self.words) {

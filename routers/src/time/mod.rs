@@ -119,7 +119,7 @@ impl Stamp {
     }
 }
 
-/// The reign of one master: later ones are greater, and two masters never have the same.
+/// Term of one master: later ones are greater, and two masters never have the same.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 pub struct Term(pub u64);
 

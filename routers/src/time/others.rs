@@ -16,7 +16,7 @@ const REFUSED_NS: u64 = 10_000_000_000;
 const APART_NS: u64 = 1_000_000_000;
 
 /// The greater one continues: whether its time is followed, and its digest.
-pub(super) type Claim = (bool, u64);
+pub(super) type TimelineClaim = (bool, u64);
 
 /// A node of another configuration.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +63,7 @@ impl Others {
     }
 
     /// A node, or an address that no node has, sends time of another configuration.
-    pub(super) fn hears(&mut self, node: Option<NodeIndex>, local_ns: u64, theirs: Claim, own: Claim) {
+    pub(super) fn hears(&mut self, node: Option<NodeIndex>, local_ns: u64, theirs: TimelineClaim, own: TimelineClaim) {
         let grace_ns = self.grace_ns;
         let other = self.other(node, theirs.1, local_ns);
         if local_ns.saturating_sub(other.heard_ns) > APART_NS {
@@ -115,7 +115,7 @@ impl Others {
         self.refusals_ns = self.refusals_ns.max(until_ns);
     }
 
-    /// Until when this node is silent, if it is.
+    /// End of this node's silence, if it is silent.
     pub(super) fn silent_until_ns(&self, local_ns: u64) -> Option<u64> {
         let until_ns = self.all.iter().flatten().map(|other| other.until_ns).max();
         until_ns.filter(|until_ns| local_ns < *until_ns)

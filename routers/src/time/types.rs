@@ -38,7 +38,8 @@ pub enum Role {
 /// What to do next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Step {
-    /// The buffer has a datagram for this node. If it is to be stamped, its id comes back with [`Clock::sent`].
+    /// The buffer has a datagram for this node. If it is to be stamped, its id comes back with
+    /// [`Clock::sent`](super::Clock::sent).
     Send {
         /// Receiver.
         to: NodeIndex,
@@ -80,8 +81,8 @@ pub enum Ignored {
     /// From a master that must yield, late, or a duplicate.
     #[error("late, twice, or of a master that must yield")]
     Late,
-    /// A reply to no open question.
-    #[error("no such question")]
+    /// A reply to no open request.
+    #[error("no such request")]
     Unasked,
     /// From an unverified sender, and of no use.
     #[error("of a router that has not shown that it lives")]
@@ -91,7 +92,7 @@ pub enum Ignored {
     NegativeDelay,
 }
 
-/// Result of [`Clock::reading`].
+/// Result of [`Clock::reading`](super::Clock::reading).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reading {
     /// System time, its epoch and its bound, by the node's page.
@@ -142,7 +143,7 @@ pub struct InSlots {
     pub allowance_ns: u64,
     /// Each node with slots has one at least this often, ns.
     pub slot_every_ns: u64,
-    /// This node and all that may be master have one this often: for questions and answers.
+    /// This node and all that may be master have one this often: for requests and replies.
     pub asks_every_ns: u64,
     /// Each node may send a hello at least this often, ns.
     pub hello_every_ns: u64,

@@ -49,7 +49,7 @@ pub(super) struct UnverifiedPeers {
 }
 
 impl UnverifiedPeers {
-    /// For this many nodes, each of which may send a hello at least once in `hello_every_ns`.
+    /// State for this many nodes, each of which may send a hello at least once in `hello_every_ns`.
     pub(super) fn new(nodes: NodeIndex, cycle_ns: u64, hello_every_ns: u64) -> Self {
         let others = u64::from(nodes.saturating_sub(1));
         let joins_ns = hello_every_ns.saturating_mul(u64::from(JOINING_SYNCS) + HELLOS * others);
@@ -102,7 +102,7 @@ impl UnverifiedPeers {
         self.span_ns = self.span_ns.map(|(first_ns, last_ns)| (first_ns + stood_ns, last_ns + stood_ns));
     }
 
-    /// Until when a frame of a peer that may be alive counts; 0: there was none.
+    /// End of the time in which a frame of a peer that may be alive counts; 0: there was none.
     pub(super) fn until_ns(&self) -> u64 {
         self.span_ns.map_or(0, |(first_ns, last_ns)| last_ns.min(self.ends_ns(first_ns)))
     }

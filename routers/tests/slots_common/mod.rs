@@ -14,15 +14,15 @@ use rohrpost_mailbox::{
 };
 use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
 use rohrpost_routers::admission::Admission;
-use rohrpost_routers::frame::{Alive, FrameHead, Kind};
+use rohrpost_routers::frame::{Alive, FrameHead, FrameKind};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Crossing, Lab, LabError, NodeSpec};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered, slots};
-use rohrpost_routers::tdma::Table;
+use rohrpost_routers::tdma::SlotTable;
 use rohrpost_routers::time::TimeSettings;
-use rohrpost_routers::time::message::{Message, Sync};
+use rohrpost_routers::time::message::{Sync, TimeMessage};
 use std::io::Write;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,12 +61,12 @@ pub(crate) fn at(node: u8) -> SocketAddr {
 /// "Still there", from a node that was launched from another file.
 pub(crate) fn of_another_digest(from: u8, to: u8) -> Vec<u8> {
     let alive = Alive::default().to_bytes();
-    let head = FrameHead { kind: Kind::Alive, system: 1, from, to, digest: 8, incarnation: 1, sequence: 0 };
+    let head = FrameHead { kind: FrameKind::Alive, system: 1, from, to, digest: 8, incarnation: 1, sequence: 0 };
     [&head.to_bytes(&[&alive])[..], &alive].concat()
 }
 
 /// Kinds of the datagrams that came, until none comes for a moment.
-pub(crate) fn frames<'a>(socket: &'a UdpSocket, buffer: &'a mut [u8]) -> impl Iterator<Item = Kind> + 'a {
+pub(crate) fn frames<'a>(socket: &'a UdpSocket, buffer: &'a mut [u8]) -> impl Iterator<Item = FrameKind> + 'a {
     std::iter::from_fn(|| {
         let bytes = socket.recv(buffer).ok()?;
         FrameHead::parse(&buffer[..bytes]).ok().map(|(head, _)| head.kind)
@@ -105,7 +105,7 @@ pub(crate) struct Station {
     settings: Settings,
     pub(crate) skew: Skew,
     /// Makes what this node hears of time come late.
-    pub(crate) late: Option<impair::Settings>,
+    pub(crate) late: Option<impair::ImpairmentSettings>,
     pub(crate) shell: Option<Shell>,
 }
 
@@ -161,18 +161,18 @@ impl Station {
         self.shell.as_ref().unwrap()
     }
 
-    pub(crate) fn slots(&self) -> slots::Snapshot {
+    pub(crate) fn slots(&self) -> slots::SlotSnapshot {
         self.shell().slots().unwrap().snapshot()
     }
 
-    pub(crate) fn clock(&self) -> rohrpost_routers::shell::clock::Snapshot {
+    pub(crate) fn clock(&self) -> rohrpost_routers::shell::clock::ClockSnapshot {
         self.shell().clock().unwrap().snapshot()
     }
 
     /// It sends, and hears both others.
     pub(crate) fn is_ready(&self) -> bool {
         let stats = self.shell().stats();
-        let alive = |peer| stats.state(peer, monotonic_ns()) == rohrpost_routers::link::State::Alive;
+        let alive = |peer| stats.state(peer, monotonic_ns()) == rohrpost_routers::link::PeerLinkState::Alive;
         self.slots().silent.is_none() && self.shell().settings().peers().all(alive)
     }
 
@@ -297,7 +297,7 @@ pub(crate) struct Crossed {
     /// When it left its sender's device, monotonic ns.
     pub(crate) at_ns: u64,
     pub(crate) from: u8,
-    pub(crate) kind: Kind,
+    pub(crate) kind: FrameKind,
     /// If it is a Sync of a master, not one in the place of another.
     pub(crate) sync: Option<Sync>,
     /// Of the whole packages in it.
@@ -305,21 +305,21 @@ pub(crate) struct Crossed {
 }
 
 /// Heads of the packages that lie one behind the other.
-fn heads(kind: Kind, mut packages: &[u8]) -> Vec<Head> {
+fn heads(kind: FrameKind, mut packages: &[u8]) -> Vec<Head> {
     let next = || {
         let head = Head::from_bytes(packages).ok()?;
         packages = packages.get(HEAD_BYTES + usize::from(head.len)..)?;
         Some(head)
     };
-    if kind == Kind::Packages { std::iter::from_fn(next).collect() } else { Vec::new() }
+    if kind == FrameKind::Packages { std::iter::from_fn(next).collect() } else { Vec::new() }
 }
 
 impl Crossed {
     fn of(crossing: &Crossing<'_>) -> Option<Self> {
         let (head, inside) = FrameHead::parse(crossing.datagram).ok()?;
         let from = (0..NODES).find(|node| address(*node) == crossing.source)?;
-        let sync = match Message::parse(head.kind, inside) {
-            Ok(Message::Sync(sync)) if !sync.replacement => Some(sync),
+        let sync = match TimeMessage::parse(head.kind, inside) {
+            Ok(TimeMessage::Sync(sync)) if !sync.replacement => Some(sync),
             _ => None,
         };
         Some(Self { at_ns: crossing.at_ns, from, kind: head.kind, sync, heads: heads(head.kind, inside) })
@@ -373,7 +373,7 @@ impl Capture {
 #[allow(unused, reason = "to be shown")]
 pub(crate) struct Outside {
     pub(crate) from: u8,
-    pub(crate) kind: Kind,
+    pub(crate) kind: FrameKind,
     /// When, in its cycle.
     pub(crate) in_cycle_us: u64,
 }
@@ -391,7 +391,7 @@ pub(crate) struct Judged {
 /// A frame is its sender's if it starts in a window of it or in the guard behind, or so little before that the guard of
 /// the slot before still holds: half of it, which is what a node's clock may be off.
 pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
-    let table = Table::new(&table(), &MASTERS, 0, NODES, 28);
+    let table = SlotTable::new(&table(), &MASTERS, 0, NODES, 28);
     let mut kept = Judged { frames: crossed.len(), ..Judged::default() };
     let mut last = None;
     for frame in crossed {

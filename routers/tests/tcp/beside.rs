@@ -6,7 +6,7 @@ use crate::hostile::Target;
 use crate::lan::{Pair, label, module};
 use crate::sessions::Raw;
 use rohrpost_mailbox::{Head, Priority, Shape, Type, monotonic_ns};
-use rohrpost_routers::session::frame::{Carried, Message};
+use rohrpost_routers::session::frame::{Carried, SessionMessage};
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::io::{Read, Write};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -38,7 +38,7 @@ fn packages_on_the_lan_come_beside_a_flood_of_a_tcp_router() {
         let (kind, priority) = (Type::data(1), Priority(90));
         let head = Head { to: to_name, from: from_name, len: 1000, kind, priority, ..Head::default() };
         for _ in 0..32 {
-            Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut flood);
+            SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut flood);
         }
         let (ends, floods, carried) = (AtomicBool::new(false), AtomicBool::new(false), AtomicU64::new(0));
         let mut ages = [Vec::new(), Vec::new()];
@@ -48,7 +48,7 @@ fn packages_on_the_lan_come_beside_a_flood_of_a_tcp_router() {
                     if floods.load(Ordering::Relaxed) {
                         from.0.write_all(&flood).unwrap();
                     } else {
-                        from.say(&Message::Ask(0));
+                        from.say(&SessionMessage::Ask(0));
                         std::thread::sleep(Duration::from_millis(5));
                     }
                 }
@@ -56,7 +56,7 @@ fn packages_on_the_lan_come_beside_a_flood_of_a_tcp_router() {
             scope.spawn(|| {
                 let mut piece = vec![0; 1 << 16];
                 while !ends.load(Ordering::Relaxed) {
-                    to.say(&Message::Ask(0));
+                    to.say(&SessionMessage::Ask(0));
                     // It gives up after some milliseconds without any.
                     carried.fetch_add(to.0.read(&mut piece).unwrap_or(0) as u64, Ordering::Relaxed);
                 }

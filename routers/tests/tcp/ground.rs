@@ -84,7 +84,7 @@ pub(crate) fn start_for(
         own_nodes: OwnNodes::default(),
         incarnation,
         clients_max: 16,
-        greetings_max: 16,
+        handshakes_max: 16,
         quota_bytes: 256 << 10,
         levels: [0; 256],
     };

@@ -6,7 +6,7 @@ use crate::sealed::{Authority, Holds};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use rohrpost_mailbox::{Head, Priority, Type};
-use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
+use rohrpost_routers::session::frame::{Carried, Range, Ranges, SessionHello, SessionMessage};
 use rohrpost_routers::tcp::{ClientSeal, LinkState, Moved, ServerSeal, Stream};
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
@@ -122,9 +122,10 @@ impl Chance {
 fn hello(incarnation: u64) -> Vec<u8> {
     let (system, system_digest) = (9, 9);
     let (reaches_own, attempt, asked_ns, name) = (false, 1, 0, "hostile");
-    let hello = Hello { system, reaches_own, common: COMMON, system_digest, incarnation, attempt, asked_ns, name };
+    let hello =
+        SessionHello { system, reaches_own, common: COMMON, system_digest, incarnation, attempt, asked_ns, name };
     let mut bytes = Vec::new();
-    Message::Hello(hello).write(&mut bytes);
+    SessionMessage::Hello(hello).write(&mut bytes);
     bytes
 }
 
@@ -137,18 +138,18 @@ fn frames(chance: &mut Chance) -> Vec<u8> {
     let mut bytes = Vec::new();
     for _ in 0..1 + chance.below(20) {
         match chance.below(4) {
-            0 => Message::Ask(chance.below(1 << 30) as u64).write(&mut bytes),
+            0 => SessionMessage::Ask(chance.below(1 << 30) as u64).write(&mut bytes),
             1 => {
                 let (ranges, mut laid_out): (Vec<_>, _) =
                     ((0..chance.below(300)).map(|_| range(chance)).collect(), Vec::new());
-                Message::Register(Ranges::new(chance.below(9) as u32, &ranges, &mut laid_out)).write(&mut bytes);
+                SessionMessage::Register(Ranges::new(chance.below(9) as u32, &ranges, &mut laid_out)).write(&mut bytes);
             }
             2 => {
                 let body = vec![7; chance.below(65_000)];
                 let (to, from) = (range(chance).first, range(chance).first);
                 let (kind, priority) = (Type::command(1 + chance.below(99) as u16), Priority(chance.below(256) as u8));
                 let head = Head { to, from, len: body.len() as u16, kind, priority, ..Head::default() };
-                Message::Package(Carried { hops: 0, published_ns: 0, head, body: &body }).write(&mut bytes);
+                SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &body }).write(&mut bytes);
             }
             _ => bytes.extend(chance.bytes(30)),
         }

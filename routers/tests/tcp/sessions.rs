@@ -4,15 +4,15 @@ use crate::ground::{COMMON, System, address, module, node, start, wait};
 use rohrpost_config as config;
 use rohrpost_mailbox::{ALL_SYSTEMS, Class, Head, Priority, Type};
 use rohrpost_routers::admission::{Access, Admission};
-use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
-use rohrpost_routers::tcp::{Link, LinkState};
+use rohrpost_routers::session::frame::{Carried, Range, Ranges, SessionHello, SessionMessage};
+use rohrpost_routers::tcp::{ClientLink, LinkState};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
 /// What a client says first.
-pub(crate) fn hello(system: u8, common: u64) -> Hello<'static> {
-    Hello {
+pub(crate) fn hello(system: u8, common: u64) -> SessionHello<'static> {
+    SessionHello {
         system,
         reaches_own: false,
         common,
@@ -31,11 +31,11 @@ impl Raw {
     pub(crate) fn new(server: SocketAddr, system: u8, common: u64) -> Self {
         let mut raw = Self(wait("it listens", || TcpStream::connect(server).ok()));
         raw.0.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
-        raw.say(&Message::Hello(hello(system, common)));
+        raw.say(&SessionMessage::Hello(hello(system, common)));
         raw
     }
 
-    pub(crate) fn say(&mut self, message: &Message<'_>) {
+    pub(crate) fn say(&mut self, message: &SessionMessage<'_>) {
         let mut bytes = Vec::new();
         message.write(&mut bytes);
         self.0.write_all(&bytes).unwrap();
@@ -44,7 +44,7 @@ impl Raw {
     pub(crate) fn hosts(&mut self, system: u8) {
         let range = Range { first: module(system), last: module(system).with_local(255) };
         let mut bytes = Vec::new();
-        self.say(&Message::Register(Ranges::new(1, &[range], &mut bytes)));
+        self.say(&SessionMessage::Register(Ranges::new(1, &[range], &mut bytes)));
     }
 
     /// Reads until the connection is closed; what came.
@@ -159,7 +159,7 @@ fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
     let first = System::new(1, "the first", address);
     first.wait_up();
     let second = System::new(1, "the second", address);
-    let why = |link: Link| (!link.why.is_empty()).then_some(link.why);
+    let why = |link: ClientLink| (!link.why.is_empty()).then_some(link.why);
     let why = wait("an objection", || why(second.client.link()));
     assert!(why.contains("hosted by the first"), "{why}");
     assert_eq!(first.client.link().state, LinkState::Up);
@@ -213,10 +213,10 @@ fn a_client_that_reads_nothing_holds_up_nobody() {
     for number in 0..200 {
         // 16 times 32 KiB into a connection that takes nothing, before each package beside it.
         for _ in 0..16 {
-            flood.say(&Message::Package(Carried { hops: 0, published_ns: 0, head, body: &body }));
+            flood.say(&SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &body }));
         }
-        slow.say(&Message::Ask(0));
-        flood.say(&Message::Ask(0));
+        slow.say(&SessionMessage::Ask(0));
+        flood.say(&SessionMessage::Ask(0));
         one.say(&mut sender, number);
         assert_eq!(two.hear_within("a package beside the flood"), number);
     }

@@ -1,7 +1,7 @@
 //! Ends of two versions, and of two installations: each says so for itself.
 
 use crate::ground::{COMMON, PATIENCE, System, address, node, start, wait};
-use rohrpost_routers::session::frame::{HEAD_BYTES, Message, Reason, Refusal, VERSION};
+use rohrpost_routers::session::frame::{HEAD_BYTES, SessionMessage, SessionRefusal, SessionRefusalReason, VERSION};
 use rohrpost_routers::tcp::LinkState;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -10,7 +10,7 @@ use std::net::{TcpListener, TcpStream};
 const VERSION_AT: usize = HEAD_BYTES + 4;
 const OTHER: u8 = VERSION + 1;
 
-fn written(message: &Message<'_>) -> Vec<u8> {
+fn written(message: &SessionMessage<'_>) -> Vec<u8> {
     let mut bytes = Vec::new();
     message.write(&mut bytes);
     bytes
@@ -20,7 +20,7 @@ fn written(message: &Message<'_>) -> Vec<u8> {
 fn a_tcp_router_says_which_version_a_client_speaks_and_tells_it_its_own() {
     let (address, (_folder, own)) = (address(), node());
     let server = start(address, &own, 1).unwrap();
-    let mut hello = written(&Message::Hello(crate::sessions::hello(3, COMMON)));
+    let mut hello = written(&SessionMessage::Hello(crate::sessions::hello(3, COMMON)));
     assert_eq!(hello[VERSION_AT], VERSION);
     hello[VERSION_AT] = OTHER;
     let mut client = TcpStream::connect(address).unwrap();
@@ -28,7 +28,11 @@ fn a_tcp_router_says_which_version_a_client_speaks_and_tells_it_its_own() {
     client.write_all(&hello).unwrap();
     let mut told = Vec::new();
     client.read_to_end(&mut told).unwrap();
-    assert_eq!(told[VERSION_AT..VERSION_AT + 2], [VERSION, Reason::Version as u8], "so the client knows what to say");
+    assert_eq!(
+        told[VERSION_AT..VERSION_AT + 2],
+        [VERSION, SessionRefusalReason::Version as u8],
+        "so the client knows what to say"
+    );
     let words = format!("session format {OTHER}, ours is {VERSION}; run the same version of Rohrpost at both ends");
     wait("the TCP router says why", || server.members().refusal.contains(&words).then_some(()));
     assert!(server.members().members.iter().all(|member| !member.is_member));
@@ -39,14 +43,18 @@ fn a_client_says_what_a_tcp_router_of_another_version_or_installation_objects_to
     for (version, reason, words) in [
         (
             OTHER,
-            Reason::Version,
+            SessionRefusalReason::Version,
             format!("the TCP router speaks session format {OTHER}, this end {VERSION}; run the same version"),
         ),
-        (VERSION, Reason::Common, "the common digest here is 00000000000000c0, that of north 00000000000000c1".into()),
+        (
+            VERSION,
+            SessionRefusalReason::Common,
+            "the common digest here is 00000000000000c0, that of north 00000000000000c1".into(),
+        ),
     ] {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let refusal = Refusal { version, reason, yours: COMMON, ours: COMMON + 1, text: "north" };
-        let refusal = written(&Message::Refusal(refusal));
+        let refusal = SessionRefusal { version, reason, yours: COMMON, ours: COMMON + 1, text: "north" };
+        let refusal = written(&SessionMessage::Refusal(refusal));
         let client = System::new(1, "one", listener.local_addr().unwrap());
         listener.set_nonblocking(true).unwrap();
         let (mut server, _) = wait("the client connects", || listener.accept().ok());
@@ -68,10 +76,10 @@ fn of_two_installations_both_ends_name_the_digests_that_differ() {
     let server = start(address, &own, 1).unwrap();
     let mut client = TcpStream::connect(address).unwrap();
     client.set_read_timeout(Some(PATIENCE)).unwrap();
-    client.write_all(&written(&Message::Hello(crate::sessions::hello(3, COMMON + 1)))).unwrap();
+    client.write_all(&written(&SessionMessage::Hello(crate::sessions::hello(3, COMMON + 1)))).unwrap();
     let mut told = Vec::new();
     client.read_to_end(&mut told).unwrap();
-    assert_eq!(told[VERSION_AT + 1], Reason::Common as u8);
+    assert_eq!(told[VERSION_AT + 1], SessionRefusalReason::Common as u8);
     let digests = ["00000000000000c1", "00000000000000c0"];
     wait("the TCP router says why", || {
         let said = server.members().refusal;

@@ -7,7 +7,7 @@ use crate::process::Said;
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::LinkState;
 use rohrpost::{CallError, Fault};
-use rohrpost_routers::frame::{FrameHead, Kind};
+use rohrpost_routers::frame::{FrameHead, FrameKind};
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -187,7 +187,7 @@ fn a_sealed_node_says_that_another_speaks_another_wire_format() {
         let _inside = field.lab.enter("arm").unwrap();
         UdpSocket::bind(("10.78.0.2", 21117)).unwrap()
     };
-    let (kind, digest) = (Kind::Packages, field.digest());
+    let (kind, digest) = (FrameKind::Packages, field.digest());
     let head = FrameHead { kind, system: 1, from: 1, to: 0, digest, incarnation: 9, sequence: 0 };
     let counted = || field.links("base").rejections.into_iter().find(|rejected| rejected.cause == "version");
     let rejected = wait("base counts", || {

@@ -6,7 +6,7 @@ use crate::harness::{OUTPUT, PATIENCE, wait};
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_config::Installation;
-use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind, Reason};
+use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, HEAD_BYTES, RefusalReason};
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
@@ -92,7 +92,7 @@ fn a_node_with_another_version_is_refused_by_both_versions_and_told_so_once_a_se
         UdpSocket::bind(("10.78.0.3", 21117)).unwrap()
     };
     let head = FrameHead {
-        kind: Kind::Packages,
+        kind: FrameKind::Packages,
         system: 1,
         from: 2,
         to: 0,
@@ -111,7 +111,7 @@ fn a_node_with_another_version_is_refused_by_both_versions_and_told_so_once_a_se
         let Ok((length, _)) = desk.recv_from(&mut bytes) else { continue };
         // Besides refusals it learns that the base is there.
         if let Ok((_, Frame::Refusal(refusal))) = Frame::parse(&bytes[..length]) {
-            assert_eq!((refusal.version, refusal.reason), (1, Reason::Version));
+            assert_eq!((refusal.version, refusal.reason), (1, RefusalReason::Version));
             assert_eq!(refusal.digest, field.digest());
             refusals += 1;
         }

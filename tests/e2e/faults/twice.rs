@@ -6,7 +6,7 @@ use crate::harness::wait;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_mailbox::{Head, Type};
-use rohrpost_routers::frame::{FrameHead, Kind};
+use rohrpost_routers::frame::{FrameHead, FrameKind};
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::net::UdpSocket;
 use std::time::Duration;
@@ -26,7 +26,7 @@ impl Second {
         let socket = UdpSocket::bind(("10.78.0.2", 0)).unwrap();
         let digest = field.digest();
         let head =
-            FrameHead { kind: Kind::Packages, system: 1, from: 1, to: 0, digest, incarnation: 4711, sequence: 0 };
+            FrameHead { kind: FrameKind::Packages, system: 1, from: 1, to: 0, digest, incarnation: 4711, sequence: 0 };
         Self { socket, head }
     }
 

@@ -2,7 +2,7 @@
 
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, PARTS_MAX, VERSION};
-use rohrpost_routers::time::message::Message;
+use rohrpost_routers::time::message::TimeMessage;
 
 pub(crate) fn run(data: &[u8]) {
     validate(data);
@@ -42,7 +42,7 @@ fn validate(datagram: &[u8]) {
         Frame::Alive(alive) => assert_eq!(alive.to_bytes(), rest),
         Frame::Refusal(refusal) => assert_eq!(refusal.to_bytes(), rest),
         Frame::Time(time) => {
-            if let Ok(message) = Message::parse(head.kind, time) {
+            if let Ok(message) = TimeMessage::parse(head.kind, time) {
                 assert_eq!((message.kind(), &message.to_bytes()[..]), (head.kind, time));
             }
         }

@@ -5,8 +5,8 @@ use crate::sessions::{BEGIN_NS, Deaf, MS, server};
 use crate::split::Bytes;
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 use rohrpost_routers::session::ClientIndex;
-use rohrpost_routers::session::frame::{Carried, Hello, Message, Range, Ranges};
-use rohrpost_routers::session::server::{Output, Server, State};
+use rohrpost_routers::session::frame::{Carried, Range, Ranges, SessionHello, SessionMessage};
+use rohrpost_routers::session::server::{MemberState, Server, ServerStep};
 
 const STEPS_MAX: usize = 300;
 /// Places of members and of accepted connections.
@@ -55,7 +55,7 @@ impl World {
             (2, Some(client)) => {
                 let ranges: Vec<Range> = (0..bytes.byte() % 8).map(|_| range(bytes)).collect();
                 let mut laid_out = Vec::new();
-                self.say(client, &Message::Register(Ranges::new(bytes.word(), &ranges, &mut laid_out)));
+                self.say(client, &SessionMessage::Register(Ranges::new(bytes.word(), &ranges, &mut laid_out)));
             }
             (3, Some(client)) => {
                 let body = vec![7; usize::from(bytes.half()) % 3000];
@@ -69,9 +69,9 @@ impl World {
                 };
                 let carried =
                     Carried { hops: bytes.byte() % 12, published_ns: bytes.long() % (2 * BEGIN_NS), head, body: &body };
-                self.say(client, &Message::Package(carried));
+                self.say(client, &SessionMessage::Package(carried));
             }
-            (4, Some(client)) => self.say(client, &Message::Ask(bytes.long())),
+            (4, Some(client)) => self.say(client, &SessionMessage::Ask(bytes.long())),
             (5, Some(client)) => {
                 let count = usize::from(bytes.byte());
                 self.server.received(self.now_ns, client, bytes.take(count), &mut Deaf);
@@ -86,7 +86,7 @@ impl World {
         self.poll(bytes);
     }
 
-    fn say(&mut self, client: ClientIndex, message: &Message<'_>) {
+    fn say(&mut self, client: ClientIndex, message: &SessionMessage<'_>) {
         let mut stream = Vec::new();
         message.write(&mut stream);
         self.server.received(self.now_ns, client, &stream, &mut Deaf);
@@ -96,13 +96,13 @@ impl World {
     fn poll(&mut self, bytes: &mut Bytes<'_>) {
         loop {
             match self.server.poll(self.now_ns, &mut Deaf) {
-                Output::Write(client) => {
+                ServerStep::Write(client) => {
                     let ready = self.server.ready(client).len();
                     let taken = if bytes.byte().is_multiple_of(4) { ready / 2 } else { ready };
                     self.server.took(self.now_ns, client, taken);
                 }
-                Output::Close(client) => self.connections.retain(|known| *known != client),
-                Output::Wait { until_ns } => return assert!(until_ns > self.now_ns),
+                ServerStep::Close(client) => self.connections.retain(|known| *known != client),
+                ServerStep::Wait { until_ns } => return assert!(until_ns > self.now_ns),
             }
         }
     }
@@ -124,7 +124,7 @@ impl World {
             let bytes = self.server.bytes_of(client);
             assert!(bytes <= BYTES_MAX, "{bytes} B for one connection");
             let hosts = hosted_by(client).count();
-            assert!(hosts == 0 || state == State::Member, "only members host names");
+            assert!(hosts == 0 || state == MemberState::Member, "only members host names");
         }
         let (mut packages, mut known) = (0, self.server.waiting() as u64);
         for (priority, class) in self.server.counts().classes() {
@@ -136,9 +136,9 @@ impl World {
     }
 }
 
-fn hello(bytes: &mut Bytes<'_>) -> Message<'static> {
+fn hello(bytes: &mut Bytes<'_>) -> SessionMessage<'static> {
     let odd = bytes.byte();
-    Message::Hello(Hello {
+    SessionMessage::Hello(SessionHello {
         system: 1 + odd % 3,
         reaches_own: odd & 4 != 0,
         common: if odd & 0x18 == 0x18 { 8 } else { 7 },

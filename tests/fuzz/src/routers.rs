@@ -10,8 +10,8 @@ use rohrpost_routers::counts::{Cause, Side};
 use rohrpost_routers::fragment::PARTIAL_MAX;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
-use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
-use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
+use rohrpost_routers::outbound::{Accepted, Outbound, OutboundStep, Package};
+use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::stats::Stats;
 use std::net::{IpAddr, Ipv4Addr};
@@ -95,7 +95,7 @@ impl Deliver for Log {
         Ok(())
     }
 
-    fn event(&mut self, _: Event) {}
+    fn event(&mut self, _: RouterEvent) {}
 }
 
 struct World {
@@ -135,7 +135,7 @@ impl World {
             _ => self.forge(bytes),
         }
         let mut refusal = [0; 64];
-        while let inbound::Output::Refuse { bytes, .. } =
+        while let inbound::InboundStep::Refuse { bytes, .. } =
             self.receiver.0.poll(self.now_ns, &mut refusal, &mut self.receiver.2)
         {
             assert!(bytes <= refusal.len());
@@ -165,7 +165,8 @@ impl World {
 
     fn leave(&mut self) {
         let mut datagram = [0; DATAGRAM_BYTES];
-        while let Output::Send { bytes, .. } = self.sender.0.poll(self.now_ns, &mut datagram, &mut self.sender.2) {
+        while let OutboundStep::Send { bytes, .. } = self.sender.0.poll(self.now_ns, &mut datagram, &mut self.sender.2)
+        {
             self.wire.push(datagram[..bytes].to_vec());
         }
     }

@@ -4,7 +4,7 @@
 
 use crate::frames::checked;
 use crate::split::Bytes;
-use rohrpost_routers::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use rohrpost_routers::frame::{FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use rohrpost_routers::security::{
     HELLO_DATAGRAM_BYTES, Handshake, InstallationKey, KeyId, KeyRing, Opened, Opening, PeerSessions, Port,
     RouterIdentity, Sealing, TAG_BYTES,
@@ -113,7 +113,7 @@ impl World {
     fn seal(&mut self, bytes: &mut Bytes<'_>) {
         let (from, port, len) = (bytes.byte() % 2, usize::from(bytes.byte() % 2), usize::from(bytes.byte()));
         let router = &mut self.routers[usize::from(from)];
-        let kind = [Kind::Packages, Kind::Sync][port];
+        let kind = [FrameKind::Packages, FrameKind::Sync][port];
         let (incarnation, sequence) = (router.incarnation, router.next[port]);
         let head = FrameHead { kind, system: 1, from, to: 1 - from, digest: 7, incarnation, sequence };
         let text = vec![bytes.byte(); len];
@@ -146,7 +146,7 @@ impl World {
                 None
             }
             Ok(Opened::Hello(head, hello)) => {
-                let reply = router.handshake.greet(0, &head, &hello, &mut room);
+                let reply = router.handshake.receive(0, &head, &hello, &mut room);
                 router.handshake.begin();
                 if reply.begins {
                     assert!(sent.step >= router.drawn, "an incarnation began by what was said before");

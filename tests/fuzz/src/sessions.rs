@@ -4,9 +4,9 @@
 use rohrpost_routers::admission::Admission;
 use rohrpost_routers::report::NotDelivered;
 use rohrpost_routers::session::client::{self, Client, ClientSettings};
-use rohrpost_routers::session::frame::{Carried, FrameHead, HEAD_BYTES, LENGTH_MAX, Message};
-use rohrpost_routers::session::server::{self, Output, OwnNodes, Server, ServerSettings};
-use rohrpost_routers::session::{Answers, Cause};
+use rohrpost_routers::session::frame::{Carried, HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMessage};
+use rohrpost_routers::session::server::{self, OwnNodes, Server, ServerSettings, ServerStep};
+use rohrpost_routers::session::{Cause, ErrorReplies};
 
 pub(crate) const MS: u64 = 1_000_000;
 pub(crate) const BEGIN_NS: u64 = 1000 * MS;
@@ -22,13 +22,13 @@ pub(crate) fn run(data: &[u8]) {
 
 fn frames(mut stream: &[u8]) {
     while let Some((bytes, rest)) = stream.split_first_chunk::<HEAD_BYTES>() {
-        let head = match FrameHead::parse(bytes, LENGTH_MAX) {
+        let head = match SessionFrameHead::parse(bytes, LENGTH_MAX) {
             Ok(head) => head,
             Err(bad) => return assert!(!bad.to_string().is_empty()),
         };
         let Some((frame, behind)) = rest.split_at_checked(head.length) else { return };
-        match Message::parse(head, frame) {
-            Ok(Message::Package(carried)) => assert_eq!(usize::from(carried.head.len), carried.body.len()),
+        match SessionMessage::parse(head, frame) {
+            Ok(SessionMessage::Package(carried)) => assert_eq!(usize::from(carried.head.len), carried.body.len()),
             Ok(message) => {
                 let mut written = Vec::new();
                 message.write(&mut written);
@@ -43,24 +43,24 @@ fn frames(mut stream: &[u8]) {
 /// Ignores all events.
 pub(crate) struct Deaf;
 
-impl Answers for Deaf {
+impl ErrorReplies for Deaf {
     fn answer(&mut self, _: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
         answer.extend(why.word().bytes());
         true
     }
 }
 
-impl server::Host for Deaf {
-    fn event(&mut self, _: server::Event<'_>) {}
+impl server::ServerHost for Deaf {
+    fn event(&mut self, _: server::ServerEvent<'_>) {}
 }
 
-impl client::Host for Deaf {
+impl client::ClientHost for Deaf {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
         assert_eq!(usize::from(carried.head.len), carried.body.len());
         if carried.head.id.is_multiple_of(3) { Err(NotDelivered::MailboxFull) } else { Ok(()) }
     }
 
-    fn event(&mut self, _: client::Event<'_>) {}
+    fn event(&mut self, _: client::ClientEvent<'_>) {}
 }
 
 pub(crate) fn server() -> Server {
@@ -71,7 +71,7 @@ pub(crate) fn server() -> Server {
         own_nodes: OwnNodes::default(),
         incarnation: 5,
         clients_max: 3,
-        greetings_max: 2,
+        handshakes_max: 2,
         quota_bytes: 64 << 10,
         levels: std::array::from_fn(|priority| priority as u8 >> 3),
     })
@@ -87,7 +87,7 @@ fn to_a_server(stream: &[u8], split: usize) {
     for (at, piece) in pieces(stream, split).enumerate() {
         let now_ns = BEGIN_NS + at as u64 * MS;
         server.received(now_ns, client, piece, &mut Deaf);
-        while let Output::Write(index) = server.poll(now_ns, &mut Deaf) {
+        while let ServerStep::Write(index) = server.poll(now_ns, &mut Deaf) {
             let ready = server.ready(index).len();
             server.took(now_ns, index, ready);
         }
@@ -113,11 +113,11 @@ fn to_a_client(stream: &[u8], split: usize) {
     for (at, piece) in pieces(stream, split).enumerate() {
         let now_ns = BEGIN_NS + at as u64 * MS;
         client.received(now_ns, piece, &mut Deaf);
-        while client.poll(now_ns, &mut Deaf) == client::Output::Write {
+        while client.poll(now_ns, &mut Deaf) == client::ClientStep::Write {
             client.took(now_ns, client.ready().len());
         }
     }
-    let balanced = |counts: &rohrpost_routers::session::Counts| {
+    let balanced = |counts: &rohrpost_routers::session::SessionCounts| {
         counts.classes().all(|(_, class)| class.packages.get() >= class.settled())
     };
     assert!(balanced(client.inn()) && balanced(client.out()));

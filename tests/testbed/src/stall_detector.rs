@@ -24,7 +24,7 @@ const LONGEST_MAX: Duration = Duration::from_millis(100);
 const TAKEN_MAX: f64 = 0.05;
 /// And here most of them: at 28 of 100 taken by the hypervisor it is 40 to 75 of 100.
 const HOPELESS: f64 = 0.25;
-/// What fails so often in a row is wrong.
+/// A test that fails this often in a row is wrong.
 const TRIES: usize = 5;
 /// After the last, so long is looked whether it is the computer that has no time, or the test that takes it.
 const ALONE: Duration = Duration::from_secs(1);
@@ -43,7 +43,7 @@ pub enum Watched {
 /// so.
 ///
 /// # Panics
-/// As the test does.
+/// Panics if the test does.
 pub fn repeated_on_stall(watched: Watched, test: impl Fn() + RefUnwindSafe) {
     let begin = || {
         let stalls = StallDetector::watched(watched);
@@ -56,7 +56,7 @@ pub fn repeated_on_stall(watched: Watched, test: impl Fn() + RefUnwindSafe) {
     }
 }
 
-/// What came of a test.
+/// Result of a test.
 enum Outcome {
     Passed,
     /// With what it panicked at last.

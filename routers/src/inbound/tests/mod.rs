@@ -1,12 +1,12 @@
 //! Each part of the incoming half; those that a broken variant must fail are in `CHECKS`.
 
-mod lives;
+mod incarnations;
 mod names;
 mod pair;
 mod refusals;
 
 use super::order::Order;
-use super::window::{Arrival, Window};
+use super::window::{Arrival, SequenceWindow};
 use super::*;
 use crate::harness::{End, MS, S, START, head, module};
 use proptest::prelude::*;
@@ -14,24 +14,24 @@ use std::collections::{BTreeMap, BTreeSet};
 
 #[test]
 fn a_window_knows_gaps_and_copies() {
-    use Arrival::{Copy, Newest, Overtaken, Returned};
-    let mut window = Window::joining(3);
+    use Arrival::{Duplicate, Newest, Reordered, Returned};
+    let mut window = SequenceWindow::joining(3);
     let mut lost_in_all = 0;
     for (sequence, arrival, lost, why) in [
         (3, Newest, 0, "the first"),
-        (0, Overtaken, 0, "both have just begun"),
-        (3, Copy, 0, "came before"),
+        (0, Reordered, 0, "both have just begun"),
+        (3, Duplicate, 0, "came before"),
         (5, Newest, 0, "a gap"),
-        (4, Overtaken, 0, "closes it"),
-        (4, Copy, 0, "once"),
+        (4, Reordered, 0, "closes it"),
+        (4, Duplicate, 0, "once"),
         (70, Newest, 3, "1, 2 and 6 are given up: the last is 64 behind"),
         (2, Returned, 0, "late, but not a copy"),
-        (2, Copy, 0, "once"),
-        (7, Overtaken, 0, "may still come"),
+        (2, Duplicate, 0, "once"),
+        (7, Reordered, 0, "may still come"),
         (2000, Newest, 1937 - 7 - 2, "a window is skipped: all from 7 to 1936 but 7 and 70"),
         (977, Returned, 0, "the oldest of which is known whether it came"),
-        (976, Copy, 0, "cannot be told"),
-        (1999, Overtaken, 0, "may still come"),
+        (976, Duplicate, 0, "cannot be told"),
+        (1999, Reordered, 0, "may still come"),
     ] {
         let mut more = 0;
         assert_eq!(window.arrive(sequence, &mut more), arrival, "{sequence}: {why}");
@@ -47,13 +47,13 @@ fn a_window_knows_gaps_and_copies() {
 #[test]
 fn a_router_that_joins_late_misses_nothing_sent_before() {
     let mut lost = 0;
-    let mut window = Window::joining(5000);
+    let mut window = SequenceWindow::joining(5000);
     assert_eq!(window.arrive(5000, &mut lost), Arrival::Newest);
-    assert_eq!(window.arrive(4999, &mut lost), Arrival::Overtaken);
-    let mut window = Window::going_on(5000);
-    assert_eq!(window.arrive(4999, &mut lost), Arrival::Copy);
+    assert_eq!(window.arrive(4999, &mut lost), Arrival::Reordered);
+    let mut window = SequenceWindow::going_on(5000);
+    assert_eq!(window.arrive(4999, &mut lost), Arrival::Duplicate);
     assert_eq!((window.arrive(5000, &mut lost), lost, window.close()), (Arrival::Newest, 0, 0));
-    let mut window = Window::default();
+    let mut window = SequenceWindow::default();
     window.arrive(5000, &mut lost);
     assert_eq!((lost, window.close()), (5000 - 63, 63), "a restarted peer's are ours from the first on");
 }
@@ -94,7 +94,7 @@ fn a_full_table_costs_packages_but_not_the_order() {
 /// A large package, then packages of many flows, then its last fragment.
 #[test]
 fn a_package_in_parts_is_late_only_if_something_newer_of_its_flow_went_before_it() {
-    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, lives::quick));
+    let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, incarnations::quick));
     let large = head(module(50, 0), module(200, 1), 90);
     arm.queue(START, large, &[1; 4000]);
     let parts: Vec<_> = arm.leave(START).into_iter().map(|(_, part)| part).collect();
@@ -121,7 +121,7 @@ proptest! {
     fn a_window_does_what_a_set_does(
         jumps in prop::collection::vec(prop_oneof![8 => -100i64..40, 1 => -1500i64..1500], 1..400),
     ) {
-        let (mut window, mut came, mut lost) = (Window::default(), BTreeSet::new(), 0);
+        let (mut window, mut came, mut lost) = (SequenceWindow::default(), BTreeSet::new(), 0);
         let (mut at, mut returned) = (0i64, 0);
         for jump in jumps {
             at = (at + jump).max(0);
@@ -129,7 +129,7 @@ proptest! {
             let next = came.last().map_or(0, |last| last + 1);
             let arrival = window.arrive(sequence, &mut lost);
             let known = sequence + WINDOW >= next && !came.contains(&sequence);
-            prop_assert_eq!(arrival == Arrival::Copy, !known, "{}", sequence);
+            prop_assert_eq!(arrival == Arrival::Duplicate, !known, "{}", sequence);
             returned += u64::from(arrival == Arrival::Returned);
             if known {
                 came.insert(sequence);
@@ -163,8 +163,15 @@ fn the_real_time_port_decides_which_incarnation_lives() {
     let mut inbound = Inbound::new(&end.settings, rest.clone());
     let mut hear = |end: &mut End, incarnation, sequence| {
         let digest = end.settings.digest;
-        let head =
-            FrameHead { kind: crate::frame::Kind::Alive, system: 1, from: 1, to: 0, digest, incarnation, sequence };
+        let head = FrameHead {
+            kind: crate::frame::FrameKind::Alive,
+            system: 1,
+            from: 1,
+            to: 0,
+            digest,
+            incarnation,
+            sequence,
+        };
         let (told, before) = ([0; 24], rest.peer(1).received.datagrams.get());
         let bytes = [&head.to_bytes(&[&told])[..], &told].concat();
         let datagram = Datagram { source: crate::harness::address(1), arrived_ns: START, bytes: &bytes };

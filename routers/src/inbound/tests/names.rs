@@ -2,10 +2,10 @@
 
 use crate::admission::{Access, Admission, PACKET, v4};
 use crate::counts::Cause;
-use crate::frame::{Fragment, FrameHead, Kind};
+use crate::frame::{Fragment, FrameHead, FrameKind};
 use crate::harness::{End, START, address, head, module};
-use crate::inbound::Came;
-use crate::link::State;
+use crate::inbound::Envelope;
+use crate::link::PeerLinkState;
 use rohrpost_config::{self as config};
 use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
 use rohrpost_network::{Security, Tunnel};
@@ -13,7 +13,8 @@ use std::net::Ipv4Addr;
 
 /// A datagram of node 1 with one package: its head, and what follows.
 fn datagram(sequence: u64, package: &Head) -> (FrameHead, Vec<u8>) {
-    let head = FrameHead { kind: Kind::Packages, system: 1, from: 1, to: 0, digest: 7, incarnation: 101, sequence };
+    let head =
+        FrameHead { kind: FrameKind::Packages, system: 1, from: 1, to: 0, digest: 7, incarnation: 101, sequence };
     (head, package.to_bytes().to_vec())
 }
 
@@ -23,7 +24,7 @@ fn causes(end: &mut End, packages: &[Head]) -> Vec<Option<Cause>> {
     for (sequence, package) in (0..).zip(packages) {
         let before = end.log.lost.len();
         let (head, text) = datagram(sequence, package);
-        let came = Came { source: address(1), arrived_ns: START, bytes: 68 };
+        let came = Envelope { source: address(1), arrived_ns: START, bytes: 68 };
         end.inbound.handle_opened(START, &came, (&head, &text, 0), &mut end.log);
         all.push(end.log.lost.get(before).map(|(.., cause)| *cause));
     }
@@ -54,7 +55,7 @@ fn only_classes_that_are_listed_may_command_from_another_node() {
     assert_eq!(causes(&mut end, &packages), [None, Some(Cause::NotAllowed), None, None]);
 }
 
-/// Of node 0, with a tunnel: routers are of class 250.
+/// End of node 0, with a tunnel: routers are of class 250.
 fn guarded() -> End {
     End::new(0, |settings| {
         let tunnel = Tunnel { network: Ipv4Addr::new(10, 78, 0, 0), prefix: 24 };
@@ -81,7 +82,7 @@ fn a_routers_own_mailboxes_take_nothing_but_packets_of_the_tunnel() {
     let body = v4(addresses[0], addresses[1], b"ping");
     let (head, mut text) = datagram(0, &Head { len: body.len() as u16, ..packet });
     text.extend_from_slice(&body);
-    let came = Came { source: address(1), arrived_ns: START, bytes: 68 };
+    let came = Envelope { source: address(1), arrived_ns: START, bytes: 68 };
     end.inbound.handle_opened(START, &came, (&head, &text, 0), &mut end.log);
     assert_eq!((end.log.delivered.len(), end.log.causes()), (1, vec![]));
     end.assert_balanced();
@@ -112,9 +113,9 @@ fn nor_does_one_that_comes_in_parts() {
     let package = Head { len: 4, ..head(module(90, 0).with_local(local::DATA), module(60, 1), 255) };
     for (index, bytes) in [(0, b"ab"), (1, b"cd")] {
         let part = Fragment { first: 0, index, count: 2, offset: 2 * u32::from(index), head: package, bytes };
-        let head = FrameHead { kind: Kind::Fragment, sequence: index.into(), ..datagram(0, &package).0 };
+        let head = FrameHead { kind: FrameKind::Fragment, sequence: index.into(), ..datagram(0, &package).0 };
         let text = [&part.head_bytes()[..], bytes].concat();
-        let came = Came { source: address(1), arrived_ns: START, bytes: 68 };
+        let came = Envelope { source: address(1), arrived_ns: START, bytes: 68 };
         end.inbound.handle_opened(START, &came, (&head, &text, 0), &mut end.log);
         end.assert_balanced();
     }
@@ -126,11 +127,11 @@ fn nor_does_one_that_comes_in_parts() {
 fn what_a_peer_said_before_it_had_our_configuration_does_not_part_us() {
     let mut end = End::new(0, |settings| settings.network.security = Security::Keys);
     let old = FrameHead { digest: 8, ..datagram(0, &head(module(200, 0), module(60, 1), 60)).0 };
-    assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));
-    assert!(matches!(end.stats.state(1, START), State::Refused(_)), "nothing else is known of it");
+    assert!(!end.inbound.may_handshake(START, address(1), &old, &mut end.log));
+    assert!(matches!(end.stats.state(1, START), PeerLinkState::Refused(_)), "nothing else is known of it");
     assert_eq!(causes(&mut end, &[head(module(200, 0), module(60, 1), 60)]), [None]);
-    assert_eq!(end.stats.state(1, START), State::Alive);
-    assert!(!end.inbound.may_greet(START, address(1), &old, &mut end.log));
-    assert_eq!(end.stats.state(1, START), State::Alive);
+    assert_eq!(end.stats.state(1, START), PeerLinkState::Alive);
+    assert!(!end.inbound.may_handshake(START, address(1), &old, &mut end.log));
+    assert_eq!(end.stats.state(1, START), PeerLinkState::Alive);
     assert!(end.refusals(START).is_empty(), "and nobody is told without a seal");
 }

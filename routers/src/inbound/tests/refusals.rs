@@ -4,8 +4,8 @@ use super::super::refusing::write_refusal;
 use super::*;
 use crate::frame::{self, Frame, VERSION};
 use crate::harness::address;
-use crate::link::State;
-use crate::report::Event;
+use crate::link::PeerLinkState;
+use crate::report::RouterEvent;
 
 /// A datagram of node 1 to node 0, made with other settings.
 fn datagram(change: impl FnOnce(&mut Settings)) -> Vec<u8> {
@@ -20,8 +20,8 @@ fn datagram(change: impl FnOnce(&mut Settings)) -> Vec<u8> {
 fn another_configuration_is_refused_and_told() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |settings| settings.digest = 8));
     let foreign = datagram(|settings| settings.digest = 8);
-    let theirs = Mismatch { reason: Reason::Digest, version: VERSION, digest: Some(8) };
-    let ours = Mismatch { reason: Reason::Digest, version: VERSION, digest: Some(7) };
+    let theirs = Mismatch { reason: RefusalReason::Digest, version: VERSION, digest: Some(8) };
+    let ours = Mismatch { reason: RefusalReason::Digest, version: VERSION, digest: Some(7) };
     let mut refusals = 0;
     for step in 0..25 {
         let now_ns = START + step * 100 * MS;
@@ -34,18 +34,22 @@ fn another_configuration_is_refused_and_told() {
     }
     let now_ns = START + 2400 * MS;
     assert_eq!(refusals, 3, "one a second");
-    let refused = Event::Refused { source: address(1), peer: Some(1), mismatch: theirs };
-    assert_eq!(base.log.events, [refused, Event::Silent { peer: 2 }], "told once; of the other node nothing is heard");
-    assert_eq!(arm.log.events, [Event::Refuses { peer: 0, mismatch: ours }]);
-    assert_eq!(base.stats.state(1, now_ns), State::Refused(theirs));
-    assert_eq!(arm.stats.state(0, now_ns), State::Refused(ours));
+    let refused = RouterEvent::Refused { source: address(1), peer: Some(1), mismatch: theirs };
+    assert_eq!(
+        base.log.events,
+        [refused, RouterEvent::Silent { peer: 2 }],
+        "told once; of the other node nothing is heard"
+    );
+    assert_eq!(arm.log.events, [RouterEvent::Refuses { peer: 0, mismatch: ours }]);
+    assert_eq!(base.stats.state(1, now_ns), PeerLinkState::Refused(theirs));
+    assert_eq!(arm.stats.state(0, now_ns), PeerLinkState::Refused(ours));
     assert!(base.log.delivered.is_empty() && arm.refusals(now_ns).is_empty(), "a refusal is not refused");
     assert_eq!(base.stats.peer(1).received.refused.get(), 25);
 
     // Its configuration is fixed: it restarts.
     base.take(now_ns, 1, &datagram(|settings| settings.incarnation = 999));
-    assert_eq!((base.stats.state(1, now_ns), base.log.delivered.len()), (State::Alive, 1));
-    assert!(base.stats.state(1, now_ns + 10 * S) == State::Silent, "and a refusal holds for a while only");
+    assert_eq!((base.stats.state(1, now_ns), base.log.delivered.len()), (PeerLinkState::Alive, 1));
+    assert!(base.stats.state(1, now_ns + 10 * S) == PeerLinkState::Silent, "and a refusal holds for a while only");
 }
 
 #[test]
@@ -58,12 +62,12 @@ fn another_version_is_refused_and_told() {
     let check = crc32fast::hash(&[head, &rest[4..]].concat());
     foreign[32..36].copy_from_slice(&check.to_le_bytes());
     base.take(START, 1, &foreign);
-    let mismatch = Mismatch { reason: Reason::Version, version: 9, digest: None };
-    assert_eq!(base.log.events, [Event::Refused { source: address(1), peer: Some(1), mismatch }]);
+    let mismatch = Mismatch { reason: RefusalReason::Version, version: 9, digest: None };
+    assert_eq!(base.log.events, [RouterEvent::Refused { source: address(1), peer: Some(1), mismatch }]);
     let [(_, refusal)] = &base.refusals(START)[..] else { panic!() };
     arm.take(START, 0, refusal);
-    let mismatch = Mismatch { reason: Reason::Version, version: VERSION, digest: Some(7) };
-    assert_eq!(arm.log.events, [Event::Refuses { peer: 0, mismatch }]);
+    let mismatch = Mismatch { reason: RefusalReason::Version, version: VERSION, digest: Some(7) };
+    assert_eq!(arm.log.events, [RouterEvent::Refuses { peer: 0, mismatch }]);
 }
 
 #[test]
@@ -80,7 +84,7 @@ fn strangers_are_refused() {
         let mut settings = crate::harness::settings(1, 3);
         change(&mut settings);
         let frame = crate::frame::FrameHead {
-            kind: frame::Kind::Alive,
+            kind: frame::FrameKind::Alive,
             system: settings.system,
             from: settings.own,
             to: 0,
@@ -91,8 +95,8 @@ fn strangers_are_refused() {
         let datagram = [&frame.to_bytes(&[&[0; 24]])[..], &[0; 24]].concat();
         assert!(Frame::parse(&datagram).is_ok());
         base.take_from(START, source, &datagram);
-        let mismatch = Mismatch { reason: Reason::Stranger, version: VERSION, digest: Some(7) };
-        assert_eq!(base.log.events, [Event::Refused { source, peer, mismatch }], "{why}");
+        let mismatch = Mismatch { reason: RefusalReason::Stranger, version: VERSION, digest: Some(7) };
+        assert_eq!(base.log.events, [RouterEvent::Refused { source, peer, mismatch }], "{why}");
         let refusals = base.refusals(START);
         assert_eq!(refusals.iter().map(|(to, _)| *to).collect::<Vec<_>>(), [source], "{why}");
     }
@@ -108,12 +112,12 @@ fn a_peer_that_does_not_know_our_address_takes_nothing_though_it_is_heard() {
     let now_ns = START + S;
     base.take(now_ns, 1, refusal);
     base.take(now_ns, 1, &own);
-    assert!(matches!(base.stats.state(1, now_ns), State::Refused(_)), "what it sends says nothing of that");
+    assert!(matches!(base.stats.state(1, now_ns), PeerLinkState::Refused(_)), "what it sends says nothing of that");
 }
 
 #[test]
 fn refusals_of_a_peer_that_hears_us_part_nobody() {
-    for reason in [Reason::Version, Reason::Digest, Reason::Stranger] {
+    for reason in [RefusalReason::Version, RefusalReason::Digest, RefusalReason::Stranger] {
         let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
         let state = |base: &End, now_ns| base.stats.state(1, now_ns);
         base.meet(START, &mut arm);
@@ -127,16 +131,19 @@ fn refusals_of_a_peer_that_hears_us_part_nobody() {
             take(&mut base, ms);
             assert_eq!(
                 state(&base, START + ms * MS),
-                State::Alive,
+                PeerLinkState::Alive,
                 "{reason:?} after {ms} ms, from a peer that hears us"
             );
         }
         assert_eq!((base.stats.peer(1).received.old.get(), &base.log.events[..]), (3, &[][..]));
         take(&mut base, 1000);
-        assert!(matches!(state(&base, START + S), State::Refused(_)), "{reason:?}: it says no more that it hears us");
+        assert!(
+            matches!(state(&base, START + S), PeerLinkState::Refused(_)),
+            "{reason:?}: it says no more that it hears us"
+        );
         let mut unheard = End::new(0, |_| {});
         take(&mut unheard, 0);
-        assert!(matches!(state(&unheard, START), State::Refused(_)), "{reason:?}: nothing speaks against it");
+        assert!(matches!(state(&unheard, START), PeerLinkState::Refused(_)), "{reason:?}: nothing speaks against it");
     }
 }
 

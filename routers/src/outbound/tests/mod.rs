@@ -120,7 +120,7 @@ fn the_largest_package_goes_in_the_smallest_datagrams() {
 
 #[test]
 fn what_goes_to_a_node_that_is_not_there_is_lost_with_its_cause() {
-    let mismatch = Mismatch { reason: crate::frame::Reason::Digest, version: 1, digest: Some(1) };
+    let mismatch = Mismatch { reason: crate::frame::RefusalReason::Digest, version: 1, digest: Some(1) };
     check_cause(|_| {}, Cause::Silent);
     let unheard = |end: &End| {
         let link = &end.stats.peer(1).link;

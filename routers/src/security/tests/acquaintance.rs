@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn two_that_never_met_know_each_other_after_question_answer_and_last_word() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
-    assert_eq!(a.seal(Port::Packages, 1, b"too early"), Err(Unacquainted));
+    assert_eq!(a.seal(Port::Packages, 1, b"too early"), Err(NoSession));
     let question = a.ask(1);
     let (began, answer) = b.greet(&question).unwrap();
     assert!(!began && b.all.incarnation(0).is_none(), "a question proves nothing");
@@ -187,7 +187,7 @@ fn recorded_questions_cost_a_bounded_number_of_answers() {
     let mut answer_at = |now_ns| {
         let (mut datagram, mut room) = (question.clone(), [0; HELLO_DATAGRAM_BYTES]);
         let Ok(Opened::Hello(head, greeting)) = b.opening[0].open(&mut datagram) else { panic!() };
-        b.handshake.greet(now_ns, &head, &greeting, &mut room).reply_bytes.is_some()
+        b.handshake.receive(now_ns, &head, &greeting, &mut room).reply_bytes.is_some()
     };
     let mut answered_in = |from_ns: u64| (0..1000).filter(|later| answer_at(from_ns + later)).count();
     assert_eq!(answered_in(PER_NS), ANSWERS_MAX as usize);
@@ -220,9 +220,9 @@ fn nothing_is_sealed_to_an_incarnation_before_the_last_word_has_left() {
     let mut answer = b.greet(&a.ask(1)).unwrap().1.unwrap();
     let mut room = [0; HELLO_DATAGRAM_BYTES];
     let Ok(Opened::Hello(head, greeting)) = a.opening[0].open(&mut answer) else { panic!() };
-    let greeted = a.handshake.greet(0, &head, &greeting, &mut room);
+    let greeted = a.handshake.receive(0, &head, &greeting, &mut room);
     assert!(greeted.begins && greeted.reply_bytes.is_some());
-    assert_eq!((a.all.known(), a.seal(Port::Packages, 1, b"too early")), (0, Err(Unacquainted)));
+    assert_eq!((a.all.known(), a.seal(Port::Packages, 1, b"too early")), (0, Err(NoSession)));
     assert_eq!((a.handshake.begin(), a.all.known()), (Some(1), 0b10));
     let first = a.seal(Port::Packages, 1, b"first").unwrap();
     b.greet(&room).unwrap();

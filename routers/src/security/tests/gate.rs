@@ -1,12 +1,12 @@
 //! The gate asks as often as it must, and no more often.
 
 use super::*;
-use crate::frame::{BadFrame, Reason};
+use crate::frame::{BadFrame, RefusalReason};
 use crate::harness::{End, MS, S, START, address};
-use crate::inbound::Came;
+use crate::inbound::Envelope;
 use crate::inbound::TICK_EVERY_NS;
-use crate::link::State;
-use crate::report::{Event, Mismatch};
+use crate::link::PeerLinkState;
+use crate::report::{Mismatch, RouterEvent};
 use rohrpost_network::Security;
 
 struct Router {
@@ -45,7 +45,7 @@ impl Router {
 
     fn take(&mut self, now_ns: u64, from: u8, datagram: &[u8]) -> Option<Vec<u8>> {
         let (mut bytes, mut reply) = (datagram.to_vec(), [0; HELLO_DATAGRAM_BYTES]);
-        let came = Came { source: address(from), arrived_ns: now_ns, bytes: bytes.len() };
+        let came = Envelope { source: address(from), arrived_ns: now_ns, bytes: bytes.len() };
         let Self { gate, end: End { inbound, log, .. }, .. } = self;
         let said = gate.take(now_ns, &came, &mut bytes, inbound, log, &mut reply);
         let reply = said.map(|said| reply[..said.bytes].to_vec());
@@ -70,14 +70,15 @@ fn an_unknown_peer_is_challenged_again_and_again_and_one_with_another_incarnatio
     // b begins anew, and a does not know it.
     let mut sealing = Sealing::new(&a.all, Port::Packages);
     let mut datagram = [0; 80];
-    let head = FrameHead { kind: Kind::Alive, system: 1, from: 0, to: 1, digest: 7, incarnation: 100, sequence: 0 };
+    let head =
+        FrameHead { kind: FrameKind::Alive, system: 1, from: 0, to: 1, digest: 7, incarnation: 100, sequence: 0 };
     sealing.seal(&head, &mut datagram).unwrap();
     let mut again = Router::new(1);
     again.ask(now_ns);
     assert!(again.take(now_ns, 0, &datagram).is_none());
     assert_eq!(again.all.rejections(Port::Packages).of(Some(0), Rejection::OtherIncarnation), 1);
     assert_eq!(again.ask(now_ns + 20 * MS).len(), 1, "sooner than a silent peer");
-    let told = again.end.log.events.iter().filter(|event| matches!(event, Event::Rejected { .. })).count();
+    let told = again.end.log.events.iter().filter(|event| matches!(event, RouterEvent::Rejected { .. })).count();
     assert_eq!(told, 1);
 }
 
@@ -88,8 +89,12 @@ fn another_wire_format_is_reported_by_its_receiver_and_changes_nothing() {
     question[2] = 2;
     crate::frame::write_check(&mut question);
     assert_eq!(b.take(START, 0, &question), None);
-    let told =
-        Event::Rejected { source: address(0), peer: Some(0), why: NotOpened::Bad(BadFrame::Version(2)), datagrams: 1 };
+    let told = RouterEvent::Rejected {
+        source: address(0),
+        peer: Some(0),
+        why: NotOpened::Bad(BadFrame::Version(2)),
+        datagrams: 1,
+    };
     assert_eq!(b.end.log.events, [told]);
     assert_eq!(b.all.rejections(Port::Packages).of(Some(0), Rejection::Version), 1);
     assert_eq!(b.all.known(), 0);
@@ -135,7 +140,7 @@ fn acquaint_at(now_ns: u64, a: &mut Router, b: &mut Router) {
 fn sealed_alive(sealing: &mut Sealing, sequence: u64) -> Vec<u8> {
     let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
     let mut datagram = [&[0; HEAD_BYTES], &told[..], &[0; TAG_BYTES]].concat();
-    let kind = Kind::Alive;
+    let kind = FrameKind::Alive;
     let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence };
     sealing.seal(&head, &mut datagram).unwrap();
     datagram
@@ -162,10 +167,10 @@ fn replays_from_the_address_of_a_third_node_separate_no_node_from_it() {
     let recorded = a.ask(START)[0].1.clone();
     assert_eq!(b.take(START, 2, &recorded), None);
     let state = |router: &Router, peer| router.end.stats.state(peer, START);
-    assert!([0, 2].iter().all(|peer| !matches!(state(&b, *peer), State::Refused(_))));
+    assert!([0, 2].iter().all(|peer| !matches!(state(&b, *peer), PeerLinkState::Refused(_))));
     assert_eq!(b.all.rejections(Port::Packages).of(Some(2), Rejection::Address), 1);
     b.take(START, 0, &recorded);
-    assert!(matches!(state(&b, 0), State::Refused(_)), "from its own, it may have another configuration");
+    assert!(matches!(state(&b, 0), PeerLinkState::Refused(_)), "from its own, it may have another configuration");
 }
 
 /// Anybody can write a peer's address on a datagram that nobody can open.
@@ -180,34 +185,34 @@ fn a_cause_is_believed_of_the_silent_alone() {
     crate::frame::write_check(&mut version);
     let unsealed = {
         let told = crate::frame::Alive { heard_incarnation: 0, heard_next: 0, heard_lost: 0 }.to_bytes();
-        let kind = Kind::Alive;
+        let kind = FrameKind::Alive;
         let head = FrameHead { kind, system: SYSTEM, from: 0, to: 1, digest: DIGEST, incarnation: 100, sequence: 0 };
         [&head.to_bytes(&[&told])[..], &told].concat()
     };
     let state = |b: &Router, now_ns| b.end.stats.state(0, now_ns);
     b.take(START, 0, &other_key);
-    assert_eq!(state(&b, START), State::Unknown, "it may be heard yet, and packages go to it");
+    assert_eq!(state(&b, START), PeerLinkState::Unknown, "it may be heard yet, and packages go to it");
     let mut now_ns = START + 2 * S;
     for (datagram, reason, wire) in [
-        (&other_id, Reason::Key, crate::frame::VERSION),
-        (&other_key, Reason::Key, crate::frame::VERSION),
-        (&version, Reason::Version, 2),
-        (&unsealed, Reason::Sealed, crate::frame::VERSION),
+        (&other_id, RefusalReason::Key, crate::frame::VERSION),
+        (&other_key, RefusalReason::Key, crate::frame::VERSION),
+        (&version, RefusalReason::Version, 2),
+        (&unsealed, RefusalReason::Sealed, crate::frame::VERSION),
     ] {
         now_ns += 10 * S;
-        assert_eq!(state(&b, now_ns), State::Silent, "what was said is over");
+        assert_eq!(state(&b, now_ns), PeerLinkState::Silent, "what was said is over");
         b.take(now_ns, 0, datagram);
         let mismatch = Mismatch { reason, version: wire, digest: None };
-        assert_eq!(state(&b, now_ns), State::Refused(mismatch));
-        assert_eq!(b.end.stats.state(2, now_ns), State::Silent, "of the others nothing is said");
+        assert_eq!(state(&b, now_ns), PeerLinkState::Refused(mismatch));
+        assert_eq!(b.end.stats.state(2, now_ns), PeerLinkState::Silent, "of the others nothing is said");
     }
     // With the right key it is heard, and what seems to come from it beside that changes nothing.
     let mut a = Router::new(0);
     acquaint_at(now_ns, &mut a, &mut b);
     b.take(now_ns, 0, &sealed_alive(&mut Sealing::new(&a.all, Port::Packages), 0));
-    assert_eq!(state(&b, now_ns), State::Alive);
+    assert_eq!(state(&b, now_ns), PeerLinkState::Alive);
     b.take(now_ns, 0, &other_key);
-    assert_eq!(state(&b, now_ns), State::Alive);
+    assert_eq!(state(&b, now_ns), PeerLinkState::Alive);
 }
 
 #[test]

@@ -100,7 +100,7 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
             match router.opening[port as usize].open(&mut datagram) {
                 Ok(Opened::Frame(head, _)) => panic!("datagram {number} was taken: {head:?}, {sent:?}"),
                 Ok(Opened::Hello(head, greeting)) => {
-                    let greeted = router.handshake.greet(number, &head, &greeting, &mut room);
+                    let greeted = router.handshake.receive(number, &head, &greeting, &mut room);
                     assert!(!greeted.begins, "an incarnation began by datagram {number}: {sent:?}");
                 }
                 Err(_) => {}

@@ -7,7 +7,7 @@ mod sealed;
 mod slots;
 
 use super::*;
-use crate::frame::{FrameHead, HEAD_BYTES, Kind, NodeIndex};
+use crate::frame::{FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use std::num::NonZeroU8;
 use std::sync::Arc;
 
@@ -68,12 +68,12 @@ impl Router {
     }
 
     pub(super) fn head(&self, port: Port, to: NodeIndex, sequence: u64) -> FrameHead {
-        let kind = if port == Port::Time { Kind::Sync } else { Kind::Packages };
+        let kind = if port == Port::Time { FrameKind::Sync } else { FrameKind::Packages };
         FrameHead { kind, system: SYSTEM, from: self.own, to, digest: DIGEST, incarnation: self.incarnation, sequence }
     }
 
     /// The next datagram of a port.
-    pub(super) fn seal(&mut self, port: Port, to: NodeIndex, text: &[u8]) -> Result<Vec<u8>, Unacquainted> {
+    pub(super) fn seal(&mut self, port: Port, to: NodeIndex, text: &[u8]) -> Result<Vec<u8>, NoSession> {
         let head = self.head(port, to, self.next[port as usize]);
         self.next[port as usize] += 1;
         let mut datagram = [&[0; HEAD_BYTES], text, &[0; TAG_BYTES]].concat();
@@ -96,7 +96,7 @@ impl Router {
         let mut room = [0; HELLO_DATAGRAM_BYTES];
         match self.opening[0].open(&mut datagram.to_vec())? {
             Opened::Hello(head, greeting) => {
-                let greeted = self.handshake.greet(now_ns, &head, &greeting, &mut room);
+                let greeted = self.handshake.receive(now_ns, &head, &greeting, &mut room);
                 assert_eq!(self.handshake.begin().is_some(), greeted.begins);
                 Ok((greeted.begins, greeted.reply_bytes.map(|bytes| room[..bytes].to_vec())))
             }

@@ -99,7 +99,7 @@ fn wrong_keys_and_none_are_told_apart() {
 
 #[test]
 fn no_two_derived_keys_are_the_same() {
-    use super::super::keys::{Binding, End, Purpose};
+    use super::super::keys::{Binding, Endpoint, Purpose};
     let ring = ring(&[2, 1]);
     let mut seen = BTreeSet::new();
     let mut number = 0;
@@ -115,8 +115,10 @@ fn no_two_derived_keys_are_the_same() {
                 (1, 0, 5, 2, 6),
                 (1, 2, 5, 1, 6),
             ] {
-                let (from, to) =
-                    (End { node: from, incarnation: from_incarnation }, End { node: to, incarnation: to_incarnation });
+                let (from, to) = (
+                    Endpoint { node: from, incarnation: from_incarnation },
+                    Endpoint { node: to, incarnation: to_incarnation },
+                );
                 let mut datagram = [0; HEAD_BYTES + 32 + TAG_BYTES];
                 ring.derive(place, &Binding { purpose, system, from, to }).close([0; 12], &mut datagram);
                 seen.insert(datagram[HEAD_BYTES..].to_vec());

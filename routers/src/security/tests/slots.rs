@@ -89,14 +89,14 @@ fn said(to: NodeIndex, is_reply: bool, begins: bool) -> Said {
 }
 
 /// What leaves next: its receiver, whether it is a reply, and its first byte.
-fn next(waiting: &mut Waiting, now_ns: u64, first: Option<NodeIndex>) -> Option<(NodeIndex, bool, u8)> {
+fn next(waiting: &mut HelloQueue, now_ns: u64, first: Option<NodeIndex>) -> Option<(NodeIndex, bool, u8)> {
     waiting.take(now_ns, first).map(|(said, datagram)| (said.to, said.is_reply, datagram[0]))
 }
 
 #[test]
 fn the_newest_hellos_wait_and_replies_go_first() {
     let [a, ..] = three();
-    let mut waiting = Waiting::new(&a.all);
+    let mut waiting = HelloQueue::new(&a.all);
     let mut put = |now_ns, said, mark| waiting.put(now_ns, said, &[mark; HELLO_DATAGRAM_BYTES]);
     put(0, said(1, false, false), 1);
     put(1, said(1, false, false), 2);
@@ -119,7 +119,7 @@ fn the_newest_hellos_wait_and_replies_go_first() {
 fn nothing_is_sealed_to_an_incarnation_while_the_reply_waits_by_which_it_can_be_opened() {
     let [mut a, mut b, _] = three();
     acquaint(&mut b, &mut a);
-    let waiting = Waiting::new(&a.all);
+    let waiting = HelloQueue::new(&a.all);
     assert_eq!((a.all.known(), a.all.reached()), (0b10, 0b10));
     a.all.reply_waits(1);
     waiting.left(said(1, false, false));
@@ -138,7 +138,7 @@ fn nothing_waits_for_a_reply_that_is_lost() {
     gate.waits(said(1, true, true), || true);
     gate.waits(said(1, true, true), || false);
     assert_eq!(a.all.reached(), 0, "the first still waits");
-    let mut waiting = Waiting::new(&a.all);
+    let mut waiting = HelloQueue::new(&a.all);
     waiting.put(0, said(1, true, true), &[1; HELLO_DATAGRAM_BYTES]);
     assert_eq!(next(&mut waiting, CHALLENGE_MAX_NS, None), None);
     assert_eq!(a.all.reached(), 0b10, "it was too old, and dropped");
@@ -171,7 +171,7 @@ fn what_is_forged_takes_nobodys_place() {
     let (head, _) = FrameHead::read(&said).unwrap();
     let (mut overheard, peer) = (unverified::UnverifiedIncarnations::default(), Router::new(1, 200));
     let seal = |incarnation| {
-        let from = keys::End { node: 0, incarnation };
+        let from = keys::Endpoint { node: 0, incarnation };
         peer.all.keys.derive(0, &peer.all.binding(Port::Time, from, peer.all.own()))
     };
     assert!(overheard.open((&head, 0), &mut said.clone(), || seal(100)).is_some());

@@ -11,7 +11,7 @@ use crate::session::{ASK_EVERY_NS, SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS};
 const FIRST_ASKS: u32 = 5;
 const FIRST_ASK_EVERY_NS: u64 = 100_000_000;
 
-/// Of one connection.
+/// Time requests of one connection.
 #[derive(Debug, Default)]
 pub(super) struct Asking {
     /// When the next is due, ns.

@@ -6,7 +6,7 @@ const FIRST_NS: u64 = 100_000_000;
 pub const BACKOFF_MAX_NS: u64 = 2_000_000_000;
 const DOUBLINGS_MAX: u32 = 16;
 
-/// Of one client.
+/// Delay before the next connection of one client.
 #[derive(Clone, Debug)]
 pub(super) struct Backoff {
     failures: u32,

@@ -1,9 +1,9 @@
 //! A client: keeps up a connection to the server, registers what it hosts, and carries packages both ways.
 //!
 //! ```text
-//!  away ─ wait is over ─▶ connecting ─ connected ─▶ greeting ─ welcome ─▶ member ─ register ─▶ up
-//!   ▲                         └───── too long ─────────┴─ refusal ─┴─ silence, damage, end of the stream ┘
-//!   └──────────────────────────── waits longer each time ◀─────────────────────────────────────┘
+//!  away ─ wait is over ─▶ connecting ─ connected ─▶ handshake ─ welcome ─▶ member ─ register ─▶ up
+//!   ▲                         └───── too long ─────────┴─ refusal ──┴─ silence, damage, end of the stream ┘
+//!   └──────────────────────────── waits longer each time ◀──────────────────────────────────────┘
 //! ```
 
 mod asking;
@@ -13,12 +13,14 @@ mod sending;
 
 pub use backoff::BACKOFF_MAX_NS;
 
-use super::counts::{Cause, Counts};
+use super::counts::{Cause, SessionCounts};
 use super::estimate::{Bounded, ServerClockEstimate};
-use super::frame::{Carried, Hello, Message, Range, Reason, Refusal, Verdict};
+use super::frame::{
+    Carried, Range, RegistrationVerdict, SessionHello, SessionMessage, SessionRefusal, SessionRefusalReason,
+};
 use super::outgoing::Outgoing;
 use super::splitter::Splitter;
-use super::{Answers, GREETING_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
+use super::{ErrorReplies, HANDSHAKE_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
 use crate::admission::Admission;
 use crate::report::NotDelivered;
 use asking::Asking;
@@ -59,7 +61,7 @@ pub struct ClientSettings {
 
 /// A package that is to go to the server.
 #[derive(Clone, Copy, Debug)]
-pub struct Package<'a> {
+pub struct ClientPackage<'a> {
     /// Its head.
     pub head: Head,
     /// Its body; as long as the head says.
@@ -70,9 +72,9 @@ pub struct Package<'a> {
     pub hops: u8,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Client::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Output {
+pub enum ClientStep {
     /// Connect; then [`Client::connected`] or [`Client::closed`].
     Connect,
     /// Write what [`Client::ready`] has, then say how much with [`Client::took`].
@@ -86,23 +88,23 @@ pub enum Output {
     },
 }
 
-/// What people want to know of, each once until it changes.
+/// A change that people are told once.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Event<'a> {
+pub enum ClientEvent<'a> {
     /// The server takes and brings packages.
     Up,
     /// It does not any more.
     Down,
     /// The server lets it not take part; it goes on trying.
-    Refused(&'a Refusal<'a>),
+    Refused(&'a SessionRefusal<'a>),
     /// It may not host what it says; it goes on trying.
-    Objected(&'a Verdict<'a>),
+    Objected(&'a RegistrationVerdict<'a>),
     /// What came is nothing of ours.
-    Damaged(super::frame::BadFrame),
+    Damaged(super::frame::BadSessionFrame),
 }
 
 /// What a client needs from the code that runs it.
-pub trait Host: Answers {
+pub trait ClientHost: ErrorReplies {
     /// Puts a package that came into its mailbox. Its `published_ns` is an estimate by the monotonic clock here.
     ///
     /// # Errors
@@ -113,23 +115,16 @@ pub trait Host: Answers {
     fn not_allowed(&mut self, _line: Option<usize>) {}
 
     /// Something happened.
-    fn event(&mut self, event: Event<'_>);
+    fn event(&mut self, event: ClientEvent<'_>);
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum State {
-    Away {
-        until_ns: u64,
-    },
-    Connecting {
-        until_ns: u64,
-    },
-    Greeting {
-        until_ns: u64,
-    },
+enum ClientState {
+    Away { until_ns: u64 },
+    Connecting { until_ns: u64 },
+    Handshake { until_ns: u64 },
     Member,
-    /// The connection is to be closed.
-    Over,
+    Closing,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -146,7 +141,7 @@ enum Registration {
 pub struct Client {
     settings: ClientSettings,
     ranges: Vec<Range>,
-    state: State,
+    state: ClientState,
     registration: Registration,
     number: u32,
     attempt: u64,
@@ -158,8 +153,8 @@ pub struct Client {
     estimate: ServerClockEstimate,
     /// The end with these clocks.
     server_incarnation: u64,
-    out: Counts,
-    inn: Counts,
+    out: SessionCounts,
+    inn: SessionCounts,
     /// What people know: the last refusal, or that it is up.
     told: Option<Reported>,
     /// When it was welcomed, if it was, ns.
@@ -175,7 +170,7 @@ pub struct Client {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Reported {
     Up,
-    Refused(Reason),
+    Refused(SessionRefusalReason),
     Objected,
     Damaged,
 }
@@ -185,7 +180,7 @@ impl Client {
     pub fn new(settings: ClientSettings, ranges: Vec<Range>, now_ns: u64) -> Self {
         Self {
             ranges,
-            state: State::Away { until_ns: now_ns },
+            state: ClientState::Away { until_ns: now_ns },
             registration: Registration::Due(0),
             number: 0,
             attempt: 0,
@@ -196,8 +191,8 @@ impl Client {
             is_slow: false,
             estimate: ServerClockEstimate::default(),
             server_incarnation: 0,
-            out: Counts::default(),
-            inn: Counts::default(),
+            out: SessionCounts::default(),
+            inn: SessionCounts::default(),
             told: None,
             joined_ns: None,
             down_ns: now_ns,
@@ -221,16 +216,16 @@ impl Client {
 
     /// Whether packages may leave.
     pub fn is_up(&self) -> bool {
-        self.state == State::Member && self.registration == Registration::Holds
+        self.state == ClientState::Member && self.registration == Registration::Holds
     }
 
     /// What went to the server, and what did not; and of packages for all systems, what went to their own.
-    pub fn out(&self) -> &Counts {
+    pub fn out(&self) -> &SessionCounts {
         &self.out
     }
 
     /// What came from it.
-    pub fn inn(&self) -> &Counts {
+    pub fn inn(&self) -> &SessionCounts {
         &self.inn
     }
 
@@ -241,10 +236,10 @@ impl Client {
 
     /// Whether there is a connection.
     pub fn is_connected(&self) -> bool {
-        matches!(self.state, State::Greeting { .. } | State::Member)
+        matches!(self.state, ClientState::Handshake { .. } | ClientState::Member)
     }
 
-    /// The shortest way there and back of late, ns.
+    /// The shortest recent round trip, ns.
     pub fn round_trip_ns(&self) -> Option<u64> {
         self.estimate.round_trip_ns()
     }
@@ -282,12 +277,12 @@ impl Client {
     /// The connection is made.
     pub fn connected(&mut self, now_ns: u64) {
         self.attempt += 1;
-        self.state = State::Greeting { until_ns: now_ns + GREETING_MAX_NS };
+        self.state = ClientState::Handshake { until_ns: now_ns + HANDSHAKE_MAX_NS };
         self.splitter = Splitter::default();
         self.outgoing.cut();
         (self.heard_ns, self.moved_ns) = (now_ns, now_ns);
         let ClientSettings { name, system, reaches_own, common, system_digest, incarnation, .. } = &self.settings;
-        self.outgoing.say(&Message::Hello(Hello {
+        self.outgoing.say(&SessionMessage::Hello(SessionHello {
             system: *system,
             reaches_own: *reaches_own,
             common: *common,
@@ -300,20 +295,20 @@ impl Client {
     }
 
     /// The connection is closed or broken, or could not be made.
-    pub fn closed(&mut self, now_ns: u64, host: &mut impl Host) {
+    pub fn closed(&mut self, now_ns: u64, host: &mut impl ClientHost) {
         if self.is_up() {
             self.down_ns = now_ns;
             self.told = None;
-            host.event(Event::Down);
+            host.event(ClientEvent::Down);
         }
-        if matches!(self.state, State::Connecting { .. }) {
+        if matches!(self.state, ClientState::Connecting { .. }) {
             // What the server said was before it went away.
             self.told = None;
         }
         if self.joined_ns.take().is_some_and(|joined_ns| now_ns.saturating_sub(joined_ns) > LASTING_NS) {
             self.backoff.lasted();
         }
-        self.state = State::Away { until_ns: now_ns + self.backoff.next_ns() };
+        self.state = ClientState::Away { until_ns: now_ns + self.backoff.next_ns() };
         self.registration = Registration::Due(now_ns);
         (self.is_blocked, self.is_slow) = (false, false);
         self.outgoing.cut();
@@ -352,32 +347,32 @@ impl Client {
     }
 
     /// What to do next.
-    pub fn poll(&mut self, now_ns: u64, host: &mut impl Host) -> Output {
+    pub fn poll(&mut self, now_ns: u64, host: &mut impl ClientHost) -> ClientStep {
         if now_ns >= self.look_ns {
             self.look(now_ns, host);
         }
         match self.state {
-            State::Away { until_ns } if now_ns >= until_ns => {
-                self.state = State::Connecting { until_ns: now_ns + CONNECT_MAX_NS };
-                return Output::Connect;
+            ClientState::Away { until_ns } if now_ns >= until_ns => {
+                self.state = ClientState::Connecting { until_ns: now_ns + CONNECT_MAX_NS };
+                return ClientStep::Connect;
             }
-            State::Away { until_ns } | State::Connecting { until_ns } if now_ns < until_ns => {
-                return Output::Wait { until_ns: until_ns.min(self.look_ns) };
+            ClientState::Away { until_ns } | ClientState::Connecting { until_ns } if now_ns < until_ns => {
+                return ClientStep::Wait { until_ns: until_ns.min(self.look_ns) };
             }
-            State::Member | State::Greeting { .. } if !self.is_gone(now_ns) => {}
+            ClientState::Member | ClientState::Handshake { .. } if !self.is_gone(now_ns) => {}
             _ => {
                 self.closed(now_ns, host);
-                return Output::Close;
+                return ClientStep::Close;
             }
         }
         self.ask(now_ns);
         if self.is_blocked {
-            return Output::Wait { until_ns: self.look_ns };
+            return ClientStep::Wait { until_ns: self.look_ns };
         }
         self.refill(now_ns, host);
         match self.outgoing.ready() {
-            [] => Output::Wait { until_ns: self.next_ns() },
-            _ => Output::Write,
+            [] => ClientStep::Wait { until_ns: self.next_ns() },
+            _ => ClientStep::Write,
         }
     }
 
@@ -386,12 +381,12 @@ impl Client {
         let is_silent = self.asking.is_silent(now_ns, self.heard_ns, self.moved_ns, is_slow);
         let is_stalled = now_ns.saturating_sub(self.moved_ns) > STALLED_AFTER_NS;
         match self.state {
-            State::Greeting { until_ns } => now_ns >= until_ns,
+            ClientState::Handshake { until_ns } => now_ns >= until_ns,
             _ => is_silent || is_stalled,
         }
     }
 
-    fn look(&mut self, now_ns: u64, host: &mut impl Host) {
+    fn look(&mut self, now_ns: u64, host: &mut impl ClientHost) {
         if self.look_ns > 0 && now_ns > self.look_ns + STOOD_STILL_NS {
             self.heard_ns = now_ns;
         }
@@ -409,7 +404,7 @@ impl Client {
             Registration::Asked | Registration::Holds => u64::MAX,
         };
         match self.state {
-            State::Member => self.look_ns.min(self.asking.next_ns).min(registers_ns),
+            ClientState::Member => self.look_ns.min(self.asking.next_ns).min(registers_ns),
             _ => self.look_ns,
         }
     }

@@ -1,19 +1,19 @@
 //! What goes to the server: packages, questions for the time, and what becomes of each.
 
-use super::{Client, Host, Package, Registration, State};
+use super::{Client, ClientHost, ClientPackage, ClientState, Registration};
 use crate::admission::capped;
-use crate::queue::Share;
+use crate::queue::QueueShare;
 use crate::report::NotDelivered;
 use crate::session::WAIT_MAX_NS;
 use crate::session::counts::Cause;
-use crate::session::frame::{Carried, Message, Ranges};
+use crate::session::frame::{Carried, Ranges, SessionMessage};
 use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Fates, Outgoing, Parcel, is_stale};
 use rohrpost_mailbox::{Name, Priority};
 
 impl Client {
     /// A package is to go to the server.
-    pub fn send(&mut self, now_ns: u64, package: &Package<'_>, host: &mut impl Host) {
+    pub fn send(&mut self, now_ns: u64, package: &ClientPackage<'_>, host: &mut impl ClientHost) {
         let head = capped(&package.head);
         self.out.came(head.priority);
         let is_long_down = !self.is_up() && now_ns.saturating_sub(self.down_ns) > WAIT_MAX_NS;
@@ -24,9 +24,9 @@ impl Client {
         self.with_ledger(now_ns, host, |outgoing, ledger| match lost {
             Some(cause) => ledger.lost(&head, package.body, cause),
             None => {
-                let Package { body, published_ns, hops, .. } = *package;
+                let ClientPackage { body, published_ns, hops, .. } = *package;
                 // Of the node's modules each has its part of memory. Which goes first is for their importance to say.
-                let share = Share { sender: head.from.with_local(0).raw(), party: 0 };
+                let share = QueueShare { sender: head.from.with_local(0).raw(), party: 0 };
                 outgoing.accept(shift_ns, &Parcel { head: &head, body, published_ns, hops, level, share }, ledger);
             }
         });
@@ -57,21 +57,21 @@ impl Client {
     /// Asks for the time, also while the stream takes nothing: packages that have not begun to leave go behind the
     /// question.
     pub(super) fn ask(&mut self, now_ns: u64) {
-        if self.state == State::Member && self.asking.is_due(now_ns) {
-            let end = self.outgoing.hurry(&Message::Ask(now_ns));
+        if self.state == ClientState::Member && self.asking.is_due(now_ns) {
+            let end = self.outgoing.hurry(&SessionMessage::Ask(now_ns));
             self.asking.asks(now_ns, end);
         }
     }
 
-    pub(super) fn refill(&mut self, now_ns: u64, host: &mut impl Host) {
-        if self.state != State::Member || !self.outgoing.ready().is_empty() {
+    pub(super) fn refill(&mut self, now_ns: u64, host: &mut impl ClientHost) {
+        if self.state != ClientState::Member || !self.outgoing.ready().is_empty() {
             return;
         }
         if matches!(self.registration, Registration::Due(at_ns) if now_ns >= at_ns) {
             self.number = self.number.wrapping_add(1);
             self.registration = Registration::Asked;
             let mut bytes = Vec::new();
-            self.outgoing.say(&Message::Register(Ranges::new(self.number, &self.ranges, &mut bytes)));
+            self.outgoing.say(&SessionMessage::Register(Ranges::new(self.number, &self.ranges, &mut bytes)));
         }
         if let Some(shift_ns) = self.shift_ns(now_ns) {
             self.with_ledger(now_ns, host, |outgoing, ledger| outgoing.refill(now_ns, shift_ns, ledger));
@@ -79,7 +79,7 @@ impl Client {
     }
 
     /// Does something with what leaves, and answers the commands of this end that are lost thereby.
-    pub(super) fn with_ledger<H: Host>(
+    pub(super) fn with_ledger<H: ClientHost>(
         &mut self,
         now_ns: u64,
         host: &mut H,

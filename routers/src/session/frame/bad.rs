@@ -5,7 +5,7 @@ pub const VERSION: u8 = 1;
 
 /// Why bytes are no frame of ours; nothing that follows them can be read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum BadFrame {
+pub enum BadSessionFrame {
     /// The stream does not begin as one of ours.
     #[error("no session of Rohrpost; is this the port of its TCP router?")]
     Foreign,

@@ -1,7 +1,7 @@
 //! What a session is for: packages, and the time.
 
-use super::BadFrame;
-use super::fields::Fields;
+use super::BadSessionFrame;
+use super::fields::FieldReader;
 use rohrpost_mailbox::{ERROR_UNKNOWN_NS, HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 
 /// A package under way.
@@ -18,13 +18,13 @@ pub struct Carried<'a> {
 }
 
 impl<'a> Carried<'a> {
-    pub(super) fn parse(hops: u8, fields: &mut Fields<'a>) -> Result<Self, BadFrame> {
+    pub(super) fn parse(hops: u8, fields: &mut FieldReader<'a>) -> Result<Self, BadSessionFrame> {
         let published_ns = fields.long()?;
         let head: [u8; PACKAGE_HEAD_BYTES] = fields.array()?;
         let body = fields.rest();
         match Head::from_bytes(&head) {
             Ok(head) if usize::from(head.len) == body.len() => Ok(Self { hops, published_ns, head, body }),
-            _ => Err(BadFrame::Damaged("a package of another length than its frame")),
+            _ => Err(BadSessionFrame::Damaged("a package of another length than its frame")),
         }
     }
 
@@ -53,7 +53,7 @@ pub struct TimeAnswer {
 }
 
 impl TimeAnswer {
-    pub(super) fn parse(fields: &mut Fields<'_>) -> Result<Self, BadFrame> {
+    pub(super) fn parse(fields: &mut FieldReader<'_>) -> Result<Self, BadSessionFrame> {
         let answer = Self {
             asked_ns: fields.long()?,
             came_ns: fields.long()?,
@@ -63,7 +63,11 @@ impl TimeAnswer {
             epoch: fields.long()?,
         };
         let is_sound = answer.came_ns <= answer.left_ns && answer.error_ns <= ERROR_UNKNOWN_NS;
-        if is_sound { Ok(answer) } else { Err(BadFrame::Damaged("an answer that left before its question came")) }
+        if is_sound {
+            Ok(answer)
+        } else {
+            Err(BadSessionFrame::Damaged("an answer that left before its question came"))
+        }
     }
 
     pub(super) fn write(&self, into: &mut Vec<u8>) {

@@ -1,7 +1,7 @@
 //! Hello, welcome and refusal: what both ends say of themselves.
 
-use super::fields::Fields;
-use super::{BadFrame, TimeAnswer, VERSION};
+use super::fields::FieldReader;
+use super::{BadSessionFrame, TimeAnswer, VERSION};
 
 const MAGIC: [u8; 4] = *b"RpTc";
 /// Bytes of a name that people read, at most.
@@ -9,7 +9,7 @@ pub const NAME_BYTES_MAX: usize = 64;
 
 /// Identity of a client.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Hello<'a> {
+pub struct SessionHello<'a> {
     /// First byte of the names that it may host.
     pub system: u8,
     /// What is sent to all systems reaches its own without the server.
@@ -28,14 +28,14 @@ pub struct Hello<'a> {
     pub name: &'a str,
 }
 
-impl<'a> Hello<'a> {
-    pub(super) fn parse(fields: &mut Fields<'a>) -> Result<Self, BadFrame> {
+impl<'a> SessionHello<'a> {
+    pub(super) fn parse(fields: &mut FieldReader<'a>) -> Result<Self, BadSessionFrame> {
         if fields.array()? != MAGIC {
-            return Err(BadFrame::Foreign);
+            return Err(BadSessionFrame::Foreign);
         }
         let (version, system, flags) = (fields.byte()?, fields.byte()?, fields.byte()?);
         if version != VERSION {
-            return Err(BadFrame::Version(version));
+            return Err(BadSessionFrame::Version(version));
         }
         fields.zeroes::<1>()?;
         let hello = Self {
@@ -50,7 +50,7 @@ impl<'a> Hello<'a> {
         };
         let is_one = system != 0 && system != rohrpost_mailbox::ALL_SYSTEMS;
         if !is_one || flags > 1 || hello.incarnation == 0 || hello.attempt == 0 {
-            return Err(BadFrame::Damaged("a hello of nobody"));
+            return Err(BadSessionFrame::Damaged("a hello of nobody"));
         }
         Ok(hello)
     }
@@ -77,13 +77,13 @@ pub struct Welcome {
 }
 
 impl Welcome {
-    pub(super) fn parse(fields: &mut Fields<'_>) -> Result<Self, BadFrame> {
+    pub(super) fn parse(fields: &mut FieldReader<'_>) -> Result<Self, BadSessionFrame> {
         if fields.array()? != MAGIC {
-            return Err(BadFrame::Foreign);
+            return Err(BadSessionFrame::Foreign);
         }
         let version = fields.byte()?;
         if version != VERSION {
-            return Err(BadFrame::Version(version));
+            return Err(BadSessionFrame::Version(version));
         }
         fields.zeroes::<3>()?;
         Ok(Self { common: fields.long()?, incarnation: fields.long()?, time: TimeAnswer::parse(fields)? })
@@ -98,10 +98,10 @@ impl Welcome {
     }
 }
 
-/// Why a server takes a client not, or not any more.
+/// Why a server does not accept a client, or ends its session.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
-pub enum Reason {
+pub enum SessionRefusalReason {
     /// Another version of the format.
     Version = 1,
     /// Another digest of what must be equal everywhere.
@@ -124,7 +124,7 @@ pub enum Reason {
     Certificate = 10,
 }
 
-impl Reason {
+impl SessionRefusalReason {
     const ALL: [Self; 10] = [
         Self::Version,
         Self::Common,
@@ -155,13 +155,13 @@ impl Reason {
     }
 }
 
-/// "I take nothing from you, since …"
+/// Tells the other end why nothing is taken from it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Refusal<'a> {
+pub struct SessionRefusal<'a> {
     /// Version of the refusing end.
     pub version: u8,
     /// Why.
-    pub reason: Reason,
+    pub reason: SessionRefusalReason,
     /// The client's digest of what differs, else 0.
     pub yours: u64,
     /// The one that it should be, else 0.
@@ -170,14 +170,14 @@ pub struct Refusal<'a> {
     pub text: &'a str,
 }
 
-impl<'a> Refusal<'a> {
-    pub(super) fn parse(fields: &mut Fields<'a>) -> Result<Self, BadFrame> {
+impl<'a> SessionRefusal<'a> {
+    pub(super) fn parse(fields: &mut FieldReader<'a>) -> Result<Self, BadSessionFrame> {
         if fields.array()? != MAGIC {
-            return Err(BadFrame::Foreign);
+            return Err(BadSessionFrame::Foreign);
         }
         let (version, reason) = (fields.byte()?, fields.byte()?);
-        let reason = Reason::ALL.into_iter().find(|known| *known as u8 == reason);
-        let reason = reason.ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
+        let reason = SessionRefusalReason::ALL.into_iter().find(|known| *known as u8 == reason);
+        let reason = reason.ok_or(BadSessionFrame::Damaged("unknown reason of a refusal"))?;
         fields.zeroes::<2>()?;
         Ok(Self { version, reason, yours: fields.long()?, ours: fields.long()?, text: fields.text(NAME_BYTES_MAX)? })
     }
@@ -191,38 +191,40 @@ impl<'a> Refusal<'a> {
     }
 }
 
-impl std::fmt::Display for Refusal<'_> {
+impl std::fmt::Display for SessionRefusal<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { version, yours, ours, text, .. } = self;
         match self.reason {
-            Reason::Version => write!(
+            SessionRefusalReason::Version => write!(
                 f,
                 "the TCP router speaks session format {version}, this end {VERSION}; \
                  run the same version of Rohrpost at both ends (`rohrpost version`)"
             ),
-            Reason::Common => write!(
+            SessionRefusalReason::Common => write!(
                 f,
                 "the common digest here is {yours:016x}, that of {text} {ours:016x}; \
                  give both configurations the same classes (`rohrpost check`, on both)"
             ),
-            Reason::System => write!(
+            SessionRefusalReason::System => write!(
                 f,
                 "the system's digest here is {yours:016x}, that of {text} {ours:016x}; \
                  start all of a system from the same file (`rohrpost check`, on both)"
             ),
-            Reason::Full if text.is_empty() => {
+            SessionRefusalReason::Full if text.is_empty() => {
                 write!(f, "the TCP router has as many clients as it takes; raise `clients`, or end some")
             }
-            Reason::Full => {
+            SessionRefusalReason::Full => {
                 write!(f, "the TCP router has as many clients as it takes, and {text}; raise `clients`, or end some")
             }
-            Reason::Replaced if text.is_empty() => write!(f, "a later connection of this client has taken its place"),
-            Reason::Replaced => write!(f, "another client has taken its place: {text}"),
-            Reason::Damaged => write!(f, "the TCP router could not read what came: {text}"),
-            Reason::Silent => write!(f, "the TCP router heard nothing for too long"),
-            Reason::Stalled => write!(f, "nothing was read here for too long"),
-            Reason::Ending => write!(f, "the TCP router ends"),
-            Reason::Certificate => {
+            SessionRefusalReason::Replaced if text.is_empty() => {
+                write!(f, "a later connection of this client has taken its place")
+            }
+            SessionRefusalReason::Replaced => write!(f, "another client has taken its place: {text}"),
+            SessionRefusalReason::Damaged => write!(f, "the TCP router could not read what came: {text}"),
+            SessionRefusalReason::Silent => write!(f, "the TCP router heard nothing for too long"),
+            SessionRefusalReason::Stalled => write!(f, "nothing was read here for too long"),
+            SessionRefusalReason::Ending => write!(f, "the TCP router ends"),
+            SessionRefusalReason::Certificate => {
                 write!(f, "the certificate here does not fit: {text}; use that of this node (`rohrpost keys new`)")
             }
         }

@@ -18,20 +18,20 @@ mod fields;
 mod meeting;
 mod ranges;
 
-pub use bad::{BadFrame, VERSION};
+pub use bad::{BadSessionFrame, VERSION};
 pub use carried::{Carried, TimeAnswer};
-pub use meeting::{Hello, NAME_BYTES_MAX, Reason, Refusal, Welcome};
-pub use ranges::{Objection, RANGES_MAX, Range, Ranges, Verdict};
+pub use meeting::{NAME_BYTES_MAX, SessionHello, SessionRefusal, SessionRefusalReason, Welcome};
+pub use ranges::{Objection, RANGES_MAX, Range, Ranges, RegistrationVerdict};
 
-use fields::Fields;
+use fields::FieldReader;
 use rohrpost_mailbox::{BODY_BYTES_MAX, HEAD_BYTES as PACKAGE_HEAD_BYTES};
 
 /// Bytes before what depends on the kind.
 pub const HEAD_BYTES: usize = 8;
 /// Bytes behind a frame's head, at most: the largest package, and when it was published.
 pub const LENGTH_MAX: usize = PUBLISHED_BYTES + PACKAGE_HEAD_BYTES + BODY_BYTES_MAX;
-/// The same before the hello.
-pub const GREETING_LENGTH_MAX: usize = 256;
+/// Longest frame before the hello.
+pub const HELLO_LENGTH_MAX: usize = 256;
 /// A package passes so many servers and programs that hand it on, at most.
 pub const HOPS_MAX: u8 = 8;
 
@@ -40,7 +40,7 @@ pub(super) const PUBLISHED_BYTES: usize = 8;
 /// What a frame is.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
-pub enum Kind {
+pub enum SessionFrameKind {
     /// Client: its identity. The first frame of each connection.
     Hello = 1,
     /// Server: it may take part.
@@ -59,7 +59,7 @@ pub enum Kind {
     Answer = 8,
 }
 
-impl Kind {
+impl SessionFrameKind {
     const ALL: [Self; 8] = [
         Self::Hello,
         Self::Welcome,
@@ -74,34 +74,37 @@ impl Kind {
 
 /// What each frame begins with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct FrameHead {
+pub struct SessionFrameHead {
     /// What it is.
-    pub kind: Kind,
+    pub kind: SessionFrameKind,
     /// Of a package: how often it was handed on before.
     pub hops: u8,
     /// Bytes that follow.
     pub length: usize,
 }
 
-impl FrameHead {
+impl SessionFrameHead {
     /// Reads a head.
     ///
     /// # Errors
-    /// [`BadFrame`]; also if more would follow than `length_max`.
-    pub fn parse(bytes: &[u8; HEAD_BYTES], length_max: usize) -> Result<Self, BadFrame> {
+    /// [`BadSessionFrame`]; also if more would follow than `length_max`.
+    pub fn parse(bytes: &[u8; HEAD_BYTES], length_max: usize) -> Result<Self, BadSessionFrame> {
         if is_tls(bytes) {
-            return Err(BadFrame::Tls);
+            return Err(BadSessionFrame::Tls);
         }
-        let mut fields = Fields::new(bytes);
+        let mut fields = FieldReader::new(bytes);
         let (length, kind, hops, rest) = (fields.word()?, fields.byte()?, fields.byte()?, fields.rest());
         // First the kind: what is no session mostly begins with text, which makes an odd length.
-        let kind = Kind::ALL.into_iter().find(|known| *known as u8 == kind).ok_or(BadFrame::Damaged("unknown kind"))?;
-        if rest != [0; 2] || (hops != 0 && kind != Kind::Package) {
-            return Err(BadFrame::Damaged("a head with bits that mean nothing"));
+        let kind = SessionFrameKind::ALL
+            .into_iter()
+            .find(|known| *known as u8 == kind)
+            .ok_or(BadSessionFrame::Damaged("unknown kind"))?;
+        if rest != [0; 2] || (hops != 0 && kind != SessionFrameKind::Package) {
+            return Err(BadSessionFrame::Damaged("a head with bits that mean nothing"));
         }
         match usize::try_from(length) {
             Ok(length) if length <= length_max => Ok(Self { kind, hops, length }),
-            _ => Err(BadFrame::TooLong(length)),
+            _ => Err(BadSessionFrame::TooLong(length)),
         }
     }
 }
@@ -114,19 +117,19 @@ pub(super) const fn is_tls(bytes: &[u8]) -> bool {
 
 const _: () = assert!(LENGTH_MAX < 0x01_03_14, "no head begins as a record of TLS");
 
-/// A frame, read.
+/// A parsed frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Message<'a> {
+pub enum SessionMessage<'a> {
     /// Identity of a client.
-    Hello(Hello<'a>),
+    Hello(SessionHello<'a>),
     /// It may take part.
     Welcome(Welcome),
     /// It may not.
-    Refusal(Refusal<'a>),
+    Refusal(SessionRefusal<'a>),
     /// The names that it hosts.
     Register(Ranges<'a>),
     /// Whether it does.
-    Registered(Verdict<'a>),
+    Registered(RegistrationVerdict<'a>),
     /// A package.
     Package(Carried<'a>),
     /// A question for the time, with the asker's own, ns.
@@ -135,25 +138,25 @@ pub enum Message<'a> {
     Answer(TimeAnswer),
 }
 
-impl<'a> Message<'a> {
+impl<'a> SessionMessage<'a> {
     /// Checks all that a frame says.
     ///
     /// # Errors
-    /// [`BadFrame`]
-    pub fn parse(head: FrameHead, rest: &'a [u8]) -> Result<Self, BadFrame> {
-        let mut fields = Fields::new(rest);
+    /// [`BadSessionFrame`]
+    pub fn parse(head: SessionFrameHead, rest: &'a [u8]) -> Result<Self, BadSessionFrame> {
+        let mut fields = FieldReader::new(rest);
         let message = match head.kind {
-            Kind::Hello => Self::Hello(Hello::parse(&mut fields)?),
-            Kind::Welcome => Self::Welcome(Welcome::parse(&mut fields)?),
-            Kind::Refusal => Self::Refusal(Refusal::parse(&mut fields)?),
-            Kind::Register => Self::Register(Ranges::parse(&mut fields)?),
-            Kind::Registered => Self::Registered(Verdict::parse(&mut fields)?),
-            Kind::Package => Self::Package(Carried::parse(head.hops, &mut fields)?),
-            Kind::Ask => Self::Ask(fields.long()?),
-            Kind::Answer => Self::Answer(TimeAnswer::parse(&mut fields)?),
+            SessionFrameKind::Hello => Self::Hello(SessionHello::parse(&mut fields)?),
+            SessionFrameKind::Welcome => Self::Welcome(Welcome::parse(&mut fields)?),
+            SessionFrameKind::Refusal => Self::Refusal(SessionRefusal::parse(&mut fields)?),
+            SessionFrameKind::Register => Self::Register(Ranges::parse(&mut fields)?),
+            SessionFrameKind::Registered => Self::Registered(RegistrationVerdict::parse(&mut fields)?),
+            SessionFrameKind::Package => Self::Package(Carried::parse(head.hops, &mut fields)?),
+            SessionFrameKind::Ask => Self::Ask(fields.long()?),
+            SessionFrameKind::Answer => Self::Answer(TimeAnswer::parse(&mut fields)?),
         };
         if !fields.rest().is_empty() {
-            return Err(BadFrame::Damaged("a frame with bytes behind its end"));
+            return Err(BadSessionFrame::Damaged("a frame with bytes behind its end"));
         }
         Ok(message)
     }
@@ -161,19 +164,19 @@ impl<'a> Message<'a> {
     /// Appends the frame.
     pub fn write(&self, into: &mut Vec<u8>) {
         match self {
-            Self::Hello(hello) => frame(into, Kind::Hello, 0, |into| hello.write(into)),
-            Self::Welcome(welcome) => frame(into, Kind::Welcome, 0, |into| welcome.write(into)),
-            Self::Refusal(refusal) => frame(into, Kind::Refusal, 0, |into| refusal.write(into)),
-            Self::Register(ranges) => frame(into, Kind::Register, 0, |into| ranges.write(into)),
-            Self::Registered(verdict) => frame(into, Kind::Registered, 0, |into| verdict.write(into)),
-            Self::Package(carried) => frame(into, Kind::Package, carried.hops, |into| carried.write(into)),
-            Self::Ask(asked_ns) => frame(into, Kind::Ask, 0, |into| into.extend(asked_ns.to_le_bytes())),
-            Self::Answer(answer) => frame(into, Kind::Answer, 0, |into| answer.write(into)),
+            Self::Hello(hello) => frame(into, SessionFrameKind::Hello, 0, |into| hello.write(into)),
+            Self::Welcome(welcome) => frame(into, SessionFrameKind::Welcome, 0, |into| welcome.write(into)),
+            Self::Refusal(refusal) => frame(into, SessionFrameKind::Refusal, 0, |into| refusal.write(into)),
+            Self::Register(ranges) => frame(into, SessionFrameKind::Register, 0, |into| ranges.write(into)),
+            Self::Registered(verdict) => frame(into, SessionFrameKind::Registered, 0, |into| verdict.write(into)),
+            Self::Package(carried) => frame(into, SessionFrameKind::Package, carried.hops, |into| carried.write(into)),
+            Self::Ask(asked_ns) => frame(into, SessionFrameKind::Ask, 0, |into| into.extend(asked_ns.to_le_bytes())),
+            Self::Answer(answer) => frame(into, SessionFrameKind::Answer, 0, |into| answer.write(into)),
         }
     }
 }
 
-fn frame(into: &mut Vec<u8>, kind: Kind, hops: u8, rest: impl FnOnce(&mut Vec<u8>)) {
+fn frame(into: &mut Vec<u8>, kind: SessionFrameKind, hops: u8, rest: impl FnOnce(&mut Vec<u8>)) {
     let start = into.len();
     into.extend([0, 0, 0, 0, kind as u8, hops, 0, 0]);
     rest(into);

@@ -1,7 +1,7 @@
 //! Registration: the names that a client hosts, and what the server says to it.
 
-use super::fields::Fields;
-use super::{BadFrame, NAME_BYTES_MAX};
+use super::fields::FieldReader;
+use super::{BadSessionFrame, NAME_BYTES_MAX};
 use rohrpost_mailbox::Name;
 
 /// Ranges of one client, at most: a system of 64 nodes with 30 modules each, all behind one.
@@ -65,11 +65,15 @@ impl<'a> Ranges<'a> {
         Self { number, bytes }
     }
 
-    pub(super) fn parse(fields: &mut Fields<'a>) -> Result<Self, BadFrame> {
+    pub(super) fn parse(fields: &mut FieldReader<'a>) -> Result<Self, BadSessionFrame> {
         let ranges = Self { number: fields.word()?, bytes: fields.rest() };
         let is_whole = ranges.bytes.len().is_multiple_of(RANGE_BYTES);
         let is_short = ranges.bytes.len() <= RANGES_MAX * RANGE_BYTES;
-        if is_whole && is_short { Ok(ranges) } else { Err(BadFrame::Damaged("ranges that are cut, or too many")) }
+        if is_whole && is_short {
+            Ok(ranges)
+        } else {
+            Err(BadSessionFrame::Damaged("ranges that are cut, or too many"))
+        }
     }
 
     pub(super) fn write(&self, into: &mut Vec<u8>) {
@@ -112,9 +116,9 @@ pub enum Objection {
     TooMany = 4,
 }
 
-/// What the server says to a registration: all of it holds, or nothing of it and all is as it was.
+/// The server's verdict on a registration: all of it is in force, or nothing of it changes anything.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Verdict<'a> {
+pub struct RegistrationVerdict<'a> {
     /// As the registration had it.
     pub number: u32,
     /// What speaks against it; none: it holds.
@@ -125,14 +129,14 @@ pub struct Verdict<'a> {
     pub holder: &'a str,
 }
 
-impl<'a> Verdict<'a> {
-    pub(super) fn parse(fields: &mut Fields<'a>) -> Result<Self, BadFrame> {
+impl<'a> RegistrationVerdict<'a> {
+    pub(super) fn parse(fields: &mut FieldReader<'a>) -> Result<Self, BadSessionFrame> {
         let (number, objection) = (fields.word()?, fields.byte()?);
         fields.zeroes::<3>()?;
         let known = [Objection::Taken, Objection::Crosses, Objection::NotOwn, Objection::TooMany];
         let found = known.into_iter().find(|known| *known as u8 == objection);
         if found.is_none() && objection != 0 {
-            return Err(BadFrame::Damaged("unknown objection"));
+            return Err(BadSessionFrame::Damaged("unknown objection"));
         }
         let range = Range { first: Name::from_raw(fields.word()?), last: Name::from_raw(fields.word()?) };
         Ok(Self { number, objection: found, range, holder: fields.text(NAME_BYTES_MAX)? })
@@ -147,7 +151,7 @@ impl<'a> Verdict<'a> {
     }
 }
 
-impl std::fmt::Display for Verdict<'_> {
+impl std::fmt::Display for RegistrationVerdict<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { range, holder, .. } = self;
         match self.objection {

@@ -2,25 +2,25 @@ use super::*;
 use proptest::prelude::*;
 use rohrpost_mailbox::{Head, Name, Type};
 
-fn written(message: &Message<'_>) -> Vec<u8> {
+fn written(message: &SessionMessage<'_>) -> Vec<u8> {
     let mut bytes = Vec::new();
     message.write(&mut bytes);
     bytes
 }
 
-fn read(bytes: &[u8]) -> Result<Message<'_>, BadFrame> {
-    let (head, rest) = bytes.split_first_chunk().ok_or(BadFrame::Damaged("short"))?;
-    let head = FrameHead::parse(head, LENGTH_MAX)?;
-    Message::parse(head, rest.get(..head.length).ok_or(BadFrame::Damaged("short"))?)
+fn read(bytes: &[u8]) -> Result<SessionMessage<'_>, BadSessionFrame> {
+    let (head, rest) = bytes.split_first_chunk().ok_or(BadSessionFrame::Damaged("short"))?;
+    let head = SessionFrameHead::parse(head, LENGTH_MAX)?;
+    SessionMessage::parse(head, rest.get(..head.length).ok_or(BadSessionFrame::Damaged("short"))?)
 }
 
 const TIME: TimeAnswer = TimeAnswer { asked_ns: 1, came_ns: 2, left_ns: 3, system_ns: 4, error_ns: 5, epoch: 6 };
 
-fn each(check: impl Fn(&Message<'_>)) {
+fn each(check: impl Fn(&SessionMessage<'_>)) {
     let range = Range::module(Name::new(1, 200, 0, 0));
     let mut bytes = Vec::new();
     let ranges = Ranges::new(9, &[range, range], &mut bytes);
-    let hello = Hello {
+    let hello = SessionHello {
         system: 1,
         reaches_own: true,
         common: 2,
@@ -30,19 +30,30 @@ fn each(check: impl Fn(&Message<'_>)) {
         asked_ns: 6,
         name: "node brain",
     };
-    let refusal = Refusal { version: VERSION, reason: Reason::Common, yours: 1, ours: 2, text: "the server" };
+    let refusal = SessionRefusal {
+        version: VERSION,
+        reason: SessionRefusalReason::Common,
+        yours: 1,
+        ours: 2,
+        text: "the server",
+    };
     let head =
         Head { to: range.first, from: Name::new(1, 16, 0, 1), len: 3, kind: Type::command(16), ..Head::default() };
     for message in [
-        Message::Hello(hello),
-        Message::Welcome(Welcome { common: 1, incarnation: 2, time: TIME }),
-        Message::Refusal(refusal),
-        Message::Register(ranges),
-        Message::Registered(Verdict { number: 9, objection: None, range, holder: "" }),
-        Message::Registered(Verdict { number: 9, objection: Some(Objection::Taken), range, holder: "arm" }),
-        Message::Package(Carried { hops: 2, published_ns: 7, head, body: &[1, 2, 3] }),
-        Message::Ask(8),
-        Message::Answer(TIME),
+        SessionMessage::Hello(hello),
+        SessionMessage::Welcome(Welcome { common: 1, incarnation: 2, time: TIME }),
+        SessionMessage::Refusal(refusal),
+        SessionMessage::Register(ranges),
+        SessionMessage::Registered(RegistrationVerdict { number: 9, objection: None, range, holder: "" }),
+        SessionMessage::Registered(RegistrationVerdict {
+            number: 9,
+            objection: Some(Objection::Taken),
+            range,
+            holder: "arm",
+        }),
+        SessionMessage::Package(Carried { hops: 2, published_ns: 7, head, body: &[1, 2, 3] }),
+        SessionMessage::Ask(8),
+        SessionMessage::Answer(TIME),
     ] {
         check(&message);
     }
@@ -62,8 +73,14 @@ fn a_frame_that_is_cut_short_is_damaged() {
             let mut cut = bytes[..HEAD_BYTES + length].to_vec();
             cut[..4].copy_from_slice(&(length as u32).to_le_bytes());
             match (message, read(&cut)) {
-                (_, Err(BadFrame::Damaged(_))) => {}
-                (Message::Hello(_) | Message::Refusal(_) | Message::Registered(_) | Message::Register(_), Ok(_)) => {}
+                (_, Err(BadSessionFrame::Damaged(_))) => {}
+                (
+                    SessionMessage::Hello(_)
+                    | SessionMessage::Refusal(_)
+                    | SessionMessage::Registered(_)
+                    | SessionMessage::Register(_),
+                    Ok(_),
+                ) => {}
                 (_, other) => panic!("{message:?} cut to {length}: {other:?}"),
             }
         }
@@ -73,33 +90,33 @@ fn a_frame_that_is_cut_short_is_damaged() {
 #[test]
 fn a_stream_of_something_else_is_told_from_another_version() {
     let hello = "GET / HTTP/1.1\r\n";
-    assert_eq!(read(hello.as_bytes()), Err(BadFrame::Damaged("unknown kind")));
+    assert_eq!(read(hello.as_bytes()), Err(BadSessionFrame::Damaged("unknown kind")));
     each(|message| {
         let mut bytes = written(message);
-        if matches!(message, Message::Hello(_) | Message::Welcome(_)) {
+        if matches!(message, SessionMessage::Hello(_) | SessionMessage::Welcome(_)) {
             bytes[HEAD_BYTES + 4] = 9;
-            assert_eq!(read(&bytes), Err(BadFrame::Version(9)));
+            assert_eq!(read(&bytes), Err(BadSessionFrame::Version(9)));
             bytes[HEAD_BYTES] = b'X';
-            assert_eq!(read(&bytes), Err(BadFrame::Foreign));
+            assert_eq!(read(&bytes), Err(BadSessionFrame::Foreign));
         }
     });
 }
 
 #[test]
 fn refusals_say_what_differs_and_what_to_do() {
-    let refusal = |reason| Refusal { version: 7, reason, yours: 0xaa, ours: 0xbb, text: "node arm" }.to_string();
+    let refusal = |reason| SessionRefusal { version: 7, reason, yours: 0xaa, ours: 0xbb, text: "node arm" }.to_string();
     for (reason, words) in [
-        (Reason::Version, ["format 7", "same version"]),
-        (Reason::Common, ["00000000000000aa", "00000000000000bb"]),
-        (Reason::System, ["00000000000000aa", "node arm 00000000000000bb"]),
-        (Reason::Full, ["as many clients", "`clients`"]),
-        (Reason::Damaged, ["could not read", "node arm"]),
+        (SessionRefusalReason::Version, ["format 7", "same version"]),
+        (SessionRefusalReason::Common, ["00000000000000aa", "00000000000000bb"]),
+        (SessionRefusalReason::System, ["00000000000000aa", "node arm 00000000000000bb"]),
+        (SessionRefusalReason::Full, ["as many clients", "`clients`"]),
+        (SessionRefusalReason::Damaged, ["could not read", "node arm"]),
     ] {
         let said = refusal(reason);
         assert!(words.iter().all(|word| said.contains(word)), "{said}");
     }
     let range = Range::module(Name::new(1, 200, 0, 0));
-    let verdict = Verdict { number: 0, objection: Some(Objection::Taken), range, holder: "node arm" };
+    let verdict = RegistrationVerdict { number: 0, objection: Some(Objection::Taken), range, holder: "node arm" };
     assert_eq!(
         verdict.to_string(),
         "1.200.0.0 to 1.200.0.255 is hosted by node arm; end it, or give one of both another name"
@@ -113,7 +130,7 @@ proptest! {
         bytes.extend([kind, hops, 0, 0]);
         bytes.extend(rest);
         // The head of a package may be in the other byte order.
-        if let Ok(message) = read(&bytes) && kind != Kind::Package as u8 {
+        if let Ok(message) = read(&bytes) && kind != SessionFrameKind::Package as u8 {
             prop_assert_eq!(&written(&message), &bytes, "{:?}", message);
         }
     }

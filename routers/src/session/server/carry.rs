@@ -1,11 +1,13 @@
 //! Packages: from the client that sends to the one that hosts the name.
 
-use super::member::{Asked, Member, RoundTrip};
-use super::{Host, Server};
+use super::member::{Member, RoundTrip, TimeRequest};
+use super::{Server, ServerHost};
 use crate::admission::capped;
-use crate::queue::Share;
+use crate::queue::QueueShare;
 use crate::session::counts::Cause;
-use crate::session::frame::{Carried, HOPS_MAX, Message, Refusal, TimeAnswer, VERSION, Verdict, Welcome};
+use crate::session::frame::{
+    Carried, HOPS_MAX, RegistrationVerdict, SessionMessage, SessionRefusal, TimeAnswer, VERSION, Welcome,
+};
 use crate::session::ledger::Ledger;
 use crate::session::outgoing::{Outgoing, Parcel, is_stale};
 use crate::session::{ClientIndex, answer_to, in_system};
@@ -13,7 +15,7 @@ use rohrpost_mailbox::{ALL_SYSTEMS, ERROR_UNKNOWN_NS, Head, TimeRecord};
 
 impl Server {
     /// Hands a package of a client on.
-    pub(super) fn carry(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+    pub(super) fn carry(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl ServerHost) {
         let head = capped(&carried.head);
         // A sender without a publishing time, or with one in the future, has published it now.
         let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
@@ -35,7 +37,7 @@ impl Server {
         }
     }
 
-    fn carry_to_one(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+    fn carry_to_one(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl ServerHost) {
         // What a client cannot deliver itself does not come back to it.
         let to = self.table.client_of(carried.head.to).filter(|to| *to != from);
         match to {
@@ -49,7 +51,7 @@ impl Server {
 
     /// Each system gets it once, by the client that hosts the name there. A client that reaches its own system's other
     /// nodes does that itself.
-    fn carry_to_all(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl Host) {
+    fn carry_to_all(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl ServerHost) {
         let Some((own, reaches_own)) = self.member(from).map(|member| (member.system, member.reaches_own)) else {
             return;
         };
@@ -74,7 +76,7 @@ impl Server {
     }
 
     /// A package that came is lost before it waits for anybody.
-    fn lose(&mut self, now_ns: u64, carried: &Carried<'_>, cause: Cause, host: &mut impl Host) {
+    fn lose(&mut self, now_ns: u64, carried: &Carried<'_>, cause: Cause, host: &mut impl ServerHost) {
         self.counts.came(carried.head.priority);
         self.counts.lost(carried.head.priority, cause);
         let answer = answer_to(&carried.head, carried.body, cause, None, host);
@@ -88,9 +90,9 @@ impl Server {
         from: ClientIndex,
         to: ClientIndex,
         carried: &Carried<'_>,
-        host: &mut impl Host,
+        host: &mut impl ServerHost,
     ) {
-        let share = self.member(from).map(|member| Share { sender: member.principal_id, party: member.party });
+        let share = self.member(from).map(|member| QueueShare { sender: member.principal_id, party: member.party });
         let share = share.unwrap_or_default();
         let level = self.settings.levels[usize::from(carried.head.priority.0)];
         // Behind a stream that stands still all waits in the queue, where the most important goes first.
@@ -103,30 +105,32 @@ impl Server {
     }
 
     /// Makes ready what is to be written next.
-    pub(super) fn refill(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
+    pub(super) fn refill(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
         let (time, incarnation, common) = (self.time, self.settings.incarnation, self.settings.common);
         let Some(member) = self.member_mut(client) else { return };
         if let Some(asked) = member.asked.take() {
             let time = time_answer(now_ns, &asked, time);
-            let welcome = Message::Welcome(Welcome { common, incarnation, time });
+            let welcome = SessionMessage::Welcome(Welcome { common, incarnation, time });
             if asked.by_hello {
                 member.round_trip = RoundTrip::Since(now_ns);
             }
-            member.outgoing.hurry(&if asked.by_hello { welcome } else { Message::Answer(time) });
+            member.outgoing.hurry(&if asked.by_hello { welcome } else { SessionMessage::Answer(time) });
         }
         if let Some(judged) = member.judged.take() {
-            member.outgoing.hurry(&Message::Registered(Verdict { holder: &judged.holder, ..judged.verdict }));
+            member
+                .outgoing
+                .hurry(&SessionMessage::Registered(RegistrationVerdict { holder: &judged.holder, ..judged.verdict }));
         }
         if let Some(refused) = member.refused.take() {
             let ((yours, ours), text) = (refused.digests, refused.text.as_str());
-            let refusal = Refusal { version: VERSION, reason: refused.reason, yours, ours, text };
-            member.outgoing.say(&Message::Refusal(refusal));
+            let refusal = SessionRefusal { version: VERSION, reason: refused.reason, yours, ours, text };
+            member.outgoing.say(&SessionMessage::Refusal(refusal));
         }
         self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.refill(now_ns, 0, ledger));
     }
 
     /// Does something with what leaves by a client's connection, and answers the commands that are lost thereby.
-    pub(super) fn with_ledger<H: Host>(
+    pub(super) fn with_ledger<H: ServerHost>(
         &mut self,
         now_ns: u64,
         client: ClientIndex,
@@ -142,7 +146,7 @@ impl Server {
     }
 
     /// Sends answers on their way. Answers are not answered; what gives way to one is less important, so this ends.
-    fn say_all(&mut self, now_ns: u64, answers: Vec<(Head, Vec<u8>)>, host: &mut impl Host) {
+    fn say_all(&mut self, now_ns: u64, answers: Vec<(Head, Vec<u8>)>, host: &mut impl ServerHost) {
         for (head, body) in answers {
             let carried = Carried { hops: 0, published_ns: now_ns, head, body: &body };
             match self.table.client_of(head.to) {
@@ -157,8 +161,8 @@ impl Server {
     }
 }
 
-fn time_answer(now_ns: u64, asked: &Asked, time: Option<TimeRecord>) -> TimeAnswer {
-    let Asked { asked_ns, came_ns, .. } = *asked;
+fn time_answer(now_ns: u64, asked: &TimeRequest, time: Option<TimeRecord>) -> TimeAnswer {
+    let TimeRequest { asked_ns, came_ns, .. } = *asked;
     let unknown = TimeAnswer { asked_ns, came_ns, left_ns: now_ns, system_ns: 0, error_ns: ERROR_UNKNOWN_NS, epoch: 0 };
     time.map_or(unknown, |record| {
         let system = record.at(now_ns);

@@ -20,7 +20,7 @@ impl<K> Default for Crowd<K> {
 }
 
 impl<K: Ord + Clone> Crowd<K> {
-    /// One more; it began then, ns.
+    /// Adds a connection that began at this time, ns.
     pub(super) fn add(&mut self, owner: &K, began_ns: u64, client: ClientIndex) {
         let of = self.of.entry(owner.clone()).or_default();
         let before = of.len();
@@ -31,7 +31,7 @@ impl<K: Ord + Clone> Crowd<K> {
         }
     }
 
-    /// One less.
+    /// Removes a connection.
     pub(super) fn remove(&mut self, owner: &K, began_ns: u64, client: ClientIndex) {
         let Some(of) = self.of.get_mut(owner) else { return };
         let before = of.len();

@@ -1,8 +1,10 @@
 //! Handles frames from clients, and decides which clients may take part.
 
-use super::member::{Asked, Refused, RoundTrip, State};
-use super::{Event, Host, Server};
-use crate::session::frame::{BadFrame, GREETING_LENGTH_MAX, Hello, LENGTH_MAX, Message, NAME_BYTES_MAX, Reason};
+use super::member::{MemberState, PendingRefusal, RoundTrip, TimeRequest};
+use super::{Server, ServerEvent, ServerHost};
+use crate::session::frame::{
+    BadSessionFrame, HELLO_LENGTH_MAX, LENGTH_MAX, NAME_BYTES_MAX, SessionHello, SessionMessage, SessionRefusalReason,
+};
 use crate::session::{ClientIndex, LOOK_EVERY_NS};
 
 /// Time that a refused client has to read the reason.
@@ -10,14 +12,14 @@ const LEAVE_WITHIN_NS: u64 = 5 * LOOK_EVERY_NS;
 
 /// What differs, and the end that has the right one.
 struct Difference {
-    reason: Reason,
+    reason: SessionRefusalReason,
     digests: (u64, u64),
     holder: String,
 }
 
 impl Server {
     /// Takes bytes of a client's stream, split anywhere.
-    pub fn received(&mut self, now_ns: u64, client: ClientIndex, mut bytes: &[u8], host: &mut impl Host) {
+    pub fn received(&mut self, now_ns: u64, client: ClientIndex, mut bytes: &[u8], host: &mut impl ServerHost) {
         let Some(member) = self.member_mut(client) else { return };
         member.heard_ns = now_ns;
         if let RoundTrip::Since(welcomed_ns) = member.round_trip {
@@ -26,14 +28,14 @@ impl Server {
         let mut splitter = std::mem::take(&mut member.splitter);
         loop {
             let length_max = match self.member(client).map(|member| member.state) {
-                Some(State::Greeting) => GREETING_LENGTH_MAX,
-                Some(State::Member) => LENGTH_MAX,
+                Some(MemberState::Handshake) => HELLO_LENGTH_MAX,
+                Some(MemberState::Member) => LENGTH_MAX,
                 // What it still says nobody reads.
-                Some(State::Leaving { .. }) | None => return,
+                Some(MemberState::Leaving { .. }) | None => return,
             };
             let message = match splitter.next(now_ns, length_max, &mut bytes) {
                 Ok(None) => break,
-                Ok(Some((head, rest))) => Message::parse(head, rest),
+                Ok(Some((head, rest))) => SessionMessage::parse(head, rest),
                 Err(bad) => Err(bad),
             };
             match message {
@@ -46,29 +48,29 @@ impl Server {
         }
     }
 
-    fn handle(&mut self, now_ns: u64, client: ClientIndex, message: &Message<'_>, host: &mut impl Host) {
+    fn handle(&mut self, now_ns: u64, client: ClientIndex, message: &SessionMessage<'_>, host: &mut impl ServerHost) {
         let Some(member) = self.member_mut(client) else { return };
         match (member.state, message) {
-            (State::Greeting, Message::Hello(hello)) => self.greet(now_ns, client, hello, host),
-            (State::Member, Message::Register(ranges)) => self.register(now_ns, client, *ranges, host),
-            (State::Member, Message::Package(carried)) => self.carry(now_ns, client, carried, host),
-            (State::Member, Message::Ask(asked_ns)) => {
+            (MemberState::Handshake, SessionMessage::Hello(hello)) => self.take_hello(now_ns, client, hello, host),
+            (MemberState::Member, SessionMessage::Register(ranges)) => self.register(now_ns, client, *ranges, host),
+            (MemberState::Member, SessionMessage::Package(carried)) => self.carry(now_ns, client, carried, host),
+            (MemberState::Member, SessionMessage::Ask(asked_ns)) => {
                 // Of several questions the last is answered: that bounds what waits.
                 let by_hello = member.asked.is_some_and(|asked| asked.by_hello);
-                member.asked = Some(Asked { asked_ns: *asked_ns, came_ns: now_ns, by_hello });
+                member.asked = Some(TimeRequest { asked_ns: *asked_ns, came_ns: now_ns, by_hello });
                 self.is_due(client);
             }
-            _ => self.refuse_bad(now_ns, client, BadFrame::Damaged("a frame that is not for now"), host),
+            _ => self.refuse_bad(now_ns, client, BadSessionFrame::Damaged("a frame that is not for now"), host),
         }
     }
 
-    fn greet(&mut self, now_ns: u64, client: ClientIndex, hello: &Hello<'_>, host: &mut impl Host) {
+    fn take_hello(&mut self, now_ns: u64, client: ClientIndex, hello: &SessionHello<'_>, host: &mut impl ServerHost) {
         if let Some(member) = self.member_mut(client) {
             match member.certified {
                 None => hello.name.clone_into(&mut member.name),
                 Some(system) if system != hello.system => {
                     let text = format!("its certificate is of system {system}, its hello of {}", hello.system);
-                    return self.refuse(now_ns, client, Reason::Certificate, (0, 0), &text, host);
+                    return self.refuse(now_ns, client, SessionRefusalReason::Certificate, (0, 0), &text, host);
                 }
                 Some(_) => {}
             }
@@ -79,35 +81,43 @@ impl Server {
         let older = self.places.of_incarnation(hello.incarnation);
         if let Some((older, attempt)) = older.and_then(|older| Some((older, self.member(older)?.attempt))) {
             if attempt >= hello.attempt {
-                return self.refuse(now_ns, client, Reason::Replaced, (0, 0), "", host);
+                return self.refuse(now_ns, client, SessionRefusalReason::Replaced, (0, 0), "", host);
             }
-            self.refuse(now_ns, older, Reason::Replaced, (0, 0), "", host);
+            self.refuse(now_ns, older, SessionRefusalReason::Replaced, (0, 0), "", host);
         }
         if !self.take_in(now_ns, client, hello, host) {
-            return self.refuse(now_ns, client, Reason::Full, (0, 0), "", host);
+            return self.refuse(now_ns, client, SessionRefusalReason::Full, (0, 0), "", host);
         }
         if let Some(member) = self.member(client) {
-            host.event(Event::Joined { name: &member.name });
+            host.event(ServerEvent::Joined { name: &member.name });
         }
         self.is_due(client);
     }
 
-    fn difference(&self, hello: &Hello<'_>) -> Option<Difference> {
+    fn difference(&self, hello: &SessionHello<'_>) -> Option<Difference> {
         let settings = &self.settings;
         if hello.common != settings.common {
             let digests = (hello.common, settings.common);
-            return Some(Difference { reason: Reason::Common, digests, holder: settings.name.clone() });
+            return Some(Difference { reason: SessionRefusalReason::Common, digests, holder: settings.name.clone() });
         }
         let own = settings.system.filter(|(system, _)| *system == hello.system);
         let own = own.map(|(_, digest)| (settings.name.as_str(), digest));
         let first = || self.places.of_system(hello.system).and_then(|first| self.member(first));
         let held = own.or_else(|| first().map(|member| (member.name.as_str(), member.system_digest)));
         let (holder, digest) = held.filter(|(_, digest)| *digest != hello.system_digest)?;
-        Some(Difference { reason: Reason::System, digests: (hello.system_digest, digest), holder: holder.to_owned() })
+        Some(Difference {
+            reason: SessionRefusalReason::System,
+            digests: (hello.system_digest, digest),
+            holder: holder.to_owned(),
+        })
     }
 
-    fn refuse_bad(&mut self, now_ns: u64, client: ClientIndex, bad: BadFrame, host: &mut impl Host) {
-        let reason = if matches!(bad, BadFrame::Version(_)) { Reason::Version } else { Reason::Damaged };
+    fn refuse_bad(&mut self, now_ns: u64, client: ClientIndex, bad: BadSessionFrame, host: &mut impl ServerHost) {
+        let reason = if matches!(bad, BadSessionFrame::Version(_)) {
+            SessionRefusalReason::Version
+        } else {
+            SessionRefusalReason::Damaged
+        };
         self.refuse(now_ns, client, reason, (0, 0), &bad.to_string(), host);
     }
 
@@ -116,24 +126,24 @@ impl Server {
         &mut self,
         now_ns: u64,
         client: ClientIndex,
-        reason: Reason,
+        reason: SessionRefusalReason,
         digests: (u64, u64),
         text: &str,
-        host: &mut impl Host,
+        host: &mut impl ServerHost,
     ) {
         let Some(Some(member)) = self.members.get(usize::from(client.0)) else { return };
         match member.state {
-            State::Leaving { .. } => return,
-            State::Greeting => {
-                self.places.greets_no_more(client, member);
-                host.event(Event::Refused { name: &member.name, reason, digests, text });
+            MemberState::Leaving { .. } => return,
+            MemberState::Handshake => {
+                self.places.handshake_ends(client, member);
+                host.event(ServerEvent::Refused { name: &member.name, reason, digests, text });
             }
-            State::Member => self.leave(now_ns, client, Some(reason), host),
+            MemberState::Member => self.leave(now_ns, client, Some(reason), host),
         }
         let Some(member) = self.member_mut(client) else { return };
-        member.state = State::Leaving { until_ns: now_ns + LEAVE_WITHIN_NS };
+        member.state = MemberState::Leaving { until_ns: now_ns + LEAVE_WITHIN_NS };
         let text = text[..text.floor_char_boundary(NAME_BYTES_MAX)].to_owned();
-        member.refused = Some(Refused { reason, digests, text });
+        member.refused = Some(PendingRefusal { reason, digests, text });
         self.is_due(client);
     }
 }

@@ -3,15 +3,15 @@
 use super::principal::{Principal, PrincipalId};
 use super::rights::Rights;
 use super::work::Registrations;
-use crate::session::frame::{Hello, Reason, Verdict};
+use crate::session::frame::{RegistrationVerdict, SessionHello, SessionRefusalReason};
 use crate::session::outgoing::Outgoing;
 use crate::session::splitter::Splitter;
 
 /// How far a connection has come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum State {
+pub enum MemberState {
     /// It has not said hello.
-    Greeting,
+    Handshake,
     /// It takes part.
     Member,
     /// It is told why it may not any more, and then closed.
@@ -21,32 +21,32 @@ pub enum State {
     },
 }
 
-/// A question for the time that waits for its answer.
+/// A request for the time that waits for its response.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(super) struct TimeRequest {
     pub(super) asked_ns: u64,
     pub(super) came_ns: u64,
     /// It came with the hello: the answer is the welcome.
     pub(super) by_hello: bool,
 }
 
-/// A verdict that waits for its way out.
+/// A verdict that is not sent yet.
 #[derive(Debug)]
-pub(super) struct Judged {
+pub(super) struct PendingVerdict {
     /// But for the holder.
-    pub(super) verdict: Verdict<'static>,
+    pub(super) verdict: RegistrationVerdict<'static>,
     pub(super) holder: String,
 }
 
-/// A refusal that waits for its way out.
+/// A refusal that is not sent yet.
 #[derive(Debug)]
-pub(super) struct Refused {
-    pub(super) reason: Reason,
+pub(super) struct PendingRefusal {
+    pub(super) reason: SessionRefusalReason,
     pub(super) digests: (u64, u64),
     pub(super) text: String,
 }
 
-/// The way there and back: a client says something as soon as it reads its welcome.
+/// The round trip: a client says something as soon as it reads its welcome.
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) enum RoundTrip {
     /// There was no welcome.
@@ -60,7 +60,7 @@ pub(super) enum RoundTrip {
 
 #[derive(Debug)]
 pub(super) struct Member {
-    pub(super) state: State,
+    pub(super) state: MemberState,
     /// Its name for people; until the hello, where it comes from.
     pub(super) name: String,
     pub(super) system: u8,
@@ -85,10 +85,10 @@ pub(super) struct Member {
     pub(super) attempt: u64,
     pub(super) splitter: Splitter,
     pub(super) outgoing: Outgoing,
-    pub(super) asked: Option<Asked>,
+    pub(super) asked: Option<TimeRequest>,
     pub(super) registrations: Registrations,
-    pub(super) judged: Option<Judged>,
-    pub(super) refused: Option<Refused>,
+    pub(super) judged: Option<PendingVerdict>,
+    pub(super) refused: Option<PendingRefusal>,
     pub(super) round_trip: RoundTrip,
     /// When the connection began, ns.
     pub(super) began_ns: u64,
@@ -105,7 +105,7 @@ pub(super) struct Member {
 impl Member {
     pub(super) fn new(now_ns: u64, name: String, address: Principal, quota_bytes: usize) -> Self {
         Self {
-            state: State::Greeting,
+            state: MemberState::Handshake,
             name,
             system: 0,
             certified: None,
@@ -135,8 +135,8 @@ impl Member {
     }
 
     /// It said hello, and may take part.
-    pub(super) fn joins(&mut self, now_ns: u64, hello: &Hello<'_>) {
-        self.state = State::Member;
+    pub(super) fn joins(&mut self, now_ns: u64, hello: &SessionHello<'_>) {
+        self.state = MemberState::Member;
         if self.certified.is_none() {
             hello.name.clone_into(&mut self.name);
         }
@@ -145,21 +145,21 @@ impl Member {
         self.reaches_own = hello.reaches_own;
         self.incarnation = hello.incarnation;
         self.attempt = hello.attempt;
-        self.asked = Some(Asked { asked_ns: hello.asked_ns, came_ns: now_ns, by_hello: true });
+        self.asked = Some(TimeRequest { asked_ns: hello.asked_ns, came_ns: now_ns, by_hello: true });
     }
 
     /// Whether it had its time to read why it must leave.
     pub(super) fn is_over(&self, now_ns: u64) -> bool {
-        matches!(self.state, State::Leaving { until_ns } if now_ns >= until_ns)
+        matches!(self.state, MemberState::Leaving { until_ns } if now_ns >= until_ns)
     }
 
     pub(super) fn is_member(&self) -> bool {
-        self.state == State::Member
+        self.state == MemberState::Member
     }
 
     /// Whether there is more to be written than what is ready.
     pub(super) fn has_more(&self) -> bool {
-        let is_leaving = matches!(self.state, State::Leaving { .. });
+        let is_leaving = matches!(self.state, MemberState::Leaving { .. });
         let says = self.asked.is_some() || self.judged.is_some() || self.refused.is_some();
         is_leaving || says || self.outgoing.has_waiting()
     }

@@ -1,9 +1,9 @@
 //! The server: takes what clients send, and gives it to the client that hosts the name.
 //!
 //! ```text
-//!  accept ─▶ greeting ─ hello ─▶ member ─ register ─▶ Table        received ─▶ intake ─▶ carry ─▶ Outgoing of another
-//!               │ too long, wrong      │ silent, stalled, replaced                                   │
-//!               └──── refusal ────▶ leaving ─▶ closed                poll ─▶ Write, Close, Wait ◀────┘
+//!  accept ─▶ handshake ─ hello ─▶ member ─ register ─▶ RoutingTable  received ─▶ intake ─▶ carry ─▶ another's Outgoing
+//!               │ too long, wrong       │ silent, stalled, replaced                                     │
+//!               └──── refusal ─────▶ leaving ─▶ closed                poll ─▶ Write, Close, Wait ◀──────┘
 //! ```
 
 mod carry;
@@ -17,16 +17,16 @@ mod registering;
 mod rights;
 mod work;
 
-pub use member::State;
+pub use member::MemberState;
 pub use places::Crowded;
 pub(super) use principal::Principals;
 pub use rights::{Names, OwnNode, OwnNodes, Rights};
 
 use super::ClientIndex;
-use super::counts::Counts;
-use super::frame::{Reason, Verdict};
-use super::table::Table;
-use super::{Answers, LOOK_EVERY_NS};
+use super::counts::SessionCounts;
+use super::frame::{RegistrationVerdict, SessionRefusalReason};
+use super::table::RoutingTable;
+use super::{ErrorReplies, LOOK_EVERY_NS};
 use member::{Member, RoundTrip};
 use places::Places;
 use principal::Principal;
@@ -51,7 +51,7 @@ pub struct ServerSettings {
     /// Clients that may take part at a time.
     pub clients_max: u16,
     /// Connections that have not said hello yet; of more the oldest gives way.
-    pub greetings_max: u16,
+    pub handshakes_max: u16,
     /// Bytes of packages that wait for one client.
     pub quota_bytes: usize,
     /// Level of each priority; 0 goes first.
@@ -82,9 +82,9 @@ pub struct View<'a> {
     pub bytes: usize,
 }
 
-/// What to do.
+/// Next step for the code around the core, from [`Server::poll`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Output {
+pub enum ServerStep {
     /// Write what [`Server::ready`] has, then say how much with [`Server::took`].
     Write(ClientIndex),
     /// Close the connection; the index is free.
@@ -96,9 +96,9 @@ pub enum Output {
     },
 }
 
-/// What people want to know of.
+/// A change that people are told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Event<'a> {
+pub enum ServerEvent<'a> {
     /// A client takes part.
     Joined {
         /// Its name.
@@ -109,14 +109,14 @@ pub enum Event<'a> {
         /// Its name.
         name: &'a str,
         /// Why.
-        why: Option<Reason>,
+        why: Option<SessionRefusalReason>,
     },
     /// One was not let in.
     Refused {
         /// Its name, as far as it is known.
         name: &'a str,
         /// Why.
-        reason: Reason,
+        reason: SessionRefusalReason,
         /// What differs: its, and what it should be.
         digests: (u64, u64),
         /// The end that has it, or what was wrong.
@@ -127,14 +127,14 @@ pub enum Event<'a> {
         /// Its name.
         name: &'a str,
         /// What it was told.
-        verdict: &'a Verdict<'a>,
+        verdict: &'a RegistrationVerdict<'a>,
     },
 }
 
 /// What the server needs from the code that runs it.
-pub trait Host: Answers {
+pub trait ServerHost: ErrorReplies {
     /// Something happened.
-    fn event(&mut self, event: Event<'_>);
+    fn event(&mut self, event: ServerEvent<'_>);
 }
 
 /// The server.
@@ -143,8 +143,8 @@ pub struct Server {
     settings: ServerSettings,
     members: Vec<Option<Box<Member>>>,
     places: Places,
-    table: Table,
-    counts: Counts,
+    table: RoutingTable,
+    counts: SessionCounts,
     /// Clients for which something is to be done.
     due: VecDeque<ClientIndex>,
     registering: Registering,
@@ -160,8 +160,8 @@ impl Server {
             settings,
             members: Vec::new(),
             places: Places::default(),
-            table: Table::default(),
-            counts: Counts::default(),
+            table: RoutingTable::default(),
+            counts: SessionCounts::default(),
             due: VecDeque::new(),
             registering: Registering::default(),
             time: None,
@@ -171,18 +171,18 @@ impl Server {
     }
 
     /// What it counts.
-    pub fn counts(&self) -> &Counts {
+    pub fn counts(&self) -> &SessionCounts {
         &self.counts
     }
 
     /// Hosts of names.
-    pub fn table(&self) -> &Table {
+    pub fn table(&self) -> &RoutingTable {
         &self.table
     }
 
     /// Registrations that were never looked at, since the same client sent a later one before its turn.
-    pub fn overtaken(&self) -> u64 {
-        self.registering.overtaken
+    pub fn superseded(&self) -> u64 {
+        self.registering.superseded
     }
 
     /// How often somebody had more of something than its share.
@@ -196,7 +196,7 @@ impl Server {
     }
 
     /// Name and state of each client.
-    pub fn clients(&self) -> impl Iterator<Item = (ClientIndex, &str, State)> {
+    pub fn clients(&self) -> impl Iterator<Item = (ClientIndex, &str, MemberState)> {
         self.present().map(|(index, member)| (index, member.name.as_str(), member.state))
     }
 
@@ -245,8 +245,8 @@ impl Server {
     }
 
     /// The certificate that a client shows before its hello does not admit it; it is told.
-    pub fn names_nobody(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
-        self.refuse(now_ns, client, Reason::Certificate, (0, 0), "it names no node", host);
+    pub fn names_nobody(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
+        self.refuse(now_ns, client, SessionRefusalReason::Certificate, (0, 0), "it names no node", host);
     }
 
     /// Bytes to be written to a client.
@@ -272,7 +272,7 @@ impl Server {
         }
     }
 
-    /// So many bytes are made ready for a client at a time from now on.
+    /// Makes this many bytes ready for a client at a time from now on.
     pub fn set_batch(&mut self, client: ClientIndex, bytes: usize) {
         if let Some(member) = self.member_mut(client) {
             member.outgoing.set_batch(bytes);
@@ -288,21 +288,21 @@ impl Server {
     }
 
     /// The connection is closed, or broken. The index is free.
-    pub fn closed(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl Host) {
+    pub fn closed(&mut self, now_ns: u64, client: ClientIndex, host: &mut impl ServerHost) {
         self.leave(now_ns, client, None, host);
         self.free(client);
     }
 
     /// All clients are told that the server ends.
-    pub fn end(&mut self, now_ns: u64, host: &mut impl Host) {
+    pub fn end(&mut self, now_ns: u64, host: &mut impl ServerHost) {
         let all: Vec<_> = self.present().map(|(index, _)| index).collect();
         for client in all {
-            self.refuse(now_ns, client, Reason::Ending, (0, 0), "", host);
+            self.refuse(now_ns, client, SessionRefusalReason::Ending, (0, 0), "", host);
         }
     }
 
     /// What to do next.
-    pub fn poll(&mut self, now_ns: u64, host: &mut impl Host) -> Output {
+    pub fn poll(&mut self, now_ns: u64, host: &mut impl ServerHost) -> ServerStep {
         if now_ns >= self.look_ns {
             self.look_ns = now_ns + LOOK_EVERY_NS;
             self.look(now_ns, host);
@@ -316,15 +316,15 @@ impl Server {
             }
             self.refill(now_ns, client, host);
             match self.member(client) {
-                Some(member) if !member.outgoing.ready().is_empty() && !is_over => return Output::Write(client),
-                Some(member) if matches!(member.state, State::Leaving { .. }) => {
+                Some(member) if !member.outgoing.ready().is_empty() && !is_over => return ServerStep::Write(client),
+                Some(member) if matches!(member.state, MemberState::Leaving { .. }) => {
                     self.free(client);
-                    return Output::Close(client);
+                    return ServerStep::Close(client);
                 }
                 _ => {}
             }
         }
-        Output::Wait { until_ns: self.look_ns }
+        ServerStep::Wait { until_ns: self.look_ns }
     }
 
     fn present(&self) -> impl Iterator<Item = (ClientIndex, &Member)> {

@@ -2,17 +2,17 @@
 //! have one.
 //!
 //! ```text
-//!  accept ─▶ greeting: of too many the oldest of the address that has most gives way
-//!  hello  ─▶ member:   of too many the newest of the principal that has most, if the new one's has fewer by two
+//!  accept ─▶ handshake: of too many the oldest of the address that has most gives way
+//!  hello  ─▶ member:    of too many the newest of the principal that has most, if the new one's has fewer by two
 //! ```
 
 use super::crowd::Crowd;
-use super::member::{Member, State};
+use super::member::{Member, MemberState};
 use super::principal::{Principal, Principals};
 use super::work::WORK_SHARE;
-use super::{Host, Server};
+use super::{Server, ServerHost};
 use crate::session::ClientIndex;
-use crate::session::frame::{Hello, Reason};
+use crate::session::frame::{SessionHello, SessionRefusalReason};
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
 
@@ -23,7 +23,7 @@ const STRANGERS: u32 = 256;
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Crowded {
     /// Connections before their hello that gave way, since their address had most.
-    pub greetings: u64,
+    pub handshakes: u64,
     /// Clients that gave way to others with fewer, or were not let in while they had most.
     pub clients: u64,
     /// Registrations with more ranges than a principal may have.
@@ -36,7 +36,7 @@ pub(super) struct Places {
     /// Places that were left.
     free: BTreeSet<u16>,
     /// Clients without a hello yet, by address.
-    greetings: Crowd<Principal>,
+    handshakes: Crowd<Principal>,
     /// Admitted clients.
     pub(super) principals: Principals,
     /// Admitted clients, by incarnation.
@@ -47,7 +47,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// One of a system that takes part.
+    /// A client of a system that takes part.
     pub(super) fn of_system(&self, system: u8) -> Option<ClientIndex> {
         let least = (system, ClientIndex(0));
         self.systems.range(least..).next().filter(|(of, _)| *of == system).map(|(_, client)| *client)
@@ -68,19 +68,19 @@ impl Places {
     }
 
     /// It does not stand before its hello any more.
-    pub(super) fn greets_no_more(&mut self, client: ClientIndex, member: &Member) {
-        self.greetings.remove(&member.address, member.began_ns, client);
+    pub(super) fn handshake_ends(&mut self, client: ClientIndex, member: &Member) {
+        self.handshakes.remove(&member.address, member.began_ns, client);
     }
 }
 
 impl Server {
     /// A connection was made, from this address. None: so many are there that it must be closed.
-    pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl Host) -> Option<ClientIndex> {
+    pub fn accept(&mut self, now_ns: u64, from: SocketAddr, host: &mut impl ServerHost) -> Option<ClientIndex> {
         let address = Principal::of(from.ip());
-        if self.places.greetings.len() >= self.settings.greetings_max.into() {
-            let oldest = self.oldest_greeting(&address)?;
-            self.places.crowded.greetings += 1;
-            self.refuse(now_ns, oldest, Reason::Silent, (0, 0), "others wait to be let in", host);
+        if self.places.handshakes.len() >= self.settings.handshakes_max.into() {
+            let oldest = self.oldest_handshake(&address)?;
+            self.places.crowded.handshakes += 1;
+            self.refuse(now_ns, oldest, SessionRefusalReason::Silent, (0, 0), "others wait to be let in", host);
         }
         let index = match self.places.free.pop_first() {
             Some(free) => free,
@@ -91,18 +91,18 @@ impl Server {
             None => return None,
         };
         let client = ClientIndex(index);
-        self.places.greetings.add(&address, now_ns, client);
+        self.places.handshakes.add(&address, now_ns, client);
         let member = Member::new(now_ns, from.to_string(), address, self.settings.quota_bytes);
         self.members[usize::from(index)] = Some(Box::new(member));
         Some(client)
     }
 
-    /// Of the connections before their hello, one that gives way to a new one from this address.
-    fn oldest_greeting(&self, address: &Principal) -> Option<ClientIndex> {
-        let greetings = &self.places.greetings;
-        let (largest, most) = greetings.largest()?;
-        let owner = if greetings.count_of(address) == most { address } else { largest };
-        greetings.ends_of(owner).map(|(oldest, _)| oldest)
+    /// The connection before its hello that gives way to a new one from this address.
+    fn oldest_handshake(&self, address: &Principal) -> Option<ClientIndex> {
+        let handshakes = &self.places.handshakes;
+        let (largest, most) = handshakes.largest()?;
+        let owner = if handshakes.count_of(address) == most { address } else { largest };
+        handshakes.ends_of(owner).map(|(oldest, _)| oldest)
     }
 
     /// A client said hello, and nothing speaks against it: whether there is a place for it.
@@ -110,18 +110,18 @@ impl Server {
         &mut self,
         now_ns: u64,
         client: ClientIndex,
-        hello: &Hello<'_>,
-        host: &mut impl Host,
+        hello: &SessionHello<'_>,
+        host: &mut impl ServerHost,
     ) -> bool {
         let Some(owner) = self.member(client).map(|member| member.principal.clone()) else { return false };
         if self.places.principals.members.len() >= self.settings.clients_max.into() {
             let Some(newest) = self.gives_way_to(&owner) else { return false };
             self.places.crowded.clients += 1;
             let text = "the principal with most connections gives way to one with fewer";
-            self.refuse(now_ns, newest, Reason::Full, (0, 0), text, host);
+            self.refuse(now_ns, newest, SessionRefusalReason::Full, (0, 0), text, host);
         }
         let Some(Some(member)) = self.members.get_mut(usize::from(client.0)) else { return false };
-        self.places.greets_no_more(client, member);
+        self.places.handshake_ends(client, member);
         member.principal_id = self.places.principals.joins(&owner, member.began_ns, client, WORK_SHARE);
         member.joins(now_ns, hello);
         let is_own = self.settings.system.is_some_and(|(system, _)| system == hello.system);
@@ -151,8 +151,8 @@ impl Server {
     /// The place is free; the next client in it is another.
     pub(super) fn free(&mut self, client: ClientIndex) {
         let Some(member) = self.members.get_mut(usize::from(client.0)).and_then(Option::take) else { return };
-        if member.state == State::Greeting {
-            self.places.greets_no_more(client, &member);
+        if member.state == MemberState::Handshake {
+            self.places.handshake_ends(client, &member);
         }
         if member.is_due {
             self.due.retain(|due| *due != client);
@@ -161,6 +161,6 @@ impl Server {
     }
 
     fn places_max(&self) -> usize {
-        usize::from(self.settings.clients_max) + usize::from(self.settings.greetings_max)
+        usize::from(self.settings.clients_max) + usize::from(self.settings.handshakes_max)
     }
 }

@@ -33,7 +33,7 @@ impl Principal {
 /// A principal by a number that no other gets as long as anything of it waits.
 pub(in crate::session) type PrincipalId = u32;
 
-/// What a principal that takes part uses.
+/// Resources that a principal uses.
 #[derive(Debug)]
 pub(in crate::session) struct Uses {
     owner: Principal,
@@ -60,7 +60,7 @@ pub(in crate::session) struct Principals {
 }
 
 impl Principals {
-    /// One of its connections takes part.
+    /// A connection of a principal becomes a member.
     pub(super) fn joins(&mut self, owner: &Principal, began_ns: u64, client: ClientIndex, work: usize) -> PrincipalId {
         let id = self.id_of(owner).unwrap_or_else(|| {
             self.next = self.next.wrapping_add(1);
@@ -73,7 +73,7 @@ impl Principals {
         id
     }
 
-    /// One of its connections does not any more.
+    /// A connection of a principal is no member any more.
     pub(super) fn leaves(&mut self, now_ns: u64, id: PrincipalId, began_ns: u64, client: ClientIndex) {
         self.members.remove(&id, began_ns, client);
         if let Some(uses) = self.uses.get_mut(&id).filter(|_| self.members.count_of(&id) == 0) {

@@ -6,11 +6,11 @@
 //!            └─ else it waits; a later one takes its place ──▲ at each look, in turn
 //! ```
 
-use super::work::{RANGES_SHARE, REGISTER_EVERY_NS, WORK_MAX, WORK_OF_ONE, Waiting};
-use super::{Event, Host, Server};
+use super::work::{PendingRegistration, RANGES_SHARE, REGISTER_EVERY_NS, WORK_MAX, WORK_OF_ONE};
+use super::{Server, ServerEvent, ServerHost};
 use crate::session::ClientIndex;
-use crate::session::frame::{Objection, Range, Ranges, Reason, Verdict};
-use crate::session::server::member::{Judged, Member};
+use crate::session::frame::{Objection, Range, Ranges, RegistrationVerdict, SessionRefusalReason};
+use crate::session::server::member::{Member, PendingVerdict};
 use rohrpost_mailbox::Name;
 
 impl Server {
@@ -19,14 +19,20 @@ impl Server {
     pub(super) fn is_to_host(&self, client: ClientIndex, name: Name) -> bool {
         let waiting = |member: &Member| {
             let waiting = member.registrations.waiting.as_ref();
-            let has = |waiting: &Waiting| waiting.ranges.iter().any(|range| range.has(name));
+            let has = |waiting: &PendingRegistration| waiting.ranges.iter().any(|range| range.has(name));
             name.system() == member.system && member.rights.may_host(name) && waiting.is_some_and(has)
         };
         self.member(client).is_some_and(waiting) && self.table.client_of(name).is_none()
     }
 
     /// A client says what it hosts from now on.
-    pub(super) fn register(&mut self, now_ns: u64, client: ClientIndex, ranges: Ranges<'_>, host: &mut impl Host) {
+    pub(super) fn register(
+        &mut self,
+        now_ns: u64,
+        client: ClientIndex,
+        ranges: Ranges<'_>,
+        host: &mut impl ServerHost,
+    ) {
         let is_left = self.is_left(client, ranges.len());
         let Some(member) = self.member_mut(client) else { return };
         let of_client = &mut member.registrations;
@@ -34,14 +40,14 @@ impl Server {
         if is_its_turn {
             return self.validate(now_ns, client, ranges.number, ranges, host);
         }
-        let waiting = Waiting { number: ranges.number, ranges: ranges.collect() };
+        let waiting = PendingRegistration { number: ranges.number, ranges: ranges.collect() };
         if of_client.waiting.replace(waiting).is_some() {
-            self.registering.overtaken += 1;
+            self.registering.superseded += 1;
         }
     }
 
     /// Looks at what waits, beginning where the work ended last time.
-    pub(super) fn look_at_registrations(&mut self, now_ns: u64, host: &mut impl Host) {
+    pub(super) fn look_at_registrations(&mut self, now_ns: u64, host: &mut impl ServerHost) {
         self.registering.left = WORK_MAX;
         let places = self.members.len() as u16;
         let first = self.registering.first.min(places);
@@ -61,7 +67,7 @@ impl Server {
                 continue;
             }
             let waiting = self.member_mut(client).and_then(|member| member.registrations.waiting.take());
-            if let Some(Waiting { number, ranges }) = waiting {
+            if let Some(PendingRegistration { number, ranges }) = waiting {
                 self.validate(now_ns, client, number, ranges.into_iter(), host);
             }
         }
@@ -93,7 +99,7 @@ impl Server {
         client: ClientIndex,
         number: u32,
         ranges: impl ExactSizeIterator<Item = Range>,
-        host: &mut impl Host,
+        host: &mut impl ServerHost,
     ) {
         let Some(member) = self.member(client).filter(|member| member.is_member()) else { return };
         let (system, rights, principal) = (member.system, member.rights.clone(), member.principal_id);
@@ -105,7 +111,7 @@ impl Server {
         let mut conflict = self.table.register(client, room, may, ranges.iter().copied()).err();
         while let Some(impostor) = conflict.and_then(|conflict| self.impostor(client, conflict.holder?)) {
             let text = "the node of that name has come, from its own address";
-            self.refuse(now_ns, impostor, Reason::Replaced, (0, 0), text, host);
+            self.refuse(now_ns, impostor, SessionRefusalReason::Replaced, (0, 0), text, host);
             conflict = self.table.register(client, room, may, ranges.iter().copied()).err();
         }
         let count = self.table.count_of(client);
@@ -115,10 +121,10 @@ impl Server {
             uses.ranges = (uses.ranges + count).saturating_sub(before);
         }
         let nothing = Range { first: Name::NONE, last: Name::NONE };
-        let mut verdict = Verdict { number, objection: None, range: nothing, holder: "" };
+        let mut verdict = RegistrationVerdict { number, objection: None, range: nothing, holder: "" };
         let mut holder = String::new();
         if let Some(conflict) = &conflict {
-            verdict = Verdict { objection: Some(conflict.objection), range: conflict.range, ..verdict };
+            verdict = RegistrationVerdict { objection: Some(conflict.objection), range: conflict.range, ..verdict };
             let held_by = conflict.holder.and_then(|holder| self.member(holder));
             holder = held_by.map(|member| member.name.clone()).unwrap_or_default();
             self.places.crowded.ranges += u64::from(conflict.objection == Objection::TooMany);
@@ -127,9 +133,12 @@ impl Server {
             member.registrations.next_ns = now_ns + REGISTER_EVERY_NS;
             member.registrations.ranges = count;
             if conflict.is_some() {
-                host.event(Event::Objected { name: &member.name, verdict: &Verdict { holder: &holder, ..verdict } });
+                host.event(ServerEvent::Objected {
+                    name: &member.name,
+                    verdict: &RegistrationVerdict { holder: &holder, ..verdict },
+                });
             }
-            member.judged = Some(Judged { verdict, holder });
+            member.judged = Some(PendingVerdict { verdict, holder });
         }
         self.is_due(client);
     }

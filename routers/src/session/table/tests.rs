@@ -6,14 +6,14 @@ fn range(first: [u8; 4], last: [u8; 4]) -> Range {
 }
 
 /// Registers whatever is of a system.
-fn register(table: &mut Table, client: ClientIndex, system: u8, ranges: &[Range]) -> Result<(), Conflict> {
+fn register(table: &mut RoutingTable, client: ClientIndex, system: u8, ranges: &[Range]) -> Result<(), Conflict> {
     let may = |range: &Range| range.first.system() == system && range.last.system() == system;
     table.register(client, RANGES_MAX, may, ranges.iter().copied())
 }
 
 #[test]
 fn a_name_is_hosted_by_the_range_that_it_lies_in() {
-    let mut table = Table::default();
+    let mut table = RoutingTable::default();
     let [brain, arm, far] = [0, 1, 2].map(ClientIndex);
     register(&mut table, brain, 1, &[range([1, 0, 0, 0], [1, 199, 255, 255]), range([1, 201, 0, 0], [1, 255, 0, 0])])
         .unwrap();
@@ -41,7 +41,7 @@ fn a_name_is_hosted_by_the_range_that_it_lies_in() {
 
 #[test]
 fn what_another_hosts_is_refused_whole_or_in_part_and_nothing_changes() {
-    let mut table = Table::default();
+    let mut table = RoutingTable::default();
     let (one, other) = (ClientIndex(0), ClientIndex(1));
     let held = range([1, 10, 0, 0], [1, 20, 0, 0]);
     register(&mut table, one, 1, &[held]).unwrap();
@@ -69,7 +69,7 @@ fn what_another_hosts_is_refused_whole_or_in_part_and_nothing_changes() {
 
 #[test]
 fn of_ones_own_ranges_those_in_others_are_part_of_these_and_none_crosses() {
-    let mut table = Table::default();
+    let mut table = RoutingTable::default();
     let (one, wide) = (ClientIndex(0), range([1, 10, 0, 0], [1, 20, 0, 0]));
     let inner = range([1, 11, 0, 0], [1, 11, 0, 9]);
     register(&mut table, one, 1, &[inner, wide, wide]).unwrap();
@@ -83,10 +83,10 @@ fn of_ones_own_ranges_those_in_others_are_part_of_these_and_none_crosses() {
 
 #[test]
 fn ranges_beyond_the_room_are_refused() {
-    let mut table = Table::default();
+    let mut table = RoutingTable::default();
     let module =
         |client: u16, index: usize| Range::module(Name::new(1 + client as u8, (index >> 8) as u8, index as u8, 0));
-    let fill = |table: &mut Table, client: u16, count: usize, room: usize| {
+    let fill = |table: &mut RoutingTable, client: u16, count: usize, room: usize| {
         table.register(ClientIndex(client), room, |_| true, (0..count).map(|index| module(client, index)))
     };
     fill(&mut table, 0, 8, 8).unwrap();
@@ -108,7 +108,7 @@ proptest! {
         steps in prop::collection::vec((0u16..4, prop::collection::vec((0u8..12, 0u8..3), 0..5)), 0..12),
         asked in 0u8..15,
     ) {
-        let (mut table, mut model) = (Table::default(), Vec::<(ClientIndex, Range)>::new());
+        let (mut table, mut model) = (RoutingTable::default(), Vec::<(ClientIndex, Range)>::new());
         for (client, ranges) in steps {
             let client = ClientIndex(client);
             let wanted: Vec<Range> = ranges

@@ -5,7 +5,7 @@ use super::plan::{client_settings, module, ranges};
 use crate::admission::{Access, Admission, PACKET, TUNNEL};
 use crate::session::Cause;
 use crate::session::client::ClientSettings;
-use crate::session::frame::{Carried, Message};
+use crate::session::frame::{Carried, SessionMessage};
 use rohrpost_config as config;
 use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
 
@@ -22,7 +22,7 @@ fn guarded() -> Ground {
 /// What becomes of a package that the server brings: with which priority it is delivered, or why it is lost.
 fn brought(ground: &mut Ground, head: Head) -> Result<u8, Cause> {
     let mut bytes = Vec::new();
-    Message::Package(Carried { hops: 1, published_ns: ground.now_ns, head, body: &[] }).write(&mut bytes);
+    SessionMessage::Package(Carried { hops: 1, published_ns: ground.now_ns, head, body: &[] }).write(&mut bytes);
     let (client, _, notes) = &mut ground.ends[0];
     let before = notes.delivered.len();
     client.received(ground.now_ns, &bytes, notes);
@@ -73,7 +73,7 @@ fn a_refused_command_names_its_rule() {
 fn crossed(kind: Type, to: Name, from: Name) -> u8 {
     let mut ground = Ground::clients(2);
     let head = Head { to, from, kind, priority: Priority(255), ..Head::default() };
-    let package = crate::session::client::Package { head, body: &[], published_ns: ground.now_ns, hops: 0 };
+    let package = crate::session::client::ClientPackage { head, body: &[], published_ns: ground.now_ns, hops: 0 };
     let (client, _, notes) = &mut ground.ends[0];
     client.send(ground.now_ns, &package, notes);
     assert_eq!(client.out().class(Priority(255)).packages.get(), 0, "it is counted as what it is");

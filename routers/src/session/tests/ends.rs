@@ -4,10 +4,12 @@ use super::ground::Ground;
 use super::plan::{COMMON, QUOTA, address, client_settings, module, ranges};
 use super::world::{MS, S};
 use crate::report::NotDelivered;
-use crate::session::client::{self, Package};
-use crate::session::frame::{Carried, FrameHead, HEAD_BYTES, HOPS_MAX, Hello, LENGTH_MAX, Message, Ranges};
-use crate::session::server::{self, State};
-use crate::session::{Cause, GREETING_MAX_NS, SILENT_AFTER_NS};
+use crate::session::client::{self, ClientPackage};
+use crate::session::frame::{
+    Carried, HEAD_BYTES, HOPS_MAX, LENGTH_MAX, Ranges, SessionFrameHead, SessionHello, SessionMessage,
+};
+use crate::session::server::{self, MemberState};
+use crate::session::{Cause, HANDSHAKE_MAX_NS, SILENT_AFTER_NS};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
 
 #[test]
@@ -86,14 +88,14 @@ fn a_client_without_a_hello_is_closed_and_keeps_no_other_out() {
         ground.now_ns += 100 * MS;
         waited_ns += 100 * MS;
         ground.settle();
-        assert!(waited_ns < GREETING_MAX_NS + 2 * S, "still there");
+        assert!(waited_ns < HANDSHAKE_MAX_NS + 2 * S, "still there");
     }
     // Many of them do not keep others out: the oldest gives way.
     for _ in 0..20 {
         let _ = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said);
     }
     ground.settle();
-    let greeting = ground.server.clients().filter(|(_, _, state)| *state == State::Greeting).count();
+    let greeting = ground.server.clients().filter(|(_, _, state)| *state == MemberState::Handshake).count();
     assert!(greeting <= 4 && ground.ends[0].0.is_up(), "{greeting}");
 }
 
@@ -153,13 +155,15 @@ fn what_the_streams_held_for_too_long_is_not_delivered() {
     let head =
         Head { to: module(1), from: module(0).with_local(1), len: 8, kind: Type::command(16), ..Head::default() };
     let (client, place, notes) = &mut ground.ends[0];
-    client.send(ground.now_ns, &Package { head, body: &[0; 8], published_ns: ground.now_ns, hops: 0 }, notes);
+    client.send(ground.now_ns, &ClientPackage { head, body: &[0; 8], published_ns: ground.now_ns, hops: 0 }, notes);
     let bytes = client.ready().to_vec();
     client.took(ground.now_ns, bytes.len());
     // The stream holds it for a second, to the server and once more from there.
     ground.now_ns += S;
     ground.server.received(ground.now_ns, place.unwrap(), &bytes, &mut ground.said);
-    let server::Output::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) else { panic!("it leaves") };
+    let server::ServerStep::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) else {
+        panic!("it leaves")
+    };
     let bytes = ground.server.ready(index).to_vec();
     ground.server.took(ground.now_ns, index, bytes.len());
     ground.now_ns += S;
@@ -178,7 +182,7 @@ fn frames_that_come_byte_by_byte_are_whole() {
     let head = Head { to: module(1), from: module(0), len: 3, ..Head::default() };
     let mut bytes = Vec::new();
     for _ in 0..3 {
-        Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[1, 2, 3] }).write(&mut bytes);
+        SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[1, 2, 3] }).write(&mut bytes);
     }
     let place = ground.ends[0].1.unwrap();
     bytes.iter().for_each(|byte| ground.server.received(ground.now_ns, place, &[*byte], &mut ground.said));
@@ -198,15 +202,16 @@ fn what_a_stranger_says_takes_no_memory_and_is_told_to_him() {
         ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
         assert!(ground.said.events[0].contains(words), "{:?}", ground.said.events);
         assert!(ground.server.bytes_of(place) < 4096);
-        let server::Output::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) else {
+        let server::ServerStep::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) else {
             panic!("{words}")
         };
         let (head, rest) = ground.server.ready(index).split_first_chunk::<HEAD_BYTES>().unwrap();
-        let head = FrameHead::parse(head, LENGTH_MAX).unwrap();
-        assert!(matches!(Message::parse(head, rest), Ok(Message::Refusal(refusal)) if refusal.text.contains(words)));
+        let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
+        let told = SessionMessage::parse(head, rest);
+        assert!(matches!(told, Ok(SessionMessage::Refusal(refusal)) if refusal.text.contains(words)));
         let bytes = ground.server.ready(index).len();
         ground.server.took(ground.now_ns, index, bytes);
-        assert_eq!(ground.server.poll(ground.now_ns, &mut ground.said), server::Output::Close(place));
+        assert_eq!(ground.server.poll(ground.now_ns, &mut ground.said), server::ServerStep::Close(place));
     }
 }
 
@@ -234,9 +239,9 @@ fn what_waits_is_bounded_and_the_least_important_gives_way() {
             let head =
                 Head { to: module(1), from: module(0), len: 1000, kind: Type::data(1), priority, ..Head::default() };
             let mut bytes = Vec::new();
-            Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut bytes);
+            SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[0; 1000] }).write(&mut bytes);
             ground.server.received(ground.now_ns, from, &bytes, &mut ground.said);
-            while let server::Output::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) {
+            while let server::ServerStep::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) {
                 let taken = if index == reader { 0 } else { ground.server.ready(index).len() };
                 ground.server.took(ground.now_ns, index, taken);
             }
@@ -257,7 +262,7 @@ fn names_of_others_are_sent_by_nobody() {
     let mut bytes = Vec::new();
     for from in [module(1), Name::NONE] {
         let head = Head { to: module(1), from, ..Head::default() };
-        Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
+        SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
     }
     let place = ground.ends[0].1.unwrap();
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
@@ -271,7 +276,7 @@ fn a_later_connection_of_the_same_incarnation_takes_the_place_of_the_earlier() {
     let mut ground = Ground::clients(2);
     let old = ground.ends[0].1.unwrap();
     let place = ground.server.accept(ground.now_ns, address(0, 2), &mut ground.said).unwrap();
-    let hello = Hello {
+    let hello = SessionHello {
         system: 1,
         reaches_own: true,
         common: COMMON,
@@ -282,11 +287,11 @@ fn a_later_connection_of_the_same_incarnation_takes_the_place_of_the_earlier() {
         name: "client 0",
     };
     let mut bytes = Vec::new();
-    Message::Hello(hello).write(&mut bytes);
+    SessionMessage::Hello(hello).write(&mut bytes);
     let mut laid_out = Vec::new();
-    Message::Register(Ranges::new(1, &ranges(0), &mut laid_out)).write(&mut bytes);
+    SessionMessage::Register(Ranges::new(1, &ranges(0), &mut laid_out)).write(&mut bytes);
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
     assert_eq!(ground.server.table().client_of(module(0)), Some(place));
     let state = ground.server.clients().find(|(index, _, _)| *index == old).map(|(_, _, state)| state);
-    assert!(matches!(state, Some(State::Leaving { .. })), "{state:?}");
+    assert!(matches!(state, Some(MemberState::Leaving { .. })), "{state:?}");
 }

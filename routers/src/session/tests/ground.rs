@@ -3,10 +3,10 @@
 use super::plan::{address, client_settings, module, ranges, server_settings};
 use super::world::S;
 use crate::report::NotDelivered;
-use crate::session::client::{self, Client, Package};
+use crate::session::client::{self, Client, ClientPackage};
 use crate::session::frame::{Carried, Range};
 use crate::session::server::{self, Server};
-use crate::session::{Answers, Cause, ClientIndex};
+use crate::session::{Cause, ClientIndex, ErrorReplies};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 
 /// Notes all that is told.
@@ -19,7 +19,7 @@ pub(super) struct Notes {
     pub(super) rules: Vec<Option<usize>>,
 }
 
-impl Answers for Notes {
+impl ErrorReplies for Notes {
     fn answer(&mut self, _: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
         self.lost.push(why);
         answer.extend(why.word().bytes());
@@ -27,7 +27,7 @@ impl Answers for Notes {
     }
 }
 
-impl client::Host for Notes {
+impl client::ClientHost for Notes {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
         self.delivered.push((carried.head, carried.hops));
         Ok(())
@@ -37,17 +37,17 @@ impl client::Host for Notes {
         self.rules.push(line);
     }
 
-    fn event(&mut self, event: client::Event<'_>) {
+    fn event(&mut self, event: client::ClientEvent<'_>) {
         self.events.push(match event {
-            client::Event::Refused(refusal) => refusal.to_string(),
-            client::Event::Objected(verdict) => verdict.to_string(),
+            client::ClientEvent::Refused(refusal) => refusal.to_string(),
+            client::ClientEvent::Objected(verdict) => verdict.to_string(),
             other => format!("{other:?}"),
         });
     }
 }
 
-impl server::Host for Notes {
-    fn event(&mut self, event: server::Event<'_>) {
+impl server::ServerHost for Notes {
+    fn event(&mut self, event: server::ServerEvent<'_>) {
         self.events.push(format!("{event:?}"));
     }
 }
@@ -69,7 +69,7 @@ impl Ground {
         (clients_max, greetings_max): (u16, u16),
         clients: impl IntoIterator<Item = (client::ClientSettings, Vec<Range>)>,
     ) -> Self {
-        Self::with(server::ServerSettings { clients_max, greetings_max, ..server_settings(5) }, clients)
+        Self::with(server::ServerSettings { clients_max, handshakes_max: greetings_max, ..server_settings(5) }, clients)
     }
 
     pub(super) fn with(
@@ -94,20 +94,20 @@ impl Ground {
             for (index, (client, place, notes)) in self.ends.iter_mut().enumerate() {
                 loop {
                     match client.poll(self.now_ns, notes) {
-                        client::Output::Connect => {
+                        client::ClientStep::Connect => {
                             *place =
                                 self.server.accept(self.now_ns, address(index, client.connections()), &mut self.said);
                             client.connected(self.now_ns);
                         }
-                        client::Output::Write => {
+                        client::ClientStep::Write => {
                             let bytes = client.ready().to_vec();
                             client.took(self.now_ns, bytes.len());
                             if let Some(place) = *place {
                                 self.server.received(self.now_ns, place, &bytes, &mut self.said);
                             }
                         }
-                        client::Output::Close => *place = None,
-                        client::Output::Wait { .. } => break,
+                        client::ClientStep::Close => *place = None,
+                        client::ClientStep::Wait { .. } => break,
                     }
                 }
             }
@@ -118,7 +118,7 @@ impl Ground {
     fn serve(&mut self) {
         loop {
             match self.server.poll(self.now_ns, &mut self.said) {
-                server::Output::Write(index) => {
+                server::ServerStep::Write(index) => {
                     let bytes = self.server.ready(index).to_vec();
                     self.server.took(self.now_ns, index, bytes.len());
                     let end = self.ends.iter_mut().find(|(_, place, _)| *place == Some(index));
@@ -126,14 +126,14 @@ impl Ground {
                         client.received(self.now_ns, &bytes, notes);
                     }
                 }
-                server::Output::Close(index) => {
+                server::ServerStep::Close(index) => {
                     let end = self.ends.iter_mut().find(|(_, place, _)| *place == Some(index));
                     if let Some((client, place, notes)) = end {
                         *place = None;
                         client.closed(self.now_ns, notes);
                     }
                 }
-                server::Output::Wait { .. } => return,
+                server::ServerStep::Wait { .. } => return,
             }
         }
     }
@@ -147,7 +147,7 @@ impl Ground {
             priority: Priority(60),
             ..Head::default()
         };
-        let package = Package { head, body: &[0; 8], published_ns: self.now_ns, hops };
+        let package = ClientPackage { head, body: &[0; 8], published_ns: self.now_ns, hops };
         let (client, _, notes) = &mut self.ends[from];
         client.send(self.now_ns, &package, notes);
         self.settle();

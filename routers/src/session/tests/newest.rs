@@ -2,9 +2,9 @@
 
 use super::plan::{QUOTA, module};
 use super::world::{MS, S};
-use crate::queue::Share;
+use crate::queue::QueueShare;
 use crate::session::counts::Cause;
-use crate::session::frame::{FrameHead, HEAD_BYTES, LENGTH_MAX, Message};
+use crate::session::frame::{HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMessage};
 use crate::session::outgoing::{Fates, Outgoing, Parcel};
 use rohrpost_mailbox::{Head, Options, Priority, Type};
 
@@ -48,8 +48,14 @@ impl Stalled {
     fn send(&mut self, head: Head, value: u8, len: usize) {
         let head = Head { to: module(0), priority: Priority(60), len: len as u16, ..head };
         let body = vec![value; len];
-        let parcel =
-            Parcel { head: &head, body: &body, published_ns: self.now_ns, hops: 0, level: 8, share: Share::default() };
+        let parcel = Parcel {
+            head: &head,
+            body: &body,
+            published_ns: self.now_ns,
+            hops: 0,
+            level: 8,
+            share: QueueShare::default(),
+        };
         self.outgoing.accept(None, &parcel, &mut self.log);
     }
 
@@ -62,9 +68,11 @@ impl Stalled {
             self.outgoing.took(bytes.len());
             let mut rest = &bytes[..];
             while let Some(head) = rest.first_chunk::<HEAD_BYTES>() {
-                let head = FrameHead::parse(head, LENGTH_MAX).unwrap();
+                let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
                 let (frame, behind) = rest[HEAD_BYTES..].split_at(head.length);
-                let Ok(Message::Package(carried)) = Message::parse(head, frame) else { panic!("no package") };
+                let Ok(SessionMessage::Package(carried)) = SessionMessage::parse(head, frame) else {
+                    panic!("no package")
+                };
                 assert!(carried.body.iter().all(|byte| *byte == carried.body[0]), "the body is its own");
                 left.push((carried.head.id, carried.body[0]));
                 rest = behind;

@@ -3,7 +3,7 @@
 use super::plan::ROUTER;
 use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
-use crate::session::{AGE_MAX_NS, Answers, Cause, client, server};
+use crate::session::{AGE_MAX_NS, Cause, ErrorReplies, client, server};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options, local};
 use rohrpost_testbed::sim::chance::Chance;
 use std::collections::BTreeMap;
@@ -126,7 +126,7 @@ pub(super) struct Teller<'a> {
     pub(super) chance: &'a mut Chance,
 }
 
-impl Answers for Teller<'_> {
+impl ErrorReplies for Teller<'_> {
     fn answer(&mut self, call: &[u8], why: Cause, _: Option<&str>, answer: &mut Vec<u8>) -> bool {
         let Some(number) = number_of(call) else { return false };
         self.oracle.saw(why.word());
@@ -150,7 +150,7 @@ impl Answers for Teller<'_> {
     }
 }
 
-impl client::Host for Teller<'_> {
+impl client::ClientHost for Teller<'_> {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
         if let Kind::Reply(_) = carried.head.kind.kind() {
             let number = carried.body.strip_prefix(LOST).and_then(number_of);
@@ -169,32 +169,32 @@ impl client::Host for Teller<'_> {
         Ok(())
     }
 
-    fn event(&mut self, event: client::Event<'_>) {
+    fn event(&mut self, event: client::ClientEvent<'_>) {
         let known = &mut self.oracle.clients[self.client];
         match event {
-            client::Event::Up => known.up_ns = Some(self.oracle.now_ns),
-            client::Event::Down => known.up_ns = None,
-            client::Event::Refused(refusal) => known.refusals.push(refusal.to_string()),
-            client::Event::Objected(verdict) => known.refusals.push(verdict.to_string()),
-            client::Event::Damaged(bad) => self.oracle.broken(format!("client {} read: {bad}", self.client)),
+            client::ClientEvent::Up => known.up_ns = Some(self.oracle.now_ns),
+            client::ClientEvent::Down => known.up_ns = None,
+            client::ClientEvent::Refused(refusal) => known.refusals.push(refusal.to_string()),
+            client::ClientEvent::Objected(verdict) => known.refusals.push(verdict.to_string()),
+            client::ClientEvent::Damaged(bad) => self.oracle.broken(format!("client {} read: {bad}", self.client)),
         }
         self.oracle.saw(match event {
-            client::Event::Up => "up",
-            client::Event::Down => "down",
-            client::Event::Refused(_) => "refused",
-            client::Event::Objected(_) => "objected",
-            client::Event::Damaged(_) => "damaged",
+            client::ClientEvent::Up => "up",
+            client::ClientEvent::Down => "down",
+            client::ClientEvent::Refused(_) => "refused",
+            client::ClientEvent::Objected(_) => "objected",
+            client::ClientEvent::Damaged(_) => "damaged",
         });
     }
 }
 
-impl server::Host for Teller<'_> {
-    fn event(&mut self, event: server::Event<'_>) {
+impl server::ServerHost for Teller<'_> {
+    fn event(&mut self, event: server::ServerEvent<'_>) {
         self.oracle.saw(match event {
-            server::Event::Joined { .. } => "joined",
-            server::Event::Left { why, .. } => why.map_or("left", |why| why.word()),
-            server::Event::Refused { .. } => "not let in",
-            server::Event::Objected { .. } => "objected to",
+            server::ServerEvent::Joined { .. } => "joined",
+            server::ServerEvent::Left { why, .. } => why.map_or("left", |why| why.word()),
+            server::ServerEvent::Refused { .. } => "not let in",
+            server::ServerEvent::Objected { .. } => "objected to",
         });
     }
 }

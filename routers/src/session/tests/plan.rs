@@ -136,7 +136,7 @@ pub(super) fn server_settings(incarnation: u64) -> ServerSettings {
         own_nodes: OwnNodes::default(),
         incarnation,
         clients_max: 16,
-        greetings_max: 4,
+        handshakes_max: 4,
         quota_bytes: QUOTA,
         levels: levels(),
     }

@@ -4,8 +4,8 @@ use super::ground::Notes;
 use super::plan::{COMMON, server_settings};
 use super::world::MS;
 use crate::session::ClientIndex;
-use crate::session::frame::{Hello, Message, Range, Ranges};
-use crate::session::server::{Output, Server, ServerSettings};
+use crate::session::frame::{Range, Ranges, SessionHello, SessionMessage};
+use crate::session::server::{Server, ServerSettings, ServerStep};
 use nix::time::{ClockId, clock_gettime};
 use rohrpost_mailbox::Name;
 use std::time::Duration;
@@ -25,7 +25,7 @@ fn says(client: usize) -> Vec<u8> {
     let ranges: Vec<Range> = (0..RANGES).map(|index| Range::module(module(index))).collect();
     let (mut bytes, mut laid_out) = (Vec::new(), Vec::new());
     let (system, incarnation, name) = (module(0).system(), 1 + client as u64, "a client");
-    let hello = Hello {
+    let hello = SessionHello {
         system,
         reaches_own: true,
         common: COMMON,
@@ -35,15 +35,15 @@ fn says(client: usize) -> Vec<u8> {
         asked_ns: 1,
         name,
     };
-    Message::Hello(hello).write(&mut bytes);
-    Message::Register(Ranges::new(1, &ranges, &mut laid_out)).write(&mut bytes);
+    SessionMessage::Hello(hello).write(&mut bytes);
+    SessionMessage::Register(Ranges::new(1, &ranges, &mut laid_out)).write(&mut bytes);
     bytes
 }
 
 /// What the server's thread works until so many clients, each with its own address, are connected and host their names.
 fn coming_at_once(clients: usize) -> Duration {
     let (clients_max, greetings_max) = (clients as u16, clients as u16);
-    let mut server = Server::new(ServerSettings { clients_max, greetings_max, ..server_settings(5) });
+    let mut server = Server::new(ServerSettings { clients_max, handshakes_max: greetings_max, ..server_settings(5) });
     let (mut host, mut now_ns, mut work) = (Notes::default(), 100_000 * MS, Duration::ZERO);
     for client in 0..clients {
         let ([high, low], bytes) = ((client as u16).to_be_bytes(), says(client));
@@ -57,7 +57,7 @@ fn coming_at_once(clients: usize) -> Duration {
         assert!(looks < 100, "{} ranges of {clients} clients", server.table().len());
         (now_ns, looks) = (now_ns + 100 * MS, looks + 1);
         let began = worked();
-        while let Output::Write(client) = server.poll(now_ns, &mut host) {
+        while let ServerStep::Write(client) = server.poll(now_ns, &mut host) {
             let bytes = server.ready(client).len();
             server.took(now_ns, client, bytes);
         }

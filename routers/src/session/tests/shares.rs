@@ -6,8 +6,8 @@ use super::plan::{QUOTA, address, classes, client_settings, loud, module, ranges
 use super::strain::{many, own, register};
 use super::world::{MS, S};
 use crate::session::client::ClientSettings;
-use crate::session::frame::{Carried, Message, RANGES_MAX, Range};
-use crate::session::server::{self, OwnNode, OwnNodes, Rights, ServerSettings, State};
+use crate::session::frame::{Carried, RANGES_MAX, Range, SessionMessage};
+use crate::session::server::{self, MemberState, OwnNode, OwnNodes, Rights, ServerSettings};
 use crate::session::{Cause, ClientIndex, ENTRIES_MAX};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 
@@ -18,7 +18,7 @@ fn send(ground: &mut Ground, from: usize, to: usize, priority: u8, kind: Type, l
     let (to, from) = (module(to), if priority > 200 { loud(from) } else { module(from).with_local(1) });
     let head = Head { to, from, len: len as u16, kind, priority: Priority(priority), ..Head::default() };
     let mut bytes = Vec::new();
-    Message::Package(Carried { hops: 0, published_ns: 0, head, body: &vec![0; len] }).write(&mut bytes);
+    SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &vec![0; len] }).write(&mut bytes);
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
 }
 
@@ -27,7 +27,7 @@ fn write(ground: &mut Ground, slow: ClientIndex, mut room: usize) {
     if room > 0 {
         ground.server.writable(slow);
     }
-    while let server::Output::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) {
+    while let server::ServerStep::Write(index) = ground.server.poll(ground.now_ns, &mut ground.said) {
         let ready = ground.server.ready(index).to_vec();
         let taken = if index == slow { ready.len().min(room) } else { ready.len() };
         ground.server.took(ground.now_ns, index, taken);
@@ -126,7 +126,7 @@ fn one_certificate_does_not_fill_the_table_however_often_it_connects() {
     ground.now_ns += S;
     for (client, place, notes) in ground.ends[..clients - 1].iter_mut() {
         client.closed(ground.now_ns - S, notes);
-        assert_eq!(client.poll(ground.now_ns, notes), crate::session::client::Output::Connect);
+        assert_eq!(client.poll(ground.now_ns, notes), crate::session::client::ClientStep::Connect);
         let index = ground.server.accept(ground.now_ns, address(9, 0), &mut ground.said).unwrap();
         ground.server.certify(index, 1, "node hostile of system 1", Rights::any());
         client.connected(ground.now_ns);
@@ -161,7 +161,7 @@ fn joins(ground: &mut Ground, client: usize, from: usize) -> Option<ClientIndex>
 }
 
 fn is_member(ground: &Ground, place: ClientIndex) -> bool {
-    ground.server.clients().any(|(index, _, state)| index == place && state == State::Member)
+    ground.server.clients().any(|(index, _, state)| index == place && state == MemberState::Member)
 }
 
 #[test]
@@ -194,8 +194,8 @@ fn one_address_does_not_push_others_out_before_their_hello() {
         let _ = accept(2, connection);
     }
     let states: Vec<_> = ground.server.clients().map(|(index, _, state)| (index, state)).collect();
-    assert!(states.contains(&(slow, State::Greeting)), "a slow client beside a flood does not give way");
-    assert!(ground.server.crowded().greetings > 3);
+    assert!(states.contains(&(slow, MemberState::Handshake)), "a slow client beside a flood does not give way");
+    assert!(ground.server.crowded().handshakes > 3);
 }
 
 #[test]

@@ -3,8 +3,10 @@
 use super::ground::Ground;
 use super::plan::{module, system_of};
 use super::world::{MS, S};
-use crate::session::client::{self, Package};
-use crate::session::frame::{Carried, FrameHead, HEAD_BYTES, Kind, LENGTH_MAX, Message, RANGES_MAX, Range, Ranges};
+use crate::session::client::{self, ClientPackage};
+use crate::session::frame::{
+    Carried, HEAD_BYTES, LENGTH_MAX, RANGES_MAX, Range, Ranges, SessionFrameHead, SessionFrameKind, SessionMessage,
+};
 use crate::session::server::Rights;
 use crate::session::{Cause, LOOK_EVERY_NS};
 use rohrpost_mailbox::{Head, Name};
@@ -18,7 +20,7 @@ pub(super) fn many(client: usize, first_class: u8) -> Vec<Range> {
 
 pub(super) fn register(ground: &mut Ground, client: usize, number: u32, ranges: &[Range]) {
     let (mut laid_out, mut bytes) = (Vec::new(), Vec::new());
-    Message::Register(Ranges::new(number, ranges, &mut laid_out)).write(&mut bytes);
+    SessionMessage::Register(Ranges::new(number, ranges, &mut laid_out)).write(&mut bytes);
     let place = ground.ends[client].1.unwrap();
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
 }
@@ -33,7 +35,7 @@ fn of_many_registrations_of_one_client_the_first_and_the_last_are_looked_at() {
     for number in 0..500 {
         register(&mut ground, 1, number, &ranges[number as usize..]);
     }
-    assert_eq!(ground.server.overtaken(), 498, "the first is looked at, the last waits");
+    assert_eq!(ground.server.superseded(), 498, "the first is looked at, the last waits");
     let hosted = |ground: &Ground| ground.server.views().find(|view| view.index == place).unwrap().ranges;
     assert_eq!(hosted(&ground), RANGES_MAX);
     assert!(ground.server.bytes_of(place) < before_bytes + 2 * RANGES_MAX * size_of::<Range>());
@@ -42,7 +44,7 @@ fn of_many_registrations_of_one_client_the_first_and_the_last_are_looked_at() {
     assert_eq!(ground.delivered(2), [module(2)]);
     ground.now_ns += LOOK_EVERY_NS;
     ground.settle();
-    assert_eq!((hosted(&ground), ground.server.overtaken()), (RANGES_MAX - 499, 498), "the last counts");
+    assert_eq!((hosted(&ground), ground.server.superseded()), (RANGES_MAX - 499, 498), "the last counts");
 }
 
 #[test]
@@ -82,7 +84,7 @@ fn send_behind_a_registration(from: Name, more: &[Range], may_host: Option<Vec<R
     let ranges: Vec<Range> = super::plan::ranges(0).into_iter().chain(more.iter().copied()).collect();
     register(&mut ground, 0, 8, &ranges);
     let (head, mut bytes) = (Head { to: module(1), from, ..Head::default() }, Vec::new());
-    Message::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
+    SessionMessage::Package(Carried { hops: 0, published_ns: 0, head, body: &[] }).write(&mut bytes);
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
     assert_eq!(ground.server.table().client_of(from).filter(|client| *client == place), None, "it waits");
     ground.settle();
@@ -133,17 +135,20 @@ fn what_was_ready_for_a_connection_that_broke_is_gone_with_it() {
     let mut ground = Ground::clients(2);
     let head = Head { to: module(1), from: module(0).with_local(1), len: 100, ..Head::default() };
     let (client, _, notes) = &mut ground.ends[0];
-    client.send(ground.now_ns, &Package { head, body: &[0; 100], published_ns: ground.now_ns, hops: 0 }, notes);
-    assert_eq!(client.poll(ground.now_ns, notes), client::Output::Write);
+    client.send(ground.now_ns, &ClientPackage { head, body: &[0; 100], published_ns: ground.now_ns, hops: 0 }, notes);
+    assert_eq!(client.poll(ground.now_ns, notes), client::ClientStep::Write);
     // The connection breaks with half of a frame.
     client.took(ground.now_ns, 60);
     client.closed(ground.now_ns, notes);
     ground.now_ns += S;
-    assert_eq!(client.poll(ground.now_ns, notes), client::Output::Connect);
+    assert_eq!(client.poll(ground.now_ns, notes), client::ClientStep::Connect);
     client.connected(ground.now_ns);
     let (head, rest) = client.ready().split_first_chunk().unwrap();
-    let head = FrameHead::parse(head, LENGTH_MAX).unwrap();
-    assert!(matches!(Message::parse(head, rest), Ok(Message::Hello(_))), "nothing else goes by the next one");
+    let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
+    assert!(
+        matches!(SessionMessage::parse(head, rest), Ok(SessionMessage::Hello(_))),
+        "nothing else goes by the next one"
+    );
 }
 
 #[test]
@@ -153,7 +158,7 @@ fn a_question_goes_behind_the_frame_that_has_begun_and_before_all_others() {
     for len in [100, 200, 300] {
         let head = Head { to: module(1), from: module(0).with_local(1), len, ..Head::default() };
         let body = vec![0; usize::from(len)];
-        client.send(ground.now_ns, &Package { head, body: &body, published_ns: ground.now_ns, hops: 0 }, notes);
+        client.send(ground.now_ns, &ClientPackage { head, body: &body, published_ns: ground.now_ns, hops: 0 }, notes);
     }
     client.took(ground.now_ns, 60);
     let due_ns = ground.now_ns + 2 * S;
@@ -161,11 +166,11 @@ fn a_question_goes_behind_the_frame_that_has_begun_and_before_all_others() {
     let mut kinds = Vec::new();
     let mut bytes = &client.ready()[HEAD_BYTES + 8 + 16 + 100 - 60..];
     while let Some((head, rest)) = bytes.split_first_chunk() {
-        let head = FrameHead::parse(head, LENGTH_MAX).unwrap();
+        let head = SessionFrameHead::parse(head, LENGTH_MAX).unwrap();
         kinds.push((head.kind, head.length));
         bytes = &rest[head.length..];
     }
-    assert_eq!(kinds, [(Kind::Ask, 8), (Kind::Package, 224), (Kind::Package, 324)]);
+    assert_eq!(kinds, [(SessionFrameKind::Ask, 8), (SessionFrameKind::Package, 224), (SessionFrameKind::Package, 324)]);
 }
 
 /// The same range among the names that only this client registers.

@@ -8,10 +8,10 @@
 //!
 //! The thread sleeps in one system call until a datagram, a stamp or its time comes. It takes nothing from the heap for
 //! a datagram. What strangers send is dropped in the kernel; whatever comes with a node's address, it works for a
-//! [share](share) of the time at most.
+//! share of the time at most.
 
+mod cpu_budget;
 mod local;
-mod share;
 mod socket;
 mod state;
 #[cfg(test)]
@@ -20,18 +20,18 @@ mod works;
 
 pub use local::Skew;
 pub(crate) use local::looked;
-pub use state::{ClockState, Snapshot};
+pub use state::{ClockSnapshot, ClockState};
 pub(super) use works::Works;
 
 use crate::impair;
 use crate::settings::Settings;
 use crate::time::{Exchange, Step, TIME_BYTES, TimeSettings};
+use cpu_budget::CpuBudget;
 use nix::poll::{PollFd, PollFlags, ppoll};
 use nix::sys::time::TimeSpec;
 use rohrpost_config::{FIFO_MAX, Installation, TimeSource};
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_mailbox::{Node, NodeError, monotonic_ns};
-use share::Share;
 use std::io::{self, PipeReader, PipeWriter};
 use std::net::SocketAddr;
 use std::os::fd::AsFd;
@@ -47,7 +47,7 @@ pub(super) const FIFO: u8 = FIFO_MAX + 11;
 /// However long nothing comes: so often it looks whether the computer has slept, or its clock is slewed.
 const LOOKS_EVERY: Duration = Duration::from_millis(100);
 
-/// So many datagrams are taken before what is due is sent.
+/// Datagrams that are taken before what is due is sent.
 const BURST: usize = 64;
 
 /// Why a clock did not start.
@@ -66,14 +66,14 @@ pub enum ClockError {
 
 /// What a clock is made of.
 pub struct ClockParts {
-    /// Who it is, and who may be master.
+    /// Which node it is, and which nodes may be master.
     pub settings: TimeSettings,
     /// Where each node takes datagrams of time, in the order of the configuration; its own too.
     pub nodes: Vec<SocketAddr>,
-    /// The node whose page it writes; none in tests that look at [`ClockState`] alone.
+    /// It writes the page of this node; none in tests that look at [`ClockState`] alone.
     pub node: Option<Arc<Node>>,
     /// A bad network before its socket.
-    pub impair: Option<impair::Settings>,
+    pub impair: Option<impair::ImpairmentSettings>,
     /// Whether the kernel stamps datagrams, if it can; else the clock does, as where it cannot.
     pub kernel_stamps: bool,
     /// For tests: see [`Skew`].
@@ -120,7 +120,7 @@ impl ClockService {
         Self::of(Works::new(parts)?)
     }
 
-    /// The same of what was made already.
+    /// A service of parts that were made already.
     pub(super) fn of(works: Works) -> Result<Self, ClockError> {
         let state = works.state().clone();
         let (ended, ends) = io::pipe().map_err(ClockError::Thread)?;
@@ -162,7 +162,7 @@ impl Worker {
         // The router's other threads tell when it is refused.
         self.works.runs_in_real_time(schedule(Scheduling::Fifo(FIFO)).is_ok());
         let mut datagram = [0; TIME_BYTES];
-        let mut share = Share::new(monotonic_ns());
+        let mut share = CpuBudget::new(monotonic_ns());
         loop {
             let began_ns = monotonic_ns();
             // Used up, what comes waits; what is due is sent all the same.

@@ -24,7 +24,7 @@ const PRIORITY: u32 = 6;
 const RETURNED_BYTES: usize = TIME_BYTES + TAG_BYTES + 128;
 const CONTROL_BYTES: usize = 512;
 
-/// What a socket has.
+/// Socket for datagrams of time.
 pub(super) struct TimeSocket {
     socket: UdpSocket,
     peers: Vec<SockaddrStorage>,
@@ -36,7 +36,7 @@ pub(super) struct TimeSocket {
 
 /// A datagram that came.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Came {
+pub(super) struct ReceivedDatagram {
     pub(super) bytes: usize,
     pub(super) source: IpAddr,
     /// CLOCK_REALTIME when the kernel took it in.
@@ -74,7 +74,7 @@ impl TimeSocket {
         })
     }
 
-    /// From now on its datagrams are sealed.
+    /// Expects sealed datagrams from now on.
     pub(super) fn sealed(self) -> Self {
         Self { datagram_bytes: TIME_BYTES + TAG_BYTES, ..self }
     }
@@ -101,7 +101,7 @@ impl TimeSocket {
     }
 
     /// The next datagram that came.
-    pub(super) fn receive(&mut self, datagram: &mut [u8]) -> Option<Came> {
+    pub(super) fn receive(&mut self, datagram: &mut [u8]) -> Option<ReceivedDatagram> {
         let mut parts = [IoSliceMut::new(datagram)];
         let fd = self.socket.as_raw_fd();
         let message = loop {
@@ -114,7 +114,7 @@ impl TimeSocket {
         };
         let bytes = if message.flags.contains(MsgFlags::MSG_TRUNC) { 0 } else { message.bytes };
         let source = message.address.as_ref().and_then(address)?;
-        Some(Came { bytes, source, realtime_ns: stamp(message.cmsgs().ok()?) })
+        Some(ReceivedDatagram { bytes, source, realtime_ns: stamp(message.cmsgs().ok()?) })
     }
 
     /// The next datagram that left: which it was, and CLOCK_REALTIME then.

@@ -5,9 +5,9 @@ use crate::time::{Clock, Reading, Role, Term};
 use rohrpost_mailbox::TimeRecord;
 use std::sync::{Mutex, PoisonError};
 
-/// How it stands with system time on this node.
+/// System time on this node at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Snapshot {
+pub struct ClockSnapshot {
     /// What the node does for the common time.
     pub role: Role,
     /// The master that it follows, or itself.
@@ -22,7 +22,7 @@ pub struct Snapshot {
     pub offset_ns: i64,
     /// How much faster than its own clock the master's runs, ns a second.
     pub rate_ppb: i64,
-    /// Shortest way there and back of late, ns.
+    /// Shortest recent round trip, ns.
     pub delay_ns: Option<u64>,
     /// When the master was heard last, monotonic ns.
     pub heard_ns: Option<u64>,
@@ -38,7 +38,7 @@ pub struct Snapshot {
     pub real_time: bool,
 }
 
-impl Snapshot {
+impl ClockSnapshot {
     pub(super) fn of(clock: &Clock, now_ns: u64) -> Self {
         let Reading { term, synchronised, .. } = clock.reading(now_ns);
         Self {
@@ -60,24 +60,24 @@ impl Snapshot {
     }
 }
 
-/// Shared by the clock's thread and whoever wants to know.
+/// Shared by the clock's thread and its readers.
 #[derive(Debug)]
 pub struct ClockState {
-    snapshot: Mutex<Snapshot>,
+    snapshot: Mutex<ClockSnapshot>,
 }
 
 impl ClockState {
-    pub(super) fn new(snapshot: Snapshot) -> Self {
+    pub(super) fn new(snapshot: ClockSnapshot) -> Self {
         Self { snapshot: Mutex::new(snapshot) }
     }
 
-    /// How it stands. For tools: modules read the node's page.
-    pub fn snapshot(&self) -> Snapshot {
+    /// The present state. For tools: modules read the node's page.
+    pub fn snapshot(&self) -> ClockSnapshot {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Of the clock's thread. It never waits for who looks: then the next one is shown.
-    pub(super) fn show(&self, snapshot: &Snapshot) {
+    /// For the clock's thread. It never waits for a reader: then the next snapshot is shown.
+    pub(super) fn show(&self, snapshot: &ClockSnapshot) {
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;
         }

@@ -1,6 +1,6 @@
 //! Clocks on this computer, each with a wrong monotonic clock of its own: so the true error of each reading is known.
 
-use super::{ClockParts, ClockService, Skew, Snapshot};
+use super::{ClockParts, ClockService, ClockSnapshot, Skew};
 use crate::time::{Exchange, Role, TimeSettings};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
@@ -65,7 +65,7 @@ impl Clocks {
         self.exchanges[usize::from(node)] = exchanges;
     }
 
-    fn snapshot(&self, node: u8) -> Snapshot {
+    fn snapshot(&self, node: u8) -> ClockSnapshot {
         self.services[usize::from(node)].as_ref().unwrap().state().snapshot()
     }
 
@@ -78,7 +78,7 @@ impl Clocks {
     fn wait(&self, what: &str, is: impl Fn() -> bool) {
         let end = Instant::now() + Duration::from_secs(60);
         while !is() {
-            let snapshots: Vec<Snapshot> = (0..self.parts.len() as u8)
+            let snapshots: Vec<ClockSnapshot> = (0..self.parts.len() as u8)
                 .filter(|node| self.services[usize::from(*node)].is_some())
                 .map(|node| self.snapshot(node))
                 .collect();
@@ -102,7 +102,7 @@ impl Clocks {
         u8::from(is_master(&1))
     }
 
-    /// The others follow one master, and are not further off than they say, at any moment; who that is.
+    /// All follow one master, and are not further off than they say, at any moment. Returns the master.
     fn check_bounds(&self) -> u8 {
         let master = self.master();
         let slaves = [1 - master, 2];

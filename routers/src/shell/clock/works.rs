@@ -1,12 +1,12 @@
 //! A clock's core and what it has of the system: its socket, the kernel's stamps, the node's page, and what others may
-//! look at. Whose thread it is, and when that sends, is its owner's business.
+//! look at. Its owner runs the thread, and decides when that sends.
 
 use super::local::LocalClock;
-use super::socket::{Came, TimeSocket};
-use super::state::{ClockState, Snapshot};
+use super::socket::{ReceivedDatagram, TimeSocket};
+use super::state::{ClockSnapshot, ClockState};
 use super::{ClockError, ClockParts};
 use crate::frame::{BadFrame, FrameHead, NodeIndex};
-use crate::impair::{Impairment, Output};
+use crate::impair::{Impairment, ImpairmentStep};
 use crate::security::{NotOpened, Opened, Opening, PeerSessions, Port, Rejection, Sealing, TAG_BYTES, Tally};
 use crate::time::{Clock, Exchange, InSlots, SentId, Stamp, TIME_BYTES};
 use rohrpost_mailbox::{TimeKeeper, TimeRecord, realtime_ns};
@@ -21,9 +21,9 @@ const WRITE_TRIES: usize = 8;
 /// Room for a datagram of time, and what seals it.
 const SEALED_BYTES: usize = TIME_BYTES + TAG_BYTES;
 
-/// What the impairment keeps besides the bytes.
+/// What the impairment keeps of a datagram besides its bytes.
 #[derive(Clone, Copy)]
-struct Held {
+struct DelayedArrival {
     source: IpAddr,
     stamp: Stamp,
     since_ns: u64,
@@ -36,13 +36,13 @@ pub(in crate::shell) struct Works {
     socket: TimeSocket,
     keeper: Option<TimeKeeper>,
     written: Option<TimeRecord>,
-    impairment: Option<Impairment<Held>>,
+    impairment: Option<Impairment<DelayedArrival>>,
     observer: Option<SyncSender<Exchange>>,
     seals: Option<Seals>,
     state: Arc<ClockState>,
-    snapshot: Snapshot,
+    snapshot: ClockSnapshot,
     system: u8,
-    /// Who says what time it is by another configuration, from an address that no node has.
+    /// Sends time of another configuration, from an address that no node has; it is to be refused.
     refuse: Option<IpAddr>,
 }
 
@@ -54,7 +54,7 @@ struct Seals {
 }
 
 /// A datagram of time that was opened.
-enum Heard<'a> {
+enum TimeDatagram<'a> {
     /// Of an incarnation that is known to live.
     Proven(FrameHead, &'a [u8]),
     /// Of one that may be over.
@@ -71,13 +71,13 @@ impl Seals {
         node: Option<NodeIndex>,
         overhears: bool,
         datagram: &'a mut [u8],
-    ) -> Option<Heard<'a>> {
+    ) -> Option<TimeDatagram<'a>> {
         let is_there = |from| node == Some(from);
         let opened = if overhears && self.opening.is_strange(datagram) {
-            self.opening.overhear_from(datagram, is_there).map(|(head, text)| Heard::Overheard(head, text))
+            self.opening.overhear_from(datagram, is_there).map(|(head, text)| TimeDatagram::Overheard(head, text))
         } else {
             match self.opening.open_from(datagram, is_there) {
-                Ok(Opened::Frame(head, text)) => Ok(Heard::Proven(head, text)),
+                Ok(Opened::Frame(head, text)) => Ok(TimeDatagram::Proven(head, text)),
                 // A hello is for the other port: the one that opens says so.
                 Ok(Opened::Hello(..)) => Err(Rejection::NotOurs.into()),
                 Err(why) => Err(why),
@@ -109,7 +109,7 @@ impl Works {
         let page = keeper.as_ref().and_then(TimeKeeper::record);
         let watched = keeper.as_ref().and_then(TimeKeeper::watched);
         let clock = Clock::new(settings, local.now_ns(), realtime_ns(), page).watching(local.now_ns(), watched);
-        let snapshot = Snapshot::of(&clock, local.now_ns());
+        let snapshot = ClockSnapshot::of(&clock, local.now_ns());
         let mut works = Self {
             clock,
             local,
@@ -133,7 +133,7 @@ impl Works {
         self.sealing(all, |all| Sealing::new(all, Port::Time))
     }
 
-    /// The same in time slots.
+    /// Seals in time slots.
     pub(in crate::shell) fn sealed_in_slots(self, all: Option<&Arc<PeerSessions>>) -> Self {
         self.sealing(all, Sealing::of_slots)
     }
@@ -169,7 +169,7 @@ impl Works {
         let Some(seals) = &mut self.seals else { return self.socket.send(to, datagram) };
         let mut sealed = [0; SEALED_BYTES];
         sealed[..TIME_BYTES].copy_from_slice(datagram);
-        // Who is not known yet is told later what time it is.
+        // A peer without a session yet is told the time later.
         seals.sealing.close(&mut sealed).is_ok() && self.socket.send(to, &sealed)
     }
 
@@ -204,7 +204,7 @@ impl Works {
         }
     }
 
-    /// To whom it is to be said, where nothing is sealed, that there is another configuration.
+    /// Address that is to be told of another configuration, where nothing is sealed.
     pub(in crate::shell) fn refuses(&mut self) -> Option<IpAddr> {
         self.refuse.take()
     }
@@ -219,12 +219,14 @@ impl Works {
     fn take_datagrams(&mut self, most: usize) -> u64 {
         let mut datagram = [0; SEALED_BYTES];
         for _ in 0..most {
-            let Some(Came { bytes, source, realtime_ns }) = self.socket.receive(&mut datagram) else { break };
+            let Some(ReceivedDatagram { bytes, source, realtime_ns }) = self.socket.receive(&mut datagram) else {
+                break;
+            };
             let now_ns = self.local.now_ns();
             let stamp = realtime_ns.and_then(|ns| self.local.stamp(ns)).unwrap_or(Stamp::by_us(now_ns));
             match &mut self.impairment {
                 Some(impairment) => {
-                    impairment.push(now_ns, Held { source, stamp, since_ns: now_ns }, &datagram[..bytes])
+                    impairment.push(now_ns, DelayedArrival { source, stamp, since_ns: now_ns }, &datagram[..bytes])
                 }
                 None => self.hand(now_ns, source, stamp, &mut datagram[..bytes]),
             }
@@ -237,9 +239,9 @@ impl Works {
         loop {
             let now_ns = self.local.now_ns();
             let Some(impairment) = &mut self.impairment else { return u64::MAX };
-            let (Held { source, stamp, since_ns }, held) = match impairment.poll(now_ns) {
-                Output::Send { to, datagram } => (to, datagram),
-                Output::Wait { until_ns } => return until_ns,
+            let (DelayedArrival { source, stamp, since_ns }, held) = match impairment.poll(now_ns) {
+                ImpairmentStep::Send { to, datagram } => (to, datagram),
+                ImpairmentStep::Wait { until_ns } => return until_ns,
             };
             let bytes = held.len().min(SEALED_BYTES);
             datagram[..bytes].copy_from_slice(&held[..bytes]);
@@ -251,20 +253,20 @@ impl Works {
     fn hand(&mut self, now_ns: u64, source: IpAddr, stamp: Stamp, datagram: &mut [u8]) {
         let overhears = self.clock.overhears(now_ns);
         let opened = match &mut self.seals {
-            None => FrameHead::parse(datagram).ok().map(|(head, rest)| Heard::Proven(head, rest)),
+            None => FrameHead::parse(datagram).ok().map(|(head, rest)| TimeDatagram::Proven(head, rest)),
             Some(seals) => seals.open(now_ns, source, self.socket.node_at(source), overhears, datagram),
         };
         let taken = match opened {
-            Some(Heard::Proven(head, rest)) if head.digest != self.clock.digest() => {
+            Some(TimeDatagram::Proven(head, rest)) if head.digest != self.clock.digest() => {
                 let node = self.socket.node_at(source);
-                // Whoever has an address that no node has here does not hear it from anybody else.
+                // No other part refuses a sender with an address of no node here.
                 self.refuse = self.refuse.or((node.is_none() && head.system == self.system).then_some(source));
                 self.clock.handle_other(now_ns, stamp, node, &head, rest).is_ok()
             }
-            Some(Heard::Proven(head, rest)) if self.socket.is_from(head.from, source) => {
+            Some(TimeDatagram::Proven(head, rest)) if self.socket.is_from(head.from, source) => {
                 self.clock.handle(now_ns, stamp, &head, rest).is_ok()
             }
-            Some(Heard::Overheard(head, rest)) if self.socket.is_from(head.from, source) => {
+            Some(TimeDatagram::Overheard(head, rest)) if self.socket.is_from(head.from, source) => {
                 self.clock.overhear(now_ns, stamp, &head, rest).is_ok()
             }
             _ => false,
@@ -273,7 +275,7 @@ impl Works {
         if let Some(exchange) = self.clock.take_exchange() {
             (self.snapshot.exchanges, self.snapshot.by_kernel) = (self.snapshot.exchanges + 1, exchange.by_kernel);
             if let Some(observer) = &self.observer {
-                // Who does not keep up misses some.
+                // An observer that does not keep up misses some.
                 let _ = observer.try_send(exchange);
             }
         }
@@ -295,9 +297,9 @@ impl Works {
     }
 
     fn show(&mut self) {
-        let Snapshot { exchanges, by_kernel, ignored, real_time, .. } = self.snapshot;
-        let seen = Snapshot::of(&self.clock, self.local.now_ns());
-        self.snapshot = Snapshot { exchanges, by_kernel, ignored, real_time, ..seen };
+        let ClockSnapshot { exchanges, by_kernel, ignored, real_time, .. } = self.snapshot;
+        let seen = ClockSnapshot::of(&self.clock, self.local.now_ns());
+        self.snapshot = ClockSnapshot { exchanges, by_kernel, ignored, real_time, ..seen };
         self.state.show(&self.snapshot);
     }
 }

@@ -8,13 +8,13 @@ const SECOND_NS: u64 = 1_000_000_000;
 /// The kernel wakes an ordinary thread so much later than it asks for, if that saves it a wake-up; by default 50 µs.
 const SLACK_NS: u64 = 1;
 
-/// From now on the calling thread wakes up when it wants to, also if it is an ordinary one.
+/// Makes the calling thread wake up on time from now on, also if it is an ordinary one.
 pub(super) fn be_punctual() {
     // Refused, it wakes up a little later.
     let _ = nix::sys::prctl::set_timerslack(SLACK_NS);
 }
 
-/// Sleeps for so long, ns, from now on. Interrupted, it wakes up earlier: whoever sleeps looks at the clock anyway.
+/// Sleeps for so long, ns, from now on. Interrupted, it wakes up earlier: the caller looks at the clock anyway.
 pub(super) fn sleep(for_ns: u64) {
     let until_ns = monotonic_ns().saturating_add(for_ns);
     let until = TimeSpec::new((until_ns / SECOND_NS).cast_signed(), (until_ns % SECOND_NS).cast_signed());

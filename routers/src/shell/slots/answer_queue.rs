@@ -2,16 +2,16 @@
 
 use super::super::socket::InSocket;
 use super::speech;
-use crate::frame::{NodeIndex, Reason};
+use crate::frame::{NodeIndex, RefusalReason};
 use crate::inbound::write_refusal;
-use crate::security::{HELLO_SLOT_BYTES, Said, Waiting};
+use crate::security::{HELLO_SLOT_BYTES, HelloQueue, Said};
 use crate::settings::Settings;
 use crate::tdma::TransmitWindow;
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-/// Whoever has no number here is refused so often at most.
+/// Senders without a number here are refused so often at most.
 const REFUSE_EVERY_NS: u64 = 50_000_000;
 
 /// Room for the longest refusal.
@@ -20,9 +20,9 @@ pub(in crate::shell) const REFUSAL_BYTES: usize = 128;
 /// second later.
 pub(in crate::shell) const ANSWERS: usize = 32;
 
-/// What the thread that receives wants to have sent.
+/// An answer from the receiving thread, to be sent.
 pub(in crate::shell) enum Answer {
-    /// Where nothing is sealed: to whom another configuration or version is refused.
+    /// Where nothing is sealed: a refusal of another configuration or version, and its receiver.
     Refusal { to: IpAddr, bytes: usize, datagram: [u8; REFUSAL_BYTES] },
     /// Where all is sealed.
     Hello { said: Said, datagram: [u8; REFUSAL_BYTES] },
@@ -31,12 +31,12 @@ pub(in crate::shell) enum Answer {
 /// In the hands of the thread that sends.
 pub(in crate::shell) struct AnswerQueue {
     answers: Receiver<Answer>,
-    /// The refusal whose turn is next.
+    /// The refusal that is next.
     refusal: Option<Answer>,
     /// When somebody without a number was refused last, ns.
     refused_ns: u64,
     /// Where all is sealed.
-    hellos: Option<Waiting>,
+    hellos: Option<HelloQueue>,
     /// By which they leave.
     socket: Arc<InSocket>,
     settings: Arc<Settings>,
@@ -45,7 +45,7 @@ pub(in crate::shell) struct AnswerQueue {
 impl AnswerQueue {
     pub(in crate::shell) fn new(
         answers: Receiver<Answer>,
-        hellos: Option<Waiting>,
+        hellos: Option<HelloQueue>,
         socket: Arc<InSocket>,
         settings: Arc<Settings>,
     ) -> Self {
@@ -70,12 +70,12 @@ impl AnswerQueue {
         if self.refusal.is_none() && self.hellos.is_none() && self.refused_ns + REFUSE_EVERY_NS <= now_ns {
             self.refused_ns = now_ns;
             let mut datagram = [0; REFUSAL_BYTES];
-            let bytes = write_refusal(&self.settings, None, Reason::Digest, &mut datagram);
+            let bytes = write_refusal(&self.settings, None, RefusalReason::Digest, &mut datagram);
             self.refusal = Some(Answer::Refusal { to, bytes, datagram });
         }
     }
 
-    /// Whose configuration this node goes by, and whose not, in words.
+    /// Which nodes have another configuration than this one, in words.
     pub(super) fn parted_by(&self, others: impl Iterator<Item = (Option<NodeIndex>, u64)>) -> String {
         speech::parted(&self.settings, others)
     }

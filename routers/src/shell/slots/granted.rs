@@ -2,18 +2,18 @@
 
 use super::super::clock::FIFO;
 use crate::driver::spin_ns;
-use crate::tdma::{Table, Window};
+use crate::tdma::{SlotTable, Window};
 use rohrpost_config::duration_decimal;
 use rohrpost_mailbox::sys::{Reservation, Scheduling, reserve, schedule};
 use std::time::Duration;
 
-/// For a window, besides the time in which it sends and the spinning before it: to wake up, and to read what came.
+/// Time for a window besides sending and spinning: to wake up, and to read what came.
 const AROUND_NS: u64 = 100_000;
-/// For each millisecond: to take what waits in the mailbox.
+/// Time for each millisecond: to take what waits in the mailbox.
 const MILLISECOND_NS: u64 = 50_000;
 /// A longer period brings nothing: the runtime would have to last for longer.
 const PERIOD_NS_MAX: u64 = 10_000_000;
-/// Of a period, the most that is reserved: others have to live as well, and several nodes may be on one computer.
+/// Part of a period that is reserved at most: other threads need time, and several nodes may be on one computer.
 const SHARE_PERCENT_MAX: u64 = 60;
 /// Slot tables repeat themselves after so many cycles at most.
 const CYCLES: u64 = 64;
@@ -32,7 +32,7 @@ pub enum Granted {
 impl Granted {
     /// Asks for the calling thread; what is refused is told once. Never bound to a processor: where another thread
     /// stands in the way it goes to the next.
-    pub(super) fn ask(table: &Table) -> Self {
+    pub(super) fn ask(table: &SlotTable) -> Self {
         let wanted = Wanted::new(table);
         let refused = match reserve(wanted.reservation()) {
             Ok(()) => {
@@ -77,7 +77,7 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn new(table: &Table) -> Self {
+    fn new(table: &SlotTable) -> Self {
         let period_ns = table.cycle_ns().min(PERIOD_NS_MAX);
         let naps_ns = period_ns / 1_000_000 * MILLISECOND_NS;
         Self { period_ns, needed_ns: busiest_ns(table, period_ns) + naps_ns }
@@ -107,8 +107,8 @@ impl Wanted {
     }
 }
 
-/// What windows take that begin within one period, at most.
-fn busiest_ns(table: &Table, period_ns: u64) -> u64 {
+/// Longest time that the windows within one period take together.
+fn busiest_ns(table: &SlotTable, period_ns: u64) -> u64 {
     let end_ns = CYCLES * table.cycle_ns() + period_ns;
     let next = |from_ns| table.next_window(from_ns).filter(|window| window.begin_ns < end_ns);
     let windows = std::iter::successors(next(0), |window| next(window.begin_ns + 1));
@@ -149,7 +149,7 @@ mod tests {
             slots: slots.iter().map(slot).collect(),
             tunnel: None,
         };
-        Wanted::new(&Table::new(&tdma, &[0], 0, 3, settings(0, 3).overhead_bytes()))
+        Wanted::new(&SlotTable::new(&tdma, &[0], 0, 3, settings(0, 3).overhead_bytes()))
     }
 
     #[test]

@@ -105,7 +105,7 @@ mod tests {
             (intake, Hands { transit, outbound: &mut end.outbound, report: &mut end.log, local_ns: || 0 })
         }
 
-        /// So many looks shortly before the call.
+        /// Looks this often shortly before the call.
         fn before_the_call(&mut self, looks: usize) {
             let (intake, mut hands) = self.hands();
             (0..looks).for_each(|_| _ = intake.take_one(&mut hands));

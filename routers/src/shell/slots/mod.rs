@@ -1,8 +1,8 @@
 //! The thread that sends in time slots: it has the router's mailbox, its queue, all sockets that send, and the clock.
 //! What it does with them, and when, says the [driver](crate::driver).
 //!
-//! It is never rung: who publishes a package makes no system call, and waits for a slot anyway. It takes nothing from
-//! the heap.
+//! Its bell is never rung: publishing a package makes no system call, since the package waits for a slot anyway. The
+//! thread takes nothing from the heap.
 
 mod alarm;
 mod answer_queue;
@@ -12,15 +12,15 @@ mod speech;
 mod state;
 
 pub use granted::Granted;
-pub use state::{Snapshot, State};
+pub use state::{SlotSnapshot, SlotStatus};
 
-use super::answers::Answers;
+use super::answers::ErrorReplier;
 use super::clock::{ClockState, Works};
 use super::failure::Failure;
 use super::sending::Sending;
 use super::threads::Shared;
 use super::tx_thread::TxThread;
-use super::wire::Wire;
+use super::wire::PeerSockets;
 use crate::driver::{NotSent, Platform, SlotDriver, SlotStep, WindowLog};
 use crate::frame::NodeIndex;
 use crate::intake::Transit;
@@ -36,7 +36,7 @@ use rohrpost_network::Network;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Whose thread it is.
+/// What the thread knows of its node.
 #[derive(Clone, Copy)]
 pub(super) struct Own {
     pub(super) router: Name,
@@ -45,13 +45,13 @@ pub(super) struct Own {
     pub(super) network: Network,
 }
 
-/// What the thread has.
-pub(super) struct Slots {
+/// State of the thread.
+pub(super) struct SlotThread {
     driver: SlotDriver,
     system: System,
 }
 
-/// What the driver has of the system.
+/// Implements the driver's platform with the real system.
 struct System {
     shared: Arc<Shared>,
     /// In which the thread that receives counts.
@@ -59,16 +59,16 @@ struct System {
     works: Works,
     transit: Receiver,
     outbound: Outbound,
-    answers: Answers,
-    wire: Wire,
+    answers: ErrorReplier,
+    wire: PeerSockets,
     line: AnswerQueue,
     router: Name,
-    snapshot: Snapshot,
-    state: Arc<State>,
+    snapshot: SlotSnapshot,
+    state: Arc<SlotStatus>,
 }
 
-impl Slots {
-    /// From what would send as packages come.
+impl SlotThread {
+    /// Makes the thread from the parts of a router without slots.
     pub(super) fn new(
         own: Own,
         tx_thread: TxThread,
@@ -78,8 +78,8 @@ impl Slots {
     ) -> Self {
         let TxThread { shared, transit, sending, .. } = tx_thread;
         let Sending { outbound, answers, wire, datagram, stats } = sending;
-        let snapshot = Snapshot::new(scheduler.silent());
-        let state = Arc::new(State::new(snapshot));
+        let snapshot = SlotSnapshot::new(scheduler.silent());
+        let state = Arc::new(SlotStatus::new(snapshot));
         let driver = SlotDriver::new(own.network, own.nodes, scheduler, datagram, monotonic_ns());
         let router = own.router;
         let system = System { shared, stats, works, transit, outbound, answers, wire, line, router, snapshot, state };
@@ -87,7 +87,7 @@ impl Slots {
     }
 
     /// What others may look at.
-    pub(super) fn state(&self) -> Arc<State> {
+    pub(super) fn state(&self) -> Arc<SlotStatus> {
         self.system.state.clone()
     }
 
@@ -96,7 +96,7 @@ impl Slots {
         self.system.works.state().clone()
     }
 
-    /// Until the router ends.
+    /// Runs until the router ends.
     pub(super) fn run(self) {
         let Self { mut driver, mut system } = self;
         alarm::be_punctual();
@@ -169,7 +169,7 @@ impl Platform for System {
         speech::tell_change(before, silent, || line.parted_by(works.clock.parted_by(works.now_ns())));
         let (counts, lead_ns) = (scheduler.counts(&works.clock), scheduler.lead_ns());
         let WindowLog { held, windows } = *log;
-        *snapshot = Snapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
+        *snapshot = SlotSnapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
         state.show(snapshot);
     }
 

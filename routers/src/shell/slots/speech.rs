@@ -26,7 +26,7 @@ pub(super) fn tell_change(before: Option<Silent>, now: Option<Silent>, parted: i
 pub(super) fn parted(settings: &Settings, by: impl Iterator<Item = (Option<NodeIndex>, u64)>) -> String {
     let node = |node: Option<NodeIndex>| match node.and_then(|node| settings.nodes.get(usize::from(node))) {
         Some(node) => format!("{} ({})", node.name, node.address),
-        None => "a node whose address this file does not have".into(),
+        None => "a node with an address that this file does not have".into(),
     };
     let others: Vec<String> = by.map(|(other, digest)| format!("{} by {digest:016x}", node(other))).collect();
     let own = settings.nodes.get(usize::from(settings.own)).map_or("", |own| own.name.as_str());

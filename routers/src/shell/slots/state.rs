@@ -2,14 +2,14 @@
 
 use super::granted::Granted;
 use crate::driver::{Used, WINDOWS};
-use crate::tdma::{Counts, Silent};
+use crate::tdma::{Silent, SlotCounts};
 use std::sync::{Mutex, PoisonError};
 
-/// How it stands with the time slots of this node.
+/// Time slots of this node at one moment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Snapshot {
+pub struct SlotSnapshot {
     /// What became of its windows.
-    pub counts: Counts,
+    pub counts: SlotCounts,
     /// Why it does not send; none if it does.
     pub silent: Option<Silent>,
     /// From the call to the wire, ns: the median, and by how much calls are made earlier.
@@ -22,11 +22,11 @@ pub struct Snapshot {
     pub windows: [Option<Used>; WINDOWS],
 }
 
-impl Snapshot {
-    /// Of a router that begins.
+impl SlotSnapshot {
+    /// Snapshot of a router that begins.
     pub(super) fn new(silent: Option<Silent>) -> Self {
         Self {
-            counts: Counts::default(),
+            counts: SlotCounts::default(),
             silent,
             lead_ns: (0, 0),
             granted: Granted::Ordinary,
@@ -36,24 +36,24 @@ impl Snapshot {
     }
 }
 
-/// Shared by the thread of the time slots and whoever wants to know.
+/// Shared by the thread of the time slots and its readers.
 #[derive(Debug)]
-pub struct State {
-    snapshot: Mutex<Snapshot>,
+pub struct SlotStatus {
+    snapshot: Mutex<SlotSnapshot>,
 }
 
-impl State {
-    pub(super) fn new(snapshot: Snapshot) -> Self {
+impl SlotStatus {
+    pub(super) fn new(snapshot: SlotSnapshot) -> Self {
         Self { snapshot: Mutex::new(snapshot) }
     }
 
-    /// How it stands.
-    pub fn snapshot(&self) -> Snapshot {
+    /// The present state.
+    pub fn snapshot(&self) -> SlotSnapshot {
         *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Of the thread itself. It never waits for who looks: then the next one is shown.
-    pub(super) fn show(&self, snapshot: &Snapshot) {
+    /// For the thread itself. It never waits for a reader: then the next snapshot is shown.
+    pub(super) fn show(&self, snapshot: &SlotSnapshot) {
         if let Ok(mut shown) = self.snapshot.try_lock() {
             *shown = *snapshot;
         }

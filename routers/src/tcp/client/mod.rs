@@ -13,12 +13,12 @@ mod time;
 use super::bad_line::BadLine;
 use super::fault_writer::FaultWriter;
 use super::seal::ClientSeal;
-use super::snapshots::{Class, LatestValue, Link, LinkState, SAY_EVERY_NS};
+use super::snapshots::{Class, ClientLink, LatestValue, LinkState, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
 use crate::admission::capped;
 use crate::impair;
-use crate::session::client::{Client, ClientSettings, Output, Package};
-use crate::session::frame::{BadFrame, Range};
+use crate::session::client::{Client, ClientPackage, ClientSettings, ClientStep};
+use crate::session::frame::{BadSessionFrame, Range};
 use crate::session::in_system;
 use crate::shell::Faults;
 use crate::shell::sender_cache::SenderCache;
@@ -61,7 +61,7 @@ pub enum ClientError {
     Thread(io::Error),
 }
 
-/// What it is made of.
+/// Parts of a client.
 pub struct ClientParts<'a> {
     /// The node that it serves.
     pub node: &'a Arc<Node>,
@@ -84,12 +84,12 @@ pub struct ClientParts<'a> {
     /// Whether the node's system time is what the server tells.
     pub keeps_time: bool,
     /// A bad network to the server; none: as it is.
-    pub impair: Option<impair::Settings>,
+    pub impair: Option<impair::ImpairmentSettings>,
 }
 
 /// A client at work; dropped, it ends. What waits in its mailbox stays there.
 pub struct ClientShell {
-    shared: Arc<Shared>,
+    shared: Arc<ClientShared>,
     /// Of its thread, which its bell wakes.
     participant: Arc<Participant>,
     /// Ends after the thread does.
@@ -98,9 +98,9 @@ pub struct ClientShell {
 }
 
 #[derive(Debug, Default)]
-struct Shared {
+struct ClientShared {
     ends: AtomicBool,
-    seen: LatestValue<Link>,
+    seen: LatestValue<ClientLink>,
 }
 
 impl ClientShell {
@@ -118,9 +118,9 @@ impl ClientShell {
         node.set_routes_beyond(via, &beyond)?;
         let time = keeps_time.then(|| Time::new(node)).transpose()?;
         let bad_line = impair.map(|impair| BadLine::begin(server, impair)).transpose().map_err(ClientError::BadLine)?;
-        let (shared, system) = (Arc::new(Shared::default()), settings.system);
+        let (shared, system) = (Arc::new(ClientShared::default()), settings.system);
         let range = |(first, last)| Range { first, last };
-        let work = Work {
+        let work = ClientThread {
             shared: shared.clone(),
             server: bad_line.as_ref().map_or(server, BadLine::near),
             client: Client::new(settings, hosts.iter().copied().map(range).collect(), monotonic_ns()),
@@ -144,7 +144,7 @@ impl ClientShell {
     }
 
     /// How it was a moment ago.
-    pub fn link(&self) -> Link {
+    pub fn link(&self) -> ClientLink {
         self.shared.seen.get()
     }
 
@@ -165,7 +165,7 @@ impl Drop for ClientShell {
     }
 }
 
-struct Connection {
+struct ClientConnection {
     stream: Stream,
     watch: Watch,
     /// It is not made yet.
@@ -173,9 +173,9 @@ struct Connection {
     awaits_room: bool,
 }
 
-/// What the thread has.
-struct Work {
-    shared: Arc<Shared>,
+/// State of the thread.
+struct ClientThread {
+    shared: Arc<ClientShared>,
     /// Where it connects to.
     server: SocketAddr,
     client: Client,
@@ -189,12 +189,12 @@ struct Work {
     time: Option<Time>,
     mailbox: Receiver,
     watches: Watches,
-    connection: Option<Connection>,
+    connection: Option<ClientConnection>,
     piece: Box<[u8]>,
 }
 
-impl Work {
-    /// Until the node ends.
+impl ClientThread {
+    /// Runs until the node ends.
     fn run(mut self) {
         let mut say_ns = 0;
         // Whether it has written since it last looked at the socket.
@@ -207,8 +207,8 @@ impl Work {
                 self.say(now_ns);
             }
             match self.client.poll(now_ns, &mut self.reporter) {
-                Output::Connect => self.connect(now_ns),
-                Output::Write => {
+                ClientStep::Connect => self.connect(now_ns),
+                ClientStep::Write => {
                     self.write();
                     // However much there is to send, what comes has its turn; a client with one package looks when it
                     // sleeps.
@@ -217,9 +217,9 @@ impl Work {
                     }
                     has_written = !has_written;
                 }
-                Output::Close => self.forget(),
-                Output::Wait { .. } if more => self.watches.look(),
-                Output::Wait { until_ns } => {
+                ClientStep::Close => self.forget(),
+                ClientStep::Wait { .. } if more => self.watches.look(),
+                ClientStep::Wait { until_ns } => {
                     self.sleep(until_ns.min(say_ns));
                     has_written = false;
                 }
@@ -249,7 +249,7 @@ impl Work {
                 let own = sender_cache.send(&Head { to, ..head }, body);
                 self.client.reached_itself(to, head.priority, own.map_err(Into::into));
             }
-            self.client.send(monotonic_ns(), &Package { head, body, published_ns, hops: 0 }, &mut self.reporter);
+            self.client.send(monotonic_ns(), &ClientPackage { head, body, published_ns, hops: 0 }, &mut self.reporter);
         }
         true
     }
@@ -266,7 +266,7 @@ impl Work {
         let begun = begun.and_then(|stream| Ok((self.watches.add(&stream, Interest::Write)?, stream)));
         match begun {
             Ok((watch, stream)) => {
-                self.connection = Some(Connection { stream, watch, is_begun: true, awaits_room: true });
+                self.connection = Some(ClientConnection { stream, watch, is_begun: true, awaits_room: true });
             }
             Err(error) => {
                 self.reporter.unreached(&error.to_string(), false);
@@ -353,8 +353,13 @@ impl Work {
         let (was_up, was_made) = (self.client.is_up(), self.client.is_connected());
         self.client.closed(monotonic_ns(), &mut self.reporter);
         if !was_up {
-            let closed =
-                || if self.client.hears_tls() { BadFrame::Tls.to_string() } else { "it closed the connection".into() };
+            let closed = || {
+                if self.client.hears_tls() {
+                    BadSessionFrame::Tls.to_string()
+                } else {
+                    "it closed the connection".into()
+                }
+            };
             self.reporter.unreached(&error.map_or_else(closed, ToString::to_string), was_made);
         }
     }
@@ -379,7 +384,7 @@ impl Work {
             (false, false) => LinkState::Away,
         };
         let told = client.system_time(now_ns).map(|record| record.at(now_ns).error);
-        self.shared.seen.say(Link {
+        self.shared.seen.say(ClientLink {
             state,
             why: self.reporter.why.clone(),
             connections: client.connections(),

@@ -1,9 +1,9 @@
 //! What a client does for its session: it delivers, answers, and says what happens.
 
 use crate::report::NotDelivered;
-use crate::session::client::{Event, Host};
+use crate::session::client::{ClientEvent, ClientHost};
 use crate::session::frame::Carried;
-use crate::session::{Answers, Cause};
+use crate::session::{Cause, ErrorReplies};
 use crate::shell::sender_cache::SenderCache;
 use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::snapshots::Outage;
@@ -47,13 +47,13 @@ impl EventReporter {
     }
 }
 
-impl Answers for EventReporter {
+impl ErrorReplies for EventReporter {
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
         self.fault_writer.answer(call, why, holder, answer)
     }
 }
 
-impl Host for EventReporter {
+impl ClientHost for EventReporter {
     fn deliver(&mut self, carried: &Carried<'_>) -> Result<(), NotDelivered> {
         self.sender_cache.send(&carried.head, carried.body).map_err(|error| {
             if let SendError::TooLarge { max, .. } = error {
@@ -67,25 +67,25 @@ impl Host for EventReporter {
         self.fault_writer.rule = line;
     }
 
-    fn event(&mut self, event: Event<'_>) {
+    fn event(&mut self, event: ClientEvent<'_>) {
         let server = self.server;
         match event {
-            Event::Up => {
+            ClientEvent::Up => {
                 self.why.clear();
                 self.outage.ends(monotonic_ns());
                 tracing::info!("takes part at the TCP router at {server}");
             }
-            Event::Down => {
+            ClientEvent::Down => {
                 self.outage.begins(monotonic_ns());
                 self.says(format!("takes part at the TCP router at {server} no more; it tries again"), false)
             }
-            Event::Refused(refusal) => {
+            ClientEvent::Refused(refusal) => {
                 self.says(format!("may not take part at the TCP router at {server}: {refusal}"), true);
             }
-            Event::Objected(verdict) => {
+            ClientEvent::Objected(verdict) => {
                 self.says(format!("may not host its names at the TCP router at {server}: {verdict}"), true);
             }
-            Event::Damaged(bad) => {
+            ClientEvent::Damaged(bad) => {
                 self.says(format!("cannot read what came from the TCP router at {server}: {bad}"), true);
             }
         }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 /// A record that came too late is made anew, so often.
 const WRITE_TRIES: usize = 8;
 
-/// What the node takes for system time, and where its modules read it.
+/// System time of the node, and the page on which its modules read it.
 pub(super) struct Time {
     follower: Follower,
     keeper: TimeKeeper,

@@ -1,6 +1,6 @@
 //! How connections come in: the socket that listens, and those that may not stay.
 
-use super::{Connection, LISTENER, ServerError, Work};
+use super::{LISTENER, ServerConnection, ServerError, ServerThread};
 use crate::session::ClientIndex;
 use crate::tcp::hush::Topic;
 use crate::tcp::seal::ServerSeal;
@@ -48,7 +48,7 @@ pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServerError> {
     })
 }
 
-impl Work {
+impl ServerThread {
     pub(super) fn accept(&mut self) {
         let now_ns = monotonic_ns();
         for _ in 0..ACCEPTS {
@@ -90,13 +90,14 @@ impl Work {
             self.connections.resize_with(index + 1, || None);
         }
         let peer = peer.to_string();
-        self.connections[index] = Some(Connection { is_known: !stream.is_sealed(), stream, peer, awaits_room: false });
+        self.connections[index] =
+            Some(ServerConnection { is_known: !stream.is_sealed(), stream, peer, awaits_room: false });
     }
 
     /// A connection cannot be sealed. The other end reads why, if this one waits a moment before it closes.
     pub(super) fn unsealed(&mut self, client: ClientIndex, error: &io::Error) {
         let now_ns = monotonic_ns();
-        let Some(Connection { stream, peer, .. }) =
+        let Some(ServerConnection { stream, peer, .. }) =
             self.connections.get_mut(usize::from(client.0)).and_then(Option::take)
         else {
             return;

@@ -8,9 +8,9 @@ mod reporter;
 
 use super::fault_writer::FaultWriter;
 use super::seal::{Holder, ServerSeal};
-use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, Member, Members, SAY_EVERY_NS};
+use super::snapshots::{Class, HOSTS_MAX, LatestValue, MEMBERS_MAX, MemberSnapshot, Members, SAY_EVERY_NS};
 use super::stream::{Moved, Stream};
-use crate::session::server::{Names, Output, Rights, Server, ServerSettings, View};
+use crate::session::server::{Names, Rights, Server, ServerSettings, ServerStep, View};
 use crate::session::{Cause, ClientIndex};
 use crate::shell::Faults;
 use door::{listen, raise_descriptors};
@@ -28,9 +28,9 @@ use std::thread::JoinHandle;
 /// Read from one client before the others have their turn.
 const PIECE_BYTES: usize = 64 * 1024;
 const EVENTS: usize = 256;
-/// What a process has open besides its connections, at most.
+/// File descriptors of a process besides its connections, at most.
 const DESCRIPTORS_BESIDE: u64 = 256;
-/// What is no client's place.
+/// Token of the listening socket; no client has this index.
 const LISTENER: u64 = u64::MAX;
 const BELL: u64 = u64::MAX - 1;
 
@@ -56,7 +56,7 @@ pub enum ServerError {
     Thread(io::Error),
 }
 
-/// What it is made of.
+/// Parts of a server.
 pub struct ServerParts<'a> {
     /// Where it listens.
     pub address: SocketAddr,
@@ -75,12 +75,12 @@ pub struct ServerParts<'a> {
 
 /// The TCP router at work; dropped, it tells its clients and ends.
 pub struct ServerShell {
-    shared: Arc<Shared>,
+    shared: Arc<ServerShared>,
     thread: Option<JoinHandle<()>>,
 }
 
 #[derive(Debug)]
-struct Shared {
+struct ServerShared {
     ends: AtomicBool,
     bell: EventFd,
     seen: LatestValue<Members>,
@@ -95,7 +95,7 @@ impl ServerShell {
         let ServerParts { address, settings, faults, seal, names, node } = parts;
         let own = settings.system.map(|(system, _)| system);
         let io = |doing| move |error: io::Error| ServerError::Io(address, doing, error);
-        raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.greetings_max) + DESCRIPTORS_BESIDE);
+        raise_descriptors(u64::from(settings.clients_max) + u64::from(settings.handshakes_max) + DESCRIPTORS_BESIDE);
         let listener = listen(address)?;
         let epoll = Epoll::new(EpollCreateFlags::EPOLL_CLOEXEC).map_err(|errno| io("epoll")(errno.into()))?;
         let bell = EventFd::from_flags(EfdFlags::EFD_CLOEXEC | EfdFlags::EFD_NONBLOCK)
@@ -105,9 +105,9 @@ impl ServerShell {
             epoll.add(&bell, EpollEvent::new(EpollFlags::EPOLLIN, BELL))
         };
         watch(&epoll).map_err(|errno| io("epoll")(errno.into()))?;
-        let shared = Arc::new(Shared { ends: AtomicBool::new(false), bell, seen: LatestValue::default() });
+        let shared = Arc::new(ServerShared { ends: AtomicBool::new(false), bell, seen: LatestValue::default() });
         let fault_writer = FaultWriter::new(faults, format!("beyond the TCP router at {address}"));
-        let work = Work {
+        let work = ServerThread {
             shared: shared.clone(),
             server: Server::new(settings),
             host: ServerReporter::new(fault_writer),
@@ -149,7 +149,7 @@ impl Drop for ServerShell {
     }
 }
 
-struct Connection {
+struct ServerConnection {
     stream: Stream,
     peer: String,
     /// It has shown a certificate, if it must.
@@ -158,9 +158,9 @@ struct Connection {
     awaits_room: bool,
 }
 
-/// What the thread has.
-struct Work {
-    shared: Arc<Shared>,
+/// State of the thread.
+struct ServerThread {
+    shared: Arc<ServerShared>,
     server: Server,
     host: ServerReporter,
     seal: Option<ServerSeal>,
@@ -173,13 +173,13 @@ struct Work {
     accept_ns: Option<u64>,
     epoll: Epoll,
     /// By client.
-    connections: Vec<Option<Connection>>,
+    connections: Vec<Option<ServerConnection>>,
     clock: SystemClock,
     piece: Box<[u8]>,
 }
 
-impl Work {
-    /// Until the router ends.
+impl ServerThread {
+    /// Runs until the router ends.
     fn run(mut self) {
         let mut events = [EpollEvent::empty(); EVENTS];
         let (mut ending, mut say_ns) = (false, 0);
@@ -203,10 +203,10 @@ impl Work {
                 self.server.end(now_ns, &mut self.host);
             }
             match self.server.poll(now_ns, &mut self.host) {
-                Output::Write(client) => self.write(client),
-                Output::Close(client) => self.close(client),
-                Output::Wait { .. } if ending && self.connections.iter().all(Option::is_none) => return,
-                Output::Wait { until_ns } => self.sleep(&mut events, until_ns.min(say_ns)),
+                ServerStep::Write(client) => self.write(client),
+                ServerStep::Close(client) => self.close(client),
+                ServerStep::Wait { .. } if ending && self.connections.iter().all(Option::is_none) => return,
+                ServerStep::Wait { until_ns } => self.sleep(&mut events, until_ns.min(say_ns)),
             }
         }
     }
@@ -327,7 +327,7 @@ impl Work {
             let hosts = hosts.get_mut(usize::from(client.0)).filter(|hosts| hosts.len() < HOSTS_MAX);
             hosts.into_iter().for_each(|hosts| hosts.push((range.first, range.last)));
         }
-        let member = |client: View<'_>| Member {
+        let member = |client: View<'_>| MemberSnapshot {
             name: client.name.to_owned(),
             peer: self
                 .connections
@@ -346,7 +346,7 @@ impl Work {
         let classes = Class::all(self.server.counts());
         let ServerReporter { left, refused, ref refusal, .. } = self.host;
         let (refusal, held) = (refusal.clone(), self.host.held());
-        let (crowded, overtaken) = (self.server.crowded(), self.server.overtaken());
+        let (crowded, superseded) = (self.server.crowded(), self.server.superseded());
         let crowded_packages = self.server.counts().lost_for(Cause::Share);
         let mut views = self.server.views();
         let members = views.by_ref().take(MEMBERS_MAX).map(member).collect();
@@ -359,13 +359,13 @@ impl Work {
             refusal,
             crowded,
             crowded_packages,
-            overtaken,
+            superseded,
             held,
             classes,
         });
     }
 }
 
-fn connection(connections: &mut [Option<Connection>], client: ClientIndex) -> Option<&mut Connection> {
+fn connection(connections: &mut [Option<ServerConnection>], client: ClientIndex) -> Option<&mut ServerConnection> {
     connections.get_mut(usize::from(client.0))?.as_mut()
 }

@@ -1,8 +1,8 @@
 //! Reports of the TCP router: refusals to senders of commands that go no further, and lines for people.
 
-use crate::session::frame::Reason;
-use crate::session::server::{Event, Host};
-use crate::session::{Answers, Cause};
+use crate::session::frame::SessionRefusalReason;
+use crate::session::server::{ServerEvent, ServerHost};
+use crate::session::{Cause, ErrorReplies};
 use crate::tcp::fault_writer::FaultWriter;
 use crate::tcp::hush::{Hush, Topic};
 use rohrpost_mailbox::monotonic_ns;
@@ -54,34 +54,34 @@ impl ServerReporter {
 fn tell(topic: Topic, line: &str) {
     match topic {
         Topic::Joined | Topic::Left(None) => tracing::info!("{line}"),
-        Topic::Left(Some(Reason::Ending)) => tracing::debug!("{line}"),
+        Topic::Left(Some(SessionRefusalReason::Ending)) => tracing::debug!("{line}"),
         _ => tracing::warn!("{line}"),
     }
 }
 
-impl Answers for ServerReporter {
+impl ErrorReplies for ServerReporter {
     fn answer(&mut self, call: &[u8], why: Cause, holder: Option<&str>, answer: &mut Vec<u8>) -> bool {
         self.fault_writer.answer(call, why, holder, answer)
     }
 }
 
-impl Host for ServerReporter {
-    fn event(&mut self, event: Event<'_>) {
+impl ServerHost for ServerReporter {
+    fn event(&mut self, event: ServerEvent<'_>) {
         match event {
-            Event::Joined { name } => self.says(Topic::Joined, &format!("{name} takes part")),
-            Event::Left { name, why } => {
+            ServerEvent::Joined { name } => self.says(Topic::Joined, &format!("{name} takes part")),
+            ServerEvent::Left { name, why } => {
                 self.left += 1;
                 let line = match why {
                     None => format!("{name} takes part no more: its connection is closed"),
-                    Some(Reason::Ending) => format!("{name} is told that the TCP router ends"),
+                    Some(SessionRefusalReason::Ending) => format!("{name} is told that the TCP router ends"),
                     Some(why) => format!("{name} takes part no more: {}", why.word()),
                 };
                 self.says(Topic::Left(why), &line);
             }
-            Event::Refused { reason: Reason::Ending, .. } => {}
-            Event::Refused { name, reason, digests: (theirs, ours), text } => {
+            ServerEvent::Refused { reason: SessionRefusalReason::Ending, .. } => {}
+            ServerEvent::Refused { name, reason, digests: (theirs, ours), text } => {
                 let refusal = match reason {
-                    Reason::Common | Reason::System => format!(
+                    SessionRefusalReason::Common | SessionRefusalReason::System => format!(
                         "{name} may not take part: its {} is {theirs:016x}, that of {text} {ours:016x}; \
                          give both the same configuration (`rohrpost check`, on both)",
                         reason.word()
@@ -91,7 +91,7 @@ impl Host for ServerReporter {
                 };
                 self.refuses(Topic::Refused(reason), refusal);
             }
-            Event::Objected { name, verdict } => {
+            ServerEvent::Objected { name, verdict } => {
                 self.says(Topic::Objected, &format!("{name} may not host what it says: {verdict}"));
             }
         }

@@ -1,7 +1,7 @@
 //! The table, and the inverse of the line, against their definitions.
 
 use super::world::{CYCLE, HEADS, MASTERS, MS, US, table, tdma};
-use crate::tdma::{Kind, Table, Window};
+use crate::tdma::{SlotTable, Window, WindowKind};
 use crate::time::TimeEstimate;
 use proptest::prelude::*;
 use rohrpost_mailbox::{TimeRecord, TimeSource};
@@ -40,7 +40,7 @@ fn any_tdma() -> impl Strategy<Value = (Tdma, Vec<u8>)> {
 }
 
 /// All windows of a node that begin in a span, by asking for one after the other.
-fn windows(table: &Table, from_ns: u64, to_ns: u64) -> Vec<Window> {
+fn windows(table: &SlotTable, from_ns: u64, to_ns: u64) -> Vec<Window> {
     let next = |from_ns| table.next_window(from_ns).filter(|window| window.begin_ns < to_ns);
     std::iter::successors(next(from_ns), |window| next(window.begin_ns + 1)).collect()
 }
@@ -57,9 +57,9 @@ proptest! {
         let to_ns = from_ns + 13 * cycle_ns;
         let mut all = Vec::new();
         for own in 0..NODES {
-            let table = Table::new(&tdma, &masters, own, NODES, HEADS);
+            let table = SlotTable::new(&tdma, &masters, own, NODES, HEADS);
             let own_windows = windows(&table, from_ns, to_ns);
-            let slots = own_windows.iter().filter(|window| matches!(window.kind, Kind::Slot { .. })).count();
+            let slots = own_windows.iter().filter(|window| matches!(window.kind, WindowKind::Slot { .. })).count();
             prop_assert_eq!(table.slots_between(from_ns, to_ns), slots as u64);
             for window in own_windows {
                 // The view from the wire agrees.
@@ -82,7 +82,7 @@ proptest! {
         }
         // Complete: each owned moment lies in a window that was found, unless it is at the edges.
         let owners = (from_ns + cycle_ns..to_ns - cycle_ns).step_by(97_000);
-        let any = Table::new(&tdma, &masters, 0, NODES, HEADS);
+        let any = SlotTable::new(&tdma, &masters, 0, NODES, HEADS);
         for owner in owners.filter_map(|at_ns| any.owner(at_ns)) {
             prop_assert!(all.contains(&(owner.node, owner.window)), "{:?}", owner);
         }
@@ -142,8 +142,12 @@ fn moments_have_owners() {
 #[test]
 fn windows_end_where_their_guard_begins() {
     let window = table(0).next_window(7 * CYCLE).unwrap();
-    let expected =
-        Window { kind: Kind::Synchronisation { rank: 0 }, cycle: 7, begin_ns: 7 * CYCLE, end_ns: 7 * CYCLE + 150 * US };
+    let expected = Window {
+        kind: WindowKind::Synchronisation { rank: 0 },
+        cycle: 7,
+        begin_ns: 7 * CYCLE,
+        end_ns: 7 * CYCLE + 150 * US,
+    };
     assert_eq!(window, expected);
     let slot = table(2).next_slot(7 * CYCLE + 2 * MS).unwrap();
     assert_eq!((slot.begin_ns, slot.end_ns), (7 * CYCLE + 3 * MS, 7 * CYCLE + 3_250 * US));
@@ -152,7 +156,7 @@ fn windows_end_where_their_guard_begins() {
 #[test]
 fn time_takes_what_the_table_says() {
     // 150 µs, of which 50 are for a late beginning; 20 µs for each frame.
-    let many = |nodes| Table::new(&tdma(), &MASTERS, 0, nodes, HEADS).for_clock();
+    let many = |nodes| SlotTable::new(&tdma(), &MASTERS, 0, nodes, HEADS).for_clock();
     assert!(many(2).warm_ups && many(2).replies_in_synchronisation, "one other node");
     assert!(many(3).warm_ups && !many(3).replies_in_synchronisation, "two others");
     assert!(!many(4).warm_ups, "three others");

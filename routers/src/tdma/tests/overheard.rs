@@ -2,8 +2,8 @@
 
 use super::world::{CYCLE, MASTERS, SECOND, US, World, table};
 use crate::frame::FrameHead;
-use crate::tdma::{Carries, GATE_NS, Kind, Next, Silent, SlotScheduler, UNPROVEN_CYCLES, Verdict};
-use crate::time::message::{Message, Request, Sync};
+use crate::tdma::{Carries, GATE_NS, Next, Silent, SlotScheduler, UNPROVEN_CYCLES, WindowKind, WindowVerdict};
+use crate::time::message::{Request, Sync, TimeMessage};
 use crate::time::{Clock, Ignored, Role, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
 
@@ -46,7 +46,7 @@ impl Ear {
         Self { clock, scheduler: SlotScheduler::new(table, 100 * US), now_ns, sequence: 0 }
     }
 
-    fn overhears_of(&mut self, from: u8, message: &Message) -> Result<(), Ignored> {
+    fn overhears_of(&mut self, from: u8, message: &TimeMessage) -> Result<(), Ignored> {
         let (kind, sequence, to) = (message.kind(), self.sequence, self.scheduler.table().own());
         let head = FrameHead { kind, system: 1, from, to, digest: 7, incarnation: 5, sequence };
         let came = Stamp { ns: self.now_ns, doubt_ns: 0, by_kernel: true };
@@ -60,7 +60,7 @@ impl Ear {
         let (sent_ns, term) = (self.now_ns + 1000 * SECOND, Term::new(7, 0));
         let (id, cycle) = (self.sequence, sent_ns / CYCLE);
         let sync = Sync { id, cycle, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
-        self.overhears_of(0, &Message::Sync(Sync { followed: true, ..sync }))
+        self.overhears_of(0, &TimeMessage::Sync(Sync { followed: true, ..sync }))
     }
 
     /// A node that has time, a thousand seconds ahead, and hears no master.
@@ -68,7 +68,7 @@ impl Ear {
         self.sequence += 1;
         let sent_ns = self.now_ns + 1000 * SECOND;
         let hello = Request { epoch: 1, sent_ns, timed: true, ..Request::default() };
-        self.overhears_of(from, &Message::Request(hello))
+        self.overhears_of(from, &TimeMessage::Request(hello))
     }
 
     /// It runs once a cycle.
@@ -103,13 +103,15 @@ fn a_hello_leaves_in_one_of_four_cycles_and_nothing_else() {
     let mut before_ns = None;
     for asked in 1..=3 {
         let Next::Window(planned) = ear.scheduler.next(ear.now_ns, &ear.clock) else { panic!("silent") };
-        assert!(matches!(planned.window.kind, Kind::Slot { .. }) && ear.scheduler.silent() == Some(Silent::Asking));
+        assert!(
+            matches!(planned.window.kind, WindowKind::Slot { .. }) && ear.scheduler.silent() == Some(Silent::Asking)
+        );
         while ear.now_ns + CYCLE < planned.call_ns {
             ear.overhears().unwrap();
         }
         ear.now_ns = planned.call_ns;
         let verdict = ear.scheduler.validate(&planned, ear.now_ns, &ear.clock);
-        let Verdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
+        let WindowVerdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
         assert_eq!(tx_window.carries, Carries::Hello);
         let step = ear.clock.poll_in(ear.now_ns, tx_window.allowed(), &mut [0; TIME_BYTES]);
         assert!(matches!(step, Step::Wait { .. }), "{step:?}");
@@ -215,7 +217,7 @@ fn a_window_of_what_is_overheard_is_no_slot_of_the_nodes_own_time() {
         clock.poll_in(now_ns, crate::time::Allowed::Nothing, &mut [0; TIME_BYTES]);
         scheduler.next(now_ns, clock);
         let sent_ns = clock.reading(now_ns).time.ns + 1000 * SECOND;
-        let message = Message::Request(Request { epoch: 9, sent_ns, timed: true, ..Request::default() });
+        let message = TimeMessage::Request(Request { epoch: 9, sent_ns, timed: true, ..Request::default() });
         let head = FrameHead { kind: message.kind(), system: 1, from: 0, to: 2, digest: 7, incarnation: 5, sequence };
         let came = Stamp { ns: now_ns, doubt_ns: 0, by_kernel: true };
         clock.overhear(now_ns, came, &head, &message.to_bytes()).unwrap();
@@ -224,7 +226,7 @@ fn a_window_of_what_is_overheard_is_no_slot_of_the_nodes_own_time() {
     assert_eq!(planned.carries, Carries::Hello);
     let before = scheduler.counts(clock);
     let late_ns = planned.begin_ns + GATE_NS + 1;
-    assert!(matches!(scheduler.validate(&planned, late_ns, clock), Verdict::Late));
+    assert!(matches!(scheduler.validate(&planned, late_ns, clock), WindowVerdict::Late));
     assert_eq!(scheduler.counts(clock), before, "none of its own slots was late");
     scheduler.next(late_ns, clock);
     let passed = scheduler.counts(clock).silent - before.silent;
@@ -240,13 +242,13 @@ fn a_node_that_meanwhile_follows_a_live_master_asks_for_its_window_anew() {
     for id in 101..=108 {
         let (sent_ns, term) = (ear.now_ns + 1000 * SECOND, Term::new(7, 0));
         let sync = Sync { id, cycle: id, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
-        let message = Message::Sync(sync);
+        let message = TimeMessage::Sync(sync);
         let head =
             FrameHead { kind: message.kind(), system: 1, from: 0, to: 2, digest: 7, incarnation: 5, sequence: id };
         let came = Stamp { ns: ear.now_ns, doubt_ns: 0, by_kernel: true };
         ear.clock.handle(ear.now_ns, came, &head, &message.to_bytes()).unwrap();
     }
-    assert!(matches!(ear.scheduler.validate(&planned, planned.call_ns, &ear.clock), Verdict::Early));
+    assert!(matches!(ear.scheduler.validate(&planned, planned.call_ns, &ear.clock), WindowVerdict::Early));
     let Next::Window(anew) = ear.scheduler.next(planned.call_ns, &ear.clock) else { panic!("silent") };
     assert_eq!((anew.window, anew.carries), (planned.window, Carries::Time));
 }
@@ -257,13 +259,14 @@ fn rare_slots_are_waited_for() {
     assert_eq!(table(0).for_clock().hello_every_ns, UNPROVEN_CYCLES * CYCLE);
     slots.slots[0].period = 16;
     slots.slots[2].period = 32;
-    let table = crate::tdma::Table::new(&slots, &MASTERS, 1, 3, super::world::HEADS);
+    let table = crate::tdma::SlotTable::new(&slots, &MASTERS, 1, 3, super::world::HEADS);
     assert_eq!(table.for_clock().slot_every_ns, 16 * CYCLE);
     assert_eq!(table.for_clock().asks_every_ns, 16 * CYCLE, "a master has it");
     assert_eq!(table.for_clock().hello_every_ns, 16 * CYCLE, "node 2 has another one in each third cycle");
     let mut slots = super::world::tdma();
     slots.slots.iter_mut().filter(|slot| slot.node == 2).for_each(|slot| slot.period = 32);
-    let asks = |own| crate::tdma::Table::new(&slots, &MASTERS, own, 3, super::world::HEADS).for_clock().asks_every_ns;
+    let asks =
+        |own| crate::tdma::SlotTable::new(&slots, &MASTERS, own, 3, super::world::HEADS).for_clock().asks_every_ns;
     assert!(!MASTERS.contains(&2) && asks(1) < asks(2), "the others wait for nobody's rare slots");
     assert_eq!(asks(2), 32 * CYCLE);
 }
@@ -271,14 +274,14 @@ fn rare_slots_are_waited_for() {
 #[test]
 fn a_node_that_knows_the_time_ignores_unverified_frames_as_it_does_those_without_time() {
     let mut ear = Ear::new(2);
-    for message in [Message::WarmUp, Message::Request(Request::default())] {
+    for message in [TimeMessage::WarmUp, TimeMessage::Request(Request::default())] {
         assert_eq!(ear.overhears_of(0, &message), Err(Ignored::Unproven));
     }
     ear.overhears().unwrap();
     let (sent_ns, term) = (ear.now_ns, Term::new(1, 0));
     let sync = Sync { id: 99, cycle: 1, nominal_ns: sent_ns, sent_ns, epoch: 1, term, began: term, ..Sync::default() };
     let head = FrameHead {
-        kind: Message::Sync(sync).kind(),
+        kind: TimeMessage::Sync(sync).kind(),
         system: 1,
         from: 0,
         to: 2,
@@ -287,7 +290,7 @@ fn a_node_that_knows_the_time_ignores_unverified_frames_as_it_does_those_without
         sequence: 99,
     };
     let came = Stamp { ns: ear.now_ns, doubt_ns: 0, by_kernel: true };
-    ear.clock.handle(ear.now_ns, came, &head, &Message::Sync(sync).to_bytes()).unwrap();
+    ear.clock.handle(ear.now_ns, came, &head, &TimeMessage::Sync(sync).to_bytes()).unwrap();
     assert!(!ear.clock.overhears(ear.now_ns));
     assert_eq!(ear.overhears(), Err(Ignored::Unproven), "it hears a master that lives");
 }

@@ -1,9 +1,9 @@
 //! One node, and a master made of plain messages: exact to the nanosecond.
 
 use super::world::{CYCLE, MASTERS, SECOND, US, table};
-use crate::frame::{FrameHead, Kind as Frame};
-use crate::tdma::{Carries, GATE_NS, LATE_NS, Next, Planned, Silent, SlotScheduler, Verdict};
-use crate::time::message::{Message, Reply, Sync};
+use crate::frame::{FrameHead, FrameKind as Frame};
+use crate::tdma::{Carries, GATE_NS, LATE_NS, Next, Planned, Silent, SlotScheduler, WindowVerdict};
+use crate::time::message::{Reply, Sync, TimeMessage};
 use crate::time::{Allowed, Clock, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ impl Lonely {
         Self { clock, scheduler: SlotScheduler::new(table, 100 * US), now_ns, cycle: (now_ns + OFFSET) / CYCLE, id: 0 }
     }
 
-    fn hears(&mut self, from: u8, at_ns: u64, message: &Message) {
+    fn hears(&mut self, from: u8, at_ns: u64, message: &TimeMessage) {
         let head =
             FrameHead { kind: message.kind(), system: 1, from, to: 2, digest: 7, incarnation: 5, sequence: self.id };
         let came = Stamp { ns: at_ns, doubt_ns: 0, by_kernel: true };
@@ -56,11 +56,11 @@ impl Lonely {
         (self.cycle, self.id) = (self.cycle + 1, self.id + 1);
         self.now_ns = self.cycle * CYCLE - OFFSET + 10 * US;
         let sync = self.sync(self.cycle * CYCLE);
-        self.hears(0, self.now_ns, &Message::Sync(sync));
+        self.hears(0, self.now_ns, &TimeMessage::Sync(sync));
     }
 
     /// Its next window, validated at this moment after its call.
-    fn judged(&mut self, after_ns: i64) -> (Planned, Verdict) {
+    fn judged(&mut self, after_ns: i64) -> (Planned, WindowVerdict) {
         let Next::Window(planned) = self.scheduler.next(self.now_ns, &self.clock) else { panic!("silent") };
         self.now_ns = planned.call_ns.saturating_add_signed(after_ns);
         let verdict = self.scheduler.validate(&planned, self.now_ns, &self.clock);
@@ -70,7 +70,7 @@ impl Lonely {
     /// Asks in its slot, and is answered. Each direction takes 10 µs.
     fn asks(&mut self) {
         let (_, verdict) = self.judged(0);
-        let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
+        let WindowVerdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
         let mut datagram = [0; TIME_BYTES];
         let mut kinds = Vec::new();
         let allowed = tx_window.allowed();
@@ -88,7 +88,7 @@ impl Lonely {
             Reply { id: self.id, sync_ns: self.cycle * CYCLE, request_ns, sent_ns: request_ns, ..Reply::default() };
         let reply = Reply { epoch: 1, term: TERM, began: TERM, ..reply };
         self.now_ns += 50 * US;
-        self.hears(0, self.now_ns, &Message::Reply(reply));
+        self.hears(0, self.now_ns, &TimeMessage::Reply(reply));
     }
 
     /// Has joined, and knows the time.
@@ -120,14 +120,14 @@ fn a_node_listens_then_asks_then_sends() {
     }
     one.hears_sync();
     let (planned, verdict) = one.judged(0);
-    let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
+    let WindowVerdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
     assert_eq!((tx_window.carries, one.scheduler.silent()), (Carries::Time, Some(Silent::Joining { heard: 8 })));
     // For coarse time a Sync takes half of its longest delay.
     let delay_max_ns = one.scheduler.table().for_clock().delay_max_ns;
     assert_eq!(planned.begin_ns, planned.window.begin_ns - OFFSET + 10 * US - delay_max_ns / 2);
     let mut one = Lonely::joined();
     let (planned, verdict) = one.judged(0);
-    let Verdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
+    let WindowVerdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
     assert_eq!((tx_window.carries, one.scheduler.silent()), (Carries::All, None));
     assert!(planned.begin_ns.abs_diff(planned.window.begin_ns - OFFSET) < 2 * US, "{planned:?}");
     assert_eq!(planned.call_ns - planned.wake_ns, 100 * US, "to be spun");
@@ -141,9 +141,9 @@ fn what_is_late_is_not_sent() {
         let mut one = Lonely::joined();
         let (_, verdict) = one.judged(after_ns);
         match sends {
-            None => assert!(matches!(verdict, Verdict::Early), "{after_ns}: {verdict:?}"),
-            Some(true) => assert!(matches!(verdict, Verdict::Send(_)), "{after_ns}: {verdict:?}"),
-            Some(false) => assert!(matches!(verdict, Verdict::Late), "{after_ns}: {verdict:?}"),
+            None => assert!(matches!(verdict, WindowVerdict::Early), "{after_ns}: {verdict:?}"),
+            Some(true) => assert!(matches!(verdict, WindowVerdict::Send(_)), "{after_ns}: {verdict:?}"),
+            Some(false) => assert!(matches!(verdict, WindowVerdict::Late), "{after_ns}: {verdict:?}"),
         }
         assert_eq!(one.scheduler.counts(&one.clock).late, u64::from(sends == Some(false)));
     }
@@ -162,7 +162,11 @@ fn silence_begins_right_above_the_allowance() {
                 one.now_ns = planned.call_ns;
                 let bound_ns = one.clock.estimate().unwrap().bound_ns(planned.end_ns);
                 let verdict = one.scheduler.validate(&planned, one.now_ns, &one.clock);
-                assert_eq!(matches!(verdict, Verdict::Send(_)), bound_ns <= allowance_ns, "{bound_ns}: {verdict:?}");
+                assert_eq!(
+                    matches!(verdict, WindowVerdict::Send(_)),
+                    bound_ns <= allowance_ns,
+                    "{bound_ns}: {verdict:?}"
+                );
                 sent += u32::from(was_sure);
                 was_sure = bound_ns <= allowance_ns;
             }
@@ -185,7 +189,7 @@ fn no_frame_starts_before_its_slot() {
         one.scheduler.left(one.now_ns, left);
     }
     let (planned, verdict) = one.judged(0);
-    assert!(matches!(verdict, Verdict::Send(_)), "{verdict:?}");
+    assert!(matches!(verdict, WindowVerdict::Send(_)), "{verdict:?}");
     assert_eq!(planned.begin_ns - planned.call_ns, 12 * US, "as much as can be compensated");
     assert_eq!(one.scheduler.lead_ns().0, 17 * US, "the median");
     let doubtful = Stamp { ns: one.now_ns + 12 * US, doubt_ns: 10_000, by_kernel: true };
@@ -200,7 +204,7 @@ fn no_frame_starts_before_its_slot() {
 fn what_was_handed_over_counts() {
     let mut one = Lonely::joined();
     let (planned, verdict) = one.judged(0);
-    let Verdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
+    let WindowVerdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
     // 350 µs: 4375 bytes. All are handed over at once, and the wire takes its time.
     assert!((349 * US..=350 * US).contains(&(planned.end_ns - planned.begin_ns)), "{planned:?}");
     let (mut datagrams, wire_ns) = (0, 85_280);
@@ -226,7 +230,7 @@ fn what_was_handed_over_counts() {
 #[test]
 fn what_leaves_later_than_bounds_reckon_with_is_late() {
     let mut one = Lonely::joined();
-    let (_, Verdict::Send(mut tx_window)) = one.judged(0) else { panic!() };
+    let (_, WindowVerdict::Send(mut tx_window)) = one.judged(0) else { panic!() };
     let (hand_over_ns, wire_ns, small_wire_ns) = (20 * US, 85_280, 6_720);
     let called_ns = tx_window.begin_ns - one.scheduler.lead_ns().1;
     let turns_at = |after_ns: u64, is_so: &dyn Fn(u64) -> bool| {
@@ -264,7 +268,7 @@ fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     let coarse = one.clock.coarse(one.now_ns);
     // Its time is ahead by its sender's error.
     let replacement = Sync { id: 77, replacement: true, followed: false, ..one.sync(one.cycle * CYCLE + 50 * US) };
-    one.hears(1, one.now_ns, &Message::Sync(replacement));
+    one.hears(1, one.now_ns, &TimeMessage::Sync(replacement));
     assert_eq!(one.clock.heard_ns(one.now_ns), heard_ns, "the master is as silent as before");
     assert_eq!(one.clock.coarse(one.now_ns), coarse, "nobody goes by it");
     assert_eq!(one.clock.sync_counts().replacements_heard, counts.replacements_heard + 1);
@@ -283,7 +287,7 @@ fn a_node_that_turns_while_the_first_master_lives_is_not_sure() {
         (one.cycle, one.now_ns) = (one.cycle + silence / CYCLE, one.now_ns + silence);
         let term = Term::new(2, 1);
         let sync = Sync { id: 1, term, began: term, ..one.sync(one.now_ns + OFFSET) };
-        one.hears(1, one.now_ns, &Message::Sync(sync));
+        one.hears(1, one.now_ns, &TimeMessage::Sync(sync));
         assert_eq!(one.clock.master(), Some(1));
         assert_eq!(one.clock.estimate().is_some(), is_sure, "after {silence} ns of silence");
     }

@@ -4,7 +4,7 @@
 use crate::frame::{FrameHead, NodeIndex};
 use crate::harness::settings;
 use crate::stats::Stats;
-use crate::tdma::{Carries, Counts, Kind, Next, Planned, Silent, SlotScheduler, Table, Verdict};
+use crate::tdma::{Carries, Next, Planned, Silent, SlotCounts, SlotScheduler, SlotTable, WindowKind, WindowVerdict};
 use crate::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -49,8 +49,8 @@ pub(super) fn tdma() -> Tdma {
 
 pub(super) const MASTERS: [NodeIndex; 2] = [0, 1];
 
-pub(super) fn table(own: NodeIndex) -> Table {
-    Table::new(&tdma(), &MASTERS, own, 3, HEADS)
+pub(super) fn table(own: NodeIndex) -> SlotTable {
+    SlotTable::new(&tdma(), &MASTERS, own, 3, HEADS)
 }
 
 /// A frame that was on the wire, in true time, with its gap.
@@ -76,8 +76,8 @@ impl File {
         Self { tdma: tdma(), masters: MASTERS.to_vec(), digest: 7 }
     }
 
-    fn table(&self, own: NodeIndex) -> Table {
-        Table::new(&self.tdma, &self.masters, own, 3, HEADS)
+    fn table(&self, own: NodeIndex) -> SlotTable {
+        SlotTable::new(&self.tdma, &self.masters, own, 3, HEADS)
     }
 }
 
@@ -191,7 +191,7 @@ impl World {
     pub(super) fn wakes_late_to_synchronise(&mut self, node: NodeIndex, late_ns: u64) {
         let window = |world: &Self| {
             let planned = world.nodes[usize::from(node)].planned;
-            planned.filter(|planned| matches!(planned.window.kind, Kind::Synchronisation { .. }))
+            planned.filter(|planned| matches!(planned.window.kind, WindowKind::Synchronisation { .. }))
         };
         assert!(self.run_until(2 * CYCLE, |world| window(world).is_some()), "it has to synchronise");
         let begin_ns = window(self).map_or(0, |planned| planned.begin_ns);
@@ -204,7 +204,7 @@ impl World {
         self.nodes[usize::from(node)].clock.as_ref().unwrap()
     }
 
-    pub(super) fn counts(&self, node: NodeIndex) -> Counts {
+    pub(super) fn counts(&self, node: NodeIndex) -> SlotCounts {
         self.nodes[usize::from(node)].scheduler.counts(self.clock(node))
     }
 
@@ -264,7 +264,7 @@ impl World {
         let local_ns = one.local_ns(now);
         let Some(clock) = &mut one.clock else { return };
         if let Some(planned) = planned
-            && let Verdict::Send(tx_window) = one.scheduler.validate(&planned, local_ns, clock)
+            && let WindowVerdict::Send(tx_window) = one.scheduler.validate(&planned, local_ns, clock)
         {
             self.send(node, tx_window);
         }

@@ -3,7 +3,7 @@
 use super::{Clock, Draft, Left, Slave};
 use crate::frame::NodeIndex;
 use crate::time::clock_model::EVEN_PPB;
-use crate::time::election::{Origin, State};
+use crate::time::election::{ElectionState, Origin};
 use crate::time::message::{Reply, Request, Sync};
 use crate::time::{Ignored, Stamp, Term};
 
@@ -19,13 +19,13 @@ impl Clock {
             self.keep_term();
             self.hello_in_slots(received, request);
             // A node that asks for a master gets its time at once.
-            if matches!(self.election.state(), State::Master(_)) {
+            if matches!(self.election.state(), ElectionState::Master(_)) {
                 self.slaves[usize::from(from)].next_ns = 0;
             }
             return Ok(());
         }
         let is_asked = self.slaves[usize::from(from)].syncs.iter().any(|left| left.id == request.id);
-        if !is_asked || !matches!(self.election.state(), State::Master(_)) {
+        if !is_asked || !matches!(self.election.state(), ElectionState::Master(_)) {
             return Err(Ignored::Unasked);
         }
         // It may come from a part of the network with a later term, and with a time that must not go back.
@@ -54,7 +54,7 @@ impl Clock {
 
     /// This node is master from now on. Its own time continues, or the one that it heard; else the first epoch begins
     /// by its wall clock.
-    pub(super) fn reign(&mut self, now_ns: u64, term: Term, origin: Origin) {
+    pub(super) fn become_master(&mut self, now_ns: u64, term: Term, origin: Origin) {
         self.line.stop_slew(now_ns);
         if origin == Origin::Heard {
             self.take_up_heard(now_ns);
@@ -73,20 +73,20 @@ impl Clock {
         self.slaves.iter_mut().for_each(|slave| *slave = Slave { next_ns: now_ns, ..Slave::default() });
         let error_ns = self.line.record().error_ns;
         if let Some(slots) = &mut self.slots {
-            slots.reigns(error_ns, origin);
+            slots.become_master(error_ns, origin);
         }
     }
 
     /// A master's own term may have been raised: its timeline continues.
     pub(super) fn keep_term(&mut self) {
-        if let State::Master(term) = self.election.state() {
+        if let ElectionState::Master(term) = self.election.state() {
             self.term = term;
         }
     }
 
     /// Another master must yield and does not know of this one: it gets a Sync soon.
     pub(super) fn answer_master(&mut self, now_ns: u64, other: NodeIndex) {
-        if matches!(self.election.state(), State::Master(_)) {
+        if matches!(self.election.state(), ElectionState::Master(_)) {
             let soon_ns = now_ns.saturating_add(self.exchange_ns);
             let slave = &mut self.slaves[usize::from(other)];
             slave.next_ns = slave.next_ns.min(soon_ns);
@@ -137,7 +137,7 @@ impl Clock {
     }
 
     pub(super) fn write_sync(&mut self, now_ns: u64, to: NodeIndex, nominal_ns: u64, sequence: u64) -> Option<Sync> {
-        let State::Master(term) = self.election.state() else { return None };
+        let ElectionState::Master(term) = self.election.state() else { return None };
         self.last_id += 1;
         let (id, at) = (self.last_id, Stamp::by_us(now_ns));
         let syncs = &mut self.slaves[usize::from(to)].syncs;
@@ -151,7 +151,7 @@ impl Clock {
     }
 
     pub(super) fn write_reply(&mut self, now_ns: u64, to: NodeIndex, id: u64, came: Stamp) -> Option<Reply> {
-        let State::Master(term) = self.election.state() else { return None };
+        let ElectionState::Master(term) = self.election.state() else { return None };
         let left = self.slaves[usize::from(to)].syncs.iter().find(|left| left.id == id)?.at;
         Some(Reply {
             id,

@@ -3,9 +3,9 @@
 use super::Clock;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::stats::Stats;
-use crate::time::election::State;
-use crate::time::message::Message;
-use crate::time::others::Claim;
+use crate::time::election::ElectionState;
+use crate::time::message::TimeMessage;
+use crate::time::others::TimelineClaim;
 use crate::time::{Ignored, Stamp};
 
 impl Clock {
@@ -25,7 +25,7 @@ impl Clock {
         if head.system != self.settings.system || head.digest == self.settings.digest {
             return Err(Ignored::Stranger);
         }
-        let theirs = claim(head, &Message::parse(head.kind, rest)?).ok_or(Ignored::OtherTable)?;
+        let theirs = claim(head, &TimeMessage::parse(head.kind, rest)?).ok_or(Ignored::OtherTable)?;
         // Without slots two times do not disturb each other.
         if self.slots.is_none() {
             return Err(Ignored::OtherTable);
@@ -93,25 +93,25 @@ impl Clock {
     }
 
     /// A node that hears no time of its own configuration, or a master without followers, has the lesser claim.
-    pub(super) fn claim(&self, now_ns: u64) -> Claim {
+    pub(super) fn claim(&self, now_ns: u64) -> TimelineClaim {
         let is_followed = match self.election.state() {
-            State::Listening => false,
-            State::Slave(_) => true,
-            State::Master(_) => self.is_followed(now_ns),
+            ElectionState::Listening => false,
+            ElectionState::Slave(_) => true,
+            ElectionState::Master(_) => self.is_followed(now_ns),
         };
         // Of two configurations without time neither may begin one.
-        let digest = if self.election.state() == State::Listening { 0 } else { self.settings.digest };
+        let digest = if self.election.state() == ElectionState::Listening { 0 } else { self.settings.digest };
         (is_followed, digest)
     }
 }
 
 /// What a datagram of another configuration says of the time there; none if it says that there is none.
-pub(super) fn claim(head: &FrameHead, message: &Message) -> Option<Claim> {
+pub(super) fn claim(head: &FrameHead, message: &TimeMessage) -> Option<TimelineClaim> {
     let is_followed = match message {
-        Message::Sync(sync) => sync.followed || sync.replacement,
-        Message::Request(hello) if hello.id == 0 && !hello.timed => return None,
+        TimeMessage::Sync(sync) => sync.followed || sync.replacement,
+        TimeMessage::Request(hello) if hello.id == 0 && !hello.timed => return None,
         // These go between a master and its follower, or say that the sender has time.
-        Message::WarmUp | Message::Request(_) | Message::Reply(_) => true,
+        TimeMessage::WarmUp | TimeMessage::Request(_) | TimeMessage::Reply(_) => true,
     };
     Some((is_followed, head.digest))
 }

@@ -4,15 +4,15 @@
 use super::Clock;
 use super::other_tables::claim;
 use crate::frame::{FrameHead, NodeIndex};
-use crate::time::election::State;
-use crate::time::message::Message;
+use crate::time::election::ElectionState;
+use crate::time::message::TimeMessage;
 use crate::time::unverified::TimeReport;
 use crate::time::{Ignored, Stamp, TimeEstimate};
 
 impl Clock {
     /// Whether unverified frames help: those for [`Clock::overhear`].
     pub fn overhears(&self, now_ns: u64) -> bool {
-        let is_listening = || self.election.state() == State::Listening && self.sure(now_ns).is_none();
+        let is_listening = || self.election.state() == ElectionState::Listening && self.sure(now_ns).is_none();
         self.slots.is_some() && (self.is_beginning() || is_listening())
     }
 
@@ -28,7 +28,7 @@ impl Clock {
         if self.is_unsteady(now_ns) {
             return Err(Ignored::Unsteady);
         }
-        let message = Message::parse(head.kind, rest)?;
+        let message = TimeMessage::parse(head.kind, rest)?;
         let theirs = claim(head, &message).filter(|_| is_other);
         if self.is_parted(now_ns) {
             if theirs.is_some() {
@@ -37,9 +37,9 @@ impl Clock {
             return Err(Ignored::OtherTable);
         }
         let told = match &message {
-            Message::Sync(sync) if sync.replacement => None,
-            Message::Sync(sync) => Some(TimeReport { epoch: sync.epoch, system_ns: sync.sent_ns, error_ns: 0 }),
-            Message::Request(hello) if hello.id == 0 && hello.timed => {
+            TimeMessage::Sync(sync) if sync.replacement => None,
+            TimeMessage::Sync(sync) => Some(TimeReport { epoch: sync.epoch, system_ns: sync.sent_ns, error_ns: 0 }),
+            TimeMessage::Request(hello) if hello.id == 0 && hello.timed => {
                 Some(TimeReport { epoch: hello.epoch, system_ns: hello.sent_ns, error_ns: hello.error_ns })
             }
             _ => return Err(Ignored::Unproven),
@@ -54,7 +54,7 @@ impl Clock {
         self.election.overhears(&slots.overheard);
         let yields = match (message, theirs) {
             (_, Some(theirs)) => theirs > self.claim(now_ns),
-            (Message::Sync(sync), None) => self.election.would_yield(head.from, &sync, self.is_followed(now_ns)),
+            (TimeMessage::Sync(sync), None) => self.election.would_yield(head.from, &sync, self.is_followed(now_ns)),
             _ => false,
         };
         if is_patient && self.is_beginning() && yields {

@@ -3,8 +3,8 @@
 use super::{Clock, Draft, EXCHANGE_NS_MIN, PendingExchange, rate_of};
 use crate::frame::FrameHead;
 use crate::time::clock_model::{EVEN_PPB, wander_ns_s};
-use crate::time::election::{Followed, Heard, State};
-use crate::time::history::{Estimate, Sample};
+use crate::time::election::{ElectionState, Followed, SyncOutcome};
+use crate::time::history::{Estimate, OffsetSample};
 use crate::time::message::{Reply, Request, Sync};
 use crate::time::{Exchange, Ignored, RATE_MAX_PPB, STEP_MIN_NS, Stamp};
 
@@ -24,27 +24,27 @@ impl Clock {
             return self.replaced(received, head, sync);
         }
         let is_contested = self.is_contested(received.ns);
-        let was_master = matches!(self.election.state(), State::Master(_));
+        let was_master = matches!(self.election.state(), ElectionState::Master(_));
         let followed = self.is_followed(now_ns);
         let heard = self.election.sync(head.from, head.incarnation, sync, received.ns, followed);
         match heard {
-            Heard::Ignored => {
+            SyncOutcome::Ignored => {
                 self.keep_term();
                 self.answer_master(now_ns, head.from);
                 return Err(Ignored::Late);
             }
-            Heard::Turned => {
+            SyncOutcome::Turned => {
                 self.line.stop_slew(now_ns);
                 self.forget();
                 if was_master {
                     self.drafts.clear();
                 }
             }
-            // The same reign under a later term: the timeline continues.
-            Heard::Followed if self.timeline == sync.began => self.term = sync.term,
-            Heard::Followed => {}
+            // The same master under a later term: the timeline continues.
+            SyncOutcome::Followed if self.timeline == sync.began => self.term = sync.term,
+            SyncOutcome::Followed => {}
         }
-        self.heard_in_slots(received, sync, heard == Heard::Turned && is_contested, heard == Heard::Turned);
+        self.heard_in_slots(received, sync, heard == SyncOutcome::Turned && is_contested, heard == SyncOutcome::Turned);
         let pauses = received.ns.saturating_sub(self.asked_ns) < self.pause_ns();
         if pauses || now_ns.saturating_sub(received.ns) > ANSWER_NS_MAX {
             return Ok(());
@@ -67,7 +67,7 @@ impl Clock {
         head: &FrameHead,
         reply: &Reply,
     ) -> Result<(), Ignored> {
-        let State::Slave(master) = self.election.state() else { return Err(Ignored::Unasked) };
+        let ElectionState::Slave(master) = self.election.state() else { return Err(Ignored::Unasked) };
         if (head.from, head.incarnation, reply.began) != (master.node, master.incarnation, master.began) {
             return Err(Ignored::Unasked);
         }
@@ -93,8 +93,8 @@ impl Clock {
     }
 
     /// The servo: from the measurement to the target of the line.
-    pub(super) fn scheduler(&mut self, now_ns: u64, newest: Sample) {
-        let State::Slave(master) = self.election.state() else { return };
+    pub(super) fn scheduler(&mut self, now_ns: u64, newest: OffsetSample) {
+        let ElectionState::Slave(master) = self.election.state() else { return };
         let Some(estimate) = self.history.estimate(now_ns, self.usual_rate) else {
             self.contradictions += 1;
             self.forget();
@@ -174,7 +174,7 @@ impl Clock {
     }
 
     pub(super) fn is_held_over(&self) -> bool {
-        let is_master = matches!(self.election.state(), State::Master(_));
+        let is_master = matches!(self.election.state(), ElectionState::Master(_));
         let at_most = self.line.record().drift_ns_s >= 2 * RATE_MAX_PPB.unsigned_abs();
         self.line.is_synchronised() && !is_master && !at_most
     }
@@ -201,7 +201,7 @@ impl Clock {
 
 /// The interval that an exchange leaves for `system − local` when the Request left. None when the frames took negative
 /// time.
-fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<Sample> {
+fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<OffsetSample> {
     let (came_ns, left_ns) = (exchange.sync_came.ns, exchange.request_left.ns);
     let waited_ns = left_ns.checked_sub(came_ns)?;
     let low_ns = exchange.sync_left_ns.wrapping_sub(came_ns).cast_signed();
@@ -212,7 +212,7 @@ fn sample(exchange: &Exchange, doubt_ns: u64) -> Option<Sample> {
     // Between both stamps of this node its clock drifted; the master's are whole numbers.
     let drifted_ns = u128::from(waited_ns) * RATE_MAX_PPB as u128 / 1_000_000_000;
     let doubt_ns = doubt_ns.saturating_add(drifted_ns as u64).saturating_add(2).cast_signed();
-    Some(Sample {
+    Some(OffsetSample {
         local_ns: left_ns,
         low_ns: low_ns.saturating_sub(doubt_ns),
         high_ns: high_ns.saturating_add(doubt_ns),

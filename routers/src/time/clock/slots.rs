@@ -9,7 +9,7 @@ use crate::frame::{FrameHead, NodeIndex};
 use crate::stats::Stats;
 use crate::time::clock_model::EVEN_PPB;
 use crate::time::coarse::Coarse;
-use crate::time::election::{Followed, Origin, State};
+use crate::time::election::{ElectionState, Followed, Origin};
 use crate::time::message::{Request, Sync};
 use crate::time::unverified::UnverifiedPeers;
 use crate::time::{Ignored, InSlots, JOINING_SYNCS, Stamp, Step, SyncCounts, TIME_BYTES, Term, TimeEstimate};
@@ -46,7 +46,7 @@ pub enum Allowed {
 
 /// State of a clock that exists only in time slots.
 #[derive(Debug)]
-pub(super) struct Slots {
+pub(super) struct SlotClock {
     pub(super) settings: InSlots,
     coarse: Coarse,
     /// Frames of nodes that may not be alive any more.
@@ -73,7 +73,7 @@ pub(super) struct Slots {
     advanced_ns: u64,
 }
 
-impl Slots {
+impl SlotClock {
     /// The page follows the master's time, which may be this far off that of an earlier term.
     pub(super) fn goes_by(&mut self, master_error_ns: u64) {
         (self.unsure, self.master_error_ns) = (false, master_error_ns);
@@ -86,7 +86,7 @@ impl Slots {
     }
 
     /// This node is master; its time may be this far off that of an earlier term.
-    pub(super) fn reigns(&mut self, error_ns: u64, origin: Origin) {
+    pub(super) fn become_master(&mut self, error_ns: u64, origin: Origin) {
         self.goes_by(error_ns);
         self.beginning = if origin == Origin::Own { 0 } else { BEGINNING_CYCLES };
     }
@@ -101,11 +101,11 @@ impl Clock {
         let hears_ns = self.interval_ns.saturating_mul(OTHERS_CYCLES);
         self.others.gives(hears_ns.saturating_add(settings.slot_every_ns.saturating_mul(OTHERS_SLOTS)));
         // A node that hears no other restarts its terms, but above those of its earlier incarnation, which others may
-        // still follow: a reign lasts longer than a millisecond.
+        // still follow: a term lasts longer than a millisecond.
         if self.line.record().epoch > 0 {
             self.election.speaks_of(Term::new(self.hello_ns / MS, 0), 0);
         }
-        self.slots = Some(Box::new(Slots {
+        self.slots = Some(Box::new(SlotClock {
             settings,
             coarse: Coarse::default(),
             overheard: UnverifiedPeers::new(self.settings.nodes, self.interval_ns, settings.hello_every_ns),
@@ -128,12 +128,12 @@ impl Clock {
         self
     }
 
-    /// As [`Clock::poll`], for a clock in time slots: what may leave now. Handle all received datagrams before: a
+    /// Like [`Clock::poll`], for a clock in time slots: what may leave now. Handle all received datagrams before: a
     /// backup master sends when it has not heard the master's Sync of this cycle. Datagrams that need another window
     /// are dropped.
     pub fn poll_in(&mut self, now_ns: u64, allowed: Allowed, datagram: &mut [u8; TIME_BYTES]) -> Step {
         self.advance(now_ns);
-        if allowed == Allowed::Slot && self.drafts.is_empty() && self.election.state() == State::Listening {
+        if allowed == Allowed::Slot && self.drafts.is_empty() && self.election.state() == ElectionState::Listening {
             self.draft_hello(now_ns);
         }
         while let Some((to, draft)) = self.next_in(now_ns, allowed) {
@@ -212,7 +212,7 @@ impl Clock {
 
     /// A stand-in becomes master when enough Syncs are missing; the next in order before others.
     fn succeed(&mut self, now_ns: u64, cycle: u64) {
-        let (State::Slave(master), Some(slots)) = (self.election.state(), &self.slots) else { return };
+        let (ElectionState::Slave(master), Some(slots)) = (self.election.state(), &self.slots) else { return };
         let is_next = self.election.before(Some(master.node)) == 0;
         let heard_cycle = if is_next { slots.heard_cycle } else { slots.lives_cycle };
         let since_cycle = heard_cycle.max(slots.spoke_cycle).max(slots.awake_cycle);
@@ -221,7 +221,7 @@ impl Clock {
             return;
         }
         if let Some(term) = self.election.succeeds() {
-            self.reign(now_ns, term, Origin::Own);
+            self.become_master(now_ns, term, Origin::Own);
         }
     }
 
@@ -235,7 +235,7 @@ impl Clock {
     }
 
     pub(super) fn write_replacement(&mut self, now_ns: u64, nominal_ns: u64) -> Option<Sync> {
-        let State::Slave(master) = self.election.state() else { return None };
+        let ElectionState::Slave(master) = self.election.state() else { return None };
         self.last_id += 1;
         Some(Sync {
             id: self.last_id,
@@ -257,9 +257,9 @@ impl Clock {
     /// A Sync of this or a later master came: whether the present one lives, so that there are two.
     pub(super) fn is_contested(&self, received_ns: u64) -> bool {
         match self.election.state() {
-            State::Listening => false,
-            State::Slave(master) => !self.election.is_succeeded(&master, received_ns),
-            State::Master(_) => true,
+            ElectionState::Listening => false,
+            ElectionState::Slave(master) => !self.election.is_succeeded(&master, received_ns),
+            ElectionState::Master(_) => true,
         }
     }
 
@@ -300,7 +300,7 @@ impl Clock {
     /// The same for packages, from their counters, with now by their monotonic clock and by the clock of time.
     pub fn hears_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
         self.refused_by(packages, now_ns, local_ns);
-        let State::Slave(Followed { node, .. }) = self.election.state() else { return };
+        let ElectionState::Slave(Followed { node, .. }) = self.election.state() else { return };
         let link = &packages.peer(node).link;
         let since_ns = now_ns.saturating_sub(link.heard_ns.get());
         self.hears(node, link.incarnation.get(), local_ns.saturating_sub(since_ns));
@@ -308,14 +308,14 @@ impl Clock {
 
     /// Another node hears no master either, and has time: a new master continues that time.
     pub(super) fn hello_in_slots(&mut self, received: Stamp, hello: &Request) {
-        if let (Some(slots), State::Listening, true) = (&mut self.slots, self.election.state(), hello.timed) {
+        if let (Some(slots), ElectionState::Listening, true) = (&mut self.slots, self.election.state(), hello.timed) {
             slots.coarse.add(hello.epoch, hello.sent_ns, received.ns, hello.error_ns);
         }
     }
 
     /// Another node sent in the master's place: the cycle lives. The master still counts as unheard.
     pub(super) fn replaced(&mut self, received: Stamp, head: &FrameHead, sync: &Sync) -> Result<(), Ignored> {
-        let (State::Slave(master), Some(slots)) = (self.election.state(), &mut self.slots) else {
+        let (ElectionState::Slave(master), Some(slots)) = (self.election.state(), &mut self.slots) else {
             return Err(Ignored::Late);
         };
         if sync.term != master.term || !self.election.stands_in(head.from, sync.term) {
@@ -338,14 +338,14 @@ impl Clock {
         Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))
     }
 
-    /// The same, if its bound is small enough to send by it.
+    /// The present time, if its bound is small enough to send by it.
     pub(super) fn sure(&self, now_ns: u64) -> Option<TimeEstimate> {
         let allowance_ns = self.slots.as_ref()?.settings.allowance_ns;
         self.estimate().filter(|own| own.bound_ns(now_ns) <= allowance_ns)
     }
 
     /// The time that this node would use as master: the others' time, if it knows that well enough.
-    pub(super) fn origin_in_slots(&self, slots: &Slots, now_ns: u64) -> Origin {
+    pub(super) fn origin_in_slots(&self, slots: &SlotClock, now_ns: u64) -> Origin {
         let is_heard =
             || self.coarse(now_ns).is_some_and(|heard| heard.bound_ns(now_ns) <= slots.settings.allowance_ns);
         match self.sure(now_ns) {
@@ -384,15 +384,15 @@ impl Clock {
     /// How many Syncs of a master count for [`Clock::coarse`]; none if no master is heard.
     pub fn joining(&self) -> Option<u8> {
         let slots = self.slots.as_ref()?;
-        matches!(self.election.state(), State::Slave(_)).then(|| slots.coarse.heard())
+        matches!(self.election.state(), ElectionState::Slave(_)).then(|| slots.coarse.heard())
     }
 
     /// Whether this node may have to send in its synchronisation windows.
     pub fn may_synchronise(&self) -> bool {
         match self.election.state() {
-            State::Master(_) => true,
-            State::Slave(master) => self.election.stands_in(self.settings.own, master.term),
-            State::Listening => false,
+            ElectionState::Master(_) => true,
+            ElectionState::Slave(master) => self.election.stands_in(self.settings.own, master.term),
+            ElectionState::Listening => false,
         }
     }
 
@@ -403,9 +403,9 @@ impl Clock {
             self.slots.as_ref().is_some_and(|slots| slots.lives_cycle < due_cycle)
         };
         match self.election.state() {
-            State::Master(_) => true,
-            State::Slave(master) => self.may_synchronise() && is_missing(&master),
-            State::Listening => false,
+            ElectionState::Master(_) => true,
+            ElectionState::Slave(master) => self.may_synchronise() && is_missing(&master),
+            ElectionState::Listening => false,
         }
     }
 
@@ -415,7 +415,7 @@ impl Clock {
     }
 
     fn is_master(&self) -> bool {
-        matches!(self.election.state(), State::Master(_))
+        matches!(self.election.state(), ElectionState::Master(_))
     }
 
     /// Counters of synchronisation in time slots.

@@ -1,12 +1,12 @@
 //! Hostile datagrams: they are refused, or change nothing that a module could notice.
 
-use crate::frame::{FrameHead, Kind};
-use crate::time::message::{MESSAGE_BYTES, Message, Reply, Request, Sync};
+use crate::frame::{FrameHead, FrameKind};
+use crate::time::message::{MESSAGE_BYTES, Reply, Request, Sync, TimeMessage};
 use crate::time::{Allowed, Clock, InSlots, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use proptest::prelude::*;
 use std::time::Duration;
 
-const KINDS: [Kind; 4] = [Kind::Sync, Kind::WarmUp, Kind::Request, Kind::Reply];
+const KINDS: [FrameKind; 4] = [FrameKind::Sync, FrameKind::WarmUp, FrameKind::Request, FrameKind::Reply];
 
 fn settings() -> TimeSettings {
     TimeSettings {
@@ -20,7 +20,7 @@ fn settings() -> TimeSettings {
     }
 }
 
-fn head(kind: Kind, from: u8) -> FrameHead {
+fn head(kind: FrameKind, from: u8) -> FrameHead {
     FrameHead { kind, system: 1, from, to: 1, digest: 7, incarnation: 5, sequence: 0 }
 }
 
@@ -29,7 +29,7 @@ fn number() -> impl Strategy<Value = u64> {
     prop_oneof![0..4_u64, 250..260_u64, 500..520_u64, Just(u64::MAX), Just(i64::MAX as u64), any::<u64>()]
 }
 
-fn message() -> impl Strategy<Value = Message> {
+fn message() -> impl Strategy<Value = TimeMessage> {
     let numbers = (number(), number(), number(), number(), number(), number(), number(), number());
     let flags = (any::<bool>(), any::<bool>(), any::<bool>(), any::<u32>(), 0..4_usize);
     (numbers, flags).prop_map(|((id, a, b, c, error_ns, epoch, term, began), (x, y, z, doubt_ns, kind))| {
@@ -38,11 +38,11 @@ fn message() -> impl Strategy<Value = Message> {
             0 => {
                 let (cycle, nominal_ns, sent_ns, followed, replacement) = (a, b, c, x, y);
                 let times = Sync { cycle, nominal_ns, sent_ns, error_ns, ..Sync::default() };
-                Message::Sync(Sync { id, epoch, term, began, followed, replacement, ..times })
+                TimeMessage::Sync(Sync { id, epoch, term, began, followed, replacement, ..times })
             }
-            1 => Message::WarmUp,
-            2 => Message::Request(Request { id, sent_ns: c, error_ns, epoch, term, eager: x, far: y, timed: z }),
-            _ => Message::Reply(Reply {
+            1 => TimeMessage::WarmUp,
+            2 => TimeMessage::Request(Request { id, sent_ns: c, error_ns, epoch, term, eager: x, far: y, timed: z }),
+            _ => TimeMessage::Reply(Reply {
                 id,
                 sync_ns: a,
                 request_ns: b,
@@ -63,14 +63,14 @@ proptest! {
     #[test]
     fn a_message_that_is_taken_has_these_bytes_and_no_others(message in message()) {
         let bytes = message.to_bytes();
-        if let Ok(parsed) = Message::parse(message.kind(), &bytes) {
+        if let Ok(parsed) = TimeMessage::parse(message.kind(), &bytes) {
             prop_assert_eq!(parsed, message);
         }
     }
 
     #[test]
     fn any_bytes_are_a_message_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..100), kind in 0..4_usize) {
-        if let Ok(message) = Message::parse(KINDS[kind], &bytes) {
+        if let Ok(message) = TimeMessage::parse(KINDS[kind], &bytes) {
             prop_assert_eq!(message.to_bytes().to_vec(), bytes);
         }
     }
@@ -142,14 +142,14 @@ fn a_reply_to_another_question_changes_nothing() {
     let sync = |id, ns| {
         let (cycle, nominal_ns, sent_ns) = (0, ns, ns);
         let (error_ns, epoch, term, began) = (0, 1, Term::new(1, 0), Term::new(1, 0));
-        Message::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, ..Sync::default() })
+        TimeMessage::Sync(Sync { id, cycle, nominal_ns, sent_ns, error_ns, epoch, term, began, ..Sync::default() })
     };
     let reply = |id| {
         let (sync_ns, request_ns, sent_ns) = (5_000_000, 5_200_000, 5_300_000);
         let reply = Reply { id, sync_ns, request_ns, sent_ns, epoch: 1, ..Reply::default() };
-        Message::Reply(Reply { term: Term::new(1, 0), began: Term::new(1, 0), ..reply })
+        TimeMessage::Reply(Reply { term: Term::new(1, 0), began: Term::new(1, 0), ..reply })
     };
-    let mut tell = |now_ns: u64, message: Message| {
+    let mut tell = |now_ns: u64, message: TimeMessage| {
         let taken = clock.handle(now_ns, Stamp::by_us(now_ns), &head(message.kind(), 0), &message.to_bytes());
         let mut datagram = [0; TIME_BYTES];
         while let Step::Send { .. } = clock.poll(now_ns, &mut datagram) {}
@@ -160,7 +160,7 @@ fn a_reply_to_another_question_changes_nothing() {
     assert!(tell(10_400_000, reply(1)));
     assert!(!tell(10_400_000, reply(1)), "answered already");
     assert!(!tell(10_500_000, sync(1, 5_000_000)), "twice");
-    assert!(!tell(10_500_000, Message::Request(Request { id: 3, ..Request::default() })), "it is no master");
+    assert!(!tell(10_500_000, TimeMessage::Request(Request { id: 3, ..Request::default() })), "it is no master");
     assert_eq!(MESSAGE_BYTES, 72);
 }
 
@@ -172,7 +172,7 @@ fn a_node_too_far_off_gets_an_epoch_though_it_followed_a_later_term() {
     let syncs = (1..100).map(|n| n * 10_000_000).find_map(|now_ns| {
         while let Step::Send { to, .. } = clock.poll(now_ns, &mut datagram) {
             let (head, rest) = FrameHead::parse(&datagram).unwrap();
-            if let (2, Ok(Message::Sync(sync))) = (to, Message::parse(head.kind, rest)) {
+            if let (2, Ok(TimeMessage::Sync(sync))) = (to, TimeMessage::parse(head.kind, rest)) {
                 return Some((now_ns, sync));
             }
         }
@@ -181,7 +181,7 @@ fn a_node_too_far_off_gets_an_epoch_though_it_followed_a_later_term() {
     let (now_ns, sync) = syncs.unwrap();
     let later = Term::new(sync.term.round() + 3, 0);
     let request = Request { id: sync.id, epoch: sync.epoch, term: later, far: true, ..Request::default() };
-    let message = Message::Request(request);
+    let message = TimeMessage::Request(request);
     clock.handle(now_ns, Stamp::by_us(now_ns), &head(message.kind(), 2), &message.to_bytes()).unwrap();
     assert!(clock.term() > later, "all take it for the latest");
     assert_eq!(clock.record().epoch, sync.epoch + 1);

@@ -13,7 +13,7 @@ use super::station::Arrived;
 use super::world::{Event, World};
 use rohrpost_mailbox::{Head, Name, Priority, Type, local};
 use rohrpost_routers::admission::{PACKET, TUNNEL};
-use rohrpost_routers::frame::{self, Alive, FrameHead, Kind, Reason, Refusal};
+use rohrpost_routers::frame::{self, Alive, FrameHead, FrameKind, Refusal, RefusalReason};
 use std::rc::Rc;
 
 /// The last that a router could send.
@@ -226,7 +226,7 @@ impl World<'_> {
         let chance = &mut self.chance;
         if chance.percent(30) {
             let head = FrameHead {
-                kind: Kind::Refusal,
+                kind: FrameKind::Refusal,
                 system: super::plan::SYSTEM,
                 from: from as u8,
                 to: to as u8,
@@ -234,7 +234,12 @@ impl World<'_> {
                 incarnation: chance.bits() | 1,
                 sequence: 0,
             };
-            let reason = chance.pick(&[Reason::Version, Reason::Stranger, Reason::Sealed, Reason::Key]);
+            let reason = chance.pick(&[
+                RefusalReason::Version,
+                RefusalReason::Stranger,
+                RefusalReason::Sealed,
+                RefusalReason::Key,
+            ]);
             let rest = Refusal { version: frame::VERSION, reason, digest: head.digest }.to_bytes();
             return Rc::from([&head.to_bytes(&[&rest])[..], &rest].concat());
         }
@@ -243,7 +248,7 @@ impl World<'_> {
         let any = chance.between(1 << 32, SEQUENCE_MAX);
         let sequence = chance.pick(&[SEQUENCE_MAX, SEQUENCE_MAX / 2, any]);
         let head = FrameHead {
-            kind: Kind::Alive,
+            kind: FrameKind::Alive,
             system: super::plan::SYSTEM,
             from: from as u8,
             to: to as u8,
@@ -267,7 +272,14 @@ impl World<'_> {
         let from = chance.below(self.stations.len() as u64) as u8;
         let rest = if chance.percent(50) { Alive::default().to_bytes().to_vec() } else { noise };
         let head = FrameHead {
-            kind: chance.pick(&[Kind::Packages, Kind::Fragment, Kind::Alive, Kind::Refusal, Kind::Sync, Kind::Reply]),
+            kind: chance.pick(&[
+                FrameKind::Packages,
+                FrameKind::Fragment,
+                FrameKind::Alive,
+                FrameKind::Refusal,
+                FrameKind::Sync,
+                FrameKind::Reply,
+            ]),
             system: if chance.percent(20) { 9 } else { super::plan::SYSTEM },
             from: if chance.percent(20) { chance.below(256) as u8 } else { from },
             to: if chance.percent(20) { chance.below(256) as u8 } else { to as u8 },

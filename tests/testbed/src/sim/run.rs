@@ -9,7 +9,7 @@ use super::slotted::Slotted;
 use super::station::Layer;
 use super::ticking::{self, Ticking};
 use super::world::{NewLayers, World};
-use rohrpost_routers::tdma::Table;
+use rohrpost_routers::tdma::SlotTable;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -54,7 +54,7 @@ fn routers(plan: &Rc<Plan>) -> NewLayers<'static> {
         }
         if let Some(slots) = plan.slots_of(edition) {
             let (own, nodes) = (settings.own, plan.nodes.len() as u8);
-            let table = Table::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());
+            let table = SlotTable::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());
             return vec![Box::new(Slotted::new(packages, ticking, &settings, table, now))];
         }
         vec![Box::new(packages) as Box<dyn Layer>, Box::new(ticking)]

@@ -3,8 +3,8 @@
 use super::chance::Chance;
 use rohrpost_routers::frame::{self, FrameHead};
 use rohrpost_routers::security::{
-    Gate, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection, RouterIdentity,
-    Sealing, TAG_BYTES, Waiting,
+    Gate, HelloQueue, InstallationKey, KEY_BYTES, KeyId, KeyRing, Opened, Opening, PeerSessions, Port, Rejection,
+    RouterIdentity, Sealing, TAG_BYTES,
 };
 use rohrpost_routers::settings::Settings;
 use std::num::NonZeroU8;
@@ -27,7 +27,7 @@ pub(super) struct PackageSeals {
     pub(super) gate: Gate,
     pub(super) sealing: Sealing,
     /// Hellos that wait for a slot.
-    pub(super) waiting: Waiting,
+    pub(super) waiting: HelloQueue,
     all: Arc<PeerSessions>,
 }
 
@@ -37,7 +37,7 @@ impl PackageSeals {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&incarnation.to_le_bytes());
         let (gate, sealing) = (Gate::new(all, seed), Sealing::new(all, Port::Packages));
-        Self { gate, sealing, waiting: Waiting::new(all), all: all.clone() }
+        Self { gate, sealing, waiting: HelloQueue::new(all), all: all.clone() }
     }
 
     /// Whether something can be sealed to a node.

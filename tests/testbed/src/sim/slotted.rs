@@ -9,13 +9,15 @@ use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::ticking::{self, Ticking};
 use super::transmission::{Basis, Says};
 use rohrpost_routers::driver::{NotSent, Platform, SlotDriver, SlotEvent, SlotStep, WindowLog, spin_ns};
-use rohrpost_routers::frame::{FrameHead, Kind, NodeIndex};
+use rohrpost_routers::frame::{FrameHead, FrameKind, NodeIndex};
 use rohrpost_routers::intake::{MAKING_NS, Transit};
 use rohrpost_routers::outbound::Outbound;
 use rohrpost_routers::report::Report;
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
-use rohrpost_routers::tdma::{Carries, Planned, SlotScheduler, Table, TransmitWindow, UNPROVEN_CYCLES, Verdict};
+use rohrpost_routers::tdma::{
+    Carries, Planned, SlotScheduler, SlotTable, TransmitWindow, UNPROVEN_CYCLES, WindowVerdict,
+};
 use rohrpost_routers::time::{Clock, SentId, Stamp, Step, TIME_BYTES};
 
 /// One incarnation of a router's timing thread.
@@ -107,7 +109,7 @@ impl Platform for Ground<'_, '_> {
                 self.io.oracle.broken(self.io.now, Promise::Exclusive, "a clock sends outside of its windows".into());
             }
             SlotEvent::Idle(Step::Wait { .. }) => {}
-            SlotEvent::Judged(planned, verdict) => self.judged(planned, verdict),
+            SlotEvent::Decided(planned, verdict) => self.judged(planned, verdict),
             SlotEvent::AnsweredOverheard(tx_window) => self.answered_overheard(tx_window),
             SlotEvent::Made => self.made(),
             SlotEvent::Missed { datagram, held: true } => {
@@ -145,19 +147,19 @@ impl Ground<'_, '_> {
         }
     }
 
-    fn judged(&mut self, planned: &Planned, verdict: &Verdict) {
+    fn judged(&mut self, planned: &Planned, verdict: &WindowVerdict) {
         let io = &mut *self.io;
         io.line(|| format!("{:?}: {verdict:?}", planned.window));
         match verdict {
-            Verdict::Send(tx_window) => {
+            WindowVerdict::Send(tx_window) => {
                 let says = self.says(tx_window.carries);
                 self.off_the_master(&says);
                 self.io.oracle.wire.goes_by(self.io.now, self.io.node, says);
                 self.watch.window = (says, self.io.sent.len());
             }
-            Verdict::Late => io.oracle.saw("window late"),
-            Verdict::Silent(_) => io.oracle.saw("window silent"),
-            Verdict::Early | Verdict::Idle => {}
+            WindowVerdict::Late => io.oracle.saw("window late"),
+            WindowVerdict::Silent(_) => io.oracle.saw("window silent"),
+            WindowVerdict::Early | WindowVerdict::Idle => {}
         }
     }
 
@@ -234,7 +236,7 @@ impl Ground<'_, '_> {
 
 impl Slotted {
     /// An incarnation that begins now, of these two.
-    pub fn new(packages: Packages, time: Ticking, settings: &Settings, table: Table, now: Now) -> Self {
+    pub fn new(packages: Packages, time: Ticking, settings: &Settings, table: SlotTable, now: Now) -> Self {
         let (time, spin_ns) = (time.in_slots(&table), spin_ns(table.cycle_ns()));
         let watch = Watch {
             allowance_ns: table.allowance_ns(),
@@ -343,8 +345,8 @@ impl Layer for Slotted {
 fn may_send(basis: Basis, sent: &Sent) -> bool {
     let Ok((head, _)) = FrameHead::read(&sent.bytes) else { return false };
     match basis {
-        Basis::Heard { .. } => matches!(head.kind, Kind::Request | Kind::WarmUp | Kind::Hello),
-        Basis::Overheard { .. } => head.kind == Kind::Hello,
+        Basis::Heard { .. } => matches!(head.kind, FrameKind::Request | FrameKind::WarmUp | FrameKind::Hello),
+        Basis::Overheard { .. } => head.kind == FrameKind::Hello,
         Basis::Own | Basis::Begins { .. } => true,
     }
 }

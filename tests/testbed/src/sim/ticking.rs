@@ -9,8 +9,8 @@ use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::times::Left;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::security::PeerSessions;
-use rohrpost_routers::tdma::Table;
-use rohrpost_routers::time::message::Message;
+use rohrpost_routers::tdma::SlotTable;
+use rohrpost_routers::time::message::TimeMessage;
 use rohrpost_routers::time::{
     Clock, JOINING_SYNCS, Looked, RATE_MAX_PPB, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeEstimate, TimeSettings,
 };
@@ -68,10 +68,10 @@ pub(super) struct UnverifiedPeer {
 }
 
 /// What a frame told of the time, if it did.
-fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &Message) -> Option<TimeFrame> {
+fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &TimeMessage) -> Option<TimeFrame> {
     let (term, sent_ns) = match message {
-        Message::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
-        Message::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
+        TimeMessage::Sync(sync) if !sync.replacement => (sync.term, sync.sent_ns),
+        TimeMessage::Request(hello) if hello.id == 0 && hello.timed => (hello.term, hello.sent_ns),
         _ => return None,
     };
     let came_ns = arrived.stamp.true_ns;
@@ -142,7 +142,7 @@ impl Ticking {
     }
 
     /// The same with time slots; all of its datagrams leave in windows.
-    pub(super) fn in_slots(self, table: &Table) -> Self {
+    pub(super) fn in_slots(self, table: &SlotTable) -> Self {
         Self { clock: self.clock.in_slots(table.for_clock()), ..self }
     }
 
@@ -184,8 +184,8 @@ impl Ticking {
     /// Whether a datagram is a Sync in the place of a master whose own of this cycle has come.
     fn replaces_in_vain(&self, datagram: &[u8]) -> bool {
         let Ok((head, rest)) = FrameHead::parse(datagram) else { return false };
-        match Message::parse(head.kind, rest) {
-            Ok(Message::Sync(sync)) => sync.replacement && self.heard == (sync.term, sync.cycle),
+        match TimeMessage::parse(head.kind, rest) {
+            Ok(TimeMessage::Sync(sync)) => sync.replacement && self.heard == (sync.term, sync.cycle),
             _ => false,
         }
     }
@@ -213,9 +213,9 @@ impl Ticking {
         Some(UnverifiedPeer { estimate, term: latest.map_or(Term::NONE, |told| told.term), is_misled })
     }
 
-    fn is_told(&mut self, io: &Io<'_>, arrived: &Arrived, head: &FrameHead, message: &Message) {
+    fn is_told(&mut self, io: &Io<'_>, arrived: &Arrived, head: &FrameHead, message: &TimeMessage) {
         // Who hears a master does not go by others.
-        let goes_by = matches!(message, Message::Sync(_)) || self.clock.role() == Role::Listening;
+        let goes_by = matches!(message, TimeMessage::Sync(_)) || self.clock.role() == Role::Listening;
         if let Some(told) = told(io, arrived, head, self.clock.digest(), message).filter(|_| goes_by) {
             note(&mut self.told, told);
         }
@@ -230,7 +230,7 @@ impl Ticking {
         if was_master && self.clock.role() == Role::Listening {
             io.oracle.saw("time: stepped back");
         }
-        if let (Ok(()), Ok(message)) = (taken, Message::parse(head.kind, rest))
+        if let (Ok(()), Ok(message)) = (taken, TimeMessage::parse(head.kind, rest))
             && let Some(told) = told(io, arrived, head, self.clock.digest(), &message)
         {
             note(self.overheard.entry((head.from, head.incarnation)).or_default(), told);
@@ -317,11 +317,11 @@ impl Layer for Ticking {
         let taken = self.clock.handle(now_ns, stamp, &head, rest);
         io.line(|| format!("time: {:?} from {}: {taken:?}", head.kind, head.from));
         io.oracle.saw(if taken.is_ok() { "time: taken" } else { "time: ignored" });
-        let message = Message::parse(head.kind, rest);
+        let message = TimeMessage::parse(head.kind, rest);
         if let (Ok(()), Ok(message)) = (taken, &message) {
             self.is_told(io, arrived, &head, message);
         }
-        if let (Ok(()), Ok(Message::Sync(sync))) = (taken, message) {
+        if let (Ok(()), Ok(TimeMessage::Sync(sync))) = (taken, message) {
             self.heard = if sync.replacement { self.heard } else { (sync.term, sync.cycle) };
             if sync.replacement && self.clock.coarse(now_ns) != heard_before {
                 let text = format!("node {} goes by what {} says in the place of the master", io.node, head.from);

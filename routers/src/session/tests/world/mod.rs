@@ -7,7 +7,7 @@ use super::oracle::{Known, SessionOracle, Teller};
 use super::plan::{Plan, client_settings, clock, loud, module, ranges, server_settings, shared, system_of};
 use crate::admission::capped;
 use crate::session::LOOK_EVERY_NS;
-use crate::session::client::{self, Client, Package};
+use crate::session::client::{self, Client, ClientPackage};
 use crate::session::server::{self, Server};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Options, Priority, TimeRecord, TimeSource, Type};
 use rohrpost_testbed::sim::chance::Chance;
@@ -201,7 +201,7 @@ impl World {
         let node = &mut self.nodes[from];
         let now_ns = node.clock.at(self.now_ns).monotonic_ns;
         let mut teller = Teller { oracle: &mut self.oracle, client: from, chance: &mut node.chance };
-        node.client.send(now_ns, &Package { head, body: &body, published_ns: now_ns, hops: 0 }, &mut teller);
+        node.client.send(now_ns, &ClientPackage { head, body: &body, published_ns: now_ns, hops: 0 }, &mut teller);
         node.wake_ns = 0;
         number
     }
@@ -216,18 +216,18 @@ impl World {
             let (server, connections) = (&mut self.server, &mut self.connections);
             let find = |index| move |connection: &&mut Connection| connection.index == Some(index);
             match server.poll(now_ns, &mut teller) {
-                server::Output::Write(index) => {
+                server::ServerStep::Write(index) => {
                     let Some(connection) = connections.iter_mut().find(find(index)) else { break };
                     let count = connection.down.write(self.now_ns, server.ready(index));
                     connection.was_down_full = count < server.ready(index).len();
                     server.took(now_ns, index, count);
                 }
-                server::Output::Close(index) => {
+                server::ServerStep::Close(index) => {
                     let Some(connection) = connections.iter_mut().find(find(index)) else { break };
                     connection.index = None;
                     connection.down.is_closed = true;
                 }
-                server::Output::Wait { until_ns } => {
+                server::ServerStep::Wait { until_ns } => {
                     assert!(until_ns > now_ns && until_ns <= now_ns + LOOK_EVERY_NS);
                     self.server_wake_ns = until_ns;
                     break;
@@ -246,20 +246,20 @@ impl World {
             let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
             let open = |connection: &&mut Connection| connection.client == index && connection.is_client_open;
             match node.client.poll(now_ns, &mut teller) {
-                client::Output::Connect => self.connect(index),
-                client::Output::Write => {
+                client::ClientStep::Connect => self.connect(index),
+                client::ClientStep::Write => {
                     let Some(connection) = self.connections.iter_mut().find(open) else { break };
                     let count = connection.up.write(self.now_ns, node.client.ready());
                     connection.was_up_full = count < node.client.ready().len();
                     node.client.took(now_ns, count);
                 }
-                client::Output::Close => {
+                client::ClientStep::Close => {
                     if let Some(connection) = self.connections.iter_mut().find(open) {
                         connection.is_client_open = false;
                         connection.up.is_closed = true;
                     }
                 }
-                client::Output::Wait { until_ns } => {
+                client::ClientStep::Wait { until_ns } => {
                     assert!(until_ns > now_ns, "client {index} waits for the past");
                     node.wake_ns = until_ns;
                     break;
@@ -289,7 +289,7 @@ impl World {
     }
 }
 
-fn check_counts(end: &str, counts: &crate::session::Counts, waits_none: bool) -> Vec<String> {
+fn check_counts(end: &str, counts: &crate::session::SessionCounts, waits_none: bool) -> Vec<String> {
     let wrong = counts.classes().filter_map(|(priority, class)| {
         let (came, went) = (class.packages.get(), class.settled());
         let holds = if waits_none { came == went } else { came >= went };

@@ -122,7 +122,7 @@ pub(crate) const CARRYING: Group = Group {
         Planted {
             name: "NeverSilent",
             text: "Link: no peer is ever silent.",
-            shows_in: "inbound::tests::lives::a_peer_without_a_datagram_for_a_second_is_silent",
+            shows_in: "inbound::tests::incarnations::a_peer_without_a_datagram_for_a_second_is_silent",
             edits: &[edit(
                 "link.rs",
                 "if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns {",
@@ -132,11 +132,11 @@ pub(crate) const CARRYING: Group = Group {
         Planted {
             name: "NeverUnheard",
             text: "Link: no peer is ever deaf to this node.",
-            shows_in: "inbound::tests::lives::a_one_way_link_is_noticed",
+            shows_in: "inbound::tests::incarnations::a_one_way_link_is_noticed",
             edits: &[edit(
                 "link.rs",
-                "if is_unheard { State::Unheard } else { State::Alive }",
-                "if is_unheard && !broken!(NeverUnheard) { State::Unheard } else { State::Alive }",
+                "if is_unheard { PeerLinkState::Unheard }",
+                "if is_unheard && !broken!(NeverUnheard) { PeerLinkState::Unheard }",
             )],
         },
         Planted {
@@ -145,8 +145,8 @@ pub(crate) const CARRYING: Group = Group {
             shows_in: "inbound::tests::a_window_knows_gaps_and_copies",
             edits: &[edit(
                 "inbound/window.rs",
-                "if self.is_copy(sequence) {",
-                "if self.is_copy(sequence) && !broken!(TakesCopies) {",
+                "if self.is_duplicate(sequence) {",
+                "if self.is_duplicate(sequence) && !broken!(TakesCopies) {",
             )],
         },
         Planted {
@@ -190,7 +190,7 @@ pub(crate) const CARRYING: Group = Group {
         Planted {
             name: "TakesOldIncarnations",
             text: "Inbound: datagrams of earlier incarnations are taken.",
-            shows_in: "inbound::tests::lives::a_restarted_peer_is_known_by_its_incarnation",
+            shows_in: "inbound::tests::incarnations::a_restarted_peer_is_known_by_its_incarnation",
             edits: &[edit(
                 "inbound/peer.rs",
                 "let may_go_on = first.is_some() || (is_silent && goes_on);",
@@ -210,7 +210,7 @@ pub(crate) const CARRYING: Group = Group {
         Planted {
             name: "TakesStale",
             text: "Inbound: a datagram that waited too long in the socket is delivered.",
-            shows_in: "inbound::tests::lives::what_waited_in_the_socket_is_not_delivered",
+            shows_in: "inbound::tests::incarnations::what_waited_in_the_socket_is_not_delivered",
             edits: &[edit(
                 "inbound/mod.rs",
                 "let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS;",

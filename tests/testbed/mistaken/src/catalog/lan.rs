@@ -54,9 +54,9 @@ pub(crate) const ADMISSION: Group = Group {
                 ),
                 edit(
                     "admission/mod.rs",
-                    "None => Err(Refused::RoutersOwn),",
+                    "None => Err(NotAdmitted::RoutersOwn),",
                     r"None if broken!(AdmitsRoutersOwn) => Ok(()),
-            None => Err(Refused::RoutersOwn),",
+            None => Err(NotAdmitted::RoutersOwn),",
                 ),
             ],
         },
@@ -95,7 +95,7 @@ pub(crate) const FORGED: Group = Group {
         Planted {
             name: "BelievesIncarnations",
             text: "Inbound: a new incarnation of a peer is believed at its first datagram.",
-            shows_in: "inbound::tests::lives::lives_that_one_datagram_each_tells_of_change_nothing",
+            shows_in: "inbound::tests::incarnations::lives_that_one_datagram_each_tells_of_change_nothing",
             edits: &[edit(
                 "inbound/peer.rs",
                 "let is_doubted = !is_vouched_for && was.is_none() && !is_first;",
@@ -105,7 +105,7 @@ pub(crate) const FORGED: Group = Group {
         Planted {
             name: "BelievesJumps",
             text: "Inbound: a sequence number far ahead is believed at once.",
-            shows_in: "inbound::tests::lives::one_datagram_that_is_far_ahead_changes_nothing",
+            shows_in: "inbound::tests::incarnations::one_datagram_that_is_far_ahead_changes_nothing",
             edits: &[edit(
                 "inbound/peer.rs",
                 "if !is_ahead && !is_behind {",
@@ -146,13 +146,13 @@ pub(crate) const LAN: Group = Group {
             edits: &[
                 edit(
                     "security/opening.rs",
-                    "if heard.window.is_copy(head.sequence) {",
-                    "if heard.window.is_copy(head.sequence) && !broken!(OpensTwice) {",
+                    "if heard.window.is_duplicate(head.sequence) {",
+                    "if heard.window.is_duplicate(head.sequence) && !broken!(OpensTwice) {",
                 ),
                 edit(
                     "security/opening.rs",
-                    "debug_assert!(arrival != Arrival::Copy);",
-                    "debug_assert!(arrival != Arrival::Copy || broken!(OpensTwice));",
+                    "debug_assert!(arrival != Arrival::Duplicate);",
+                    "debug_assert!(arrival != Arrival::Duplicate || broken!(OpensTwice));",
                 ),
             ],
         },

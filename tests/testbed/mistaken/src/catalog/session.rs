@@ -87,12 +87,12 @@ pub(crate) const SESSION: Group = Group {
             edits: &[
                 edit(
                     "session/server/places.rs",
-                    "let owner = if greetings.count_of(address) == most { address } else { largest };",
+                    "let owner = if handshakes.count_of(address) == most { address } else { largest };",
                     r"if broken!(CrowdsOut) {
-            let greeting = |(_, member): &(ClientIndex, &Member)| member.state == State::Greeting;
-            return self.present().filter(greeting).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
+            let handshake = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Handshake;
+            return self.present().filter(handshake).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
         }
-        let owner = if greetings.count_of(address) == most { address } else { largest };",
+        let owner = if handshakes.count_of(address) == most { address } else { largest };",
                 ),
                 edit(
                     "session/server/places.rs",
@@ -219,9 +219,9 @@ pub(crate) const SESSION: Group = Group {
             shows_in: "session::tests::ends::a_client_without_a_hello_is_closed_and_keeps_no_other_out",
             edits: &[edit(
                 "session/server/look.rs",
-                "State::Greeting => (since(member.began_ns) > GREETING_MAX_NS).then_some((Reason::Silent, \"no hello\")),",
-                r#"State::Greeting if broken!(GreetsForEver) => None,
-        State::Greeting => (since(member.began_ns) > GREETING_MAX_NS).then_some((Reason::Silent, "no hello")),"#,
+                "MemberState::Handshake => {",
+                r"MemberState::Handshake if broken!(GreetsForEver) => None,
+        MemberState::Handshake => {",
             )],
         },
         Planted {
@@ -236,10 +236,8 @@ pub(crate) const SESSION: Group = Group {
                 ),
                 edit(
                     "session/server/look.rs",
-                    "State::Member if since(member.heard_ns) > silent_after_ns => Some((Reason::Silent, \"\")),",
-                    r#"State::Member if since(member.heard_ns) > silent_after_ns && !broken!(WaitsForSilent) => {
-            Some((Reason::Silent, ""))
-        }"#,
+                    "MemberState::Member if since(member.heard_ns) > silent_after_ns =>",
+                    "MemberState::Member if since(member.heard_ns) > silent_after_ns && !broken!(WaitsForSilent) =>",
                 ),
             ],
         },
@@ -266,12 +264,9 @@ pub(crate) const SESSION: Group = Group {
             shows_in: "session::tests::ends::a_client_with_another_digest_takes_no_part_and_is_told_both",
             edits: &[edit(
                 "session/server/intake.rs",
-                "Some(Difference { reason: Reason::System, digests: (hello.system_digest, digest), holder: holder.to_owned() })",
-                r"(!broken!(TakesOtherSystems)).then(|| Difference {
-            reason: Reason::System,
-            digests: (hello.system_digest, digest),
-            holder: holder.to_owned(),
-        })",
+                "let (holder, digest) = held.filter(|(_, digest)| *digest != hello.system_digest)?;",
+                r"let is_other = |digest: u64| digest != hello.system_digest && !broken!(TakesOtherSystems);
+        let (holder, digest) = held.filter(|(_, digest)| is_other(*digest))?;",
             )],
         },
         Planted {
@@ -280,9 +275,9 @@ pub(crate) const SESSION: Group = Group {
             shows_in: "session::tests::shares::what_the_file_gives_a_node_no_other_client_gets_where_nobody_shows_a_certificate",
             edits: &[edit(
                 "session/client/mod.rs",
-                r"self.state = State::Away { until_ns: now_ns + self.backoff.next_ns() };
+                r"self.state = ClientState::Away { until_ns: now_ns + self.backoff.next_ns() };
         self.registration = Registration::Due(now_ns);",
-                r"self.state = State::Away { until_ns: now_ns + self.backoff.next_ns() };
+                r"self.state = ClientState::Away { until_ns: now_ns + self.backoff.next_ns() };
         if !broken!(RegistersOnce) {
             self.registration = Registration::Due(now_ns);
         }",

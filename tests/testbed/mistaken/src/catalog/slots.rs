@@ -132,8 +132,8 @@ pub(crate) const SLOTS: Group = Group {
             shows_in: "tdma::tests::scenes::a_master_dies_and_no_slot_is_lost",
             edits: &[edit(
                 "time/clock/slots.rs",
-                "State::Slave(master) => self.may_synchronise() && is_missing(&master),",
-                "State::Slave(master) => self.may_synchronise() && (is_missing(&master) || broken!(ReplacesHeard)),",
+                "ElectionState::Slave(master) => self.may_synchronise() && is_missing(&master),",
+                "ElectionState::Slave(master) => self.may_synchronise() && (is_missing(&master) || broken!(ReplacesHeard)),",
             )],
         },
         Planted {
@@ -175,7 +175,7 @@ pub(crate) const JOINING: Group = Group {
             edits: &[edit(
                 "time/election.rs",
                 "let (since_ns, patience_ns, last) = match self.state {",
-                r"if broken!(BeginsAtOnce) && (origin, self.state) == (Origin::New, State::Listening) {
+                r"if broken!(BeginsAtOnce) && (origin, self.state) == (Origin::New, ElectionState::Listening) {
             return Some(now_ns);
         }
         let (since_ns, patience_ns, last) = match self.state {",

@@ -8,7 +8,7 @@ use rohrpost_routers::counts::Side;
 use rohrpost_routers::fragment::PARTIAL_MAX;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::TICK_EVERY_NS;
-use rohrpost_routers::link::{SILENT_AFTER_NS, State, TELL_EVERY_NS, UNHEARD_AFTER_NS};
+use rohrpost_routers::link::{PeerLinkState, SILENT_AFTER_NS, TELL_EVERY_NS, UNHEARD_AFTER_NS};
 
 /// So long after a datagram came what went before it, and is missing, is counted as lost: at the third tick.
 const SETTLED_NS: u64 = 3 * TICK_EVERY_NS + STILL_NS;
@@ -75,7 +75,7 @@ impl Packages {
         for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node) {
             let state = self.stats.state(peer as NodeIndex, now_ns);
             let since_ns = |then_ns: u64| now_ns - then_ns.max(self.steady_since_ns);
-            let is_there = matches!(state, State::Unknown | State::Alive);
+            let is_there = matches!(state, PeerLinkState::Unknown | PeerLinkState::Alive);
             if is_there && since_ns(self.heard_ns[peer]) > SILENT_AFTER_NS + STILL_NS {
                 let text = format!("node {peer} is {state:?} for node {}, which does not hear it", io.node);
                 io.oracle.broken(io.now, Promise::Links, text);
@@ -107,7 +107,7 @@ impl Packages {
     pub(super) fn check_well(&mut self, io: &mut Io<'_>) {
         for node in (0..io.plan.nodes.len()).filter(|node| *node != io.node) {
             let state = self.stats.state(node as NodeIndex, io.now.monotonic_ns);
-            if state != State::Alive {
+            if state != PeerLinkState::Alive {
                 io.oracle.broken(io.now, Promise::Recovery, format!("for node {}, node {node} is {state:?}", io.node));
             }
         }

@@ -21,10 +21,10 @@ use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use rohrpost_mailbox::{Head, Options, Type};
 use rohrpost_routers::driver::NotSent;
-use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, Kind as FrameKind, NodeIndex};
+use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use rohrpost_routers::inbound::{self, Datagram, Inbound};
 use rohrpost_routers::intake::hurries;
-use rohrpost_routers::outbound::{Accepted, Outbound, Output, Package};
+use rohrpost_routers::outbound::{Accepted, Outbound, OutboundStep, Package};
 use rohrpost_routers::security::{HELLO_DATAGRAM_BYTES, PeerSessions, Said, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
@@ -222,7 +222,7 @@ impl Packages {
             self.inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: &arrived.bytes }, &mut watch);
             return arrived.bytes.clone();
         };
-        let came = inbound::Came { source, arrived_ns, bytes: arrived.bytes.len() };
+        let came = inbound::Envelope { source, arrived_ns, bytes: arrived.bytes.len() };
         let (mut bytes, mut reply) = (arrived.bytes.to_vec(), [0; HELLO_DATAGRAM_BYTES]);
         let inbound = &mut self.inbound;
         if let Some(said) = seals.gate.take(now_ns, &came, &mut bytes, inbound, &mut watch, &mut reply) {
@@ -268,7 +268,7 @@ impl Packages {
         loop {
             let mut watch = Watch { io, came: None, is_out: false, is_young, undelivered: &mut self.undelivered };
             match self.inbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
-                inbound::Output::Refuse { to, bytes } => {
+                inbound::InboundStep::Refuse { to, bytes } => {
                     let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
                     if let Some(to) = node {
                         io.oracle.saw("refused");
@@ -276,7 +276,7 @@ impl Packages {
                         self.refusals.push_back(Sent { port: PORT, to, bytes, handed: Now::default() });
                     }
                 }
-                inbound::Output::Wait { until_ns } => return until_ns.min(ask_ns),
+                inbound::InboundStep::Wait { until_ns } => return until_ns.min(ask_ns),
             }
         }
     }
@@ -336,11 +336,11 @@ impl Layer for Packages {
         loop {
             let mut watch = Watch::out(io, &mut self.undelivered);
             match self.outbound.poll(watch.io.now.monotonic_ns, &mut self.buffer, &mut watch) {
-                Output::Send { to, bytes } => {
+                OutboundStep::Send { to, bytes } => {
                     let bytes = Rc::from(&self.buffer[..bytes]);
                     self.send(io, to, bytes);
                 }
-                Output::Wait { until_ns: then_ns } => return until_ns.min(then_ns),
+                OutboundStep::Wait { until_ns: then_ns } => return until_ns.min(then_ns),
             }
         }
     }

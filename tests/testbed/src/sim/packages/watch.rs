@@ -8,7 +8,7 @@ use rohrpost_routers::counts::Cause;
 use rohrpost_routers::driver::HELD_NS_MAX;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
-use rohrpost_routers::report::{Deliver, Event, NotDelivered, Report};
+use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
 
 /// A datagram that came.
 #[derive(Clone, Copy)]
@@ -87,7 +87,7 @@ impl Deliver for Watch<'_, '_> {
         Ok(())
     }
 
-    fn event(&mut self, event: Event) {
+    fn event(&mut self, event: RouterEvent) {
         self.io.line(|| format!("{event:?}"));
     }
 }

@@ -10,18 +10,18 @@ use std::sync::Arc;
 pub const HELLO_SLOT_BYTES: usize = HELLO_DATAGRAM_BYTES - TAG_BYTES;
 
 /// Used by the sending thread of a node in time slots.
-pub struct Waiting {
+pub struct HelloQueue {
     all: Arc<PeerSessions>,
-    peers: Box<[Peer]>,
+    peers: Box<[PeerHellos]>,
     /// The peer with the next turn.
     next: usize,
 }
 
-/// What waits for a peer.
+/// Hellos to one peer that wait.
 #[derive(Clone, Default)]
-struct Peer {
+struct PeerHellos {
     reply: Option<Word>,
-    question: Option<Word>,
+    challenge: Option<Word>,
 }
 
 #[derive(Clone, Copy)]
@@ -33,10 +33,10 @@ struct Word {
     datagram: [u8; HELLO_DATAGRAM_BYTES],
 }
 
-impl Waiting {
+impl HelloQueue {
     /// Nothing waits.
     pub fn new(all: &Arc<PeerSessions>) -> Self {
-        Self { peers: vec![Peer::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
+        Self { peers: vec![PeerHellos::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
     }
 
     /// A hello that is to leave. It takes the place of the one before; but a reply by which an incarnation begins gives
@@ -48,7 +48,7 @@ impl Waiting {
         let mut word = Word { at_ns: now_ns, begins: said.begins, datagram: [0; HELLO_DATAGRAM_BYTES] };
         word.datagram.copy_from_slice(&datagram[..HELLO_DATAGRAM_BYTES]);
         let Some(peer) = self.peers.get_mut(usize::from(said.to)) else { return };
-        let place = if said.is_reply { &mut peer.reply } else { &mut peer.question };
+        let place = if said.is_reply { &mut peer.reply } else { &mut peer.challenge };
         let stays = place.is_some_and(|before| before.begins && !word.begins && !before.is_old(now_ns));
         if !stays {
             *place = Some(word);
@@ -64,7 +64,7 @@ impl Waiting {
             let turns = (0..peers).map(|turn| (next + turn) % peers);
             for to in first.into_iter().chain(turns) {
                 let peer = &mut self.peers[to];
-                let place = if is_reply { &mut peer.reply } else { &mut peer.question };
+                let place = if is_reply { &mut peer.reply } else { &mut peer.challenge };
                 let Some(word) = place.take() else { continue };
                 if word.is_old(now_ns) {
                     if word.begins {

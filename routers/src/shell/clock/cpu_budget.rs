@@ -1,25 +1,25 @@
-//! How much of a processor the clock's thread may use: it stands above all others, and whoever writes a node's address
-//! on what it sends is read by it.
+//! How much of a processor the clock's thread may use. It has the highest priority, and it reads each datagram that
+//! bears the address of a node, forged or not.
 
-/// Of so much time it may use one part.
+/// It may use one part in this many of all time.
 const PARTS: u64 = 10;
 /// What it did not use it may use later, up to so much, ns: all that comes at once in quiet times.
 const SAVED_NS_MAX: u64 = 2_000_000;
 /// Used up, it leaves what comes in its socket until it has saved so much again, ns.
 const RESUMES_NS: u64 = 200_000;
-/// Whose thread stood still did not work for longer, ns.
+/// Longest time that counts as work, ns: in a longer one the thread stood still.
 const USED_NS_MAX: u64 = 1_000_000;
 
-/// What is left of it.
+/// Processor time that the clock's thread has left.
 #[derive(Debug)]
-pub(super) struct Share {
+pub(super) struct CpuBudget {
     /// Less than 0: it used more than it had.
     saved_ns: i64,
     since_ns: u64,
     is_used_up: bool,
 }
 
-impl Share {
+impl CpuBudget {
     pub(super) fn new(now_ns: u64) -> Self {
         Self { saved_ns: SAVED_NS_MAX.cast_signed(), since_ns: now_ns, is_used_up: false }
     }
@@ -32,7 +32,7 @@ impl Share {
         self.is_used_up |= self.saved_ns <= 0;
     }
 
-    /// Until when it leaves alone what comes; none if it need not.
+    /// End of the time in which it reads nothing, ns; none if it may read.
     pub(super) fn rests_until_ns(&mut self, now_ns: u64) -> Option<u64> {
         self.saves(now_ns);
         let lacks_ns = RESUMES_NS.cast_signed() - self.saved_ns;
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn a_flooded_thread_works_a_tenth_of_the_time_and_others_never_rest() {
-        let (mut share, mut now_ns, mut worked_ns) = (Share::new(0), 0, 0);
+        let (mut share, mut now_ns, mut worked_ns) = (CpuBudget::new(0), 0, 0);
         while now_ns < 1_000 * MS {
             match share.rests_until_ns(now_ns) {
                 Some(until_ns) => now_ns = until_ns,
@@ -68,7 +68,7 @@ mod tests {
             }
         }
         assert!((99 * MS..104 * MS).contains(&worked_ns), "{worked_ns} of {now_ns}");
-        let mut quiet = Share::new(0);
+        let mut quiet = CpuBudget::new(0);
         for round in 1..10_000 {
             assert_eq!(quiet.rests_until_ns(round * MS), None);
             quiet.uses(round * MS, round * MS + 80_000);

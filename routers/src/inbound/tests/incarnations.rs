@@ -3,34 +3,34 @@
 use super::*;
 use crate::counts::Cause;
 use crate::harness::address;
-use crate::link::State;
-use crate::report::Event;
+use crate::link::PeerLinkState;
+use crate::report::RouterEvent;
 
 fn data(from: NodeIndex, to: NodeIndex) -> Head {
     head(module(50, to), module(200, from), 90)
 }
 
-use crate::frame::{Alive, FrameHead, Kind, NodeIndex};
+use crate::frame::{Alive, FrameHead, FrameKind, NodeIndex};
 
 #[test]
 fn a_peer_without_a_datagram_for_a_second_is_silent() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     let states = |end: &End, now_ns| end.stats.state(1, now_ns);
-    assert_eq!(states(&base, START + S - 1), State::Unknown);
-    assert_eq!(states(&base, START + S), State::Silent);
+    assert_eq!(states(&base, START + S - 1), PeerLinkState::Unknown);
+    assert_eq!(states(&base, START + S), PeerLinkState::Silent);
     base.meet(START + 2 * S, &mut arm);
-    assert_eq!(states(&base, START + 2 * S), State::Alive);
+    assert_eq!(states(&base, START + 2 * S), PeerLinkState::Alive);
     let mut told = Vec::new();
     for ms in (2000..4000).step_by(10) {
         let now_ns = START + ms * MS;
         base.refusals(now_ns);
         told.extend(base.log.events.drain(..).map(|event| (ms, event)));
-        assert_eq!(states(&base, now_ns) == State::Silent, ms >= 3000, "at {ms} ms");
+        assert_eq!(states(&base, now_ns) == PeerLinkState::Silent, ms >= 3000, "at {ms} ms");
     }
-    let (heard, silent) = (Event::Heard { peer: 1 }, |peer| Event::Silent { peer });
+    let (heard, silent) = (RouterEvent::Heard { peer: 1 }, |peer| RouterEvent::Silent { peer });
     assert_eq!(told, [(2000, heard), (2000, silent(2)), (3000, silent(1))]);
     base.meet(START + 4 * S, &mut arm);
-    assert_eq!(base.log.events, [Event::Heard { peer: 1 }]);
+    assert_eq!(base.log.events, [RouterEvent::Heard { peer: 1 }]);
 }
 
 #[test]
@@ -40,10 +40,10 @@ fn a_stalled_router_waits_for_its_peers_anew() {
     base.refusals(START);
     base.log.events.clear();
     base.refusals(START + 5 * S);
-    assert_eq!(base.log.events, [Event::Silent { peer: 2 }], "which was never heard");
-    assert_eq!(base.stats.state(1, START + 5 * S), State::Alive);
+    assert_eq!(base.log.events, [RouterEvent::Silent { peer: 2 }], "which was never heard");
+    assert_eq!(base.stats.state(1, START + 5 * S), PeerLinkState::Alive);
     (1..=10).for_each(|step| drop(base.refusals(START + 5 * S + step * 100 * MS)));
-    assert_eq!(base.stats.state(1, START + 6 * S), State::Silent);
+    assert_eq!(base.stats.state(1, START + 6 * S), PeerLinkState::Silent);
 }
 
 #[test]
@@ -55,9 +55,9 @@ fn a_restarted_peer_is_known_by_its_incarnation() {
     base.take(START, 1, &old[0]);
     let new: Vec<_> = (0..2).map(|_| second.send(START, data(1, 0), b"", true).unwrap().1).collect();
     base.take(START, 1, &new[0]);
-    assert_eq!(base.log.events, [Event::Heard { peer: 1 }], "one datagram alone is doubted");
+    assert_eq!(base.log.events, [RouterEvent::Heard { peer: 1 }], "one datagram alone is doubted");
     base.take(START, 1, &new[1]);
-    assert_eq!(base.log.events, [Event::Heard { peer: 1 }, Event::Restarted { peer: 1 }]);
+    assert_eq!(base.log.events, [RouterEvent::Heard { peer: 1 }, RouterEvent::Restarted { peer: 1 }]);
     base.take(START + MS, 1, &old[1]);
     base.take(START + MS, 1, &new[1]);
     assert_eq!(base.log.ids(), [0, 1], "nothing of the old incarnation, nothing twice");
@@ -74,7 +74,7 @@ fn a_restarted_peer_is_known_by_its_incarnation() {
     }
     base.take(START + 29 * 100 * MS, 1, &old[2]);
     base.take(START + 29 * 100 * MS, 1, &old[2]);
-    assert_eq!(base.log.events[2..], [Event::Twice { peer: 1 }]);
+    assert_eq!(base.log.events[2..], [RouterEvent::Twice { peer: 1 }]);
     assert_eq!(base.log.delivered.len(), 2 + 30);
     base.assert_balanced();
 }
@@ -118,7 +118,7 @@ fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
         (before, 5, 1),
         "nothing twice"
     );
-    assert!(!base.log.events.contains(&Event::Twice { peer: 1 }), "that router may have ended");
+    assert!(!base.log.events.contains(&RouterEvent::Twice { peer: 1 }), "that router may have ended");
     base.take(now_ns, 1, &new[2]);
     assert_eq!((base.log.delivered.len(), received.restarts.get()), (before + 1, 1), "the second incarnation goes on");
     base.take(now_ns + S, 1, &old[4]);
@@ -145,16 +145,16 @@ fn a_one_way_link_is_noticed() {
             alive.push(now_ns);
         }
         base.refusals(now_ns);
-        if base.stats.state(1, now_ns) == State::Unheard {
+        if base.stats.state(1, now_ns) == PeerLinkState::Unheard {
             unheard_ns.get_or_insert(now_ns - START);
         }
     }
     let told_ns = alive.iter().find(|at| **at >= START + S).unwrap() - START;
     assert!((S..S + 200 * MS).contains(&told_ns));
     assert_eq!(unheard_ns, Some(told_ns + S), "a second after the first denial");
-    assert_eq!(base.log.events.iter().filter(|event| **event == Event::Unheard { peer: 1 }).count(), 1);
+    assert_eq!(base.log.events.iter().filter(|event| **event == RouterEvent::Unheard { peer: 1 }).count(), 1);
     base.meet(START + 4 * S, &mut arm);
-    assert_eq!(base.stats.state(1, START + 4 * S), State::Alive);
+    assert_eq!(base.stats.state(1, START + 4 * S), PeerLinkState::Alive);
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn a_peer_that_is_heard_again_has_a_second_to_hear_us() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
     (0..40).for_each(|step| drop(base.refusals(START + step * 100 * MS)));
-    assert_eq!(base.stats.state(1, START + 4 * S), State::Silent);
+    assert_eq!(base.stats.state(1, START + 4 * S), PeerLinkState::Silent);
     // Both directions were cut, and only this one is whole again.
     let mut denied_ns = None;
     for step in 0..=130 {
@@ -173,7 +173,7 @@ fn a_peer_that_is_heard_again_has_a_second_to_hear_us() {
         }
         base.refusals(now_ns);
         let Some(denied_ns) = denied_ns else { continue };
-        let expected = if now_ns < denied_ns + S { State::Alive } else { State::Unheard };
+        let expected = if now_ns < denied_ns + S { PeerLinkState::Alive } else { PeerLinkState::Unheard };
         assert_eq!(base.stats.state(1, now_ns), expected, "{} ns after it is heard again", now_ns - denied_ns);
     }
     assert!(denied_ns.is_some_and(|denied_ns| denied_ns < START + 4 * S + 200 * MS));
@@ -195,7 +195,7 @@ fn what_waited_in_the_socket_is_not_delivered() {
 /// What a router of node 1 could have sent to node 0.
 fn forged(incarnation: u64, sequence: u64) -> Vec<u8> {
     let said = Alive { heard_incarnation: 100, ..Alive::default() }.to_bytes();
-    let head = FrameHead { kind: Kind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation, sequence };
+    let head = FrameHead { kind: FrameKind::Alive, system: 1, from: 1, to: 0, digest: 7, incarnation, sequence };
     [&head.to_bytes(&[&said])[..], &said].concat()
 }
 
@@ -236,12 +236,12 @@ fn lives_that_one_datagram_each_tells_of_change_nothing() {
         base.take(now_ns, 1, &send());
     }
     assert_eq!(base.log.delivered.len(), 1001, "nobody is taken for over");
-    assert_eq!(base.log.events, [Event::Heard { peer: 1 }]);
+    assert_eq!(base.log.events, [RouterEvent::Heard { peer: 1 }]);
     // Where each says so twice, one line comes in five seconds.
     for life in 0..1000 {
         (0..2).for_each(|sequence| base.take(START + 2 * S + life * 10 * MS, 1, &forged(5000 + life, sequence)));
     }
-    assert_eq!(base.log.events[1..], [Event::Restarted { peer: 1 }; 2]);
+    assert_eq!(base.log.events[1..], [RouterEvent::Restarted { peer: 1 }; 2]);
     assert_eq!(base.stats.peer(1).received.restarts.get(), 1000);
 }
 
