@@ -86,9 +86,6 @@ const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 1), ("routers/src", 48
 const WORDS_LEFT: &[(&str, usize)] = &[
     ("cli/src", 7),
     ("gui-bridge/src", 7),
-    ("mailbox/proof", 49),
-    ("mailbox/src", 119),
-    ("mailbox/tests", 57),
     ("modules/schema", 2),
     ("modules/src", 108),
     ("modules/tests", 4),
@@ -109,7 +106,7 @@ const LONG: &[(&str, usize)] = &[
     ("config/src/reader.rs", 403),
     ("mailbox/proof/loom/src/broken.rs", 922),
     ("mailbox/proof/loom/src/models.rs", 673),
-    ("mailbox/src/node.rs", 426),
+    ("mailbox/src/node.rs", 425),
     ("mailbox/src/sender.rs", 420),
     ("mailbox/src/slots.rs", 430),
     ("mailbox/src/system_time.rs", 422),
