@@ -84,15 +84,9 @@ const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 1), ("routers/src", 48
 
 /// How many lines of a folder are still too wide, or have words that are not the field's; they may only become fewer.
 const WORDS_LEFT: &[(&str, usize)] = &[
-    ("cli/src", 7),
-    ("gui-bridge/src", 7),
-    ("modules/schema", 2),
-    ("modules/src", 108),
-    ("modules/tests", 4),
+    ("cli/src", 1),
     ("routers/src", 182),
-    ("routers/tests", 17),
-    ("tests", 1),
-    ("tests/e2e", 2),
+    ("routers/tests", 2),
     ("tests/testbed", 114),
 ];
 
@@ -225,8 +219,8 @@ fn lines_fit_and_words_are_the_fields() {
     assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
 }
 
-/// Folders with more mistakes than are left to be fixed there, each mistake in a line; and those with fewer, whose
-/// number is to be lowered.
+/// Folders with more mistakes than are left to be fixed there, each mistake in a line; and those with fewer, for which
+/// the number is to be lowered.
 fn beyond(left: &[(&str, usize)], found: &BTreeMap<String, Vec<String>>) -> Vec<String> {
     let folders: BTreeSet<&str> =
         left.iter().map(|(folder, _)| *folder).chain(found.keys().map(String::as_str)).collect();

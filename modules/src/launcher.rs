@@ -173,7 +173,7 @@ pub enum LookError {
     #[error("{0}")]
     Failed(String),
     /// The look has so many bytes.
-    #[error("the look has {0} bytes, which is more than {max}; look at one module (`rohrpost bw NAME`)", max = LOOK_BYTES_MAX)]
+    #[error("the look has {0} bytes, which is more than {LOOK_BYTES_MAX}; look at one module (`rohrpost bw NAME`)")]
     TooLarge(u32),
 }
 

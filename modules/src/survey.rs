@@ -6,8 +6,8 @@
 //! ```
 //!
 //! A package that goes to another node is counted by its sender there, and once more by the router that delivers it
-//! here under the sender's name: such a flow is a *hop* ([`is_hop`]). Who adds up several nodes leaves hops out, but
-//! for those from nodes that do not answer. It is also received twice, first in the transit mailbox of its own node's
+//! here under the sender's name: such a flow is a *hop* ([`is_hop`]). A sum over several nodes leaves hops out, but for
+//! those from nodes that do not answer. It is also received twice, first in the transit mailbox of its own node's
 //! router: of such mailboxes only the losses are in [`Survey::classes`].
 
 mod distant;

@@ -169,7 +169,7 @@ pub struct Links {
 /// Datagrams that were not taken.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Rejected {
-    /// The node whose address they came from, which anybody can write on a datagram; empty: no node has it.
+    /// The node that has the address they came from, which anybody can write on a datagram; empty: no node has it.
     pub node: String,
     /// In a word: `unsealed`, `other-key`, `not-ours`, `other-incarnation`, `replay`, `forged`, `version`.
     pub cause: String,
@@ -207,7 +207,7 @@ pub struct ClockState {
     pub role: ClockRole,
     /// The master that it follows, or is; empty if there is none yet.
     pub master: String,
-    /// Tells the reigns of masters apart; later ones are greater.
+    /// The term of the master; later terms are greater.
     pub term: u64,
     /// Raised with each step of time.
     pub epoch: u64,
@@ -263,8 +263,8 @@ pub struct SlotState {
     /// Datagrams that were made and missed the end of their slot, since the router stood still just then: they waited
     /// for the next one.
     pub held: u64,
-    /// Hellos that it said, having no time of its own, by the time of who had not shown that it lives: who repeats what
-    /// was said brings about some.
+    /// Hellos that it said, having no time of its own, by the time of a node that had not shown that it lives: replayed
+    /// datagrams bring about some.
     pub unproven: u64,
     /// Changes of role: slave, master.
     pub roles: u64,
@@ -272,7 +272,7 @@ pub struct SlotState {
     pub lead_ns: u64,
     /// Ordinary traffic through the tunnel; none without one.
     pub tunnel: Option<TunnelState>,
-    /// How the kernel schedules who keeps the slots: `deadline`, `fifo` or `ordinary`.
+    /// How the kernel schedules the thread that keeps the slots: `deadline`, `fifo` or `ordinary`.
     pub scheduled: String,
     /// The last slots and windows that were used, the oldest first.
     pub last: Vec<SlotUse>,
@@ -347,12 +347,12 @@ pub struct FlowState {
     pub bound_ns: Option<u64>,
     /// The deadline, ns.
     pub deadline_ns: u64,
-    /// The slowest of those since whose publishing no slot of the node was left out or cut short, ns: the bound is
-    /// about these. 0 without any.
+    /// The slowest of those for which no slot of the node was left out or cut short since they were published, ns: the
+    /// bound is about these. 0 without any.
     pub kept_worst_ns: u64,
     /// Packages slower than the bound.
     pub over_bound: u64,
-    /// Of these, those since whose publishing no slot was left out or cut short.
+    /// Of these, those for which no slot was left out or cut short since they were published.
     pub kept_over_bound: u64,
     /// Packages slower than the deadline.
     pub over_deadline: u64,

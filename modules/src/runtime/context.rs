@@ -268,7 +268,7 @@ impl Context {
     ///
     /// # Errors
     /// When [`rohrpost_mailbox::WATCHES_MAX`] are watched, the process has no descriptor left, or the pipe by which
-    /// senders wake who waits like this cannot be made in the node's directory.
+    /// senders wake such a receiver cannot be made in the node's directory.
     pub fn watch(&mut self, descriptor: &impl AsFd, interest: Interest) -> io::Result<Watch> {
         let watches = match &mut self.watches {
             Some(watches) => watches,

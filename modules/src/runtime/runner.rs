@@ -133,7 +133,7 @@ impl<M: Module> Running<M> {
     /// Hands out what came to the data mailbox and to the module's own; while the module is off it is dropped.
     fn take_data(&mut self) -> bool {
         let mut any = take(&mut self.data, &mut self.life, &mut self.context);
-        // Taken out meanwhile, since the module is given the context whose they are.
+        // Taken out meanwhile, since the module is given the context that they belong to.
         let mut own = std::mem::take(&mut self.context.own);
         for mailbox in &mut own {
             any |= take(mailbox, &mut self.life, &mut self.context);

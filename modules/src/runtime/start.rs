@@ -177,7 +177,7 @@ fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
 }
 
 /// On SIGTERM, SIGINT and SIGHUP: ask the loop to end; if it does not within the time, end the process. SIGHUP is how
-/// the kernel wakes a stopped module whose launch has died.
+/// the kernel wakes a stopped module after its launch has died.
 fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGHUP])
@@ -189,7 +189,7 @@ fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<A
             flag.store(true, Ordering::Release);
             participant.ring();
             std::thread::sleep(within);
-            // Whoever hangs may hang while it prints; then nobody else can, and the end must not wait for that.
+            // A module that hangs may hang while it prints; then nobody else can, and the end must not wait for that.
             let say = move || output::print(&format_args!("does not stop within {within:?}; ended"));
             let _ = std::thread::Builder::new().spawn(say);
             std::thread::sleep(LAST_WORDS);
