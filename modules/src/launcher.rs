@@ -264,13 +264,13 @@ impl ToolLink {
         self.order(launcher, START, module)
     }
 
-    /// Begins to have a module restarted, and returns at once; [`Link::poll_as`] has the answer, a `Result` of what
+    /// Begins to have a module restarted, and returns at once; [`Link::poll_for`] has the answer, a `Result` of what
     /// [`ToolLink::restart`] returns.
     ///
     /// # Errors
     /// See [`CallError`].
     ///
-    /// [`Link::poll_as`]: crate::call::Link::poll_as
+    /// [`Link::poll_for`]: crate::call::Link::poll_for
     pub fn begin_restart(&mut self, launcher: Name, module: &str) -> Result<u32, CallError> {
         self.begin_asking(launcher, RESTART, &(module,))
     }

@@ -43,6 +43,13 @@ pub fn kept() -> Vec<OwnedFd> {
 }
 
 /// What to start.
+///
+/// ```
+/// use rohrpost_modules::runtime::{Start, StartError};
+///
+/// let start = Start::from_arguments(["--name", "pilot.0"].into_iter().map(String::from));
+/// assert!(matches!(start, Err(StartError::Usage(_))), "which configuration?");
+/// ```
 #[derive(Debug)]
 pub struct Start {
     /// The configuration.
@@ -227,6 +234,12 @@ fn schedule(wanted: Scheduling) {
 }
 
 /// Directories of the nodes of this user that are launched now.
+///
+/// ```
+/// for node in rohrpost_modules::runtime::find_running() {
+///     println!("{}", node.display());
+/// }
+/// ```
 pub fn find_running() -> Vec<PathBuf> {
     let launched = |node: &Node| node.launcher().is_some();
     nodes()
@@ -237,6 +250,12 @@ pub fn find_running() -> Vec<PathBuf> {
 }
 
 /// Why nodes of this user cannot be looked into that another version of Rohrpost made: [`NodeError::Version`] of each.
+///
+/// ```
+/// for error in rohrpost_modules::runtime::find_other_versions() {
+///     eprintln!("{error}");
+/// }
+/// ```
 pub fn find_other_versions() -> Vec<NodeError> {
     let errors = nodes().into_iter().filter_map(|(_, node)| node.err());
     errors.filter(|error| matches!(error, NodeError::Version(..))).collect()
