@@ -100,8 +100,8 @@ fn clients(servers: &[&BeyondClients]) -> String {
                  {greetings} connections before their hello gave way, {ranges} registrations of too many ranges)\n"
             );
         }
-        if server.superseded > 0 {
-            text += &format!("({} registrations were replaced by later ones of the same client)\n", server.superseded);
+        if server.overtaken > 0 {
+            text += &format!("({} registrations were replaced by later ones of the same client)\n", server.overtaken);
         }
         if !server.refusal.is_empty() {
             text += &format!("the last that was refused: {}\n", plain::line(&server.refusal));

@@ -263,8 +263,8 @@ pub struct SlotState {
     /// Datagrams that were made and missed the end of their slot, since the router stood still just then: they waited
     /// for the next one.
     pub held: u64,
-    /// Hellos that it said, having no time of its own, by the time of a node that had not shown that it lives: replayed
-    /// datagrams bring about some.
+    /// Hellos that it said, having no time of its own, by the time of who had not shown that it lives: who repeats what
+    /// was said brings about some.
     pub unproven: u64,
     /// Changes of role: slave, master.
     pub roles: u64,
@@ -347,12 +347,12 @@ pub struct FlowState {
     pub bound_ns: Option<u64>,
     /// The deadline, ns.
     pub deadline_ns: u64,
-    /// The slowest of those for which no slot of the node was left out or cut short since they were published, ns: the
-    /// bound is about these. 0 without any.
+    /// The slowest of those since whose publishing no slot of the node was left out or cut short, ns: the bound is
+    /// about these. 0 without any.
     pub kept_worst_ns: u64,
     /// Packages slower than the bound.
     pub over_bound: u64,
-    /// Of these, those for which no slot was left out or cut short since they were published.
+    /// Of these, those since whose publishing no slot was left out or cut short.
     pub kept_over_bound: u64,
     /// Packages slower than the deadline.
     pub over_deadline: u64,

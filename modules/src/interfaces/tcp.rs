@@ -147,7 +147,7 @@ pub struct BeyondClients {
     /// What went beyond the part of one certificate, or one address.
     pub crowded: BeyondCrowded,
     /// Registrations that a later one of the same client took the place of before they were looked at.
-    pub superseded: u64,
+    pub overtaken: u64,
     /// Lines of output that were not said one by one, since there were too many of their cause.
     pub held_lines: u64,
     /// Classes of which something passed, the most urgent first.
