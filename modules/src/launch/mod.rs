@@ -95,6 +95,13 @@ pub struct Launch {
 
 /// The node that is meant: the one named, or the only one.
 ///
+/// ```
+/// # use rohrpost_modules::launch::{LaunchError, choose_node};
+/// fn name(installation: &rohrpost_config::Installation) -> Result<&str, LaunchError> {
+///     Ok(&choose_node(installation, None)?.name)
+/// }
+/// ```
+///
 /// # Errors
 /// [`LaunchError::WhichNode`] and [`LaunchError::NoNode`].
 pub fn choose_node<'a>(installation: &'a Installation, name: Option<&str>) -> Result<&'a NodeConfig, LaunchError> {
