@@ -8,7 +8,7 @@ use rohrpost_routers::time::message::{Message, Sync};
 use std::collections::VecDeque;
 
 /// The oldest are dropped first. On a busy computer, a backup master stands in for about one cycle in some hundred.
-const TERMS_MAX: usize = 10_000;
+const REIGNS_MAX: usize = 10_000;
 
 /// Consecutive cycles of one node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -62,7 +62,7 @@ impl Masters {
             (last.last_ns, last.last_cycle) = (at_ns, cycle);
             return;
         }
-        if self.list.len() == TERMS_MAX {
+        if self.list.len() == REIGNS_MAX {
             self.list.pop_front();
         }
         let (first_ns, last_ns, first_cycle, last_cycle) = (at_ns, at_ns, cycle, cycle);
