@@ -272,7 +272,7 @@ pub struct SlotState {
     pub lead_ns: u64,
     /// Ordinary traffic through the tunnel; none without one.
     pub tunnel: Option<TunnelState>,
-    /// How the kernel schedules the thread that keeps the slots: `deadline`, `fifo` or `ordinary`.
+    /// How the kernel schedules who keeps the slots: `deadline`, `fifo` or `ordinary`.
     pub scheduled: String,
     /// The last slots and windows that were used, the oldest first.
     pub last: Vec<SlotUse>,

@@ -106,7 +106,7 @@ impl Times {
         self.lines.values_mut().filter(|line| line.node == node).for_each(|line| line.is_void = true);
     }
 
-    /// Looks at a node after its layer of time did anything: its term, and what its page says from now on.
+    /// Looks at a node after its layer of time did anything: its reign, and what its page says from now on.
     pub fn look(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
         if core.role() == Role::Master {
             self.leads(now, node, core, problems);
