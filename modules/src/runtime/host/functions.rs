@@ -32,7 +32,8 @@ impl ToolLink {
         self.common(module, if on { common::ON } else { common::OFF }, &())
     }
 
-    /// Begins to switch a module on or off, and returns at once; [`Link::poll`] tells how it went.
+    /// Begins to switch a module on or off, and returns at once; [`Link::poll`](crate::call::Link::poll) tells how it
+    /// went.
     ///
     /// ```
     /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
