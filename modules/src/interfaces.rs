@@ -136,7 +136,7 @@ pub trait Player {
 /// A page of the collector's lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Page {
-    /// Tells this incarnation of the collector, whose lines are counted from its start, from earlier ones.
+    /// Tells this incarnation of the collector from earlier ones; lines are counted from its start.
     pub life: u32,
     /// Number of the first line here.
     pub first: u64,

@@ -124,7 +124,7 @@ fn packages_in_the_routers_mailbox_outlive_it() {
 }
 
 #[test]
-fn a_router_with_another_digest_is_refused_by_both_and_taken_when_it_is_mended() {
+fn a_router_with_another_digest_is_refused_by_both_and_taken_when_it_is_corrected() {
     let mut pair = Pair::new();
     let mut replies = replies(&pair);
     pair.sides[1].settings.digest = 8;

@@ -169,7 +169,7 @@ pub struct Links {
 /// Datagrams that were not taken.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Rejected {
-    /// The node whose address they came from, which anybody can write on a datagram; empty: no node has it.
+    /// The node that has the address they came from, which anybody can write on a datagram; empty: no node has it.
     pub node: String,
     /// In a word: `unsealed`, `other-key`, `not-ours`, `other-incarnation`, `replay`, `forged`, `version`.
     pub cause: String,
@@ -207,7 +207,7 @@ pub struct ClockState {
     pub role: ClockRole,
     /// The master that it follows, or is; empty if there is none yet.
     pub master: String,
-    /// Tells the reigns of masters apart; later ones are greater.
+    /// The term of the master; later terms are greater.
     pub term: u64,
     /// Raised with each step of time.
     pub epoch: u64,

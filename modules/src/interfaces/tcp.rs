@@ -142,7 +142,7 @@ pub struct BeyondClients {
     pub left: u64,
     /// Connections that might not take part, or not any more.
     pub refused: u64,
-    /// Who was the last of them, and why; empty without one.
+    /// The last of them, and why it was refused; empty without one.
     pub refusal: String,
     /// What went beyond the part of one certificate, or one address.
     pub crowded: BeyondCrowded,
@@ -185,7 +185,7 @@ pub trait Tcp {
     #[data(2)]
     fn clients() -> BeyondClients;
 
-    /// Which names are registered at the TCP router, and by whom.
+    /// Which names are registered at the TCP router, and by which host.
     #[data(3)]
     fn hosts() -> BeyondHosts;
 }

@@ -232,7 +232,7 @@ fn rough_slotted_networks_keep_their_promises() {
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED_ROUGH_SLOTTED);
 }
 
-/// A network whose master does not die keeps it: at most one change in 100 000 cycles, where up to one datagram of 20
+/// A network keeps a master that does not die: at most one change in 100 000 cycles, where up to one datagram of 20
 /// is lost. A quarter as many networks.
 #[test]
 fn losses_and_late_wake_ups_change_no_master() {

@@ -201,7 +201,7 @@ impl Calls {
             }
         }
         if dies {
-            // A package whose receiver dies a second time is dropped.
+            // A package is dropped when its receiver dies a second time.
             if !waiting.redelivered {
                 server.waiting.push_front(Waiting { redelivered: true, ..waiting });
             }

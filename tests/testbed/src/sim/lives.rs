@@ -22,7 +22,7 @@ pub struct Account {
 pub struct Sending {
     /// Its packages.
     pub account: Account,
-    /// Datagrams whose most urgent package is of a lower level than this.
+    /// Datagrams in which the most urgent package is of a lower level than this.
     pub(super) below: [u64; LEVELS],
     /// Packages of each module that wait.
     pub(super) waiting: Table<Name, Waiting>,

@@ -87,7 +87,7 @@ pub struct Sent {
 pub struct Arrived {
     /// Socket that has it.
     pub port: Port,
-    /// Node whose address it comes from; none: an address that no node has.
+    /// Node that has the address it comes from; none: an address that no node has.
     pub source: Option<usize>,
     /// Its bytes.
     pub bytes: Rc<[u8]>,
@@ -162,7 +162,7 @@ pub struct Station {
 }
 
 impl Station {
-    /// One whose router has not begun yet.
+    /// One of which the router has not begun yet.
     pub fn new(clock: Clock) -> Self {
         Self {
             clock,

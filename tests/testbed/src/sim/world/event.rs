@@ -20,7 +20,7 @@ pub(in crate::sim) enum Event {
     /// It is over.
     End { fault: usize },
     /// All faults are over.
-    Mended,
+    Fixed,
     /// The next package of a flow, or the next of its burst.
     Flow { flow: usize },
     /// The next call of a caller.

@@ -68,7 +68,7 @@ const LOOK_NS: u64 = 50 * MS;
 const OLD_MAX: usize = 64;
 
 impl<'a> World<'a> {
-    /// A network as planned. `layers` makes routers, `guard` those who let commands run.
+    /// A network as planned. `layers` makes routers, `guard` makes what lets commands run.
     pub fn new(plan: Rc<Plan>, guard: NewGuard, layers: NewLayers<'a>, trace: bool) -> Self {
         let mut chance = Chance::new(plan.seed ^ 0x5eed);
         let count = plan.nodes.len();
@@ -119,7 +119,7 @@ impl<'a> World<'a> {
             self.at(its.from_ns, Event::Begin { fault });
             self.at(its.until_ns, Event::End { fault });
         }
-        self.at(plan.fixed_ns, Event::Mended);
+        self.at(plan.fixed_ns, Event::Fixed);
         for (flow, its) in plan.flows.iter().enumerate() {
             let later_ns = if plan.moment_of(its).is_some() { 0 } else { self.chance.below(its.period_ns) };
             let at_ns = plan.traffic_begin_ns + later_ns;
@@ -184,7 +184,7 @@ impl<'a> World<'a> {
             Event::Start { node } => self.start(node),
             Event::Begin { fault } => self.begin(fault),
             Event::End { fault } => self.end(fault),
-            Event::Mended => self.fix(),
+            Event::Fixed => self.fix(),
             Event::Flow { flow } => self.flow(flow),
             Event::Call { caller } => self.call(caller),
             Event::Try { call } => self.try_call(call),
