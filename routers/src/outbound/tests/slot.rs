@@ -66,7 +66,7 @@ impl End {
 }
 
 #[test]
-fn nothing_overtakes_what_is_more_important_and_does_not_fit() {
+fn a_package_that_does_not_fit_is_passed_by_no_less_important_one() {
     let mut end = in_slots(&[1000]);
     for (peer, priority, len) in [(1, 10, 10), (1, 90, 900), (2, 90, 600), (2, 20, 10)] {
         end.queue(START, to(peer, priority), &vec![0; len]);

@@ -1,7 +1,7 @@
 //! Two routers that seal, a wire that keeps all datagrams, and an attacker with access to it.
 
-mod acquaintance;
 mod gate;
+mod handshake;
 mod hostile;
 mod sealed;
 mod slots;
@@ -95,8 +95,8 @@ impl Router {
     pub(super) fn greet_at(&mut self, now_ns: u64, datagram: &[u8]) -> Result<(bool, Option<Vec<u8>>), NotOpened> {
         let mut room = [0; HELLO_DATAGRAM_BYTES];
         match self.opening[0].open(&mut datagram.to_vec())? {
-            Opened::Hello(head, greeting) => {
-                let greeted = self.handshake.receive(now_ns, &head, &greeting, &mut room);
+            Opened::Hello(head, hello) => {
+                let greeted = self.handshake.receive(now_ns, &head, &hello, &mut room);
                 assert_eq!(self.handshake.begin().is_some(), greeted.begins);
                 Ok((greeted.begins, greeted.reply_bytes.map(|bytes| room[..bytes].to_vec())))
             }

@@ -172,7 +172,7 @@ fn what_is_not_real_time_opens_once_however_often_its_incarnation_begins() {
         assert!(b.open(Port::Rest, datagram).is_ok());
     }
     assert_eq!(b.opening[Port::Rest as usize].first(0), 1, "what it sent before is not missed");
-    assert!(b.open(Port::Rest, &early).is_ok(), "it was overtaken");
+    assert!(b.open(Port::Rest, &early).is_ok(), "it was reordered");
     let again = |a: &mut Router, b: &mut Router, why: &str| {
         for datagram in datagrams.iter().chain([&early]) {
             assert_eq!(b.open(Port::Rest, datagram), Err(Rejection::Replay.into()), "{why}");

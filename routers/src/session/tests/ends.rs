@@ -95,8 +95,8 @@ fn a_client_without_a_hello_is_closed_and_keeps_no_other_out() {
         let _ = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said);
     }
     ground.settle();
-    let greeting = ground.server.clients().filter(|(_, _, state)| *state == MemberState::Handshake).count();
-    assert!(greeting <= 4 && ground.ends[0].0.is_up(), "{greeting}");
+    let waiting = ground.server.clients().filter(|(_, _, state)| *state == MemberState::Handshake).count();
+    assert!(waiting <= 4 && ground.ends[0].0.is_up(), "{waiting}");
 }
 
 #[test]

@@ -19,7 +19,7 @@ use rohrpost_mailbox::{ALL_SYSTEMS, Head, Priority, Type};
 use std::collections::BTreeMap;
 use world::{MS, S, World};
 
-/// After the last fault all clients are registered again within so long: silence is noticed, a greeting given up, and
+/// After the last fault all clients are registered again within so long: silence is noticed, a handshake given up, and
 /// the longest wait is over.
 const WELL_NS: u64 = 10 * S;
 const SEEDS: u64 = 30;

@@ -73,8 +73,8 @@ fn is_replaced(world: &mut World, other: NodeIndex, died: u64) -> [u64; 2] {
     assert!(world.run_until(3 * CYCLE, stands_in), "no replacement: {}", tell(world));
     let stood_in = world.now;
     assert_eq!(world.clock(2).term(), term, "the role has not changed yet");
-    let reigns = |world: &World| world.clock(other).role() == Role::Master;
-    assert!(world.run_until(5 * CYCLE, reigns), "no takeover: {}", tell(world));
+    let is_master = |world: &World| world.clock(other).role() == Role::Master;
+    assert!(world.run_until(5 * CYCLE, is_master), "no takeover: {}", tell(world));
     [stood_in - died, world.now - died]
 }
 
@@ -177,8 +177,8 @@ fn a_master_with_packages_that_come_lives() {
         );
         assert!(world.counts(1).syncs.replacements_sent >= 9, "seed {seed}: its Syncs are missing all the same");
         world.packages_come = false;
-        let reigns = |world: &World| world.clock(1).role() == Role::Master;
-        assert!(world.run_until(4 * CYCLE, reigns), "seed {seed}: nothing comes any more: {}", tell(&world));
+        let is_master = |world: &World| world.clock(1).role() == Role::Master;
+        assert!(world.run_until(4 * CYCLE, is_master), "seed {seed}: nothing comes any more: {}", tell(&world));
     }
 }
 

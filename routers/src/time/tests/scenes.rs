@@ -41,7 +41,7 @@ fn agrees_again(world: &mut World, within_ns: u64) {
 
 fn quiet(world: &mut World) {
     world.run(30 * SECOND);
-    assert!(world.reigns.len() == 1 && world.epoch(3) == 1, "{}", world.replay);
+    assert!(world.begun.len() == 1 && world.epoch(3) == 1, "{}", world.replay);
 }
 
 fn the_master_dies(world: &mut World) {

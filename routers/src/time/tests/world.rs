@@ -53,7 +53,7 @@ pub(super) struct World {
     cut: Vec<Vec<bool>>,
     pub(super) replay: String,
     /// When a node became master, and which.
-    pub(super) reigns: Vec<(u64, NodeIndex)>,
+    pub(super) begun: Vec<(u64, NodeIndex)>,
     pub(super) ignored: u64,
     /// True errors and bounds of slaves, ns, since it was emptied last.
     pub(super) errors: Vec<(u64, u64)>,
@@ -89,7 +89,7 @@ impl World {
             terms: BTreeMap::new(),
             cut: vec![vec![false; nodes.into()]; nodes.into()],
             replay: format!("seed {seed}, {nodes} nodes, interval {interval:?}"),
-            reigns: Vec::new(),
+            begun: Vec::new(),
             ignored: 0,
             errors: Vec::new(),
         };

@@ -1,6 +1,7 @@
 //! The routers' own tests notice the mistakes: each in a process of its own that makes one mistake all the time.
 
-use crate::catalog::{GROUPS, Planted};
+use crate::catalog::GROUPS;
+use crate::catalog::planted::Planted;
 use crate::mistakes::MISTAKE_VARIABLE;
 use std::process::{Command, Stdio};
 use std::sync::Mutex;

@@ -3,7 +3,7 @@
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
 use super::link::Quality;
-use super::plan::{Calls, Flow, Plan, Shape};
+use super::plan::{CallPlan, Flow, Plan, Shape};
 use super::spans::{DRAIN_NS, MS, RECOVERY_NS, S, US, WELL_NS};
 use rohrpost_mailbox::local;
 
@@ -67,7 +67,7 @@ impl Plan {
             let large = Flow { period_ns: 600 * MS, bytes: (20_000, 50_000), burst: 12, ..mixed };
             self.flows.extend([steady, mixed, large]);
             let valid_for_ns = chance.between(100, 2000) * MS;
-            self.calls.push(Calls { node, from, to, period_ns: 50 * MS, valid_for_ns, priority: u8::MAX });
+            self.calls.push(CallPlan { node, from, to, period_ns: 50 * MS, valid_for_ns, priority: u8::MAX });
         }
     }
 

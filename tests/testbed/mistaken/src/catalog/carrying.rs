@@ -1,6 +1,6 @@
 //! What a router could do wrong with packages and datagrams.
 
-use super::{Group, Planted, edit};
+use super::planted::{Group, Planted, edit};
 
 pub(crate) const CARRYING: Group = Group {
     name: "CARRYING",

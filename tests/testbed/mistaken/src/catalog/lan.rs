@@ -1,6 +1,6 @@
 //! What a router could do wrong with what strangers and other nodes send.
 
-use super::{Group, Planted, edit};
+use super::planted::{Group, Planted, edit};
 
 pub(crate) const ADMISSION: Group = Group {
     name: "ADMISSION",
@@ -159,7 +159,7 @@ pub(crate) const LAN: Group = Group {
         Planted {
             name: "BeginsUnproven",
             text: "Security: any sender of a hello is taken to be alive.",
-            shows_in: "security::tests::acquaintance::only_a_living_incarnation_begins",
+            shows_in: "security::tests::handshake::only_a_living_incarnation_begins",
             edits: &[edit(
                 "security/handshake.rs",
                 "let proves = self.is_answer(now_ns, peer, hello.answer);",

@@ -1,6 +1,6 @@
 //! What client and server beyond the LAN could do wrong.
 
-use super::{Group, Planted, edit};
+use super::planted::{Group, Planted, edit};
 
 pub(crate) const SESSION: Group = Group {
     name: "SESSION",

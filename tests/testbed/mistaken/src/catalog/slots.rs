@@ -1,6 +1,6 @@
 //! What a router could do wrong in time slots.
 
-use super::{Group, Planted, edit};
+use super::planted::{Group, Planted, edit};
 
 pub(crate) const IN_SLOT: Group = Group {
     name: "IN_SLOT",
@@ -9,7 +9,7 @@ pub(crate) const IN_SLOT: Group = Group {
         Planted {
             name: "OvertakesInSlot",
             text: "Outbound: in a slot a package that fits leaves before a more important one that does not.",
-            shows_in: "outbound::tests::slot::nothing_overtakes_what_is_more_important_and_does_not_fit",
+            shows_in: "outbound::tests::slot::a_package_that_does_not_fit_is_passed_by_no_less_important_one",
             edits: &[edit(
                 "outbound/datagram.rs",
                 "if self.in_slots {",

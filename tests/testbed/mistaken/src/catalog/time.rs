@@ -1,6 +1,6 @@
 //! What a clock could do wrong.
 
-use super::{Group, Planted, edit};
+use super::planted::{Group, Planted, edit};
 
 pub(crate) const TIME: Group = Group {
     name: "TIME",

@@ -75,7 +75,7 @@ pub struct Flow {
 
 /// A module that calls a function of another, again and again.
 #[derive(Clone, Copy, Debug)]
-pub struct Calls {
+pub struct CallPlan {
     /// Node of the caller.
     pub node: usize,
     /// The module that calls.
@@ -108,7 +108,7 @@ pub struct Plan {
     /// Data.
     pub flows: Vec<Flow>,
     /// Commands.
-    pub calls: Vec<Calls>,
+    pub calls: Vec<CallPlan>,
     /// What goes wrong.
     pub faults: Vec<Planned>,
     /// The nodes that may be master of time, in order.
