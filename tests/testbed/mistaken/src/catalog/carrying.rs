@@ -102,11 +102,10 @@ pub(crate) const CARRYING: Group = Group {
             text: "Outbound: a package keeps a priority above that of its sender or its request.",
             shows_in: "outbound::tests::a_package_is_no_more_urgent_than_its_sender_or_its_caller",
             edits: &[edit(
-                "outbound/mod.rs",
-                r"pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
-        let head = capped(&package.head);",
-                r"pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
-        let head = if broken!(Hurries) { package.head } else { capped(&package.head) };",
+                "outbound/accept.rs",
+                "self.accept_capped(now_ns, &Package { head, ..*package }, alone, report)",
+                r"let head = if broken!(Hurries) { package.head } else { head };
+        self.accept_capped(now_ns, &Package { head, ..*package }, alone, report)",
             )],
         },
         Planted {
