@@ -145,7 +145,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     }
     if !late.is_empty() {
         text +=
-            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
+            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle:\n\n{late}{}", flows::legend());
     }
     if !installation.flows.is_empty() {
         text +=

@@ -44,7 +44,7 @@ mod words;
 
 pub use argument::parse_argument;
 pub use bytes::{SchemaError, TYPES_MAX, VERSION, hash};
-pub use counters::{counter_fields, counters};
+pub use counters::{counters, quantities, quantity_fields};
 pub use decode::decode;
 pub use description::{DataItem, Description, Function};
 pub use encode::encode;
