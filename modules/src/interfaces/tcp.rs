@@ -168,7 +168,7 @@ pub struct BeyondClients {
     pub crowded: BeyondCrowded,
     /// Registrations that a later one of the same client replaced before they were handled.
     #[schema(unit = "registrations")]
-    pub reordered: u64,
+    pub superseded: u64,
     /// Lines of output that were only counted, since there were too many of their cause.
     #[schema(unit = "lines")]
     pub held_lines: u64,
