@@ -11,6 +11,7 @@
 mod bench;
 mod bw;
 mod call;
+mod carried;
 mod check;
 mod clean;
 mod completions;

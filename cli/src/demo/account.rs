@@ -1,13 +1,9 @@
 //! The traffic between the nodes of the demo, and whether every package is accounted for.
 
-use crate::summary::class_name;
-use crate::table::{cells, counted, heads, table, table_of, time};
-use rohrpost::Class;
+use crate::table::{counted, table};
 use rohrpost::interfaces::{ClassCarried, Links, PeerLink};
-use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::time::Duration;
 
 /// Whether every package that routers were given is accounted for, once nothing is under way.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -131,24 +127,6 @@ fn lost_of(class: &ClassCarried) -> u64 {
 /// Datagrams from a peer that did not arrive intact.
 fn gone(peer: &PeerLink) -> u64 {
     peer.counters.lost + peer.counters.damaged
-}
-
-/// A row for each class and node.
-pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
-    let mut rows: Vec<(u8, Vec<String>)> = Vec::new();
-    for node in links {
-        for class in &node.classes {
-            let age = class.age.map_or("-".into(), |age| time(Duration::from_nanos(age.p99_ns)));
-            let lost = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause));
-            let lost: Vec<String> = lost.collect();
-            let name = class_name(installation, Some(Class(class.class)));
-            let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
-            rows.push((class.class, cells([name, node.node.clone()], class, [age, lost])));
-        }
-    }
-    rows.sort_by_key(|(class, _)| std::cmp::Reverse(*class));
-    let heads = heads::<ClassCarried>(&["class", "node"], &[">age p99", "lost"]);
-    table_of(&heads, rows.into_iter().map(|(_, row)| row))
 }
 
 /// A row for each pair of nodes and direction, as counted by the receiver.

@@ -1,7 +1,8 @@
 //! Traffic through the TCP router in the demo, as its clients count it; and the losses when it died.
 
+use crate::net;
 use crate::summary::class_name;
-use crate::table::{table, time};
+use crate::table::table;
 use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{BeyondLink, BeyondState, ClassPassed, TcpInterface};
@@ -101,14 +102,7 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
         text += "(packages that newer ones replaced at the TCP router itself count as lost on the way here; `rohrpost \
             net` lists them separately)\n";
     }
-    let rows = links.iter().map(|link| {
-        let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {
-            Some(ended_ns) => time(outage.duration(ended_ns)),
-            None => "it is not over".into(),
-        });
-        [link.node.clone(), link.reconnects.to_string(), link.outages.to_string(), outage]
-    });
-    text + "\n" + &table(["node", ">reconnected", ">outages", ">the last took"], rows)
+    text + "\n" + &net::beyond::links(&links.iter().collect::<Vec<_>>())
 }
 
 /// Whether all clients are connected at the end.

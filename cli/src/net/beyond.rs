@@ -2,6 +2,8 @@
 //! view.
 
 use super::node_report::NodeReport;
+use crate::carried::lost;
+use crate::summary::class_name;
 use crate::table::{self, counted, time};
 use crate::target::Running;
 use rohrpost::Class;
@@ -16,7 +18,8 @@ pub(super) fn text(running: &Running, all: &[NodeReport]) -> [String; 4] {
     [self::links(&links), whys(&links), clients(&servers), losses(running, &links, &servers)]
 }
 
-fn links(links: &[&BeyondLink]) -> String {
+/// A row for each client; empty if there are none.
+pub(crate) fn links(links: &[&BeyondLink]) -> String {
     let sum = |classes: &[ClassPassed]| classes.iter().map(|class| class.passed).sum::<u64>().to_string();
     let row = |link: &&BeyondLink| {
         let state = match link.state {
@@ -76,11 +79,8 @@ fn losses(running: &Running, links: &[&BeyondLink], servers: &[&BeyondClients]) 
     let mut rows = Vec::new();
     for (at, classes) in ends {
         for class in classes.iter().filter(|class| class.replaced > 0 || !class.lost.is_empty()) {
-            let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
-            let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
-            let name = name.unwrap_or_else(|| class.class.to_string());
-            let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
-            rows.push(table::cells([at.clone(), name], class, [lost]));
+            let name = class_name(&running.installation, Some(Class(class.class)));
+            rows.push(table::cells([at.clone(), name], class, [lost(&class.lost)]));
         }
     }
     let heads = table::heads::<ClassPassed>(&["at", "class"], &["lost"]);

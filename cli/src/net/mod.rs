@@ -1,7 +1,7 @@
 //! `rohrpost net`: the state of all nodes' routers: links, queues, losses with their causes, and the quality of each
 //! clock.
 
-mod beyond;
+pub(super) mod beyond;
 mod node_report;
 mod show;
 

@@ -2,14 +2,13 @@
 
 use super::beyond;
 use super::node_report::NodeReport;
-use crate::flows;
 use crate::slots::kept;
-use crate::table::{cells, counted, heads, table, table_of, time};
+use crate::table::{counted, table, time};
 use crate::target::Running;
 use crate::units::{bytes, fine};
 use crate::vocabulary::Vocabulary;
-use rohrpost::Class;
-use rohrpost::interfaces::{ClassCarried, ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
+use crate::{carried, flows};
+use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
 use rohrpost::output::plain;
 use std::time::Duration;
 
@@ -151,19 +150,8 @@ fn waiting(all: &[NodeReport]) -> String {
 
 /// Classes with losses; the others are in the JSON.
 fn losses(running: &Running, all: &[NodeReport]) -> String {
-    let mut rows = Vec::new();
-    for links in all.iter().filter_map(|told| told.links.as_ref()) {
-        for class in links.classes.iter().filter(|class| !class.lost.is_empty()) {
-            let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
-            let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
-            let name = name.unwrap_or_else(|| class.class.to_string());
-            rows.push(cells([links.node.clone(), name], class, [lost.join(", ")]));
-        }
-    }
-    if rows.is_empty() {
-        return String::new();
-    }
-    table_of(&heads::<ClassCarried>(&["node", "class"], &["lost"]), rows)
+    let links = all.iter().filter_map(|told| told.links.as_ref());
+    carried::by_class(&running.installation, links, |class| !class.lost.is_empty())
 }
 
 /// Declared flows; empty if there is none.
