@@ -1,7 +1,8 @@
 //! What routers carried, by class, as a table: used by `net` and by the demo's summary.
 
+use super::quantities::{cells, heads};
 use super::summary::class_name;
-use super::table::{cells, heads, table_of, time};
+use super::table::{table_of, time};
 use rohrpost::Class;
 use rohrpost::interfaces::{CarriedLoss, ClassCarried, Links};
 use rohrpost_config::Installation;

@@ -1,6 +1,7 @@
 //! Declared flows as a table: the allowed latency and the measured latency. Used by `net` and by the demo's summary.
 
-use super::table;
+use super::quantities::{self, cells, heads};
+use super::table::table_of;
 use super::units::fine;
 use super::vocabulary::{Vocabulary, built_in};
 use rohrpost::Name;
@@ -12,7 +13,7 @@ use rohrpost_config::{Contents, Installation};
 pub(super) fn legend() -> String {
     format!(
         "Of declared flows, measured by the sending router up to the arrival at the other computer:\n{}{LEGEND}",
-        table::legend::<FlowState>()
+        quantities::legend::<FlowState>()
     )
 }
 
@@ -40,7 +41,7 @@ pub(super) fn measured<'a>(
     if rows.is_empty() {
         return String::new();
     }
-    table::table_of(&table::heads::<FlowState>(&["flow"], &[">lost", ">oldest"]), rows)
+    table_of(&heads::<FlowState>(&["flow"], &[">lost", ">oldest"]), rows)
 }
 
 /// A flow's content, by its name in the interface if that is known; none if the file does not list it.
@@ -63,7 +64,7 @@ fn row(installation: &Installation, flow: &FlowState, carried: Option<String>, l
     let carried = carried.map(|word| format!(" {word}")).unwrap_or_default();
     let lost: u64 = flow.lost.iter().map(|lost| lost.packages).sum();
     let oldest = oldest_ns(installation, flow, links).map_or("-".into(), |ns| fine(ns as f64 * 1e-9));
-    table::cells([format!("{} → {}{carried}", flow.from, flow.to)], flow, [lost.to_string(), oldest])
+    cells([format!("{} → {}{carried}", flow.from, flow.to)], flow, [lost.to_string(), oldest])
 }
 
 /// Packages of the receiver's class, on its node. Commands and replies have no stamp.

@@ -38,6 +38,7 @@ mod observer;
 mod param;
 mod ping;
 mod published;
+mod quantities;
 mod resolved;
 mod round;
 mod router;

@@ -1,6 +1,7 @@
 //! How nodes keep their time slots, as tables: used by `net` and by the demo's summary.
 
-use super::table::{by_quantity, table_of};
+use super::quantities::by_quantity;
+use super::table::table_of;
 use super::units::fine;
 use rohrpost::interfaces::{SlotState, TunnelState};
 use rohrpost::schema::Schema;

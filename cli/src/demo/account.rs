@@ -1,6 +1,7 @@
 //! The traffic between the nodes of the demo, and whether every package is accounted for.
 
-use crate::table::{counted, table};
+use crate::quantities::counted;
+use crate::table::table;
 use rohrpost::interfaces::{ClassCarried, Links, PeerLink};
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! The demo's report on a router's death: the backup master, the next master, and when the router was back.
+//! The demo's report on a router's death: when the router was back, and the next master.
 //!
 //! A thread observes the bridge and the nodes' tables. It sends nothing, so it adds no traffic.
 

@@ -3,8 +3,9 @@
 
 use super::node_report::NodeReport;
 use crate::carried::lost;
+use crate::quantities::{cells, counted, heads};
 use crate::summary::class_name;
-use crate::table::{self, counted, time};
+use crate::table::{table_of, time};
 use crate::target::Running;
 use rohrpost::Class;
 use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondLink, BeyondState, ClassPassed};
@@ -28,10 +29,10 @@ pub(crate) fn links(links: &[&BeyondLink]) -> String {
             BeyondState::Up => "up",
         };
         let before = [link.node.clone(), link.server.clone(), state.into()];
-        table::cells(before, *link, [outage(link), sum(&link.sent), sum(&link.received)])
+        cells(before, *link, [outage(link), sum(&link.sent), sum(&link.received)])
     };
-    let heads = table::heads::<BeyondLink>(&["node", "TCP router", "state"], &["last outage", ">sent", ">received"]);
-    if links.is_empty() { String::new() } else { table::table_of(&heads, links.iter().map(row)) }
+    let heads = heads::<BeyondLink>(&["node", "TCP router", "state"], &["last outage", ">sent", ">received"]);
+    if links.is_empty() { String::new() } else { table_of(&heads, links.iter().map(row)) }
 }
 
 /// How long it was disconnected.
@@ -51,9 +52,9 @@ fn clients(servers: &[&BeyondClients]) -> String {
         let rows = server.clients.iter().map(|client| {
             let state = if client.takes_part { "takes part" } else { "-" };
             let before = [client.name.clone(), client.address.clone(), client.system.to_string(), state.into()];
-            table::cells(before, client, [])
+            cells(before, client, [])
         });
-        text += &table::table_of(&table::heads::<BeyondClient>(&["client", "from", ">system", "state"], &[]), rows);
+        text += &table_of(&heads::<BeyondClient>(&["client", "from", ">system", "state"], &[]), rows);
         if server.more > 0 {
             text += &format!("… and {} more\n", server.more);
         }
@@ -80,9 +81,9 @@ fn losses(running: &Running, links: &[&BeyondLink], servers: &[&BeyondClients]) 
     for (at, classes) in ends {
         for class in classes.iter().filter(|class| class.replaced > 0 || !class.lost.is_empty()) {
             let name = class_name(&running.installation, Some(Class(class.class)));
-            rows.push(table::cells([at.clone(), name], class, [lost(&class.lost)]));
+            rows.push(cells([at.clone(), name], class, [lost(&class.lost)]));
         }
     }
-    let heads = table::heads::<ClassPassed>(&["at", "class"], &["lost"]);
-    if rows.is_empty() { String::new() } else { table::table_of(&heads, rows) }
+    let heads = heads::<ClassPassed>(&["at", "class"], &["lost"]);
+    if rows.is_empty() { String::new() } else { table_of(&heads, rows) }
 }

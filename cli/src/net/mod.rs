@@ -7,12 +7,12 @@ mod show;
 
 use super::round::{Round, Rounds};
 use super::vocabulary::Vocabulary;
-use crate::table::legend;
+use crate::quantities::legend;
 use crate::terminal::{Failure, say};
 use node_report::{NodeReport, rates};
 use rohrpost::interfaces::{
-    BeyondClient, BeyondClients, BeyondLink, ClassPassed, LinkCounters, RouterInterface, SlotState, TcpInterface,
-    TunnelState,
+    BeyondClient, BeyondClients, BeyondCrowded, BeyondLink, ClassPassed, LinkCounters, RouterInterface, SlotState,
+    TcpInterface, TunnelState,
 };
 use std::process::ExitCode;
 use std::time::Duration;
@@ -37,6 +37,7 @@ fn help() -> String {
         ("Of a client of the TCP router", legend::<BeyondLink>()),
         ("Of a connection with the TCP router", legend::<BeyondClient>()),
         ("Of the TCP router", legend::<BeyondClients>()),
+        ("Of what went beyond the share of a certificate or address there", legend::<BeyondCrowded>()),
         ("Of a class there, and at its clients", legend::<ClassPassed>()),
     ];
     parts.into_iter().fold(EXAMPLES.to_owned(), |text, (of, lines)| format!("{text}{of}:\n{lines}"))

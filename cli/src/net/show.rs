@@ -2,8 +2,9 @@
 
 use super::beyond;
 use super::node_report::NodeReport;
+use crate::quantities::counted;
 use crate::slots::kept;
-use crate::table::{counted, table, time};
+use crate::table::{table, time};
 use crate::target::Running;
 use crate::units::{bytes, fine};
 use crate::vocabulary::Vocabulary;

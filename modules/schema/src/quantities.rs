@@ -47,8 +47,8 @@ pub fn quantities<T: Schema + Serialize>(value: &T) -> Vec<(Field, Option<u64>)>
     quantity_fields::<T>()
         .into_iter()
         .map(|field| {
-            let n = number(&field.name);
-            (field, n)
+            let value = number(&field.name);
+            (field, value)
         })
         .collect()
 }
