@@ -84,13 +84,13 @@ const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 1), ("routers/src", 48
 
 /// How many lines of a folder are still too wide, or have words that are not the field's; they may only become fewer.
 const WORDS_LEFT: &[(&str, usize)] = &[
-    ("cli/src", 7),
+    ("cli/src", 2),
     ("gui-bridge/src", 7),
     ("mailbox/proof", 49),
     ("mailbox/src", 119),
     ("mailbox/tests", 57),
     ("modules/schema", 2),
-    ("modules/src", 108),
+    ("modules/src", 102),
     ("modules/tests", 4),
     ("routers/src", 182),
     ("routers/tests", 17),
