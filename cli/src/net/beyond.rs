@@ -38,7 +38,7 @@ pub(crate) fn links(links: &[&BeyondLink]) -> String {
 /// How long it was disconnected.
 fn outage(link: &BeyondLink) -> String {
     let Some(last) = link.outage else { return "none".into() };
-    last.ended_ns.map_or("it is disconnected".into(), |ended_ns| time(last.duration(ended_ns)))
+    last.ended_ns.map_or("it is disconnected".into(), |ended_ns| format!("took {}", time(last.duration(ended_ns))))
 }
 
 fn whys(links: &[&BeyondLink]) -> String {
