@@ -1,11 +1,12 @@
 //! Traffic through the TCP router in the demo, as its clients count it; and the losses when it died.
 
+use crate::carried::lost;
 use crate::net;
 use crate::summary::class_name;
 use crate::table::table;
 use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
-use rohrpost::interfaces::{BeyondLink, BeyondState, ClassPassed, TcpInterface};
+use rohrpost::interfaces::{BeyondLink, BeyondState, CarriedLoss, ClassPassed, TcpInterface};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Class, ToolLink};
 use rohrpost_config::Installation;
@@ -78,7 +79,8 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     let all = sums(links);
     let is_any_on_way = all.values().any(|sum| sum.on_way() > 0);
     let rows = all.into_iter().rev().map(|(class, sum)| {
-        let lost: Vec<String> = sum.lost.iter().map(|(cause, packages)| format!("{packages} {cause}")).collect();
+        let losses = sum.lost.iter().map(|(cause, packages)| CarriedLoss { cause: cause.clone(), packages: *packages });
+        let losses: Vec<CarriedLoss> = losses.collect();
         [
             class_name(installation, Some(Class(class))),
             sum.meant.to_string(),
@@ -87,7 +89,7 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
             sum.came.to_string(),
             sum.delivered.to_string(),
             sum.on_way().to_string(),
-            if lost.is_empty() { "none".into() } else { lost.join(", ") },
+            lost(&losses),
         ]
     });
     let heads =
