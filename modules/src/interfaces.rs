@@ -2,13 +2,14 @@
 //! modules.
 
 mod router;
+mod slots;
 mod tcp;
 
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkCounters,
-    LinkState, Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure,
-    TunnelState,
+    LinkState, Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SocketFailure,
 };
+pub use slots::{SlotState, SlotUse, TunnelState};
 
 pub use tcp::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondOutage, BeyondState,

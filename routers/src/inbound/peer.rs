@@ -47,7 +47,7 @@ pub(super) struct Refusing {
     /// No refusal before this time, ns.
     pub(super) not_before_ns: u64,
     pub(super) told: Option<(IpAddr, Mismatch)>,
-    pub(super) told_ns: u64,
+    pub(super) throttle: Throttle,
     pub(super) last_ns: u64,
 }
 

@@ -50,10 +50,10 @@ impl Inbound {
         }
         let is_over = refusing.last_ns + OVER_NS < now_ns;
         refusing.last_ns = now_ns;
+        let is_news = is_over || refusing.told != Some((source, mismatch));
         // Two sources in turns are not reported each time.
-        let is_other = refusing.told != Some((source, mismatch)) && refusing.told_ns + OVER_NS < now_ns;
-        if is_over || is_other {
-            (refusing.told, refusing.told_ns) = (Some((source, mismatch)), now_ns);
+        if is_news && refusing.throttle.note(now_ns, OVER_NS).is_some() {
+            refusing.told = Some((source, mismatch));
             deliver.event(RouterEvent::Refused { source, peer, mismatch });
         }
     }

@@ -265,7 +265,8 @@ impl Outbound {
             // Without this fragment the others are worth nothing.
             let level = self.levels[usize::from(part.head.priority.0)];
             let under_way = self.queue.first_of(peer, level);
-            match under_way.filter(|place| self.queue.at(*place).parts > 0 && self.queue.at(*place).first == part.first)
+            match under_way
+                .filter(|place| self.queue.at(*place).fragments > 0 && self.queue.at(*place).first == part.first)
             {
                 Some(place) => self.drop_out(place, Cause::Socket, report),
                 None => self.came_back(peer, &part.head, &[], report),

@@ -81,7 +81,7 @@ impl Outbound {
         if !self.is_large(waiting) {
             return DIRECT_HEAD_BYTES + len;
         }
-        let left = len - usize::from(waiting.parts) * (self.datagram_bytes - PART_START);
+        let left = len - usize::from(waiting.fragments) * (self.datagram_bytes - PART_START);
         self.datagram_bytes.min(PART_START + left)
     }
 

@@ -48,7 +48,7 @@ pub struct QueuedPackage {
     /// Sequence of the first fragment, if some have left.
     pub first: u64,
     /// How many fragments have left.
-    pub parts: u16,
+    pub fragments: u16,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -205,7 +205,7 @@ impl Queue {
             let QueueEntry { waiting, .. } = &self.entries[*place as usize];
             let is_alike = (waiting.sender, waiting.peer, waiting.level) == (newer.sender, newer.peer, newer.level);
             is_alike
-                && waiting.parts == 0
+                && waiting.fragments == 0
                 && self.entries[*place as usize].of_newest().is_some_and(|head| same_state(head, &newer.head))
         };
         hints.of(&newer.head).find(is_older).map(Place)
@@ -317,8 +317,8 @@ impl Queue {
     /// A fragment has left: the package cannot be displaced any more.
     pub fn part_left(&mut self, place: Place, first: u64) {
         let entry = &mut self.entries[place.0 as usize];
-        entry.waiting.parts += 1;
-        if entry.waiting.parts == 1 {
+        entry.waiting.fragments += 1;
+        if entry.waiting.fragments == 1 {
             entry.waiting.first = first;
             let (sender, level) = (usize::from(entry.waiting.sender), usize::from(entry.waiting.level));
             let sender = &mut self.senders[sender];
@@ -341,7 +341,7 @@ impl Queue {
             }
         }
         let sender = &mut self.senders[usize::from(waiting.sender)];
-        if waiting.parts == 0 {
+        if waiting.fragments == 0 {
             self.by_sender.remove(&mut sender.levels[level], place.0);
             sender.emptied(level);
             sender.blocks[level] -= body.blocks();

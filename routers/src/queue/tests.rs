@@ -90,7 +90,7 @@ fn what_has_left_in_part_does_not_give_way() {
     queue.part_left(place, 77);
     assert_eq!(push(&mut queue, 1, 0, 0, 2 * BLOCK_BYTES), [1]);
     assert_eq!(push(&mut queue, 2, 0, 0, BLOCK_BYTES), []);
-    assert_eq!((queue.at(place).first, queue.at(place).parts), (77, 1));
+    assert_eq!((queue.at(place).first, queue.at(place).fragments), (77, 1));
     let mut rest = vec![9; 15 * BLOCK_BYTES - 100];
     queue.read(place, &mut rest);
     assert!(rest.iter().all(|byte| *byte == 0));
