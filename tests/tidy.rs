@@ -80,24 +80,11 @@ const SHARED_NAMES: &[(&str, &str, &str)] = &[
 ];
 
 /// How many other names of types a crate still shares; they may only become fewer.
-const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 1), ("routers/src", 1), ("tests/testbed/src", 3)];
+const SHARED_NAMES_LEFT: &[(&str, usize)] = &[("cli/src", 0), ("tests/testbed/src", 0)];
 
 /// How many lines of a folder are still too wide, or have words that are not the field's; they may only become fewer.
-const WORDS_LEFT: &[(&str, usize)] = &[
-    ("cli/src", 6),
-    ("gui-bridge/src", 7),
-    ("mailbox/proof", 49),
-    ("mailbox/src", 119),
-    ("mailbox/tests", 57),
-    ("modules/schema", 2),
-    ("modules/src", 108),
-    ("modules/tests", 4),
-    ("routers/src", 161),
-    ("routers/tests", 17),
-    ("tests", 1),
-    ("tests/e2e", 2),
-    ("tests/testbed", 110),
-];
+const WORDS_LEFT: &[(&str, usize)] =
+    &[("cli/src", 0), ("modules/src", 0), ("routers/src", 0), ("routers/tests", 0), ("tests/testbed", 0)];
 
 /// Lines that a file may have.
 const LINES_MAX: usize = 400;
@@ -109,25 +96,21 @@ const LONG: &[(&str, usize)] = &[
     ("config/src/reader.rs", 403),
     ("mailbox/proof/loom/src/broken.rs", 922),
     ("mailbox/proof/loom/src/models.rs", 673),
-    ("mailbox/src/node.rs", 426),
+    ("mailbox/src/node.rs", 425),
     ("mailbox/src/sender.rs", 420),
     ("mailbox/src/slots.rs", 430),
     ("mailbox/src/system_time.rs", 422),
     ("modules/src/call/deduplicator_simulation.rs", 424),
     ("modules/src/output/way.rs", 438),
-    ("modules/src/runtime/context.rs", 404),
     ("modules/tests/launch.rs", 404),
     ("routers/src/frame/mod.rs", 429),
-    ("routers/src/outbound/mod.rs", 461),
     ("routers/src/outbound/tests/mod.rs", 461),
-    ("routers/src/queue/mod.rs", 406),
     ("routers/src/session/client/mod.rs", 414),
     ("routers/src/shell/socket.rs", 428),
     ("routers/src/time/clock.rs", 420),
     ("routers/src/time/clock/slots.rs", 437),
     ("routers/src/time/election.rs", 408),
     ("routers/tests/shell.rs", 419),
-    ("tests/testbed/tests/simulation.rs", 466),
     ("routers/tests/slots_common/mod.rs", 450),
     ("tests/e2e/probe.rs", 413),
 ];
@@ -228,8 +211,8 @@ fn lines_fit_and_words_are_the_fields() {
     assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
 }
 
-/// Folders with more mistakes than are left to be fixed there, each mistake in a line; and those with fewer, whose
-/// number is to be lowered.
+/// Folders with more mistakes than are left to be fixed there, each mistake in a line; and those with fewer, for which
+/// the number is to be lowered.
 fn beyond(left: &[(&str, usize)], found: &BTreeMap<String, Vec<String>>) -> Vec<String> {
     let folders: BTreeSet<&str> =
         left.iter().map(|(folder, _)| *folder).chain(found.keys().map(String::as_str)).collect();

@@ -4,7 +4,7 @@
 
 mod support;
 
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use support::{bench, children, interrupt, left_behind, rows, run, wait_for};

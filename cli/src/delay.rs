@@ -39,7 +39,7 @@ struct Wait {
 }
 
 /// One observation.
-struct Observation {
+struct ObservedDelays {
     waits: Window<Vec<Wait>>,
     module: WatchedModule,
 }
@@ -77,9 +77,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut module = WatchedModule::new(&arguments.target, &arguments.name, long)?;
     module.require_present()?;
     let mut names = data_of(&module.running, module.module, None).unwrap_or_default();
-    let mut observed = Observation { waits: Window::new(long), module };
-    let look = |observed: &mut Observation| {
-        let Observation { waits: window, module } = observed;
+    let mut observed = ObservedDelays { waits: Window::new(long), module };
+    let look = |observed: &mut ObservedDelays| {
+        let ObservedDelays { waits: window, module } = observed;
         let Some(survey) = module.look()? else { return Ok(()) };
         let waits = waits(&module.running, module.module, &survey)?;
         if window.ends().is_some_and(|(_, before)| begins_anew(before, &waits)) {
@@ -89,7 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         module.take_published(survey);
         Ok(())
     };
-    let tell = |observed: &mut Observation| {
+    let tell = |observed: &mut ObservedDelays| {
         observed.module.renew(&mut names, None);
         let delays = delays(&arguments.name, observed, &names);
         Ok(say(if arguments.pace.json { serde_json::to_string(&delays)? } else { in_text(&delays) }))
@@ -125,7 +125,7 @@ fn waits(running: &Running, module: Name, survey: &Survey) -> Result<Vec<Wait>, 
     Ok(mailboxes.into_iter().flat_map(|mailbox| mailbox.classes.iter().map(wait(mailbox.name))).collect())
 }
 
-fn delays<'a>(name: &'a str, observed: &Observation, names: &[(u16, String)]) -> Delays<'a> {
+fn delays<'a>(name: &'a str, observed: &ObservedDelays, names: &[(u16, String)]) -> Delays<'a> {
     let installation = &observed.module.running.installation;
     let (earlier, now) = observed.waits.ends().map_or((&[][..], &[][..]), |(a, b)| (&a[..], &b[..]));
     let line = |wait: &Wait| {

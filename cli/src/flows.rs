@@ -1,6 +1,7 @@
 //! Declared flows as a table: the allowed latency and the measured latency. Used by `net` and by the demo's summary.
 
-use super::table::table;
+use super::quantities::{self, cells, heads};
+use super::table::table_of;
 use super::units::fine;
 use super::vocabulary::{Vocabulary, built_in};
 use rohrpost::Name;
@@ -9,16 +10,19 @@ use rohrpost::schema::Description;
 use rohrpost_config::{Contents, Installation};
 
 /// Explains the columns.
-pub(super) const LEGEND: &str = "\
-at worst: the bound that `check` computes, if all slots are kept; kept: the slowest package with no slot missed or \
-    cut between its publishing
-and its arrival; slowest: of all, measured by the sending router, up to the arrival at the other computer; beyond: \
-    packages slower than the bound,
-of kept: those of them with all slots kept; late: slower than the deadline, `within`; lost: in that router's queue; \
-    oldest: data of the receiver's class
-at their arrival in its mailbox, by their stamp. A package between two modules belongs to the flow that carries it \
-    (`carries`), else, declared
-or not, to a flow without `carries`";
+pub(super) fn legend() -> String {
+    format!(
+        "Of declared flows, measured by the sending router up to the arrival at the other computer:\n{}{LEGEND}",
+        quantities::legend::<FlowState>()
+    )
+}
+
+const LEGEND: &str = "  \
+  lost: packages lost in that router's queue
+  oldest: data of the receiver's class at their arrival in its mailbox, by their stamp
+A package between two modules belongs to the flow that carries it, else, declared or not, to a flow that does not say
+what it carries.
+";
 
 /// A row for each flow that starts at one of these nodes; empty if there is none. `ask` asks a module for its
 /// interface.
@@ -37,22 +41,7 @@ pub(super) fn measured<'a>(
     if rows.is_empty() {
         return String::new();
     }
-    let heads = [
-        "flow",
-        ">bytes",
-        ">packages",
-        ">at worst",
-        ">kept",
-        ">slowest",
-        ">99 of 100",
-        ">within",
-        ">beyond",
-        ">of kept",
-        ">late",
-        ">lost",
-        ">oldest",
-    ];
-    table(heads, rows)
+    table_of(&heads::<FlowState>(&["flow"], &[">lost", ">oldest"]), rows)
 }
 
 /// A flow's content, by its name in the interface if that is known; none if the file does not list it.
@@ -71,25 +60,11 @@ fn carried(
     Some(word.unwrap_or_else(|| contents.to_string()))
 }
 
-fn row(installation: &Installation, flow: &FlowState, carried: Option<String>, links: &[&Links]) -> [String; 13] {
-    let ns = |ns: u64| fine(ns as f64 * 1e-9);
-    let seen = |of: u64| if flow.packages == 0 { "-".into() } else { ns(of) };
+fn row(installation: &Installation, flow: &FlowState, carried: Option<String>, links: &[&Links]) -> Vec<String> {
+    let carried = carried.map(|word| format!(" {word}")).unwrap_or_default();
     let lost: u64 = flow.lost.iter().map(|lost| lost.packages).sum();
-    [
-        format!("{} → {}{}", flow.from, flow.to, carried.map(|word| format!(" {word}")).unwrap_or_default()),
-        flow.size.to_string(),
-        flow.packages.to_string(),
-        flow.bound_ns.map_or("-".into(), ns),
-        flow.bound_ns.filter(|_| flow.kept_worst_ns > 0).map_or("-".into(), |_| ns(flow.kept_worst_ns)),
-        seen(flow.worst_ns),
-        seen(flow.p99_ns),
-        ns(flow.deadline_ns),
-        flow.bound_ns.map_or("-".into(), |_| flow.over_bound.to_string()),
-        flow.bound_ns.map_or("-".into(), |_| flow.kept_over_bound.to_string()),
-        flow.over_deadline.to_string(),
-        lost.to_string(),
-        oldest_ns(installation, flow, links).map_or("-".into(), ns),
-    ]
+    let oldest = oldest_ns(installation, flow, links).map_or("-".into(), |ns| fine(ns as f64 * 1e-9));
+    cells([format!("{} → {}{carried}", flow.from, flow.to)], flow, [lost.to_string(), oldest])
 }
 
 /// Packages of the receiver's class, on its node. Commands and replies have no stamp.
@@ -114,14 +89,14 @@ mod tests {
             carries: String::new(),
             size: 800,
             packages,
-            worst_ns: 5_100_000,
-            mean_ns: 2_000_000,
-            p99_ns: 4_900_000,
             bound_ns,
+            kept_worst_ns: bound_ns.map(|_| 5_090_000),
+            worst_ns: Some(5_100_000).filter(|_| packages > 0),
+            mean_ns: Some(2_000_000).filter(|_| packages > 0),
+            p99_ns: Some(4_900_000).filter(|_| packages > 0),
             deadline_ns: 10_000_000,
-            kept_worst_ns: 5_090_000,
-            over_bound: 2,
-            kept_over_bound: 0,
+            over_bound: bound_ns.map(|_| 2),
+            kept_over_bound: bound_ns.map(|_| 0),
             over_deadline: 1,
             lost: vec![CarriedLoss { cause: "quota".into(), packages: 3 }],
         }
@@ -135,7 +110,7 @@ mod tests {
             let node = FlowStates { node: "base".into(), flows: vec![flow] };
             let text = measured(&installation, [&node], &[], &mut Vocabulary::default(), |_| None);
             text.lines()
-                .nth(1)
+                .find(|line| line.contains(" → "))
                 .unwrap_or_default()
                 .split("  ")
                 .map(str::trim)
@@ -146,9 +121,9 @@ mod tests {
         let of = |columns: &str| columns.split('|').map(str::to_owned).collect::<Vec<_>>();
         assert_eq!(
             words(flow(7, Some(5_540_000))),
-            of("laser.0 → pilot.0|800|7|5.540 ms|5.090 ms|5.100 ms|4.900 ms|10.00 ms|2|0|1|3|-")
+            of("laser.0 → pilot.0|800 B|7|5.540 ms|5.090 ms|5.100 ms|2.000 ms|4.900 ms|10.00 ms|2|0|1|3|-")
         );
-        assert_eq!(words(flow(0, None)), of("laser.0 → pilot.0|800|0|-|-|-|-|10.00 ms|-|-|1|3|-"));
+        assert_eq!(words(flow(0, None)), of("laser.0 → pilot.0|800 B|0|-|-|-|-|-|10.00 ms|-|-|1|3|-"));
         let none = FlowStates { node: "base".into(), flows: Vec::new() };
         assert_eq!(measured(&installation, [&none], &[], &mut Vocabulary::default(), |_| None), "");
     }
@@ -188,7 +163,7 @@ mod tests {
         let node = FlowStates { node: "base".into(), flows: cases.map(carrying).into() };
         let text = measured(&installation, [&node], &[], &mut Vocabulary::default(), ask);
         let first = |row: &str| row.split("  ").next().unwrap_or_default().to_owned();
-        let first: Vec<String> = text.lines().skip(1).map(first).collect();
+        let first: Vec<String> = text.lines().filter(|line| line.contains(" → ")).map(first).collect();
         assert_eq!(first, cases.map(|(.., expected)| expected));
         assert_eq!(
             asked,

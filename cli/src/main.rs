@@ -11,6 +11,7 @@
 mod bench;
 mod bw;
 mod call;
+mod carried;
 mod check;
 mod clean;
 mod completions;
@@ -37,6 +38,7 @@ mod observer;
 mod param;
 mod ping;
 mod published;
+mod quantities;
 mod resolved;
 mod round;
 mod router;

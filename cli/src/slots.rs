@@ -1,72 +1,42 @@
-//! How nodes keep their time slots, as a table: used by `net` and by the demo's summary.
+//! How nodes keep their time slots, as tables: used by `net` and by the demo's summary.
 
-use super::table::table;
-use super::units::{bytes, fine};
+use super::quantities::by_quantity;
+use super::table::table_of;
+use super::units::fine;
 use rohrpost::interfaces::{SlotState, TunnelState};
+use rohrpost::schema::Schema;
+use serde::Serialize;
 
-/// A row for each node, and the reason for each silent node; empty if there are no slots.
+/// A column for each node, and the reason for each silent node; empty if there are no slots.
 pub(super) fn kept<'a>(slots: impl IntoIterator<Item = &'a SlotState>) -> String {
-    let slots: Vec<&SlotState> = slots.into_iter().collect();
-    if slots.is_empty() {
+    let nodes: Vec<(&str, &SlotState)> = slots.into_iter().map(|slots| (slots.node.as_str(), slots)).collect();
+    if nodes.is_empty() {
         return String::new();
     }
-    let rows = slots.iter().map(|slots| {
+    let off = |slots: &SlotState| {
         let off_ns = slots.last.iter().map(|used| used.off_ns.unsigned_abs()).max();
-        [
-            slots.node.clone(),
-            slots.used.to_string(),
-            slots.empty.to_string(),
-            slots.late.to_string(),
-            slots.skipped.to_string(),
-            slots.silent.to_string(),
-            slots.held.to_string(),
-            off_ns.map_or("-".into(), |ns| fine(ns as f64 * 1e-9)),
-            bytes(slots.wire_bytes as f64),
-            slots.synchronisations_sent.to_string(),
-            slots.synchronisations_late.to_string(),
-            slots.synchronisations_heard.to_string(),
-            slots.synchronisations_missed.to_string(),
-            slots.replacements_sent.to_string(),
-            slots.scheduled.clone(),
-        ]
-    });
-    let heads = [
-        "node",
-        ">slots used",
-        ">empty",
-        ">late",
-        ">skipped",
-        ">silent",
-        ">held",
-        ">off by",
-        ">sent",
-        ">syncs sent",
-        ">late",
-        ">heard",
-        ">missed",
-        ">replaced",
-        "scheduled",
-    ];
-    let silent = slots.iter().filter(|slots| !slots.why_silent.is_empty());
-    let silent = silent.map(|slots| format!("node {} is silent: {}\n", slots.node, slots.why_silent));
-    let hellos = slots.iter().filter(|slots| slots.unproven > 0).map(|slots| unproven(slots));
-    let tunnels = slots.iter().filter_map(|slots| slots.tunnel.map(|tunnel| tunnelled(&slots.node, &tunnel)));
-    table(heads, rows) + &silent.collect::<String>() + &hellos.collect::<String>() + &tunnels.collect::<String>()
+        off_ns.map_or("-".into(), |ns| fine(ns as f64 * 1e-9))
+    };
+    let row = |name: &str, cell: &dyn Fn(&SlotState) -> String| {
+        [name.to_owned()].into_iter().chain(nodes.iter().map(|(_, slots)| cell(slots))).collect::<Vec<_>>()
+    };
+    let last = [row("off by", &off), row("scheduled", &|slots| slots.scheduled.clone())];
+    let table = by_node("time slots", &nodes, last);
+    let silent = nodes.iter().filter(|(_, slots)| !slots.why_silent.is_empty());
+    let silent = silent.map(|(node, slots)| format!("node {node} is silent: {}\n", slots.why_silent));
+    let tunnels: Vec<(&str, &TunnelState)> =
+        nodes.iter().filter_map(|(node, slots)| Some((*node, slots.tunnel.as_ref()?))).collect();
+    let tunnels = if tunnels.is_empty() { String::new() } else { "\n".to_owned() + &by_node("tunnel", &tunnels, []) };
+    table + &silent.collect::<String>() + &tunnels
 }
 
-/// Hellos that were sent at an unverified time.
-fn unproven(slots: &SlotState) -> String {
-    let hellos = if slots.unproven == 1 { "1 hello".into() } else { format!("{} hellos", slots.unproven) };
-    format!("node {}: {hellos} sent by the time of an unverified node\n", slots.node)
-}
-
-/// Ordinary traffic in the slots; errors appear if there were any.
-fn tunnelled(node: &str, tunnel: &TunnelState) -> String {
-    let TunnelState { sent, dropped, stray, received, refused } = *tunnel;
-    let wrong =
-        [(dropped, "dropped, since too many waited"), (stray, "for nobody"), (refused, "not taken by the kernel")];
-    let wrong = wrong.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
-    format!("tunnel of {node}: {sent} packets sent, {received} received{}\n", wrong.collect::<String>())
+fn by_node<T: Schema + Serialize>(
+    what: &str,
+    nodes: &[(&str, &T)],
+    last: impl IntoIterator<Item = Vec<String>>,
+) -> String {
+    let heads = [what.to_owned()].into_iter().chain(nodes.iter().map(|(node, _)| format!(">{node}")));
+    table_of(&heads.collect::<Vec<_>>(), by_quantity(nodes).into_iter().chain(last))
 }
 
 #[cfg(test)]
@@ -74,23 +44,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unverified_hellos_are_reported_if_there_were_any() {
-        let slots = |unproven| SlotState { node: "arm".into(), unproven, ..SlotState::default() };
-        assert!(!kept([&slots(0)]).contains("hello"));
-        let line = "node arm: 3 hellos sent by the time of an unverified node";
-        assert!(kept([&slots(3)]).lines().any(|told| told == line));
-        assert!(kept([&slots(1)]).contains("arm: 1 hello sent"));
-    }
-
-    #[test]
-    fn a_tunnel_reports_errors_only_if_there_were_any() {
-        let well = TunnelState { sent: 7, received: 5, ..TunnelState::default() };
-        assert_eq!(tunnelled("arm", &well), "tunnel of arm: 7 packets sent, 5 received\n");
-        let badly = TunnelState { dropped: 3, stray: 2, refused: 1, ..well };
-        assert_eq!(
-            tunnelled("arm", &badly),
-            "tunnel of arm: 7 packets sent, 5 received, 3 dropped, since too many waited, 2 for nobody, 1 not taken \
-            by the kernel\n"
-        );
+    fn what_happened_on_any_node_has_a_row() {
+        let tunnel = TunnelState { sent: 7, dropped: 3, ..TunnelState::default() };
+        let base = SlotState { node: "base".into(), used: 5, scheduled: "fifo".into(), ..SlotState::default() };
+        let arm = SlotState { node: "arm".into(), unproven: 3, wire_bytes: 2500, tunnel: Some(tunnel), ..base.clone() };
+        let text = kept([&base, &arm]);
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+        let expected = [
+            "time slots base arm",
+            "used 5 5",
+            "wire bytes 0 B 2.50 kB",
+            "unproven 0 3",
+            "off by - -",
+            "scheduled fifo fifo",
+            "",
+            "tunnel arm",
+            "sent 7",
+            "dropped 3",
+        ];
+        assert_eq!(rows.iter().map(|row| row.join(" ")).collect::<Vec<_>>(), expected);
     }
 }

@@ -2,8 +2,6 @@
 
 use comfy_table::{CellAlignment, Table, presets};
 use rohrpost::output::plain;
-use rohrpost::schema::{Schema, counters};
-use serde::Serialize;
 use std::time::Duration;
 
 /// A plain table: a line of heads, then rows; a head that begins with `>` aligns its column to the right.
@@ -12,26 +10,19 @@ pub(super) fn table<const N: usize>(heads: [&str; N], rows: impl IntoIterator<It
 }
 
 /// The same with a number of columns known at run time. Foreign text stays in its line.
-pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[&str], rows: impl IntoIterator<Item = R>) -> String {
+pub(super) fn table_of<R: Into<Vec<String>>>(heads: &[impl AsRef<str>], rows: impl IntoIterator<Item = R>) -> String {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING);
-    table.set_header(heads.iter().map(|head| head.trim_start_matches('>')));
+    table.set_header(heads.iter().map(|head| head.as_ref().trim_start_matches('>')));
     let plain = |row: R| row.into().iter().map(|cell| plain::line(cell).into_owned()).collect::<Vec<_>>();
     table.add_rows(rows.into_iter().map(plain));
     for (column, head) in table.column_iter_mut().zip(heads) {
         column.set_padding((0, 2));
-        if head.starts_with('>') {
+        if head.as_ref().starts_with('>') {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
     table.lines().map(|line| format!("{}\n", line.trim_end())).collect()
-}
-
-/// The non-zero counters of a value in one cell: `3 lost, 1 damaged`.
-pub(super) fn counted<T: Schema + Serialize>(value: &T) -> String {
-    let counted = counters(value).into_iter().filter(|(_, count)| *count > 0);
-    let words: Vec<String> = counted.map(|(field, count)| format!("{count} {}", field.name)).collect();
-    if words.is_empty() { "none".into() } else { words.join(", ") }
 }
 
 /// A short time in the unit that suits it.

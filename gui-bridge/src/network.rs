@@ -98,8 +98,8 @@ impl View for Network {
     }
 }
 
-/// When the graph is drawn that this report of a router changes. Several routers report it, and one report is overtaken
-/// by what another told later; an entity's rows go on in time, unless time itself went back.
+/// When the graph is drawn that this report of a router changes. Several routers report it, and a report may come after
+/// a later one of another router; an entity's rows go on in time, unless time itself went back.
 fn onward(drawn_ns: u64, told_ns: u64) -> u64 {
     let went_back = u128::from(drawn_ns.saturating_sub(told_ns)) > OLD.as_nanos();
     if went_back { told_ns } else { told_ns.max(drawn_ns) }
@@ -295,12 +295,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_overtaken_is_drawn_when_the_other_was_and_a_new_time_is_followed() {
+    fn a_late_report_is_drawn_when_the_other_was_and_a_new_time_is_followed() {
         const SECOND: u64 = 1_000_000_000;
         for (drawn_s, told_s, at_s, why) in [
             (10, 11, 11, "it goes on"),
-            (10, 9, 10, "overtaken"),
-            (10, 6, 6, "nothing is overtaken for so long: time was set back"),
+            (10, 9, 10, "it came late"),
+            (10, 6, 6, "no report is so late: time was set back"),
         ] {
             assert_eq!(onward(drawn_s * SECOND, told_s * SECOND), at_s * SECOND, "{why}");
         }

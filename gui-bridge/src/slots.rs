@@ -4,6 +4,7 @@
 //!   slots/plan            a lane for each node over the cycle: its slots and synchronisation windows, guards dim
 //!   slots/sent/NODE       first frames of the last used slots, when they were sent; the newest lowest
 //!   slots/off/NODE        the farthest that one of them was off since told last, µs
+//!   slots/counters/…/NODE what each node counts of its slots
 //!   slots/flows/NODE n/…  a flow of the node: its slowest package so far, and its bound (dim), ms
 //! ```
 
@@ -15,7 +16,7 @@ use crate::view::{Datum, View, is};
 use rerun::blueprint::{ContainerLike, Spatial2DView, TimeSeriesView, Vertical};
 use rerun::{Boxes2D, LineStrips2D, Points2D};
 use rohrpost::interfaces::{FlowState, FlowStates, SlotState, SlotUse};
-use rohrpost::schema::{DataItem, Description};
+use rohrpost::schema::{DataItem, Description, counters};
 use rohrpost_config::{Flow, Installation, duration_decimal};
 use rohrpost_network::Tdma;
 use std::collections::HashMap;
@@ -29,6 +30,8 @@ const PITCH: f32 = 80.0;
 const ROWS: usize = 16;
 /// Parts of the cycle that are marked.
 const MARKS: u32 = 5;
+/// Counters that grow where slots are not kept.
+const WRONG: [&str; 5] = ["late", "skipped", "silent", "held", "synchronisations_missed"];
 const FRAME: palette::Rgb = palette::ROBOT;
 
 /// The tab of both views.
@@ -41,9 +44,13 @@ fn tab() -> Tab {
         Vertical::new([
             cycle.into(),
             chart("First frames off their slots' beginnings, µs", "slots/off"),
+            TimeSeriesView::new("Slots and cycles that were not as they should be, since start")
+                .with_origin("slots/counters")
+                .with_contents(WRONG.map(|counter| format!("/slots/counters/{counter}/**")))
+                .into(),
             chart("Declared flows, ms: the slowest package so far, and the bound (dim)", "slots/flows"),
         ])
-        .with_row_shares([4.0, 3.0, 5.0])
+        .with_row_shares([4.0, 3.0, 3.0, 5.0])
         .with_name("Time slots")
     })
 }
@@ -74,6 +81,9 @@ impl View for Slots {
         let off = ["slots", "off", &slots.node];
         if scene.charts.is_first(&off.join("/")) {
             scene.series(&off, &slots.node, palette::series(lane), 1.5);
+        }
+        for (counter, count) in counters(&slots) {
+            scene.curve(&["slots", "counters", &counter.name, &slots.node], count as f64);
         }
         let told_ns = self.told_ns.entry(slots.node.clone()).or_default();
         let told = slots.last.iter().filter(|used| used.begin_ns > *told_ns).map(|used| used.off_ns);
@@ -171,20 +181,20 @@ impl View for Flows {
 
     fn draw(&mut self, scene: &mut Scene, datum: &Datum<'_>) -> Result<(), DrawError> {
         let node: FlowStates = datum.read()?;
-        let ms = |ns: u64| ns as f64 / 1e6;
         for (index, flow) in node.flows.iter().enumerate().filter(|(_, flow)| flow.packages > 0) {
             let place = format!("{} {index}", node.node);
-            let [slowest, bound] = ["slowest", "at worst"].map(|series| ["slots", "flows", &place, series]);
+            let [worst, bound] = ["worst", "bound"].map(|series| ["slots", "flows", &place, series]);
             if scene.charts.is_first(&place) {
                 let what = if flow.carries.is_empty() { format!("{} B", flow.size) } else { flow.carries.clone() };
                 let name = format!("{} → {}, {what}", flow.from, flow.to);
                 let colour = palette::series(colour(datum.installation, flow));
-                scene.series(&slowest, &name, colour, 1.5);
-                scene.series(&bound, &format!("{name}: at worst"), palette::muted(colour), 1.0);
+                scene.series(&worst, &name, colour, 1.5);
+                scene.series(&bound, &format!("{name}: bound"), palette::muted(colour), 1.0);
             }
-            scene.curve(&slowest, ms(flow.worst_ns));
-            if let Some(bound_ns) = flow.bound_ns {
-                scene.curve(&bound, ms(bound_ns));
+            for (curve, ns) in [(&worst, flow.worst_ns), (&bound, flow.bound_ns)] {
+                if let Some(ns) = ns {
+                    scene.curve(curve, ns as f64 / 1e6);
+                }
             }
         }
         Ok(())
@@ -241,30 +251,7 @@ mod tests {
     }
 
     fn slots(last: Vec<SlotUse>) -> SlotState {
-        SlotState {
-            node: "brain".into(),
-            used: 1,
-            empty: 0,
-            late: 0,
-            skipped: 0,
-            silent: 0,
-            why_silent: String::new(),
-            datagrams: 1,
-            wire_bytes: 100,
-            synchronisations_sent: 0,
-            replacements_sent: 0,
-            synchronisations_heard: 0,
-            replacements_heard: 0,
-            synchronisations_missed: 0,
-            synchronisations_late: 0,
-            held: 0,
-            unproven: 0,
-            roles: 0,
-            lead_ns: 0,
-            tunnel: None,
-            scheduled: "deadline".into(),
-            last,
-        }
+        SlotState { node: "brain".into(), used: 1, late: 2, scheduled: "deadline".into(), last, ..SlotState::default() }
     }
 
     #[test]
@@ -301,6 +288,7 @@ mod tests {
         let rows = drawing.rows();
         assert_eq!((rows["/slots/plan/slots"], rows["/slots/plan/guards"]), (1, 1));
         assert_eq!((rows["/slots/sent/brain"], rows["/slots/off/brain"]), (2, 1 + 1), "with its style");
+        assert_eq!(WRONG.map(|counter| rows[&format!("/slots/counters/{counter}/brain")]), [2; WRONG.len()]);
     }
 
     #[test]
@@ -311,14 +299,14 @@ mod tests {
             carries: String::new(),
             size: 800,
             packages,
-            worst_ns: 5_000_000,
-            mean_ns: 1,
-            p99_ns: 1,
             bound_ns,
+            kept_worst_ns: bound_ns.map(|_| 4_000_000),
+            worst_ns: Some(5_000_000),
+            mean_ns: Some(1),
+            p99_ns: Some(1),
             deadline_ns: 10_000_000,
-            kept_worst_ns: 4_000_000,
-            over_bound: 0,
-            kept_over_bound: 0,
+            over_bound: bound_ns.map(|_| 0),
+            kept_over_bound: bound_ns.map(|_| 0),
             over_deadline: 0,
             lost: Vec::new(),
         };
@@ -328,7 +316,7 @@ mod tests {
         (0..2).for_each(|_| draw(&mut drawing, &mut Flows, "flows", &told));
         let rows = drawing.rows();
         let of = |entity: &str| rows.get(&format!(r"/slots/flows/{entity}")).copied().unwrap_or(0);
-        assert_eq!([of(r"base\ 0/slowest"), of(r"base\ 0/at\ worst")], [3, 3], "its style, then twice");
-        assert_eq!([of(r"base\ 1/slowest"), of(r"base\ 2/slowest"), of(r"base\ 2/at\ worst")], [0, 3, 1]);
+        assert_eq!([of(r"base\ 0/worst"), of(r"base\ 0/bound")], [3, 3], "its style, then twice");
+        assert_eq!([of(r"base\ 1/worst"), of(r"base\ 2/worst"), of(r"base\ 2/bound")], [0, 3, 1]);
     }
 }

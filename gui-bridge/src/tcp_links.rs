@@ -4,6 +4,7 @@
 //! ```text
 //!   modules/TCP router, from NODE                a lane: on, or unreachable while packages cannot go there
 //!   network/latency/TCP router, from NODE        half of the way there and back, µs
+//!   network/counters/…/NODE, of the TCP router   what its client counts
 //!   network/clock/NODE                           error bound of a node that has its time from there, µs
 //! ```
 //!
@@ -18,12 +19,15 @@ use crate::states::Level;
 use crate::view::{Datum, View, is};
 use rerun::Clear;
 use rohrpost::interfaces::{BeyondLink, BeyondState};
-use rohrpost::schema::{DataItem, Description};
+use rohrpost::schema::{DataItem, Description, counters};
 use rohrpost::survey::Standing;
 use std::collections::HashMap;
 
 /// Entities above what is true at its moment only.
 const PRESENT: [&[&str]; 2] = [&["world", "scan"], &["motion"]];
+
+/// The unit of what goes up and down beside the counters.
+const MEMORY: &str = "bytes";
 
 /// Ways to the TCP router, as all clients see theirs.
 #[derive(Default)]
@@ -56,6 +60,10 @@ impl View for TcpLinks {
         }
         if let Some(error_ns) = link.time.as_ref().and_then(|time| time.error_ns) {
             scene.curve(&["network", "clock", &link.node], error_ns as f64 / 1e3);
+        }
+        let name = format!("{}, of the TCP router", link.node);
+        for (counter, count) in counters(&link).into_iter().filter(|(counter, _)| counter.unit != MEMORY) {
+            scene.curve(&["network", "counters", &counter.name, &name], count as f64);
         }
         let now = Drawn { outages: link.outages, is_up: link.state == BeyondState::Up };
         let Some(mut before) = self.drawn.insert(link.node, now) else {

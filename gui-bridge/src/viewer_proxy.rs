@@ -151,7 +151,7 @@ mod tests {
     const PATIENCE: Duration = Duration::from_secs(10);
 
     #[test]
-    fn who_is_connected_to_itself_has_no_viewer() {
+    fn a_socket_connected_to_itself_has_no_viewer() {
         let range = std::fs::read_to_string("/proc/sys/net/ipv4/ip_local_port_range").unwrap();
         let ports: Vec<u16> = range.split_whitespace().map(|port| port.parse().unwrap()).collect();
         // Linux picks the source port from every second of these, so at some time it picks the port that is connected

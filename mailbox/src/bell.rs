@@ -4,11 +4,11 @@
 //! sleeper:  seen = rings │ (F) last look │ polling = 1 │ (I) │ rings == seen? ──▶ poll(pipe, …) │ polling = 0
 //! ringer:   rings += 1 │ (H) │ polling? ──▶ a byte into the pipe
 //! ```
-//! Who sleeps on mailboxes alone sleeps on the word `rings` itself, and the kernel compares it. Who sleeps on file
-//! descriptors too sleeps in `poll`, which knows no words; so the sleeper compares, and a ringer that comes later
-//! writes into a pipe. Of a sleeper and a ringer at least one sees the other. Each ringer that sees the mark writes,
-//! whoever wrote before: so one that dies before it writes takes away no wake-up but its own. Nothing here makes a
-//! system call (see `doorbell`), so that loom can check it as it stands.
+//! A receiver that waits for mailboxes alone sleeps on the word `rings` itself, and the kernel compares it. One that
+//! waits for file descriptors too sleeps in `poll`, which compares no words. So the sleeper compares, and a ringer that
+//! comes later writes into a pipe. Of a sleeper and a ringer at least one sees the other. Each ringer that sees the
+//! mark writes, even if another wrote before: so a ringer that dies before it writes takes away no wake-up but its own.
+//! Nothing here makes a system call (see `doorbell`), so that loom can check it as it stands.
 
 use crate::step::step;
 use crate::sync::{AtomicU32, Ordering, fence};
@@ -30,7 +30,7 @@ impl Bell<'_> {
 
     /// Rings; true when the sleeper is to be told through its pipe.
     pub(crate) fn ring(&self) -> bool {
-        // ORDERING: Release; what the ringer did before is seen by whoever then reads the bell.
+        // ORDERING: Release; a thread that then reads the bell sees what the ringer did before.
         self.rings.fetch_add(1, Ordering::Release);
         // ORDERING (H): the ring before the look at `polling`. Pairs with (I).
         fence(Ordering::SeqCst);
@@ -48,7 +48,7 @@ impl Bell<'_> {
         self.rings.load(Ordering::Relaxed) == seen
     }
 
-    /// The sleeper is back. Who still sees the mark writes a byte that wakes it once for nothing.
+    /// The sleeper is back. A ringer that still sees the mark writes a byte that wakes it once for nothing.
     pub(crate) fn polled(&self) {
         self.polling.store(0, Ordering::Relaxed);
     }

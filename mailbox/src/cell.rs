@@ -10,7 +10,7 @@
 //! so that a read that races with a write is no undefined behaviour; the caller loads and stores them Relaxed. A write
 //! takes a bounded number of steps and waits for nobody. A read never waits: it gives up when a write is in its way.
 //!
-//! Who the one writer is, the caller decides: by a lock, a claim or a single thread. Nothing here maps memory or
+//! The caller decides which writer is the one: by a lock, a claim or a single thread. Nothing here maps memory or
 //! sleeps, so that loom checks this file as it is.
 
 use crate::step::step;

@@ -1,8 +1,8 @@
 //! Counters of a mailbox, in its segment's first page: anyone may read them, and reading changes nothing.
 //!
-//! A row a class, claimed by the first that needs it; the last row takes all classes for which none is left. Losses are
-//! counted by whoever causes or finds them; a process killed between counting and acting, or whose mailbox is replaced
-//! just then, can leave a count one too high, never too low: no loss is hidden.
+//! A row a class, claimed by the first that needs it; the last row takes all classes for which none is left. The
+//! process that causes or finds a loss counts it. If it is killed between counting and acting, or its mailbox is
+//! replaced just then, the count can be one too high, never too low: no loss is hidden.
 
 use crate::name::{Class, Priority};
 use crate::step::step;

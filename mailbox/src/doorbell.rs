@@ -7,8 +7,8 @@
 //! The receiver reads the bell before it says that it sleeps; so a ring after its last look changes the word it would
 //! sleep on. One bell serves all mailboxes of a participant, so waiting on several is waiting on one.
 //!
-//! Who waits for file descriptors too sleeps in `poll` and has a named pipe `bell.N` in the node's directory, N its
-//! place in the table. Only then anybody opens it (see `bell`).
+//! A participant that waits for file descriptors too sleeps in `poll` and has a named pipe `bell.N` in the node's
+//! directory; N is its place in the table. Ringers open it only while it sleeps there (see `bell`).
 
 use crate::node::Node;
 use crate::step::step;
@@ -48,7 +48,7 @@ pub(crate) fn timespec(time: Duration) -> libc::timespec {
     }
 }
 
-/// Wakes whoever sleeps on this participant's bell, or keeps them from falling asleep.
+/// Wakes the threads that sleep on this participant's bell, and keeps those from sleeping that are about to.
 pub(crate) fn ring(node: &Node, participant: u16) {
     let bell = node.entry(participant).bell();
     // The word changes before the wake, else a sleeper that is just about to sleep would miss both.
@@ -86,7 +86,7 @@ pub(crate) fn make_pipe(node: &Node, participant: u16) -> io::Result<OwnedFd> {
     mkfifo(&node.path().join(format!("bell.{participant}")), Mode::S_IRUSR | Mode::S_IWUSR)?;
     step!("pipe: made");
     let pipe = open_pipe(node, participant)?;
-    // Whom the directory lets in may ring.
+    // The users that the directory lets in may ring.
     let around = Mode::from_bits_truncate(fstat(node.directory())?.st_mode & 0o666);
     fchmod(&pipe, around)?;
     Ok(pipe)
@@ -94,7 +94,7 @@ pub(crate) fn make_pipe(node: &Node, participant: u16) -> io::Result<OwnedFd> {
 
 /// Removes it, if there is one.
 pub(crate) fn remove_pipe(node: &Node, participant: u16) {
-    // One that stays is removed by who has this place in the table next, or with the directory.
+    // If it stays, the next participant at this place of the table removes it, or it goes with the directory.
     let _ = with_name(participant, |name| unlinkat(node.directory(), name, UnlinkatFlags::NoRemoveDir));
 }
 

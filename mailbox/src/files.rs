@@ -6,8 +6,8 @@ use std::io::{self, IoSlice, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 
-/// Opens a file of the node's directory, never through a link. A new file may be used by whom the directory's mode lets
-/// in.
+/// Opens a file of the node's directory, never through a link. A new file may be used by the users that the directory's
+/// mode lets in.
 pub(crate) fn open_shared(path: &Path, create: bool) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).write(true).mode(0o600).custom_flags(libc::O_CLOEXEC | libc::O_NOFOLLOW);

@@ -12,8 +12,8 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// A row is changed within nanoseconds, unless its writer was just put aside: then it gets time to go on. So many naps
-/// are for all rows of all participants together, since launch looks too and must not be held up by those who were
-/// stopped in there, nor by a damaged table.
+/// are for all rows of all participants together, since launch looks too: neither a writer that was stopped in there
+/// nor a damaged table may hold it up.
 const TRIES_AT_ONCE: usize = 8;
 const NAPS: u32 = 24;
 const NAP: Duration = Duration::from_micros(100);
@@ -193,7 +193,7 @@ fn read(row: &FlowRow, participant: &ParticipantInfo) -> Option<FlowInfo> {
     })
 }
 
-/// Counts what a participant publishes: each value once, whoever subscribes.
+/// Counts what a participant publishes: each value once, however many subscribe.
 pub struct Publications {
     participant: Arc<Participant>,
     writer: Writer,

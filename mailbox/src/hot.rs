@@ -40,7 +40,7 @@ pub(crate) struct Hot {
 pub(crate) struct ReceiverSays {
     /// Not 0: it sleeps or is about to; see [`rings`].
     pub(crate) sleeping: AtomicU32,
-    /// It has looked at all hints, and receives packages of this priority without looking again: who sends a more
+    /// It has looked at all hints, and receives packages of this priority without looking again: the sender of a more
     /// important one says so by `alert`.
     pub(crate) level: AtomicU32,
     /// Not 0: this mailbox has been given up; what is sent here is not received.
@@ -82,8 +82,8 @@ impl Slots<'_> {
     }
 
     fn drowsy_until(&self, sleeping: u32) {
-        // ORDERING: Release, at least; who sees this owner asleep sees whose bell to ring. Pairs with the load in
-        // `publish`.
+        // ORDERING: Release, at least; a sender that sees this owner asleep sees which bell to ring. Pairs with the
+        // load in `publish`.
         self.hot.receiver.0.sleeping.store(sleeping, Ordering::SeqCst);
         // ORDERING (F): `sleeping` before the last look at the hints. Pairs with (E).
         seq_cst_accesses();
@@ -94,8 +94,8 @@ impl Slots<'_> {
         self.hot.receiver.0.sleeping.store(0, Ordering::Relaxed);
     }
 
-    /// Has the line of the hints come here to be written, as it will be: looked at first, it would come twice. Who
-    /// looks again and again keeps it, and nothing moves until a sender takes it.
+    /// Has the line of the hints come here to be written, as it will be: looked at first, it would come twice. A
+    /// receiver that looks again and again keeps it, and nothing moves until a sender takes it.
     pub(crate) fn expect_hints(&self) {
         prefetch_to_write(&raw const self.hot.ready);
     }
@@ -117,8 +117,8 @@ impl Slots<'_> {
         self.hot.alert.0.swap(0, Ordering::AcqRel);
     }
 
-    /// From now on whoever sends something above this alerts. Raised: who has read the old level alerts for nothing,
-    /// and Relaxed will do: the next lowering is ordered against all who read this.
+    /// From now on a sender of something above this alerts. Raised: a sender that has read the old level alerts for
+    /// nothing, and Relaxed will do: the next lowering is ordered against all that read this.
     pub(crate) fn raise_level(&self, level: Priority) {
         self.hot.receiver.0.level.store(level.0.into(), Ordering::Relaxed);
     }
@@ -126,8 +126,8 @@ impl Slots<'_> {
     /// The same, when the level sinks: then look at the hints once more.
     pub(crate) fn lower_level(&self, level: Priority) {
         self.hot.receiver.0.level.store(level.0.into(), Ordering::SeqCst);
-        // ORDERING (J): the level before the look at the hints. Pairs with (E): who has read the higher level, and
-        // therefore did not alert, is seen by that look.
+        // ORDERING (J): the level before the look at the hints. Pairs with (E): that look sees each sender that has
+        // read the higher level and therefore did not alert.
         seq_cst_accesses();
         step!("level: lowered");
     }
@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_sleeps_above_a_priority_is_rung_for_what_is_above_it_alone() {
+    fn a_sleeper_above_a_priority_is_rung_for_what_is_above_it_alone() {
         let above = |priority: u8| FOR_ALL + 1 + u32::from(priority);
         for (sleeping, priority, wakes, why) in [
             (0, 255, false, "nobody sleeps"),

@@ -34,12 +34,12 @@ pub struct MailboxInfo {
     pub classes: Vec<ClassTraffic>,
 }
 
-/// The same, and what can be seen of who receives and of each slot.
+/// The same, and what can be seen of the receiver and of each slot.
 #[derive(Clone, Debug)]
 pub struct MailboxDetail {
     /// What all mailboxes are listed with.
     pub info: MailboxInfo,
-    /// Who receives, or did so last; none when nobody ever has.
+    /// The receiver, or the last one; none when there never was one.
     pub receiver: Option<Party>,
     /// Given up: nobody sends there any more, and the next receiver replaces it.
     pub is_retired: bool,
@@ -54,7 +54,7 @@ pub enum SlotInfo {
     Free,
     /// A package is being written, and not accepted yet.
     Filling {
-        /// Who writes it.
+        /// Its sender.
         by: Party,
         /// The accepted package that lost this slot to it, if there was one.
         victim: Option<VictimInfo>,
@@ -171,7 +171,7 @@ impl Node {
 
     fn filler(&self, by: Claimant) -> Party {
         let there = self.entry(by.participant).read();
-        // Who left in order has taken its number out of the table.
+        // A participant that left in order has taken its number out of the table.
         let same = there.incarnation == by.incarnation && there.pid != 0;
         let is_alive = !self.is_dead(by);
         let module = if same { there.module } else { Name::NONE };

@@ -2,7 +2,7 @@
 //!
 //! Two packages of one sender are of the same state if `from`, `kind` and `id` of their heads are the same. A
 //! subscription's data have one id, so the newer replaces the older; commands each have their own, so none is ever
-//! replaced: whoever called waits for the answer.
+//! replaced: the caller waits for the answer.
 
 use crate::full::OverflowPolicy;
 use crate::layout::Shape;

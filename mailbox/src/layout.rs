@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!     0  Identity   what this is: written once, before the segment gets its name; then only read
-//!    64  Owner      who receives: changed on adoption
+//!    64  Owner      the receiver: changed on adoption
 //!   128  Hot        ticket, ready hints, what the receiver says, alert: 128 bytes each
 //!   640  Counters   ten rows of 320 bytes
 //!  4096  words      one a slot, 64 B apart up to 64 slots, 8 B above
@@ -187,10 +187,10 @@ impl Identity {
     }
 }
 
-/// Who receives, and what it has seen.
+/// The receiver, and what it has seen.
 #[repr(C, align(64))]
 pub(crate) struct Owner {
-    /// Participant whose bell wakes the receiver.
+    /// Participant that owns the bell which wakes the receiver.
     pub(crate) participant: AtomicU32,
     pub(crate) pid: AtomicU32,
     /// Times a new owner took over.

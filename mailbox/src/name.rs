@@ -1,4 +1,4 @@
-//! Mailbox names: 32 bits that say whom a package is for, and nothing about where that one runs (seed 002, 2.2.2).
+//! Mailbox names: 32 bits that say which module a package is for, and nothing about where that runs (seed 002, 2.2.2).
 //!
 //! ```text
 //!   31      24 23      16 15       8 7        0
@@ -57,7 +57,7 @@ pub mod local {
     pub const REPLIES: u8 = 1;
     /// Takes data that the module subscribed to; ids above are the module's own.
     pub const DATA: u8 = 2;
-    /// Of a router: takes packages for other nodes, whose heads keep the name they are for.
+    /// Of a router: takes packages for other nodes; their heads keep the name they are for.
     pub const TRANSIT: u8 = 3;
 }
 

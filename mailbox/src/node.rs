@@ -7,7 +7,7 @@
 //!     config         where the configuration is that launch runs (launch writes it, not this crate)
 //!     time           system time (see `system_time`)
 //!     traffic.3      what participant 3 sends (see `traffic`)
-//!     routes         which names are on other nodes, and whose mailbox leads there (see `routes`)
+//!     routes         which names are on other nodes, and which mailbox leads there (see `routes`)
 //!     bell.3         a pipe that wakes participant 3, while it watches descriptors (see `doorbell`)
 //!     01c80000.mbx   a mailbox: its name in hexadecimal (see `layout`)
 //!     01c80000.about what its owner says of it (see `about`)
@@ -33,10 +33,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Lock bytes above the participants': whoever launched the node, and whoever changes the registry.
+/// Lock bytes above the participants': of the process that launched the node, and of the one that changes the registry.
 const LAUNCH_BYTE: u64 = 1 << 20;
 const REGISTRY_BYTE: u64 = LAUNCH_BYTE + 1;
-/// Changing the registry takes microseconds; who holds it longer is stopped.
+/// Changing the registry takes microseconds; a process that holds it longer is stopped.
 pub(crate) const REGISTRY_PATIENCE: Duration = Duration::from_secs(2);
 /// Between two tries: as long as making a mailbox takes, then longer and longer.
 const REGISTRY_PAUSE: Duration = Duration::from_micros(50);
@@ -75,12 +75,11 @@ pub enum NodeError {
     /// Another version's layout.
     #[error(
         "node {0} was made by another version of Rohrpost (layout {1}, this program has {VERSION}); use the \
-        `rohrpost` that \
-         launched it, or stop what runs there and remove the directory"
+         `rohrpost` that launched it, or stop what runs there and remove the directory"
     )]
     Version(PathBuf, u32),
     /// No memory, most likely.
-    #[error("node {path}: no shared memory: {source}; is it full (df {})?", crate::files::existing(path).display(), path = path.display())]
+    #[error("node {path}: no shared memory: {source}; is it full (df {})?", crate::files::existing(path).display())]
     Memory {
         /// Its directory.
         path: PathBuf,
@@ -90,13 +89,13 @@ pub enum NodeError {
     /// As many files are open as may be.
     #[error(
         "node {0}: this process, or the computer, has no file descriptor left; raise the limit (ulimit -n, or \
-        LimitNOFILE= \
-         of a service)"
+         LimitNOFILE= of a service)"
     )]
     Descriptors(PathBuf),
     /// Another user's.
     #[error(
-        "node {0}: permission denied; be the user whose node it is, or have its `mode` in the configuration let you in"
+        "node {0}: permission denied; be the user that owns the node, or have its `mode` in the configuration let \
+         you in"
     )]
     Denied(PathBuf),
     /// Cut off, or somebody else's.
@@ -175,7 +174,7 @@ impl Node {
         if owner(path)? != us {
             return Err(NodeError::Foreign(path.into(), owner(path)?));
         }
-        // Whoever owns the folder around it could put another directory in its place.
+        // The owner of the folder around it could put another directory in its place.
         if let Some(around) = path.parent().filter(|around| !around.as_os_str().is_empty()) {
             let owner = owner(around)?;
             if owner != us && owner != 0 {
@@ -200,7 +199,7 @@ impl Node {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(NodeError::Missing(path.into())),
             opened => opened.map_err(failed)?,
         };
-        // Only who makes it whole needs the registry to itself; somebody else may have done so before it was had.
+        // Only its maker needs the registry to itself; another may have made it before this one had the registry.
         let maker = if is_whole(path, &file)? { None } else { Some(RegistryLock::take(path)?) };
         let bytes = size_of::<NodePage>();
         if maker.is_some() && !is_whole(path, &file)? && file.metadata().map_err(failed)?.len() < bytes as u64 {
@@ -230,7 +229,7 @@ impl Node {
             step!("node: before magic");
             page.magic.store(MAGIC, Ordering::Release);
         }
-        // Whoever made it between the look before and the lock may have been another version's.
+        // A process of another version may have made it between the look before and the lock.
         match page.version.load(Ordering::Relaxed) {
             VERSION => Ok(()),
             other => Err(NodeError::Version(self.path.clone(), other)),
@@ -255,25 +254,25 @@ impl Node {
     }
 
     /// Whether this use of an entry has ended. An answer of false may be late by moments, never an answer of true.
-    pub(crate) fn is_dead(&self, who: Claimant) -> bool {
-        if usize::from(who.participant) >= PARTICIPANTS_MAX {
+    pub(crate) fn is_dead(&self, claimant: Claimant) -> bool {
+        if usize::from(claimant.participant) >= PARTICIPANTS_MAX {
             return true;
         }
-        let same = || self.entry(who.participant).incarnation.load(Ordering::Acquire) == who.incarnation;
+        let same = || self.entry(claimant.participant).incarnation.load(Ordering::Acquire) == claimant.incarnation;
         // A lock that cannot be asked about counts as held: taking a slot from the living is the worse mistake.
-        !same() || !lock::is_locked(&self.file, u64::from(who.participant)).unwrap_or(true)
+        !same() || !lock::is_locked(&self.file, u64::from(claimant.participant)).unwrap_or(true)
     }
 
     /// A number that is later than all that this node gave out before; they count upwards, wrap, and are never 0.
     /// Participants have one each, from when they joined. That says nothing of the order in which they then have a
-    /// name, so whoever must be told from earlier owners of a name asks for one of its own, when the name's mailbox is
-    /// its own.
+    /// name, so an owner that must be told from earlier owners of a name asks for one of its own, once the name's
+    /// mailbox is its own.
     pub fn next_incarnation(&self) -> u32 {
         self.page().incarnations.fetch_add(1, Ordering::AcqRel).wrapping_add(1).max(1)
     }
 
-    /// Tells all receivers that somebody died, so that they look for what was left. Sleeping needs no timeout because
-    /// whoever sees a process end (launch, above all) calls this.
+    /// Tells all receivers that somebody died, so that they look for what was left. Sleeping needs no timeout because a
+    /// process that sees another end (launch, above all) calls this.
     pub fn announce_death(&self) {
         self.page().deaths.fetch_add(1, Ordering::AcqRel);
         let there = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
@@ -283,8 +282,8 @@ impl Node {
     /// Changes with every new, taken over and gone mailbox. One that was not there when the number, read *before*
     /// looking, was this is still not there while it is the same: one load, and no system call.
     pub fn registry_epoch(&self) -> u32 {
-        // ORDERING: Acquire; who sees the number raised finds the file. Pairs with the raise after it was renamed or
-        // unlinked.
+        // ORDERING: Acquire; a reader that sees the number raised finds the file. Pairs with the raise after it was
+        // renamed or unlinked.
         self.page().registry_epoch.load(Ordering::Acquire)
     }
 
@@ -299,8 +298,8 @@ impl Node {
 
     /// The same, with their places in the table.
     pub(crate) fn living(&self) -> impl Iterator<Item = (Claimant, ParticipantInfo)> + '_ {
-        // Who is joining or leaving just now has no process id here; as a number to signal, 0 would be one's own group.
-        // Asked first, and once more with the lock seen held: the lock is a system call, and most places are empty.
+        // A participant that joins or leaves just now has no process id here; as a number to signal, 0 would be our own
+        // group. Asked first, and once more with the lock seen held: the lock is a system call, most places are empty.
         let used = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
         let alive = |index: &u16| lock::is_locked(&self.file, u64::from(*index)).unwrap_or(false);
         let all = (0..PARTICIPANTS_MAX as u16).filter(used).filter(alive);

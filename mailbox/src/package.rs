@@ -115,7 +115,7 @@ impl Options {
 pub struct Head {
     /// Mailbox it goes to.
     pub to: Name,
-    /// Mailbox that answers go to; also who sent it.
+    /// Mailbox that answers go to; also names the sender.
     pub from: Name,
     /// Bytes of the body.
     pub len: u16,

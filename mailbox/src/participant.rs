@@ -48,13 +48,13 @@ impl Participant {
             // Before the entry says so: a table is read if the entry has the same incarnation.
             let traffic = Table::make(node, me)?;
             let entry = node.entry(participant);
-            // First of all: the lock is ours, but the name and the number still are those of whoever was here before.
+            // First of all: the lock is ours, but the name and the number still are those of the participant before.
             entry.module.store(0, Ordering::Release);
-            // Who leaves in order takes its process id out of the table.
+            // A participant that leaves in order takes its process id out of the table.
             let died = entry.pid.load(Ordering::Relaxed) != 0;
             entry.state.store(0, Ordering::Relaxed);
             entry.restarts.store(0, Ordering::Relaxed);
-            // Who was here before may have died in its sleep.
+            // The participant before may have died in its sleep.
             entry.polling.store(0, Ordering::Relaxed);
             entry.mark.clear();
             doorbell::remove_pipe(node, participant);
@@ -63,8 +63,8 @@ impl Participant {
             entry.incarnation.store(incarnation, Ordering::Release);
             step!("join: incarnation");
             if died {
-                // From our lock until the new incarnation the dead one looked alive; who searched then missed what it
-                // left.
+                // From our lock until the new incarnation the dead one looked alive; a receiver that searched then
+                // missed what it left.
                 node.announce_death();
             }
             entry.pid.store(std::process::id(), Ordering::Relaxed);
@@ -82,7 +82,7 @@ impl Participant {
     }
 
     /// Tells this use of the name from all earlier ones on this node; also from those before its directory was last
-    /// made, on a computer whose clock runs on while it is off.
+    /// made, if the computer's clock runs on while it is off.
     pub fn incarnation(&self) -> u32 {
         self.me.incarnation
     }
@@ -144,7 +144,7 @@ impl Participant {
 
 impl Participant {
     /// Takes its name and its process id out of the table: it ends in order, and is not to be mourned. Dropping it does
-    /// the same; this is for processes whose threads keep it until they end.
+    /// the same; this is for processes with threads that keep it until they end.
     pub fn leave(&self) {
         let entry = self.entry();
         doorbell::remove_pipe(&self.node, self.me.participant);

@@ -27,7 +27,7 @@ pub(crate) struct Queue {
     /// second package could pass its first; and those that are rescanned.
     deferred: [u64; HINT_WORDS],
     receives: u32,
-    /// What senders were told: who sends something above this alerts.
+    /// What senders were told: they alert when they send something above this.
     level: u16,
 }
 
@@ -59,8 +59,8 @@ impl Queue {
             self.defer((self.receives / RESCAN_EVERY) as usize % slots.count());
         }
         let mut known = self.knows_the_first(slots);
-        // Each turn but the last drops an entry whose package was displaced or replaced since it was seen; that as
-        // often as there are slots is more bad luck than going on forever for.
+        // Each turn but the last drops an entry because its package was displaced or replaced since it was seen. That
+        // is tried as often as there are slots, and not forever.
         for _ in 0..=slots.count() {
             if !known {
                 self.look_for_the_first(slots);
@@ -69,7 +69,7 @@ impl Queue {
             if let Some(taken) = slots.take(slot, seen) {
                 return Some(taken);
             }
-            // Whoever fills the slot hints again; and what took its place may stand before all others.
+            // The slot's next sender hints again; and what took its place may stand before all others.
             known = false;
         }
         // So much bad luck in a row: something that waits, then, though perhaps not the first.
@@ -130,8 +130,8 @@ impl Queue {
     /// Moves what the hints speak of into the heap: with a package all that its sender published before it.
     pub(crate) fn look(&mut self, slots: &Slots<'_>) {
         self.collect(slots, u64::MAX);
-        // ORDERING: the words were read with Acquire. Who published one of them had hinted its earlier ones before;
-        // those hints were among the swapped ones, or are seen here.
+        // ORDERING: the words were read with Acquire. The sender that published one of them had hinted its earlier ones
+        // before; those hints were among the swapped ones, or are seen here.
         if !slots.any_hint() {
             return;
         }

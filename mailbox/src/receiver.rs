@@ -61,7 +61,7 @@ impl Receiver {
         &self.segment.shape
     }
 
-    /// Whom its bell wakes.
+    /// The participant that its bell wakes.
     pub fn participant(&self) -> &Arc<Participant> {
         &self.participant
     }
@@ -153,7 +153,7 @@ impl Receiver {
     /// Looks through all slots for what the dead left.
     fn search(&mut self) {
         let node = self.participant.node().clone();
-        // Read before the search: who dies after it raises the count once more.
+        // Read before the search: a death after it raises the count once more.
         self.deaths_seen = node.page().deaths.load(Ordering::Acquire);
         let me = self.participant.claimant();
         let counters = &self.segment.page().counters;

@@ -1,8 +1,8 @@
 //! Making, adopting, replacing and removing mailboxes (`inspect` looks at them): the files of a node's directory are
 //! the registry.
 //!
-//! All changes happen under the node's registry lock, and a mailbox is only changed by who holds its owner's lock. A
-//! file gets its name last, whole; so nobody ever opens half a mailbox.
+//! All changes happen under the node's registry lock, and a mailbox is only changed by the holder of its owner's lock.
+//! A file gets its name last, whole; so nobody ever opens half a mailbox.
 
 use crate::counters::Loss;
 use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
@@ -45,7 +45,10 @@ pub enum CreateError {
     #[error(transparent)]
     Node(NodeError),
     /// No memory, most likely.
-    #[error("mailbox {name}: {bytes} bytes of shared memory: {source}; is it full (df {})?", crate::files::existing(.node).display())]
+    #[error(
+        "mailbox {name}: {bytes} bytes of shared memory: {source}; is it full (df {})?",
+        crate::files::existing(.node).display()
+    )]
     Memory {
         /// Which mailbox.
         name: Name,
@@ -110,7 +113,7 @@ impl Participant {
         step!("create: owned");
         let owner = &segment.page().owner;
         owner.pid.store(std::process::id(), Ordering::Relaxed);
-        // ORDERING: Release; a sender that sees `sleeping` set by this owner sees whose bell to ring.
+        // ORDERING: Release; a sender that sees `sleeping` set by this owner sees which bell to ring.
         owner.participant.store(u32::from(self.claimant().participant), Ordering::Release);
         Ok(Receiver::new(self.clone(), segment, lock))
     }
@@ -213,7 +216,7 @@ impl Node {
         self.remove_orphan_within(name, REGISTRY_PATIENCE)
     }
 
-    /// The same for who must not wait: [`NodeError::Busy`] at once while somebody else changes the registry.
+    /// The same for a caller that must not wait: [`NodeError::Busy`] at once while somebody else changes the registry.
     ///
     /// # Errors
     /// When the registry is busy, or the node's directory cannot be changed.

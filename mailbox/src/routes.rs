@@ -74,7 +74,7 @@ impl Node {
             let _ = fs::remove_file(&unfinished);
             NodeError::of(&path, error)
         })?;
-        // Who did not find a name before may find a way to it now.
+        // A sender that did not find a name before may find a way to it now.
         self.raise_registry_epoch();
         Ok(())
     }
@@ -121,9 +121,10 @@ fn find_in(node: &Path, file_name: &str, name: Name) -> Result<Option<Name>, Str
         Err(error) => return Err(unread(error)),
     }
     // Another process wrote it.
-    let who = if file_name == BEYOND { "client of the TCP router" } else { "router" };
-    look_up(&bytes, name)
-        .ok_or_else(|| format!("its file `{file_name}` is damaged, or another version's; start the node's {who} again"))
+    let router = if file_name == BEYOND { "client of the TCP router" } else { "router" };
+    look_up(&bytes, name).ok_or_else(|| {
+        format!("its file `{file_name}` is damaged, or another version's; start the node's {router} again")
+    })
 }
 
 /// None when these bytes are no routes.

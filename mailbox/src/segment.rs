@@ -156,7 +156,8 @@ impl Segment {
         now_ns
     }
 
-    /// When a taken package was published (monotonic ns), and its head, whose length is one that the slot has room for.
+    /// When a taken package was published (monotonic ns), and its head; the length in it is one that the slot has room
+    /// for.
     #[inline]
     pub(crate) fn read_head(&self, taken: &Taken) -> (u64, Head) {
         let prefix = self.slot(taken.slot(), taken.segment());

@@ -120,8 +120,8 @@ impl Participant {
         self.sender_within(name, Reach::Routes)
     }
 
-    /// Opens a mailbox of this node for sending, whatever routes there are: for who brings packages from other nodes,
-    /// which must not go back there.
+    /// Opens a mailbox of this node for sending, whatever routes there are: for a router that brings packages from
+    /// other nodes, which must not go back there.
     ///
     /// # Errors
     /// As for [`Participant::sender`], but for [`SendError::NoRouter`].
@@ -184,8 +184,8 @@ impl Sender {
         self.to
     }
 
-    /// From now on packages are for another name, by the same way: for who sends by a router to names that others
-    /// choose, and must not search for each of them. Whether a router leads there is the caller's to know.
+    /// From now on packages are for another name, by the same way: for a caller that sends by a router to names that
+    /// others choose, and must not search for each of them. Whether a router leads there is the caller's to know.
     pub fn readdress(&mut self, to: Name) {
         self.to = to;
     }
@@ -195,7 +195,7 @@ impl Sender {
         usize::from(self.segment.shape.body_bytes_max)
     }
 
-    /// Sends a package whose body is these parts, one after the other.
+    /// Sends a package; its body is these parts, one after the other.
     ///
     /// # Errors
     /// When it was not accepted.

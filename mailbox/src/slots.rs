@@ -4,7 +4,7 @@
 //! can check it as it stands. Each operation takes a number of steps bounded by the slot count and never waits for
 //! another process; a process that dies between any two steps leaves a state that the others fix:
 //!
-//! | died | left behind | who fixes it, and how |
+//! | died | left behind | what fixes it, and how |
 //! | --- | --- | --- |
 //! | sender, claimed, not published | Filling | receiver's `reclaim`: Free again; the package was never accepted |
 //! | sender, with its ticket | Filling, and a ticket that nobody has | the same; the count of accepted packages is one too high |
@@ -13,13 +13,13 @@
 //! | sender, replacing | Filling with its victim, which may still be Ready | `reclaim` counts a loss, perhaps one too many |
 //! | sender, published, hint not set | Ready without hint | receiver's rescan, one word in turn, or all when the death is noticed: found and delivered |
 //! | sender, hinted, not alerted | Ready, and a receiver that works off less important packages | found when those it knows are received, or when the death is noticed (`Queue::doubt`): then it is next |
-//! | sender, all said, bell not rung | a receiver asleep | the next sender sees it asleep and rings; so does whoever notices the death |
+//! | sender, all said, bell not rung | a receiver asleep | the next sender sees it asleep and rings; so does the process that notices the death |
 //! | receiver, hints in its private heap | Ready without hints | the next owner's rescan |
 //! | receiver, level said | a level that nobody works at | the next owner looks before it receives, and says its own |
 //! | receiver, asleep | `sleeping`, and senders that ring for nobody | the next owner's `adopt` |
 //! | receiver, package in hand | Taken | the next owner's `adopt`: Ready, redelivered; the second time dropped as poison |
 //! | new owner, adopting | some Taken, some Ready again | the owner after it: each word tells by itself what is due |
-//! | owner, giving up | `retired`, and packages | the next receiver of this name, who replaces it and counts them |
+//! | owner, giving up | `retired`, and packages | the next receiver of this name replaces it and counts them |
 //!
 //! Orderings. The body is handed over by the word: publishing is a Release (A), taking an Acquire (B); freeing is a
 //! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G)
@@ -79,8 +79,8 @@ impl Claim {
 /// A published package, as its sender remembers it. Whether it still waits, only a compare-and-swap tells. No two
 /// senders have the same ticket, so no other sender's package has this word. This sender's may have it once more: A,
 /// then B in another slot, then C where A was, all in A's place of the order. C is of the same state as A and newer,
-/// and its word is swapped in after its body was written; so whoever remembers A's word, and comes late, gets C whole
-/// (loom: `a_word_comes_back_with_the_newer_package`).
+/// and its word is swapped in after its body was written; so a sender that remembers A's word, and comes late, gets C
+/// whole (loom: `a_word_comes_back_with_the_newer_package`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Posted {
     pub(crate) slot: usize,
@@ -166,8 +166,8 @@ impl<'a> Slots<'a> {
         &self.words[slot * self.stride]
     }
 
-    /// ORDERING: Acquire (B), for who takes what this sees, and for `Queue::look`: all that the package's sender hinted
-    /// before is seen after this.
+    /// ORDERING: Acquire (B), for the receiver that takes what this sees, and for `Queue::look`: all that the package's
+    /// sender hinted before is seen after this.
     pub(crate) fn load(&self, slot: usize) -> Word {
         Word(self.word(slot).load(Ordering::Acquire))
     }
@@ -219,7 +219,7 @@ impl<'a> Slots<'a> {
     }
 
     /// Takes the slot of the newest of the least important packages, if `priority` outranks it, or one that was freed
-    /// since the search for one: whoever outranks all is not refused because the receiver is quick.
+    /// since the search for one: a sender that outranks all is not refused because the receiver is quick.
     fn displace(&self, by: Claimant, priority: Priority) -> Option<Claim> {
         for _ in 0..DISPLACE_LOOKS_MAX {
             let words = (0..self.count).map(|slot| (slot, self.load(slot)));
@@ -231,8 +231,8 @@ impl<'a> Slots<'a> {
             step!("displace: chosen");
             if self.change(slot, last, word) {
                 step!("displace: claimed");
-                // ORDERING (E): the mark before the look. Pairs with (G): the owner, who settles after it gave the
-                // mailbox up, sees the victim, or this is seen here.
+                // ORDERING (E): the mark before the look. Pairs with (G): the owner settles after it gave the mailbox
+                // up, and sees the victim, or this is seen here.
                 seq_cst_accesses();
                 let late = victim.is_some() && self.hot.receiver.0.retired.load(Ordering::SeqCst) != 0;
                 return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });
@@ -289,7 +289,7 @@ impl<'a> Slots<'a> {
     pub(crate) fn publish(&self, claim: Claim, priority: Priority) -> Published {
         self.is_of_this(claim.segment);
         let slot = claim.slot;
-        // ORDERING: AcqRel, so that whoever reads the counter sees what came before the tickets it counts. A receiver
+        // ORDERING: AcqRel, so that a reader of the counter sees what came before the tickets it counts. A receiver
         // that reads T sees the hints of all packages that one sender published before its package T.
         let ticket = self.hot.ticket.0.fetch_add(1, Ordering::AcqRel);
         step!("publish: ticket");
@@ -376,7 +376,7 @@ impl<'a> Slots<'a> {
         self.first_lines(slot).into_iter().for_each(prefetch_to_read);
     }
 
-    /// Frees slots whose filler is dead, and tells `lost` their victims.
+    /// Frees the slots of dead fillers, and tells `lost` their victims.
     ///
     /// `dead` must never hold a living one for dead. It may hold a dead one for living: this is repeated.
     pub(crate) fn reclaim(&self, mut dead: impl FnMut(Claimant) -> bool, mut lost: impl FnMut(Victim)) -> usize {
@@ -415,8 +415,8 @@ impl<'a> Slots<'a> {
         }
     }
 
-    /// Of a mailbox given up: tells `lost` the victims of those who still fill, since they could only count them here,
-    /// where nobody looks any more. They find their claim changed, and go on as after any other retirement.
+    /// Of a mailbox given up: tells `lost` the victims of the senders that still fill, since they could only count them
+    /// here, where nobody looks any more. They find their claim changed, and go on as after any other retirement.
     pub(crate) fn settle(&self, mut lost: impl FnMut(Victim)) {
         for slot in 0..self.count {
             let word = self.load(slot);

@@ -25,8 +25,8 @@ pub enum Scheduling {
 /// Time of a processor that a thread needs again and again, for SCHED_DEADLINE.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reservation {
-    /// So much of it in each period, ns. Who uses it up stands still until the next period, unless nobody has reserved
-    /// the rest. From 1024 on.
+    /// So much of it in each period, ns. A thread that uses it up stands still until the next period, unless nobody has
+    /// reserved the rest. From 1024 on.
     pub runtime_ns: u64,
     /// It has got it so long after it has become ready to run, at the latest, ns; at least the runtime, at most the
     /// period.
@@ -42,8 +42,7 @@ pub enum ReservationError {
     #[error(
         "SCHED_DEADLINE needs CAP_SYS_NICE, which no limit of users brings: `setcap cap_sys_nice+ep` on the program, \
          `AmbientCapabilities=CAP_SYS_NICE` in its unit, or `--cap-add=SYS_NICE` for its container; nor is it given \
-         to who is bound to some of the \
-         processors"
+         to a thread that is bound to some of the processors"
     )]
     NotAllowed,
     /// Others have reserved too much.
@@ -97,8 +96,8 @@ const _: () = {
 /// [`ReservationError`]
 pub fn reserve(reservation: Reservation) -> Result<(), ReservationError> {
     // Interrupts and the hypervisor take the processor from a thread that runs, and the kernel counts that as the
-    // thread's. Whoever exceeds its reservation by that stands still for as many periods as make up for it, unless it
-    // counts what nobody has reserved as well.
+    // thread's. A thread that exceeds its reservation by that stands still for as many periods as make up for it,
+    // unless it counts what nobody has reserved as well.
     let flags = libc::SCHED_FLAG_RESET_ON_FORK | libc::SCHED_FLAG_RECLAIM;
     let attributes = libc::sched_attr {
         size: size_of::<libc::sched_attr>() as u32,
@@ -238,8 +237,8 @@ pub fn hand_nothing_on(command: &mut Command) {
     command.env_remove(HANDED_ON);
 }
 
-/// Takes over the descriptors that whoever started this process has [handed on](hand_on), in their order; up to the
-/// first that is not there. Once: asked again, there are none.
+/// Takes over the descriptors that the process which started this one has [handed on](hand_on), in their order; up to
+/// the first that is not there. Once: asked again, there are none.
 pub fn handed_on() -> Vec<OwnedFd> {
     static WERE_TAKEN: AtomicBool = AtomicBool::new(false);
     if WERE_TAKEN.swap(true, Ordering::Relaxed) {
@@ -262,9 +261,9 @@ fn adopt(number: RawFd) -> io::Result<OwnedFd> {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("descriptor {number} was not handed on")));
     }
     fcntl(descriptor, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC))?;
-    // SAFETY: it is open, whoever started this process says that it is ours, and nobody else in this process has taken
-    // it: each number is asked for once, and what this process has opened itself is marked to be closed in further
-    // ones, which this one was not.
+    // SAFETY: it is open, the process that started this one says that it is ours, and nobody else in this process has
+    // taken it: each number is asked for once, and what this process has opened itself is marked to be closed in
+    // further ones, which this one was not.
     Ok(unsafe { OwnedFd::from_raw_fd(number) })
 }
 
@@ -303,7 +302,7 @@ mod tests {
             Err(ReservationError::NotAllowed | ReservationError::TooMuch) => {}
             Err(error) => panic!("{error}"),
         }
-        // More than there is, and nothing: whoever asks, it is refused.
+        // More than there is, and nothing: both are refused, with and without the capability.
         let error = reserved(2 * MS, MS).unwrap_err();
         assert!(matches!(error, ReservationError::NotTaken(..) | ReservationError::NotAllowed), "{error}");
     }

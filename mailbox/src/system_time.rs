@@ -16,14 +16,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// A reader that was overtaken twice by the writer tries again, so often: the writer writes at most some thousand times
-/// a second, a reading takes less than a microsecond.
+/// A reader tries again so often when the writer wrote twice meanwhile: the writer writes at most some thousand times a
+/// second, a reading takes less than a microsecond.
 const READ_TRIES: usize = 8;
 /// A slower pace begins so far ahead: longer than writing a record takes. A writer that was held up tries again, so
 /// often.
 const SLOWER_LEAD_NS: u64 = 1_000_000;
 const WRITE_TRIES: usize = 8;
-/// The error bound of who does not know the time: 292 years.
+/// The error bound of a node that does not know the time: 292 years.
 pub const ERROR_UNKNOWN_NS: u64 = i64::MAX as u64;
 const BILLION: i128 = 1_000_000_000;
 /// Stands for a rate that is not known.
@@ -105,8 +105,8 @@ impl TimeRecord {
     }
 }
 
-/// What was seen last of the computer's clocks by whoever writes a node's time: its next incarnation sees what they did
-/// while nobody watched.
+/// What the writer of a node's time saw last of the computer's clocks: its next incarnation sees what they did while
+/// nobody watched.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Watched {
     /// The clock of the page, [`monotonic_ns`].
@@ -338,7 +338,7 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
-    /// Opens the page, making it if need be, and leaves what it says: who was started again goes on from there.
+    /// Opens the page, making it if need be, and leaves what it says: a restarted writer goes on from there.
     ///
     /// # Errors
     /// When the page cannot be made.
@@ -366,8 +366,8 @@ impl TimeKeeper {
         (local_ns > 0).then_some(Watched { local_ns, unslewed_ns, apart_ns, slept_ns, rate_ppb, unsteady_until_ns })
     }
 
-    /// Notes what was seen, for the next incarnation of whoever writes here. Records that are written from then on are
-    /// of this moment: if the computer sleeps before one is written, its readers see that.
+    /// Notes what was seen, for the next incarnation of the writer. Records that are written from then on are of this
+    /// moment: if the computer sleeps before one is written, its readers see that.
     pub fn note_watched(&mut self, watched: &Watched) {
         if self.watched.replace(*watched) == Some(*watched) {
             return;

@@ -19,11 +19,29 @@ pub struct Throttle {
 impl Throttle {
     /// Counts an event; if it is to be reported, how many there were since the last report, this one included.
     pub fn note(&mut self, now_ns: u64, every_ns: u64) -> Option<u64> {
+        self.note_burst(now_ns, every_ns, 1)
+    }
+
+    /// The same, with `burst` reports at once after a pause.
+    pub fn note_burst(&mut self, now_ns: u64, every_ns: u64, burst: u32) -> Option<u64> {
         self.events += 1;
-        if now_ns < self.not_before_ns {
+        self.take_due(now_ns, every_ns, burst)
+    }
+
+    /// The events that were not reported, if there are some and it is time: the end of a flood is reported, too.
+    ///
+    /// ```
+    /// # use rohrpost_mailbox::Throttle;
+    /// let mut throttle = Throttle::default();
+    /// assert_eq!([1, 2, 3].map(|now_ns| throttle.note_burst(now_ns, 100, 2)), [Some(1), Some(1), None]);
+    /// assert_eq!([100, 101, 300].map(|now_ns| throttle.take_due(now_ns, 100, 2)), [None, Some(1), None]);
+    /// ```
+    pub fn take_due(&mut self, now_ns: u64, every_ns: u64, burst: u32) -> Option<u64> {
+        let room_ns = every_ns.saturating_mul(u64::from(burst.saturating_sub(1)));
+        if self.events == 0 || now_ns.saturating_add(room_ns) < self.not_before_ns {
             return None;
         }
-        self.not_before_ns = now_ns.saturating_add(every_ns);
+        self.not_before_ns = self.not_before_ns.max(now_ns).saturating_add(every_ns);
         Some(std::mem::take(&mut self.events))
     }
 }

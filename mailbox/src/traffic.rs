@@ -1,10 +1,10 @@
-//! What a participant sends, in memory that anyone may read: who to, from which name, which type, how much and how
+//! What a participant sends, in memory that anyone may read: to which name, from which, which type, how much and how
 //! often. Looking at it sends nothing and asks nobody, so it changes nothing.
 //!
 //! ```text
 //! traffic.N  =  header (64 B)  +  128 rows (256 B each), one for each receiver, sender's name and type of package
 //!                                 │ ▲
-//!            a Sender owns a row ─┘ └─ who sent the same before it left the row idle, counts and all
+//!            a Sender owns a row ─┘ └─ an earlier Sender of the same left the row idle, counts and all
 //! ```
 //!
 //! A row has one writer, which loads and stores: sending to where it sent before costs no read-modify-write, no lock
@@ -34,7 +34,7 @@ pub(crate) const SECONDS_KEPT: usize = 4;
 /// Rows that a writer finds without a search: more kinds of package than most send to one mailbox.
 const RECENT: usize = 4;
 
-/// [`FlowRow::writer`] of a row that was never used, and of one whose writer has gone.
+/// [`FlowRow::writer`] of a row that was never used, and of one that its writer has left.
 const UNUSED: u32 = 0;
 const IDLE: u32 = u32::MAX;
 
@@ -183,7 +183,7 @@ impl Table {
             row.writer.compare_exchange(from, me, Ordering::Acquire, Ordering::Relaxed).is_ok()
         };
         if let Some(at) = rows.iter().position(|row| row.writer() == IDLE && row.key() == key && take(row, IDLE)) {
-            // Who looked while it was idle may have taken it for another key meanwhile.
+            // Another sender that saw it idle may have taken it for another key meanwhile.
             if rows[at].key() == key {
                 return at;
             }
@@ -210,8 +210,8 @@ impl Table {
     }
 
     /// What a row has counted goes to the rest, so that sums stay what they are. While the row is being written, so
-    /// that who sees it empty, and then looks at the rest, finds it there; who saw it full a moment before sees it
-    /// twice, never not at all.
+    /// that a reader that sees it empty, and then looks at the rest, finds it there; one that saw it full a moment
+    /// before sees it twice, never not at all.
     fn add_to_rest(&self, row: &FlowRow) {
         let rest = &self.rows()[REST];
         let pairs = [(&row.packages, &rest.packages), (&row.bytes, &rest.bytes), (&row.refused, &rest.refused)];
@@ -226,12 +226,12 @@ pub(crate) struct TableView(Mapping);
 
 impl TableView {
     /// The table of this participant, if it is there, whole, and of this use of the index.
-    pub(crate) fn open(node: &Path, who: Claimant) -> Option<Self> {
-        let file = open_to_read(&path_of(node, who.participant)).ok()?;
+    pub(crate) fn open(node: &Path, claimant: Claimant) -> Option<Self> {
+        let file = open_to_read(&path_of(node, claimant.participant)).ok()?;
         let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Look).ok()?;
         let header = &mapping.at::<TrafficPage>(0).header;
         let said = [&header.version, &header.participant, &header.incarnation, &header.rows];
-        let expected = [VERSION, who.participant.into(), who.incarnation, FLOWS as u32];
+        let expected = [VERSION, claimant.participant.into(), claimant.incarnation, FLOWS as u32];
         let same = header.magic.load(Ordering::Acquire) == MAGIC
             && said.iter().zip(expected).all(|(said, expected)| said.load(Ordering::Relaxed) == expected);
         same.then_some(Self(mapping))
@@ -293,7 +293,7 @@ impl Writer {
     pub(crate) fn leave(&mut self, table: &Table) {
         self.recent = [None; RECENT];
         for row in table.rows()[..REST].iter().filter(|row| row.writer() == self.me) {
-            // ORDERING: Release; who takes it over continues from what was written here.
+            // ORDERING: Release; the next writer continues from what was written here.
             row.writer.store(IDLE, Ordering::Release);
         }
     }

@@ -12,7 +12,7 @@ pub(crate) fn remove(node: &Node, name: Name) -> Result<(), NodeError> {
     unlink(node, name, &RegistryLock::take(node.path())?)
 }
 
-/// The same for who holds the lock of the registry.
+/// The same for a caller that holds the lock of the registry.
 pub(crate) fn unlink(node: &Node, name: Name, _registry: &RegistryLock) -> Result<(), NodeError> {
     about::remove(node, name);
     fs::remove_file(path_of(node.path(), name)).map_err(|error| NodeError::Io(path_of(node.path(), name), error))?;

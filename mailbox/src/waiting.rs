@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 /// Reading the clock takes as long as so many looks at a mailbox.
 const LOOKS_A_CLOCK: usize = 16;
 
-/// Who was rung on its way to sleep looks for so long before it goes that way again: its sender is about as quick as it
-/// is, and would pay for a wake-up with each package, it for a sleep. The first real sleep ends it. Measured with
-/// packages of 4 KiB sent as fast as they go, against a ring with a futex (`rohrpost-bench local --only
+/// A receiver that was rung on its way to sleep looks for so long before it goes that way again: its sender is about as
+/// quick as it is, and would pay for a wake-up with each package, it for a sleep. The first real sleep ends it.
+/// Measured with packages of 4 KiB sent as fast as they go, against a ring with a futex (`rohrpost-bench local --only
 /// rate-blocking`): 0.8 times as many without, 2.5 times as many with it.
 const EAGER: Duration = Duration::from_micros(2);
 
@@ -77,12 +77,12 @@ impl Waiting {
 
 /// Waits until one of these mailboxes has a package, `other` says that there is something else to do, or the deadline
 /// has passed. May return early for no reason. Says how long it slept, that is, left the processor to others. All must
-/// be of one participant, whose bell it is that wakes.
+/// be of one participant: its bell wakes.
 ///
-/// Whoever makes `other` true from outside calls [`Participant::ring`](crate::Participant::ring) afterwards.
+/// A thread that makes `other` true from outside calls [`Participant::ring`](crate::Participant::ring) afterwards.
 ///
 /// Without a mailbox there is no bell to sleep on: then this returns at once, whatever `waiting` and `other` say, and a
-/// loop around it would spin. Who has no mailbox waits by other means.
+/// loop around it would spin. A thread without a mailbox waits by other means.
 ///
 /// # Panics
 /// When the mailboxes are of different participants: their bells are different words.
@@ -93,8 +93,8 @@ pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, ot
 }
 
 /// Waits until this mailbox has a package that is more important than `priority`, `other` says that there is something
-/// else to do, or the deadline has passed. Others may wait there all the while: for who cannot use them yet. May return
-/// early for no reason. Says how long it slept.
+/// else to do, or the deadline has passed. Less important ones may wait there all the while: for a receiver that cannot
+/// use them yet. May return early for no reason. Says how long it slept.
 ///
 /// What is not above `priority` rings no bell meanwhile: its sender makes no system call, and this thread sleeps on.
 pub fn wait_above(
@@ -178,8 +178,8 @@ fn timed(sleep: impl FnOnce()) -> Duration {
     began.elapsed()
 }
 
-/// Waits. To sleep it calls `asleep`, which calls what it is given; the clock is read by who wants to know how long
-/// that was.
+/// Waits. To sleep it calls `asleep`, which calls what it is given; a caller that wants to know how long that was reads
+/// the clock.
 fn wait(
     receivers: &mut [&mut Receiver],
     watches: Option<&mut Watches>,

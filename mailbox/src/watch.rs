@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 /// Most descriptors that one participant watches.
 pub const WATCHES_MAX: usize = 64;
 
-/// How long a sleeper believes that its pipe would wake it. Who rings must open the pipe, and cannot when its process,
+/// How long a sleeper believes that its pipe would wake it. A ringer must open the pipe, and cannot when its process,
 /// or the system, has no descriptor left; but it has changed the bell before, and that the sleeper sees after so long.
-/// Costs ten looks at one word a second, and only who watches descriptors.
+/// Costs ten looks at one word a second, and only participants that watch descriptors.
 const PIPE_TRUSTED: Duration = Duration::from_millis(100);
 
 /// One watched descriptor.

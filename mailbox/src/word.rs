@@ -4,14 +4,14 @@
 //!  63 62  61        53  52      48 47         32 31                      0
 //!  ┌────┬───┬─────────┬─┬────────┬─────────────┬──────────────────────────┐
 //!  │Fill│ v │ victim  │n│  zero  │ participant │ incarnation              │  v: took the place of an accepted package
-//!  └────┴───┴─────────┴─┴────────┴─────────────┴──────────────────────────┘     of priority `victim`; n: as its newer one
+//!  └────┴───┴─────────┴─┴────────┴─────────────┴──────────────────────────┘  of priority `victim`; n: as its newer one
 //!  63 62  61        54  53  52                                            0
 //!  ┌────┬─────────────┬───┬───────────────────────────────────────────────┐
 //!  │R/T │ priority    │ r │ ticket                                        │  r: redelivered after its receiver died
 //!  └────┴─────────────┴───┴───────────────────────────────────────────────┘
 //! ```
 //!
-//! The incarnation of a slot, and who may make each change:
+//! The states of a slot, and which process may make each change:
 //!
 //! ```text
 //!            claim (sender)               publish (its filler)            take (receiver)
@@ -42,7 +42,7 @@ const TICKET: u64 = REDELIVERED - 1;
 /// A slot nobody uses.
 pub(crate) const FREE: Word = Word(0);
 
-/// Who fills a slot: an entry of the node's table of participants, and which use of that entry.
+/// The sender that fills a slot: an entry of the node's table of participants, and which use of that entry.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Claimant {
     /// Index in the node's table of participants.

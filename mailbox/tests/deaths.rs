@@ -101,7 +101,7 @@ fn a_dead_sender_s_slot_comes_back_and_the_sleeping_receiver_sees_to_it() {
 }
 
 #[test]
-fn who_takes_a_dead_one_s_place_announces_its_death() {
+fn the_successor_of_a_dead_participant_announces_its_death() {
     let ground = Ground::new();
     let mut receiver = ground.join().receiver(MAILBOX, shape(1)).unwrap();
     let dead = ground.start("lend");

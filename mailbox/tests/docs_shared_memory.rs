@@ -198,7 +198,7 @@ fn waiting_times_by_class_are_as_documented() {
 }
 
 #[test]
-fn a_word_tells_whom_its_package_replaces() {
+fn a_word_tells_which_package_its_own_replaces() {
     let ground = Ground::new();
     let shape = Shape { slots: 1, body_bytes_max: 8, full: OverflowPolicy::Latest, ..Shape::default() };
     let mut receiver = ground.join().receiver(MAILBOX, shape).unwrap();
@@ -214,7 +214,7 @@ fn a_word_tells_whom_its_package_replaces() {
 }
 
 #[test]
-fn who_sleeps_in_poll_says_so_as_documented() {
+fn a_poller_says_that_it_sleeps_as_documented() {
     let ground = Ground::new();
     let me = ground.join();
     let mut receiver = me.receiver(MAILBOX, Shape::default()).unwrap();

@@ -40,7 +40,7 @@ fn what_is_urgent_passes_a_flood_as_the_policy_says() {
 }
 
 #[test]
-fn who_is_stopped_with_a_loan_closes_no_mailbox() {
+fn a_sender_stopped_with_a_loan_closes_no_mailbox() {
     OverflowPolicy::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), &format!("holders, {}", full.name())));
 }
 
@@ -69,7 +69,7 @@ fn low_sender(board: Board, ground: &Ground, full: OverflowPolicy) {
     while !board.is_ended() {
         let sent = board.seat(LOW).operate(|| send(board, &mut sender, full, LOW, number));
         number += u32::from(sent);
-        // Asleep now and then, as whoever is not real-time.
+        // Asleep now and then, as a process that is not real-time.
         if random.one_in(if sent { 200 } else { 20 }) {
             std::thread::sleep(Duration::from_micros(50));
         }

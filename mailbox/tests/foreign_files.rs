@@ -113,10 +113,10 @@ fn whatever_stands_beside_the_mailboxes_stops_nobody_and_goes_with_the_node() {
             thing.put(&ground.path().join(name));
             let what = format!("{thing:.40?} at {name}");
             let is_error = |error: &NodeError| matches!(error, NodeError::Io(path, _) if path.ends_with(name));
-            // Those who look.
+            // Readers.
             assert!(node.traffic().is_empty() && node.mailboxes().unwrap().is_empty(), "{what}");
             let _ = (node.about(MAILBOX), SystemClock::open(&node).now());
-            // Those who take part. Only what they cannot put aside is told, and where it is.
+            // Participants. Only what they cannot put aside is told, and where it is.
             match Participant::join(&node, Name::NONE) {
                 Err(error) => {
                     assert!(matches!(thing, Thing::Directory) && name.starts_with("traffic"), "{what}: {error}")

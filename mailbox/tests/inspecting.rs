@@ -49,7 +49,7 @@ fn fillers(detail: &MailboxDetail) -> Vec<(Option<u32>, Name, bool, Option<Victi
 }
 
 #[test]
-fn each_slot_says_who_fills_it_and_whether_they_live() {
+fn each_slot_names_its_filler_and_whether_that_lives() {
     let ground = Ground::new();
     let _receiver = ground.join().receiver(MAILBOX, shape(2)).unwrap();
     assert_eq!(inspect(&ground).slots, [SlotInfo::Free; 2]);
@@ -62,7 +62,7 @@ fn each_slot_says_who_fills_it_and_whether_they_live() {
     let dead = first.id();
     first.kill();
     assert_eq!(fillers(&inspect(&ground)), [(Some(dead), MODULE, false, victim)]);
-    // Whoever takes the dead one's place is somebody else.
+    // The successor of the dead one is another participant.
     let _successor = ground.join();
     assert_eq!(fillers(&inspect(&ground)), [(None, Name::NONE, false, victim)]);
     let detail = inspect(&ground);

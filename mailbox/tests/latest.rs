@@ -74,10 +74,10 @@ fn a_slow_reader_of_fast_writers_gets_the_newest_of_each_and_never_goes_back() {
     let mut sent = 0;
     for told in told {
         let mut numbers = told.split(' ').map(|number| number.parse::<u32>().unwrap());
-        let who = numbers.next().unwrap();
+        let sender = numbers.next().unwrap();
         for (state, number) in (0..STATES).zip(numbers) {
             sent += u64::from(number);
-            assert_eq!(last.get(&(who, state)).copied(), Some(number), "the newest was received");
+            assert_eq!(last.get(&(sender, state)).copied(), Some(number), "the newest was received");
         }
     }
     let info = ground.look();
@@ -134,7 +134,7 @@ fn a_fast_sender_and_a_slow_one_come_in_turn() {
         slow.send(&label(LOW, 1), &[&[2]]).unwrap();
         flood(&mut fast);
         let order = [1, 2].map(|_| receiver.try_receive().unwrap().body()[0]);
-        assert_eq!(order, [1, 2], "who came first is received first, however often it sends");
+        assert_eq!(order, [1, 2], "the sender that came first is received first, however often it sends");
         assert!(receiver.try_receive().is_none());
         slow.send(&label(LOW, 1), &[&[2]]).unwrap();
         flood(&mut fast);

@@ -41,7 +41,7 @@ fn step() -> impl Strategy<Value = Step> {
 struct Waiting {
     priority: u8,
     number: u16,
-    /// Who sent it, and of what it is the newest.
+    /// Its sender, and of what it is the newest.
     of: (usize, u16),
 }
 

@@ -71,7 +71,7 @@ fn whatever_comes_and_goes_raises_the_epoch() {
 }
 
 #[test]
-fn a_second_owner_is_refused_and_told_who_the_first_is() {
+fn a_second_owner_is_refused_and_told_the_first_one() {
     let ground = Ground::new();
     let first = ground.start("own");
     assert_eq!(first.hear(), "there");
@@ -310,7 +310,7 @@ fn only_the_dead_are_removed() {
     let late = Node::open(ground.path()).unwrap();
     assert!(ground.node().remove_if_dead().unwrap());
     assert!(matches!(Node::open(ground.path()), Err(NodeError::Missing(_))));
-    // Who opened the node before finds that it is another now.
+    // A process that opened the node before finds that it is another now.
     assert!(Participant::join(&late, Name::NONE).is_err());
     let _again = ground.join();
     assert!(matches!(Participant::join(&late, Name::NONE), Err(NodeError::Missing(_))));

@@ -63,7 +63,7 @@ fn a_routed_package_comes_to_the_router_as_it_was_sent() {
     let second = transit.receive_timeout(PATIENCE).unwrap();
     assert_eq!((second.head().to, second.head().id, second.body()), (FAR, 7, &b"something"[..]));
     drop(second);
-    // Who looks at what is sent sees whom it is for.
+    // A reader of what is sent sees which name it is for.
     let flows = ground.node().traffic();
     assert!(flows.iter().all(|flow| flow.to == FAR) && !flows.is_empty());
 }

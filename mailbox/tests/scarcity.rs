@@ -132,12 +132,13 @@ fn fill_a_small_memory(ground: &Ground) {
         );
         assert!(matches!(&error, CreateError::Memory { .. }) && error.to_string().ends_with(&words), "{error}");
     }
-    // Neither has who wants to take part.
+    // Neither has a process that wants to take part.
     let error = Participant::join(&node, Name::NONE).err().unwrap();
     assert!(matches!(&error, NodeError::Memory { .. }) && error.to_string().contains("is it full (df "), "{error}");
     let error = Node::create(&ground.path().with_file_name("other"), 0o700).err().unwrap();
     assert!(matches!(&error, NodeError::Memory { .. }), "{error}");
-    // Whoever could not make it removes what there is of it; what the error tells to look at is there all the same.
+    // The process that could not make it removes what there is of it; what the error tells to look at is there all the
+    // same.
     std::fs::remove_dir_all(ground.path().with_file_name("other")).unwrap();
     let said = error.to_string();
     let named = said.split_once("(df ").and_then(|(_, rest)| rest.strip_suffix(")?")).unwrap();
@@ -214,14 +215,14 @@ fn open_until_there_is_no_descriptor(ground: &Ground) {
 
 /// With no more rights than any user; the parent has made what is there unreadable even for itself.
 fn intrude(ground: &Ground) {
-    // Whom no mode keeps out takes the rights of nobody.
+    // A user that no mode keeps out takes the rights of nobody.
     if nix::unistd::geteuid().is_root() {
         nix::unistd::setgid(65534.into()).unwrap();
         nix::unistd::setuid(65534.into()).unwrap();
     }
     let error = Node::open(ground.path()).err().unwrap();
     assert!(matches!(&error, NodeError::Denied(_)), "{error}");
-    assert!(error.to_string().contains("be the user whose node it is"), "{error}");
+    assert!(error.to_string().contains("be the user that owns the node"), "{error}");
     tell("kept out");
     let mut answer = String::new();
     io::stdin().read_line(&mut answer).unwrap();
@@ -242,7 +243,7 @@ fn intrude(ground: &Ground) {
 }
 
 #[test]
-fn without_rights_it_is_said_whose_node_it_is_and_which_mailbox_is_closed() {
+fn without_rights_errors_tell_the_owner_and_the_closed_mailbox() {
     let ground = Ground::new();
     let around = ground.path().parent().unwrap();
     let mode = |path: &Path, mode: u32| fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();

@@ -73,7 +73,7 @@ fn what_is_sent_is_received_in_order_or_counted_to_the_last_package() {
 /// Lets all loose on one mailbox; returns how many packages were stale.
 fn soak(ground: &Ground, shape: Shape, way: WaitMode, time: Duration) -> u64 {
     let board = Board::new(SENDERS);
-    // Those who are forked hold no lock of ours: the mailbox is ours again only after that.
+    // Forked processes hold no lock of ours: the mailbox is ours again only after that.
     drop(Listener::new(board, &ground.join(), &[shape], way));
     let processes: Vec<Actor> = (0..PROCESSES)
         .map(|seat| Actor::new(|| talk(board, seat, shape.full, ground.join().sender(MAILBOXES[0]).unwrap())))

@@ -1,6 +1,7 @@
-//! Who is stopped in the middle of an operation holds nobody up: there is no lock, and nothing spins on another
-//! process. Stopped at random moments, and after each single instruction; and killed after some of them, or after each:
-//! `ROHRPOST_INSTRUCTION_KILLS=1000000 cargo test -p rohrpost-mailbox --test stops -- --nocapture instruction`
+//! A process that is stopped in the middle of an operation holds nobody up: there is no lock, and nothing spins on
+//! another process. Stopped at random moments, and after each single instruction; and killed after some of them, or
+//! after each: `ROHRPOST_INSTRUCTION_KILLS=1000000 cargo test -p rohrpost-mailbox --test stops -- --nocapture
+//! instruction`
 
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, reason = "these are tests")]
@@ -40,7 +41,7 @@ fn role() {
 }
 
 #[test]
-fn who_is_stopped_at_random_holds_nobody_up() {
+fn a_process_stopped_at_random_holds_nobody_up() {
     OverflowPolicy::ALL.into_iter().for_each(|full| alone(&Ground::in_memory(), full.name()));
 }
 
@@ -48,7 +49,7 @@ fn who_is_stopped_at_random_holds_nobody_up() {
 // the first.
 #[cfg(target_arch = "x86_64")]
 #[test]
-fn who_is_stopped_after_any_instruction_holds_nobody_up() {
+fn a_process_stopped_after_any_instruction_holds_nobody_up() {
     alone(&Ground::in_memory(), "instructions");
 }
 
@@ -88,14 +89,14 @@ fn stop_and_go(ground: &Ground, full: OverflowPolicy) {
         stopped.iter().for_each(|seat| actors[*seat].stop());
         let others: Vec<usize> = (0..=SENDERS).filter(|seat| !stopped.contains(seat)).collect();
         let before = others.iter().map(|seat| board.seat(*seat).operations()).collect::<Vec<_>>();
-        until("those who were not stopped go on", || {
+        until("the others go on", || {
             actors.iter().for_each(|actor| actor.assert_alive());
             others.iter().zip(&before).all(|(seat, before)| board.seat(*seat).operations() >= before + 20)
         });
         stopped.iter().for_each(|seat| actors[*seat].go_on());
     }
     board.end();
-    // Who still sends, or sleeps, sees that it is the end when somebody rings.
+    // A process that still sends, or sleeps, sees that it is the end when somebody rings.
     for (seat, actor) in actors.into_iter().enumerate() {
         if seat == RECEIVER {
             ground.node().announce_death();

@@ -88,7 +88,7 @@ struct Storm {
 impl Storm {
     fn new(ground: Ground, full: OverflowPolicy) -> Self {
         let node = ground.node();
-        // An incarnation for each kill, and for those who live at the end of each part.
+        // An incarnation for each kill, and for the processes that live at the end of each part.
         let board = Board::new((kills() * 2) as usize + 100 * SENDERS);
         let random = Random::from_environment();
         let shaped = Shaped { wanted: 0, known: None, replacements: 0 };
@@ -180,7 +180,7 @@ impl Storm {
         self.deadline = Instant::now() + PATIENCE;
         // Some while they start; most at work, however busy the computer is.
         if !self.random.one_in(4) {
-            self.wait("whoever is to be killed works", |storm| storm.board.seat(seat).is_ready());
+            self.wait("the process to be killed works", |storm| storm.board.seat(seat).is_ready());
             std::thread::sleep(Duration::from_micros(self.random.below(500)));
         }
         let actor = self.actors.swap_remove(seat);
@@ -207,7 +207,7 @@ impl Storm {
         self.node.announce_death();
     }
 
-    /// Nobody sends: whoever sleeps beside a package now has missed its wake-up.
+    /// Nobody sends: a receiver that sleeps beside a package now has missed its wake-up.
     fn calm(&mut self) {
         self.deadline = Instant::now() + PATIENCE;
         self.board.hold(true);
@@ -229,7 +229,7 @@ impl Storm {
         MAILBOXES.map(|name| self.node.look_at(name).unwrap())
     }
 
-    /// Adopts what those left who were all killed at once, and uses each slot again.
+    /// Adopts what processes left that were all killed at once, and uses each slot again.
     fn audit(&mut self) {
         let me = self.ground.join();
         let shapes = shapes(self.full, self.shaped.known.unwrap_or(self.shaped.wanted));

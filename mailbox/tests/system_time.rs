@@ -125,7 +125,7 @@ fn a_successor_goes_on_and_writes_nothing_that_goes_back() {
 }
 
 #[test]
-fn who_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
+fn a_node_that_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
     let ground = Ground::new();
     let node = ground.node();
     let mut keeper = TimeKeeper::await_master(&node).unwrap();
@@ -154,7 +154,7 @@ fn what_was_seen_of_the_clocks_is_left_to_the_next_writer() {
 
 /// In a time namespace, in which the computer has slept for an hour more than it has; that takes root.
 #[test]
-fn who_reads_after_a_sleep_is_told_that_nobody_knows_although_nobody_wrote_since() {
+fn a_reader_after_a_sleep_is_told_that_nobody_knows_although_nobody_wrote_since() {
     let may = std::process::Command::new("unshare").args(["--time", "--boottime", "3600", "true"]).status();
     if !may.is_ok_and(|status| status.success()) {
         eprintln!("SKIPPED: no time namespace for this user");

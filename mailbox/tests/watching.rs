@@ -123,7 +123,7 @@ fn a_timeout_is_kept_in_poll_to_less_than_a_millisecond() {
     }
 }
 
-/// Without a deadline: whoever loses a wake-up hangs.
+/// Without a deadline: a receiver that loses a wake-up hangs.
 #[test]
 fn no_wake_up_is_lost_between_many_ringers_and_a_poller() {
     const ROUNDS: u32 = 3_000;
@@ -176,7 +176,7 @@ fn no_wake_up_is_lost_between_many_ringers_and_a_poller() {
 }
 
 #[test]
-fn who_dies_in_poll_does_no_harm() {
+fn a_death_in_poll_does_no_harm() {
     let ground = Ground::new();
     let node = ground.node();
     let sleeper = ground.start("sleep in poll");
@@ -240,7 +240,7 @@ fn send_without_descriptors(ground: &Ground) {
 }
 
 #[test]
-fn a_poller_is_woken_by_who_cannot_open_its_pipe() {
+fn a_ringer_that_cannot_open_the_pipe_wakes_the_poller() {
     let ground = Ground::new();
     let me = ground.join();
     let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
@@ -287,7 +287,7 @@ fn the_pipe_is_there_as_long_as_somebody_watches() {
     assert!(!pipe(&ground).exists());
     let _watches = Watches::new(&me).unwrap();
     me.leave();
-    assert!(!pipe(&ground).exists(), "also for processes whose threads keep all this until they end");
+    assert!(!pipe(&ground).exists(), "also for processes with threads that keep all this until they end");
 }
 
 #[test]
@@ -306,7 +306,7 @@ fn there_is_room_for_so_many_and_no_more() {
 }
 
 #[test]
-fn a_sender_rings_nobody_who_spins() {
+fn a_sender_rings_no_receiver_that_spins() {
     let ground = Ground::new();
     let me = ground.join();
     let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();
@@ -332,7 +332,7 @@ fn a_sender_rings_nobody_who_spins() {
 }
 
 #[test]
-fn who_has_spun_long_enough_sleeps_until_the_deadline() {
+fn a_receiver_that_has_spun_long_enough_sleeps_until_the_deadline() {
     let ground = Ground::new();
     let me = ground.join();
     let mut receiver = me.receiver(MAILBOX, shape(4)).unwrap();

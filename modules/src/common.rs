@@ -185,7 +185,7 @@ pub struct Exchange {
     pub late: u64,
 }
 
-/// Some of those with whom a module exchanges something.
+/// Some of the modules with which a module exchanges something.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ExchangePage {
     /// All there are.

@@ -127,7 +127,11 @@ macro_rules! interfaces_of_tuples {
     ($(($($interface:ident),*))*) => {$(
         impl<M, $($interface: Serve<M>),*> Interfaces<M> for ($($interface,)*) {
             fn table() -> Vec<Served<M>> {
-                vec![$(Served { class: $interface::CLASS, description: $interface::description(), serve: $interface::serve }),*]
+                vec![$(Served {
+                    class: $interface::CLASS,
+                    description: $interface::description(),
+                    serve: $interface::serve,
+                }),*]
             }
         }
     )*};

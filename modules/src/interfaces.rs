@@ -2,13 +2,14 @@
 //! modules.
 
 mod router;
+mod slots;
 mod tcp;
 
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkCounters,
-    LinkState, Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SlotState, SlotUse, SocketFailure,
-    TunnelState,
+    LinkState, Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SocketFailure,
 };
+pub use slots::{SlotState, SlotUse, TunnelState};
 
 pub use tcp::{
     BeyondClient, BeyondClients, BeyondCrowded, BeyondHost, BeyondHosts, BeyondLink, BeyondOutage, BeyondState,
@@ -136,7 +137,7 @@ pub trait Player {
 /// A page of the collector's lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Page {
-    /// Tells this incarnation of the collector, whose lines are counted from its start, from earlier ones.
+    /// Tells this incarnation of the collector from earlier ones; lines are counted from its start.
     pub life: u32,
     /// Number of the first line here.
     pub first: u64,

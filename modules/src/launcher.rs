@@ -52,6 +52,12 @@ impl Phase {
     }
 
     /// Whether it does not run, and will not unless somebody asks for it.
+    ///
+    /// ```
+    /// use rohrpost_modules::launcher::Phase;
+    ///
+    /// assert!(Phase::Failed.is_over() && !Phase::Starting.is_over());
+    /// ```
     pub const fn is_over(self) -> bool {
         matches!(self, Self::Stopped | Self::Ended | Self::Failed)
     }
@@ -173,7 +179,7 @@ pub enum LookError {
     #[error("{0}")]
     Failed(String),
     /// The look has so many bytes.
-    #[error("the look has {0} bytes, which is more than {max}; look at one module (`rohrpost bw NAME`)", max = LOOK_BYTES_MAX)]
+    #[error("the look has {0} bytes, which is more than {LOOK_BYTES_MAX}; look at one module (`rohrpost bw NAME`)")]
     TooLarge(u32),
 }
 
@@ -216,6 +222,15 @@ pub(crate) const LOOK: u16 = 20;
 pub(crate) const LOOK_ON: u16 = 21;
 
 /// The name under which the launch of a node takes commands, if the configuration has this node.
+///
+/// ```
+/// # use rohrpost_modules::{call::CallError, launcher::launcher_of, runtime::ToolLink};
+/// # use rohrpost_config::Installation;
+/// fn modules_of(tool: &mut ToolLink, installation: &Installation, node: &str) -> Result<usize, CallError> {
+///     let Some(launcher) = launcher_of(installation, node) else { return Ok(0) };
+///     Ok(tool.children(launcher)?.len())
+/// }
+/// ```
 pub fn launcher_of(installation: &Installation, node: &str) -> Option<Name> {
     let instance = installation.node(node)?.launch_instance();
     Some(Name::new(installation.system.id, installation.classes.tool().0, instance, 0))
@@ -224,6 +239,16 @@ pub fn launcher_of(installation: &Installation, node: &str) -> Option<Name> {
 /// Launch of any node, asked by a tool. The first argument is the name of that launch ([`launcher_of`]).
 impl ToolLink {
     /// How it stands with all modules that launch watches over, in the order of the configuration.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
+    /// fn failed(tool: &mut ToolLink) -> Result<Vec<String>, CallError> {
+    ///     use rohrpost_modules::launcher::Phase;
+    ///
+    ///     let states = tool.children(tool.launcher())?;
+    ///     Ok(states.into_iter().filter(|state| state.phase == Phase::Failed).map(|state| state.module).collect())
+    /// }
+    /// ```
     ///
     /// # Errors
     /// See [`CallError`]; [`CallError::NotSent`] when no launch runs on that node, and this is it.
@@ -242,6 +267,15 @@ impl ToolLink {
 
     /// Asks launch to restart a module (`pilot.0`); which of its processes that will be ([`ChildState::lives`]).
     ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, launcher::ControlError, runtime::ToolLink};
+    /// fn restart(tool: &mut ToolLink) -> Result<(), CallError<ControlError>> {
+    ///     let process = tool.restart(tool.launcher(), "pilot.0")?;
+    ///     println!("process {process} of pilot.0 begins");
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
     /// # Errors
     /// See [`CallError`] and [`ControlError`].
     pub fn restart(&mut self, launcher: Name, module: &str) -> Result<u32, CallError<ControlError>> {
@@ -249,6 +283,13 @@ impl ToolLink {
     }
 
     /// Asks launch to stop a module.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, launcher::ControlError, runtime::ToolLink};
+    /// fn stop(tool: &mut ToolLink) -> Result<(), CallError<ControlError>> {
+    ///     tool.stop(tool.launcher(), "pilot.0")
+    /// }
+    /// ```
     ///
     /// # Errors
     /// See [`CallError`] and [`ControlError`].
@@ -258,19 +299,26 @@ impl ToolLink {
 
     /// Asks launch to start a module; which of its processes that will be ([`ChildState::lives`]).
     ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, launcher::ControlError, runtime::ToolLink};
+    /// fn start(tool: &mut ToolLink) -> Result<u32, CallError<ControlError>> {
+    ///     tool.start(tool.launcher(), "pilot.0")
+    /// }
+    /// ```
+    ///
     /// # Errors
     /// See [`CallError`] and [`ControlError`].
     pub fn start(&mut self, launcher: Name, module: &str) -> Result<u32, CallError<ControlError>> {
         self.order(launcher, START, module)
     }
 
-    /// Begins to have a module restarted, and returns at once; [`Link::poll_as`] has the answer, a `Result` of what
+    /// Begins to have a module restarted, and returns at once; [`Link::poll_for`] has the answer, a `Result` of what
     /// [`ToolLink::restart`] returns.
     ///
     /// # Errors
     /// See [`CallError`].
     ///
-    /// [`Link::poll_as`]: crate::call::Link::poll_as
+    /// [`Link::poll_for`]: crate::call::Link::poll_for
     pub fn begin_restart(&mut self, launcher: Name, module: &str) -> Result<u32, CallError> {
         self.begin_asking(launcher, RESTART, &(module,))
     }

@@ -11,6 +11,41 @@ use std::fmt;
 /// A program of a class. Implement this for a struct, the interface's trait too, and call [`crate::run`] in `main`.
 ///
 /// One thread calls all of it, one thing at a time: commands of the interface, these functions, nothing else.
+///
+/// ```
+/// use rohrpost_modules::interfaces::WheelsInterface;
+/// use rohrpost_modules::runtime::{Context, Rate, Received, Subscription};
+/// use rohrpost_modules::types::Odometry;
+/// use rohrpost_modules::{Module, ModuleError};
+///
+/// #[derive(serde::Deserialize)]
+/// #[serde(deny_unknown_fields)]
+/// struct Settings {
+///     odometry: String,
+/// }
+///
+/// /// Says how fast the robot is.
+/// struct Speedometer {
+///     odometry: Subscription<Odometry>,
+/// }
+///
+/// impl Module for Speedometer {
+///     type Settings = Settings;
+///     type Interfaces = ();
+///
+///     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
+///         let odometry = context.subscribe(WheelsInterface::ODOMETRY, &settings.odometry, Rate::hz(1.0)?)?;
+///         Ok(Self { odometry })
+///     }
+///
+///     fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
+///         if let Some(odometry) = data.read(&self.odometry)? {
+///             tracing::info!("{} m/s", odometry.twist.speed_m_s);
+///         }
+///         Ok(())
+///     }
+/// }
+/// ```
 pub trait Module: Sized {
     /// What the configuration says under `settings`; use `#[serde(deny_unknown_fields, rename_all = "kebab-case")]`.
     type Settings: DeserializeOwned;

@@ -1,16 +1,16 @@
-//! Places of something bounded, shared out by principal: who holds them decides who may take another. Knows no clock
-//! and no mailbox.
+//! Places of something bounded, shared out by principal: the principals that hold them decide which one may take
+//! another. Knows no clock and no mailbox.
 //!
 //! ```text
 //!  │ own places of each named principal │ open places: for all others, and for what the named hold beyond their own │
 //! ```
 //!
 //! Of the open places a principal gets another one only while it holds fewer of them than are free. So n principals
-//! that take all they can hold one part of n + 1 each, and as many places are free for whoever comes next.
+//! that take all they can hold one part of n + 1 each, and as many places are free for the next one.
 
 use rohrpost_config::Principal;
 
-/// How many places there are, and whose.
+/// How many places there are, and of which principals.
 pub(crate) struct Places {
     named: Box<[Principal]>,
     /// Of each named principal.
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_takes_all_it_can_leaves_as_much_to_the_next() {
+    fn a_principal_that_takes_all_it_can_leaves_as_much_to_the_next() {
         let places = Places::new(&[NAMED, NAMED], 2, 64);
         let mut held = Vec::new();
         let taken: Vec<usize> = (2..9).map(|n| take_all(&places, &mut held, Principal::System(n))).collect();

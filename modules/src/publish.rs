@@ -9,7 +9,7 @@ use rohrpost_mailbox::{Name, Priority};
 const SUBSCRIPTIONS_MAX: usize = 64;
 /// Each of those always finds so many.
 const OWN_SUBSCRIPTIONS: usize = 8;
-/// Whoever wants data for longer has to say so again, however long a lease it asked for, ms.
+/// A subscriber that wants data for longer has to say so again, however long a lease it asked for, ms.
 const LEASE_MAX_MS: u32 = 60_000;
 /// A subscriber that wants data more often gets it so often: the period is its word, the work is ours.
 const PERIOD_MIN_US: u32 = 100;
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn each_value_goes_to_who_wants_each() {
+    fn each_value_goes_to_a_subscriber_of_each() {
         let mut all = subscribed(0);
         assert_eq!((publish(&mut all, || Delivery::Sent), publish(&mut all, || Delivery::Sent)), (1, 1));
         let other = Newest { number: 2, ..Newest::default() };
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn who_takes_all_places_it_can_leaves_some_and_who_is_named_always_finds_its_own() {
+    fn a_principal_that_takes_all_it_can_leaves_some_places_and_a_named_one_always_finds_its_own() {
         let named = Principal::Module(Name::new(1, 140, 0, 0));
         let mut all = Subscriptions::new(&[named]);
         let take = |all: &mut Subscriptions, principal: Principal, class: u8| {

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! A package that goes to another node is counted by its sender there, and once more by the router that delivers it
-//! here under the sender's name: such a flow is a *hop* ([`is_hop`]). Who adds up several nodes leaves hops out, but
-//! for those from nodes that do not answer. It is also received twice, first in the transit mailbox of its own node's
+//! here under the sender's name: such a flow is a *hop* ([`is_hop`]). A sum over several nodes leaves hops out, but for
+//! those from nodes that do not answer. It is also received twice, first in the transit mailbox of its own node's
 //! router: of such mailboxes only the losses are in [`Survey::classes`].
 
 mod distant;
@@ -31,6 +31,20 @@ use rohrpost_mailbox::{
 };
 
 /// A node at one moment.
+///
+/// ```no_run
+/// use rohrpost_modules::survey::Survey;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let installation = rohrpost_config::Installation::load("robot.toml".as_ref())?;
+/// let directory = rohrpost_modules::runtime::find_running().pop().ok_or("no node runs")?;
+/// let node = rohrpost_mailbox::Node::open(&directory)?;
+/// for module in Survey::new(&node, &installation, "base")?.modules {
+///     println!("{} is {}", installation.classes.format(module.name), module.standing().word());
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Survey {
     /// The node's name.
@@ -195,6 +209,13 @@ impl Survey {
     }
 
     /// Packages a second that a module received since `earlier`.
+    ///
+    /// ```
+    /// # use rohrpost_modules::survey::Survey;
+    /// fn is_idle(before: &Survey, now: &Survey, module: rohrpost_mailbox::Name) -> bool {
+    ///     now.received_per_s(before, module) < 1.0
+    /// }
+    /// ```
     pub fn received_per_s(&self, earlier: &Self, name: Name) -> f64 {
         let (Some(now), Some(before)) = (self.module(name), earlier.module(name)) else { return 0.0 };
         let (Some(now_ns), Some(before_ns)) = (now.at_ns, before.at_ns) else { return 0.0 };

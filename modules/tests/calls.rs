@@ -237,7 +237,7 @@ fn a_missing_mailbox_is_looked_for_again_only_when_something_came_or_went() {
     std::fs::rename(&file, &hidden).unwrap();
     let send = |ground: &mut Ground| ground.link.send(SERVER, &Label::default(), &[b"x"]);
     assert!(matches!(send(&mut ground), Err(SendError::NoMailbox(SERVER))));
-    // Back without a word to the registry, which only a test does: who looks finds it.
+    // Back without a word to the registry, which only a test does: a look finds it.
     std::fs::rename(&hidden, &file).unwrap();
     assert!(matches!(send(&mut ground), Err(SendError::NoMailbox(SERVER))), "it did not look");
     let third = Name::new(1, 202, 1, 0);
@@ -251,7 +251,7 @@ fn a_missing_mailbox_is_looked_for_again_only_when_something_came_or_went() {
 
 /// Tools that start at once join one after the other, and may take the first name that is free in another order.
 #[test]
-fn who_has_a_name_later_has_the_later_life_whoever_joined_first() {
+fn the_later_owner_of_a_name_has_the_later_incarnation() {
     let mut ground = ground();
     let name = Name::new(1, 90, 2, 0);
     let [first, second] = [(); 2].map(|()| Participant::join(&ground.node, Name::NONE).unwrap());
@@ -289,7 +289,7 @@ fn a_call_to_all_systems_has_the_first_answer_and_no_fault_of_one_of_them() {
     let command = take(&mut ground.other);
     let (incarnation, fault) = (command.envelope.incarnation, postcard::to_stdvec(&Fault::NoMailbox).unwrap());
     ground.answer_as(Name::new(2, 200, 1, 0), incarnation, sequence, Options::ERROR, &fault);
-    // Another module is nobody whom it has called.
+    // It has called no other module.
     ground.answer_as(
         Name::new(3, 201, 1, 0),
         incarnation,

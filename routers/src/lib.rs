@@ -29,7 +29,6 @@
 #![forbid(unsafe_code)]
 
 pub mod admission;
-pub mod broken;
 pub mod counts;
 pub mod driver;
 pub mod flows;

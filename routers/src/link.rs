@@ -1,6 +1,5 @@
 //! Whether a peer is reachable: the receiving half finds out; the sending half and others read.
 
-use crate::broken::broken;
 use crate::counts::Count;
 use crate::frame::{Alive, RefusalReason};
 use crate::report::Mismatch;
@@ -73,7 +72,7 @@ impl Link {
         if refused_ns > 0 && refused_ns.saturating_add(REFUSED_FOR_NS) > now_ns {
             return PeerLinkState::Refused(self.mismatch());
         }
-        if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns && !broken!(NeverSilent) {
+        if heard_ns.max(started_ns).saturating_add(SILENT_AFTER_NS) <= now_ns {
             return PeerLinkState::Silent;
         }
         if heard_ns == 0 {
@@ -81,7 +80,7 @@ impl Link {
         }
         let denied_ns = self.denied_ns.get();
         let is_unheard = denied_ns != 0 && denied_ns.saturating_add(DENIED_FOR_NS) <= now_ns;
-        if is_unheard && !broken!(NeverUnheard) { PeerLinkState::Unheard } else { PeerLinkState::Alive }
+        if is_unheard { PeerLinkState::Unheard } else { PeerLinkState::Alive }
     }
 
     /// The report for it. `missing`: its datagrams that never came.

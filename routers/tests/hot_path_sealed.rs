@@ -45,8 +45,8 @@ impl Router {
     /// Takes a hello; what it answers takes its place.
     fn greet(&mut self, now_ns: u64, hello: &mut [u8; HELLO_DATAGRAM_BYTES]) -> bool {
         let mut reply = [0; HELLO_DATAGRAM_BYTES];
-        let Opened::Hello(head, greeting) = self.opening.open(hello).unwrap() else { panic!("no hello") };
-        let replied = self.handshake.receive(now_ns, &head, &greeting, &mut reply).reply_bytes.is_some();
+        let Opened::Hello(head, asked) = self.opening.open(hello).unwrap() else { panic!("no hello") };
+        let replied = self.handshake.receive(now_ns, &head, &asked, &mut reply).reply_bytes.is_some();
         self.handshake.begin();
         *hello = reply;
         replied

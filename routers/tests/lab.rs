@@ -120,7 +120,7 @@ fn a_thread_comes_back_and_its_children_stay() {
 }
 
 #[test]
-fn a_cut_link_carries_nothing_and_a_mended_one_all() {
+fn a_cut_link_carries_nothing_and_a_restored_one_all() {
     let Some(lab) = lab(&["10.77.0.1", "10.77.0.2", "10.77.0.3"], 1500) else { return };
     let sockets = [0, 1, 2].map(|index| socket(&lab, &format!("n{index}"), &format!("10.77.0.{}", index + 1)));
     arrives(&sockets[0], &sockets[1]);

@@ -13,11 +13,11 @@ use rohrpost_network::Security;
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{FrameHead, FrameKind, HEAD_BYTES};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
 use rohrpost_routers::stats::Stats;
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
@@ -124,7 +124,7 @@ fn packages_in_the_routers_mailbox_outlive_it() {
 }
 
 #[test]
-fn a_router_with_another_digest_is_refused_by_both_and_taken_when_it_is_mended() {
+fn a_router_with_another_digest_is_refused_by_both_and_taken_when_it_is_corrected() {
     let mut pair = Pair::new();
     let mut replies = replies(&pair);
     pair.sides[1].settings.digest = 8;

@@ -8,9 +8,9 @@ mod common;
 
 use common::{PATIENCE, Pair, Side, label, module, turns};
 use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::security::Port;
 use rohrpost_routers::stats::Stats;
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};

@@ -10,9 +10,9 @@ use common::process::{Router, be_a_router};
 use common::talk::{Listeners, talk};
 use common::{Capture, Crossed, MASTERS, Segment, assert_kept, name, table, validate};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::time::Role;
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::sync::{Arc, Weak};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -138,11 +138,11 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         };
         let foreign = validate(before, &time).outside.len();
         assert!(foreign > FOREIGN / 2, "the parts had two times: {foreign} frames of {}", before.len());
-        if let Some((reigns_ns, _)) = ahead_ns(after, LONELY, 0).next() {
+        if let Some((leads_ns, _)) = ahead_ns(after, LONELY, 0).next() {
             // By the true clock, some of these may be replacements: of a master that stood still.
             let last_ns =
-                ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).rfind(|at_ns| *at_ns < reigns_ns).unwrap();
-            let silent_ns = reigns_ns - last_ns;
+                ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).rfind(|at_ns| *at_ns < leads_ns).unwrap();
+            let silent_ns = leads_ns - last_ns;
             assert!(
                 silent_ns > table().cycle.as_nanos() as u64,
                 "there is one master, and it spoke {silent_ns} ns before"

@@ -12,8 +12,8 @@ use common::talk::{Listeners, PAUSE, Talker, talkers};
 use common::{Capture, MASTERS, Segment, assert_kept};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::monotonic_ns;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::link::PeerLinkState;
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -135,10 +135,10 @@ fn in_a_process_of_its_own() {
 fn the_master_is_killed_again_and_again_and_the_others_lose_nothing() {
     repeated_on_stall(Watched::RealTime, || {
         let Some(mut scene) = Scene::new() else { return };
-        let mut reigns = [0; 2];
+        let mut terms = [0; 2];
         for time in 0..kills() {
             let kill = |scene: &mut Scene, master: u8| {
-                reigns[usize::from(master)] += 1;
+                terms[usize::from(master)] += 1;
                 scene.routers[usize::from(master)].take().unwrap().kill(&scene.segment, master);
             };
             scene.round(&format!("killed, {time}"), kill, Scene::wait_for_another);
@@ -146,7 +146,7 @@ fn the_master_is_killed_again_and_again_and_the_others_lose_nothing() {
             scene.routers[usize::from(dead)] = Some(Router::start(&scene.segment, dead, PROCESS));
             scene.all_talk();
         }
-        assert!(kills() < 2 || reigns.iter().all(|times| *times > 0), "each was master at a time: {reigns:?}");
+        assert!(kills() < 2 || terms.iter().all(|times| *times > 0), "each was master at a time: {terms:?}");
     });
 }
 

@@ -8,8 +8,8 @@ mod common;
 use common::talk::{Listeners, PAUSE, talkers};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, assert_kept, validate};
 use rohrpost_routers::frame::FrameKind;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::time::Role;
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::time::Instant;
 
 /// Rounds of packages: from each node to each other.

@@ -21,8 +21,8 @@ use common::{
 use rohrpost_config::{Installation, bounds};
 use rohrpost_mailbox::{Receiver, Sender, TimeRecord, monotonic_ns};
 use rohrpost_network::{LATE, Tdma, Tunnel};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::tdma::SlotTable;
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{Read, Write};

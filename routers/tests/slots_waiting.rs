@@ -9,7 +9,7 @@ use common::{PATIENCE, Pair, Side, label, module, router, turns};
 use rohrpost_config::TRANSIT;
 use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
 use rohrpost_network::Tdma;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::net::IpAddr;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};

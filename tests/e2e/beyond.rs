@@ -4,7 +4,7 @@
 use crate::harness::{halt, probe, signal, wait};
 use crate::systems::{OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 

@@ -62,7 +62,7 @@ const SAID: [&str; 11] = [
      `laser-noise-m`, `odometry-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
     "21: module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz",
     "28: module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`",
-    "34: module `pilot.1`: settings: `laser` is `odometry.0`, but must be of class `laser`, whose functions it calls",
+    "34: module `pilot.1`: settings: `laser` is `odometry.0`, but this module calls functions of class `laser`",
     "35: module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean \
      `motor`?",
     "40: module `mapper.0`: settings: `resolution-m` is 5; use 0.005 to 1",

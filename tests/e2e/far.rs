@@ -6,7 +6,7 @@ use crate::process::{Running, Said};
 use crate::systems::CLASSES;
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::path::PathBuf;
 
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";
@@ -176,7 +176,7 @@ fn sealed_it_reaches_all_nodes_of_a_lan_and_an_outage_costs_a_gap() {
         assert!(began_ns < ended_ns, "{began_ns} to {ended_ns}");
         wait("it says so in words", || {
             let net = field.shows(&["net"]).out;
-            net.lines().any(|line| line.starts_with("far ") && line.contains(", the last took")).then_some(())
+            net.lines().any(|line| line.starts_with("far ") && line.contains("  took ")).then_some(())
         });
         field.stop();
     });

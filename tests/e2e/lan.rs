@@ -10,7 +10,7 @@ use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Head, monotonic_ns};
 use rohrpost_routers::frame::{FrameHead, FrameKind};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;

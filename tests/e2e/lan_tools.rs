@@ -5,7 +5,7 @@ use crate::lan::addresses;
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::FlowInfo;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use serde_json::Value;
 use std::time::{Duration, Instant};
 

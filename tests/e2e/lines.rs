@@ -88,7 +88,7 @@ fn a_module_with_endless_lines_has_its_share_and_lines_of_others_stay() {
         (0..5000).for_each(|_| _ = send(&robot, &mut tool, me, &line));
         (refused(&robot, &mut tool).beyond_share > 0).then_some(())
     });
-    let after = told(&place, "more than the share of whoever says tool.");
+    let after = told(&place, "more than the share of the principal of tool.");
     let noise = after.lines().filter(|line| line.ends_with("noise")).count();
     assert!(noise > RING / 2 && noise < RING, "{noise} of {RING}");
     assert!(of_probe.iter().all(|line| after.contains(line)), "{before}\n{after}");

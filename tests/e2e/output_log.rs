@@ -4,7 +4,7 @@ use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
 use crate::output::{call, is_own};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 
 const PATIENT: [&str; 3] = ["log", "--timeout", "60"];
 

@@ -3,7 +3,7 @@
 use crate::harness::{PATIENCE, Place, halt, probe, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use serde_json::Value;
 
 #[test]

@@ -5,8 +5,8 @@ use crate::harness::{PATIENCE, Place, Robot, probe, skipped, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use rohrpost::wire::{append, from_bytes};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::HashSet;
 use std::path::PathBuf;
 

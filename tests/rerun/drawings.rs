@@ -1,7 +1,7 @@
 //! Drawings of whole demos, in files.
 
 use super::programs::{bridge, entities_of, ok, rerun, rows, rrd, search_path, timed_rows, times_ns};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
@@ -125,8 +125,8 @@ fn time_slots_and_flows_are_drawn() {
             drawing.has(&format!("/slots/off/{node}"), 2..=41);
         }
         for flow in [r"base\ 0", r"brain\ 0"] {
-            drawing.has(&format!("/slots/flows/{flow}/slowest"), 2..=41);
-            drawing.has(&format!(r"/slots/flows/{flow}/at\ worst"), 2..=41);
+            drawing.has(&format!("/slots/flows/{flow}/worst"), 2..=41);
+            drawing.has(&format!("/slots/flows/{flow}/bound"), 2..=41);
         }
     });
 }

@@ -5,7 +5,7 @@ use super::robot::{Robot, wait};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost_mailbox::{ClassTraffic, Loss, OverflowPolicy, local};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 
 const SCAN: &str = "/world/scan/source.0";
 /// The bridge's mailbox for states.

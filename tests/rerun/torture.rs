@@ -16,7 +16,7 @@ use super::load::{Load, on_one_processor};
 use super::modules::Mark;
 use super::robot::Robot;
 use super::viewer::{Viewer, free_port};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};
 
 /// Ratio of the robot's delay with a faulty viewer to that in peace, at most; with a requested number of rounds.

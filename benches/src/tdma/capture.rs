@@ -1,27 +1,22 @@
 //! What crosses the bridge, and when: the kernel stamps each frame as it comes in by the port of its sender.
 
-use super::filter::{self, HEADS_BYTES};
+use super::filter;
 use super::plan::PORT;
 use super::stage::Stage;
 use crate::Failure;
 use crate::harness::{Child, Gate, Shared, Zeroable};
-use nix::sys::socket::{ControlMessageOwned, MsgFlags, recvmsg};
-use nix::sys::time::{TimeSpec, TimeValLike};
-use rohrpost_mailbox::{Name, Type, monotonic_ns, realtime_ns};
+use rohrpost_mailbox::{Name, Type};
 use rohrpost_routers::frame::Frame;
+use rohrpost_routers::lab;
 use rohrpost_routers::time::message::TimeMessage;
-use std::io::IoSliceMut;
-use std::os::fd::{AsRawFd, OwnedFd};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Most frames, and most packages of declared flows, of one turn.
 const FRAMES_MAX: usize = 1 << 20;
 const ARRIVALS_MAX: usize = 1 << 17;
-/// Interval of reading.
+/// Longest wait for a frame.
 const PATIENCE: Duration = Duration::from_millis(20);
-/// Readings of two clocks; the closest pair counts.
-const READINGS: usize = 100;
 /// Type of packages that hold their time of publication.
 pub const STAMPED: Type = Type::data(7);
 /// Their last bytes: monotonic ns.
@@ -95,9 +90,12 @@ impl Capture {
         let seen = Shared::<CaptureMemory>::new()?;
         let mut watcher = vec![Child::start(|| {
             stage.enter_bridge()?;
-            let socket = filter::open([PORT, PORT + 1], PATIENCE)?;
+            let mut capture = lab::Capture::of(filter::open([PORT, PORT + 1])?);
             seen.gate.meet(2)?;
-            watch(&socket, &seen)
+            loop {
+                capture.wait(PATIENCE);
+                capture.drain(|crossing| note(&seen, crossing.at_ns, crossing.datagram));
+            }
         })?];
         seen.gate.meet_children(&mut watcher)?;
         Ok(Self { seen, watcher })
@@ -175,28 +173,6 @@ fn append<const WORDS: usize>(count: &AtomicU64, all: &[[AtomicU64; WORDS]], wor
     count.store(at + 1, Ordering::Release);
 }
 
-fn watch(socket: &OwnedFd, seen: &CaptureMemory) -> Result<(), Failure> {
-    // Both clocks are slewed alike, so the offset is constant unless somebody sets one.
-    let ahead_ns = realtime_ahead_ns();
-    let (mut bytes, mut space) = ([0; 2048], nix::cmsg_space!(TimeSpec));
-    loop {
-        let mut parts = [IoSliceMut::new(&mut bytes)];
-        let message = match recvmsg::<()>(socket.as_raw_fd(), &mut parts, Some(&mut space), MsgFlags::empty()) {
-            Ok(message) => message,
-            Err(nix::Error::EAGAIN | nix::Error::EINTR) => continue,
-            Err(error) => return Err(Failure::of("packet socket", error)),
-        };
-        let stamps = message.cmsgs().map_err(|error| Failure::of("receive stamp", error))?;
-        let stamp = stamps.into_iter().find_map(|stamp| match stamp {
-            ControlMessageOwned::ScmTimestampns(time) => Some(time.num_nanoseconds()),
-            _ => None,
-        });
-        let stamp = stamp.ok_or_else(|| Failure::Failed("the kernel stamps no frames".into()))?;
-        let len = message.bytes;
-        note(seen, (stamp - ahead_ns).cast_unsigned(), bytes.get(HEADS_BYTES..len).unwrap_or_default());
-    }
-}
-
 /// Records a datagram, and the stamped packages in it.
 fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
     let Ok((head, frame)) = Frame::parse(datagram) else { return };
@@ -230,14 +206,4 @@ fn arrive(seen: &CaptureMemory, at_ns: u64, from: u8, sender: Name, end: &[u8]) 
         let (published_ns, class) = (u64::from_le_bytes(*published), sender.class().0);
         seen.arrival(&Arrived { at_ns, published_ns, class, from });
     }
-}
-
-/// By how much the clock of stamps is ahead of the monotonic one, ns: from the readings that were closest to each
-/// other.
-fn realtime_ahead_ns() -> i64 {
-    let read = |_| {
-        let (before, real, after) = (monotonic_ns(), realtime_ns(), monotonic_ns());
-        (after - before, real.cast_signed() - ((before + after) / 2).cast_signed())
-    };
-    (0..READINGS).map(read).min().map_or(0, |(_, ahead_ns)| ahead_ns)
 }

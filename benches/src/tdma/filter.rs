@@ -3,22 +3,17 @@
 use crate::Failure;
 use libc::{BPF_ABS, BPF_B, BPF_H, BPF_JEQ, BPF_JMP, BPF_K, BPF_LD, BPF_RET, sock_filter, sock_fprog};
 use nix::sys::socket::{AddressFamily, SockFlag, SockProtocol, SockType, setsockopt, socket, sockopt};
-use nix::sys::time::{TimeVal, TimeValLike};
 use std::io;
 use std::os::fd::{AsRawFd, OwnedFd};
-use std::time::Duration;
 
-/// Headers before a datagram's payload: Ethernet, IPv4, UDP.
-pub const HEADS_BYTES: usize = 14 + 20 + 8;
 /// Receive buffer.
 const RECEIVE_BYTES: usize = 64 << 20;
 
-/// Each datagram to one of these ports that comes in at the calling thread's place, with the kernel's stamp. A wait for
-/// one ends after `patience`.
+/// Each datagram to one of these ports that comes in at the calling thread's place, with the kernel's stamp.
 ///
 /// # Errors
 /// When the system refuses it.
-pub fn open(ports: [u16; 2], patience: Duration) -> Result<OwnedFd, Failure> {
+pub fn open(ports: [u16; 2]) -> Result<OwnedFd, Failure> {
     let failed = |error: nix::Error| Failure::of("packet socket", error);
     let socket = socket(AddressFamily::Packet, SockType::Raw, SockFlag::SOCK_CLOEXEC, SockProtocol::EthAll);
     let socket = socket.map_err(failed)?;
@@ -26,8 +21,6 @@ pub fn open(ports: [u16; 2], patience: Duration) -> Result<OwnedFd, Failure> {
     // Only root may exceed the system's limit; other users keep the limit.
     let _ = setsockopt(&socket, sockopt::RcvBufForce, &RECEIVE_BYTES);
     setsockopt(&socket, sockopt::ReceiveTimestampns, &true).map_err(failed)?;
-    let patience = TimeVal::microseconds(i64::try_from(patience.as_micros()).unwrap_or(i64::MAX));
-    setsockopt(&socket, sockopt::ReceiveTimeout, &patience).map_err(failed)?;
     Ok(socket)
 }
 

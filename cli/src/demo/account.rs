@@ -1,13 +1,10 @@
 //! The traffic between the nodes of the demo, and whether every package is accounted for.
 
-use crate::summary::class_name;
-use crate::table::{counted, table, time};
-use rohrpost::Class;
+use crate::quantities::counted;
+use crate::table::table;
 use rohrpost::interfaces::{ClassCarried, Links, PeerLink};
-use rohrpost_config::Installation;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::time::Duration;
 
 /// Whether every package that routers were given is accounted for, once nothing is under way.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -131,28 +128,6 @@ fn lost_of(class: &ClassCarried) -> u64 {
 /// Datagrams from a peer that did not arrive intact.
 fn gone(peer: &PeerLink) -> u64 {
     peer.counters.lost + peer.counters.damaged
-}
-
-/// A row for each class and node.
-pub(super) fn by_class(installation: &Installation, links: &[Links]) -> String {
-    let mut rows: Vec<(u8, [String; 8])> = Vec::new();
-    for node in links {
-        for class in &node.classes {
-            let age = class.age.map_or("-".into(), |age| time(Duration::from_nanos(age.p99_ns)));
-            let lost = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause));
-            let lost: Vec<String> = lost.collect();
-            let counts = [class.taken, class.sent, class.came, class.delivered].map(|count| count.to_string());
-            let [taken, sent, came, delivered] = counts;
-            let name = class_name(installation, Some(Class(class.class)));
-            let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
-            rows.push((class.class, [name, node.node.clone(), taken, sent, came, delivered, age, lost]));
-        }
-    }
-    rows.sort_by_key(|(class, _)| std::cmp::Reverse(*class));
-    table(
-        ["class", "node", ">taken", ">sent", ">came", ">delivered", ">age p99", "lost"],
-        rows.into_iter().map(|(_, row)| row),
-    )
 }
 
 /// A row for each pair of nodes and direction, as counted by the receiver.

@@ -1,10 +1,12 @@
 //! Traffic through the TCP router in the demo, as its clients count it; and the losses when it died.
 
+use crate::carried::lost;
+use crate::net;
 use crate::summary::class_name;
-use crate::table::{table, time};
+use crate::table::table;
 use crate::terminal::Failure;
 use rohrpost::common::GET_DATA;
-use rohrpost::interfaces::{BeyondLink, BeyondState, ClassPassed, TcpInterface};
+use rohrpost::interfaces::{BeyondLink, BeyondState, CarriedLoss, ClassPassed, TcpInterface};
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{CallError, Class, ToolLink};
 use rohrpost_config::Installation;
@@ -77,7 +79,8 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
     let all = sums(links);
     let is_any_on_way = all.values().any(|sum| sum.on_way() > 0);
     let rows = all.into_iter().rev().map(|(class, sum)| {
-        let lost: Vec<String> = sum.lost.iter().map(|(cause, packages)| format!("{packages} {cause}")).collect();
+        let losses = sum.lost.iter().map(|(cause, packages)| CarriedLoss { cause: cause.clone(), packages: *packages });
+        let losses: Vec<CarriedLoss> = losses.collect();
         [
             class_name(installation, Some(Class(class))),
             sum.meant.to_string(),
@@ -86,7 +89,7 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
             sum.came.to_string(),
             sum.delivered.to_string(),
             sum.on_way().to_string(),
-            if lost.is_empty() { "none".into() } else { lost.join(", ") },
+            lost(&losses),
         ]
     });
     let heads =
@@ -101,14 +104,7 @@ pub(super) fn text(installation: &Installation, links: &[BeyondLink], has_died: 
         text += "(packages that newer ones replaced at the TCP router itself count as lost on the way here; `rohrpost \
             net` lists them separately)\n";
     }
-    let rows = links.iter().map(|link| {
-        let outage = link.outage.map_or("-".into(), |outage| match outage.ended_ns {
-            Some(ended_ns) => time(outage.duration(ended_ns)),
-            None => "it is not over".into(),
-        });
-        [link.node.clone(), link.reconnects.to_string(), link.outages.to_string(), outage]
-    });
-    text + "\n" + &table(["node", ">reconnected", ">outages", ">the last took"], rows)
+    text + "\n" + &net::beyond::links(&links.iter().collect::<Vec<_>>())
 }
 
 /// Whether all clients are connected at the end.

@@ -12,7 +12,7 @@ use crate::speech::Speech;
 use crate::summary::print_classes;
 use crate::terminal::{Failure, say};
 use crate::vocabulary::Vocabulary;
-use crate::{flows, slots};
+use crate::{carried, flows, slots};
 use rohrpost::common::{GET_DATA, State};
 use rohrpost::interface::{DataPort, Interface};
 use rohrpost::interfaces::{CartographerInterface, FlowStates, Links, MapCounts, RouterInterface, SlotState};
@@ -129,7 +129,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
         text += &format!("{error}\n");
     }
     text += "\nOver the network; age: from the stamp of data to the mailbox on the other node:\n\n";
-    text += &account::by_class(installation, &links);
+    text += &carried::by_class(installation, &links, |_| true);
     text += &beyond::text(installation, &beyond, seen.tcp_router_died());
     if !verbose {
         return Ok((text, well));
@@ -145,7 +145,7 @@ fn summary(installation: &Arc<Installation>, seen: &TakeoverRecord, verbose: boo
     }
     if !late.is_empty() {
         text +=
-            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle;\n{}:\n\n{late}", flows::LEGEND);
+            &format!("\nDeclared flows; a slot that was late or skipped costs a cycle:\n\n{late}{}", flows::legend());
     }
     if !installation.flows.is_empty() {
         text +=

@@ -2,13 +2,14 @@
 //! view.
 
 use super::node_report::NodeReport;
-use crate::table::{table, time};
+use crate::carried::lost;
+use crate::quantities::{cells, counted, heads};
+use crate::summary::class_name;
+use crate::table::{table_of, time};
 use crate::target::Running;
-use crate::units::{bytes, fine};
 use rohrpost::Class;
-use rohrpost::interfaces::{BeyondClients, BeyondCrowded, BeyondLink, BeyondState, ClassPassed};
+use rohrpost::interfaces::{BeyondClient, BeyondClients, BeyondLink, BeyondState, ClassPassed};
 use rohrpost::output::plain;
-use std::time::Duration;
 
 /// Tables of clients, of the server's connections and of lost or replaced packages, and why a client is not connected;
 /// empty without a TCP router.
@@ -18,8 +19,8 @@ pub(super) fn text(running: &Running, all: &[NodeReport]) -> [String; 4] {
     [self::links(&links), whys(&links), clients(&servers), losses(running, &links, &servers)]
 }
 
-fn links(links: &[&BeyondLink]) -> String {
-    let ns = |ns: Option<u64>| ns.map_or("-".into(), |ns| fine(ns as f64 * 1e-9));
+/// A row for each client; empty if there are none.
+pub(crate) fn links(links: &[&BeyondLink]) -> String {
     let sum = |classes: &[ClassPassed]| classes.iter().map(|class| class.passed).sum::<u64>().to_string();
     let row = |link: &&BeyondLink| {
         let state = match link.state {
@@ -27,42 +28,17 @@ fn links(links: &[&BeyondLink]) -> String {
             BeyondState::Joining => "joining",
             BeyondState::Up => "up",
         };
-        [
-            link.node.clone(),
-            link.server.clone(),
-            state.into(),
-            link.reconnects.to_string(),
-            outages(link),
-            ns(link.round_trip_ns),
-            link.time_error_ns.map_or("-".into(), |error_ns| format!("±{}", fine(error_ns as f64 * 1e-9))),
-            sum(&link.sent),
-            sum(&link.received),
-            bytes(link.waiting_bytes as f64),
-        ]
+        let before = [link.node.clone(), link.server.clone(), state.into()];
+        cells(before, *link, [outage(link), sum(&link.sent), sum(&link.received)])
     };
-    let heads = [
-        "node",
-        "TCP router",
-        "state",
-        ">reconnects",
-        "outages",
-        ">there and back",
-        ">time",
-        ">sent",
-        ">received",
-        ">memory",
-    ];
-    if links.is_empty() { String::new() } else { table(heads, links.iter().map(row)) }
+    let heads = heads::<BeyondLink>(&["node", "TCP router", "state"], &["last outage", ">sent", ">received"]);
+    if links.is_empty() { String::new() } else { table_of(&heads, links.iter().map(row)) }
 }
 
-/// How often it was disconnected, and for how long.
-fn outages(link: &BeyondLink) -> String {
+/// How long it was disconnected.
+fn outage(link: &BeyondLink) -> String {
     let Some(last) = link.outage else { return "none".into() };
-    let took = match last.ended_ns {
-        Some(ended_ns) => format!("the last took {}", time(last.duration(ended_ns))),
-        None => "it is disconnected".into(),
-    };
-    format!("{}, {took}", link.outages)
+    last.ended_ns.map_or("it is disconnected".into(), |ended_ns| format!("took {}", time(last.duration(ended_ns))))
 }
 
 fn whys(links: &[&BeyondLink]) -> String {
@@ -73,36 +49,21 @@ fn whys(links: &[&BeyondLink]) -> String {
 fn clients(servers: &[&BeyondClients]) -> String {
     let mut text = String::new();
     for server in servers {
-        let ms = |ms: u64| time(Duration::from_millis(ms));
         let rows = server.clients.iter().map(|client| {
-            [
-                client.name.clone(),
-                client.address.clone(),
-                client.system.to_string(),
-                if client.takes_part { "takes part".into() } else { "-".into() },
-                client.ranges.to_string(),
-                ms(client.age_ms),
-                ms(client.heard_ms),
-                client.lost.to_string(),
-                bytes(client.bytes as f64),
-            ]
+            let state = if client.takes_part { "takes part" } else { "-" };
+            let before = [client.name.clone(), client.address.clone(), client.system.to_string(), state.into()];
+            cells(before, client, [])
         });
-        let heads = ["client", "from", ">system", "state", ">ranges", ">since", ">heard", ">lost", ">memory"];
-        text += &table(heads, rows);
+        text += &table_of(&heads::<BeyondClient>(&["client", "from", ">system", "state"], &[]), rows);
         if server.more > 0 {
             text += &format!("… and {} more\n", server.more);
         }
-        text += &format!("(TCP router at {}: {} left, {} refused)\n", server.address, server.left, server.refused);
-        let BeyondCrowded { greetings, clients, ranges, packages } = server.crowded;
-        if greetings + clients + ranges + packages > 0 {
-            text += &format!(
-                "(beyond the part of one certificate or address: {packages} packages lost, {clients} clients and \
-                 {greetings} connections before their hello gave way, {ranges} registrations of too many ranges)\n"
-            );
-        }
-        if server.overtaken > 0 {
-            text += &format!("({} registrations were replaced by later ones of the same client)\n", server.overtaken);
-        }
+        text += &format!(
+            "(TCP router at {}: counted {}; beyond the share of one certificate or address {})\n",
+            server.address,
+            counted(*server),
+            counted(&server.crowded)
+        );
         if !server.refusal.is_empty() {
             text += &format!("the last that was refused: {}\n", plain::line(&server.refusal));
         }
@@ -119,14 +80,10 @@ fn losses(running: &Running, links: &[&BeyondLink], servers: &[&BeyondClients]) 
     let mut rows = Vec::new();
     for (at, classes) in ends {
         for class in classes.iter().filter(|class| class.replaced > 0 || !class.lost.is_empty()) {
-            let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
-            let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
-            let name = name.unwrap_or_else(|| class.class.to_string());
-            let [came, passed, replaced] =
-                [class.packages, class.passed, class.replaced].map(|count| count.to_string());
-            let lost = if lost.is_empty() { "none".into() } else { lost.join(", ") };
-            rows.push([at.clone(), name, came, passed, replaced, lost]);
+            let name = class_name(&running.installation, Some(Class(class.class)));
+            rows.push(cells([at.clone(), name], class, [lost(&class.lost)]));
         }
     }
-    if rows.is_empty() { String::new() } else { table(["at", "class", ">came", ">passed", ">replaced", "lost"], rows) }
+    let heads = heads::<ClassPassed>(&["at", "class"], &["lost"]);
+    if rows.is_empty() { String::new() } else { table_of(&heads, rows) }
 }

@@ -1,35 +1,50 @@
 //! `rohrpost net`: the state of all nodes' routers: links, queues, losses with their causes, and the quality of each
 //! clock.
 
-mod beyond;
+pub(super) mod beyond;
 mod node_report;
 mod show;
 
 use super::round::{Round, Rounds};
 use super::vocabulary::Vocabulary;
+use crate::quantities::legend;
 use crate::terminal::{Failure, say};
 use node_report::{NodeReport, rates};
-use rohrpost::interfaces::{RouterInterface, TcpInterface};
+use rohrpost::interfaces::{
+    BeyondClient, BeyondClients, BeyondCrowded, BeyondLink, ClassPassed, LinkCounters, RouterInterface, SlotState,
+    TcpInterface, TunnelState,
+};
 use std::process::ExitCode;
 use std::time::Duration;
 
 /// Time between the two observations of a rate: routers publish their state twice a second.
 const LOOK_AGAIN: Duration = Duration::from_millis(600);
 
-#[derive(clap::Args)]
-#[command(after_help = "Examples:
+const EXAMPLES: &str = "Examples:
   rohrpost net                all nodes, once
   rohrpost net --watch        repeatedly; Ctrl-C ends it
   rohrpost net --node arm --json
-`lost`: datagrams from the peer that never arrived; `missed`: datagrams to the peer that it misses; both are losses \
-    on the wire. `refused`: datagrams from the peer's address that were rejected. With time slots, `late`: slots that \
-    were not used because the router woke up too late; `skipped`: slots that passed while it did not run; `silent`: \
-    slots in which its time was too uncertain; `held`: datagrams that missed the end of their slot. Where datagrams \
-    are sealed, a line counts hellos that a node sent by the time of an unverified node. Packages lost in routers \
-    follow below, by class and cause (at the TCP router and its clients also `replaced` packages: only the newest \
-    data count, and newer data came while they waited, which is no loss), and at the end the declared flows: allowed \
-    and measured latency. Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, \
-    or a client is not connected.")]
+Exit code 1: a router or a client of the TCP router does not answer, a peer is not alive, or a client is not \
+    connected.
+";
+
+/// Examples, and what each counter means.
+fn help() -> String {
+    let parts = [
+        ("Of a link between two routers", legend::<LinkCounters>()),
+        ("Of time slots", legend::<SlotState>()),
+        ("Of the tunnel", legend::<TunnelState>()),
+        ("Of a client of the TCP router", legend::<BeyondLink>()),
+        ("Of a connection with the TCP router", legend::<BeyondClient>()),
+        ("Of the TCP router", legend::<BeyondClients>()),
+        ("Of what went beyond the share of a certificate or address there", legend::<BeyondCrowded>()),
+        ("Of a class there, and at its clients", legend::<ClassPassed>()),
+    ];
+    parts.into_iter().fold(EXAMPLES.to_owned(), |text, (of, lines)| format!("{text}{of}:\n{lines}"))
+}
+
+#[derive(clap::Args)]
+#[command(after_help = help())]
 pub(super) struct Arguments {
     #[command(flatten)]
     rounds: Rounds,

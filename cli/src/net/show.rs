@@ -2,13 +2,13 @@
 
 use super::beyond;
 use super::node_report::NodeReport;
-use crate::flows;
+use crate::quantities::counted;
 use crate::slots::kept;
-use crate::table::{counted, table, time};
+use crate::table::{table, time};
 use crate::target::Running;
 use crate::units::{bytes, fine};
 use crate::vocabulary::Vocabulary;
-use rohrpost::Class;
+use crate::{carried, flows};
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
 use rohrpost::output::plain;
 use std::time::Duration;
@@ -151,26 +151,8 @@ fn waiting(all: &[NodeReport]) -> String {
 
 /// Classes with losses; the others are in the JSON.
 fn losses(running: &Running, all: &[NodeReport]) -> String {
-    let mut rows = Vec::new();
-    for links in all.iter().filter_map(|told| told.links.as_ref()) {
-        for class in links.classes.iter().filter(|class| !class.lost.is_empty()) {
-            let name = running.installation.classes.name(Class(class.class)).map(str::to_owned);
-            let lost: Vec<String> = class.lost.iter().map(|lost| format!("{} {}", lost.packages, lost.cause)).collect();
-            rows.push([
-                links.node.clone(),
-                name.unwrap_or_else(|| class.class.to_string()),
-                class.taken.to_string(),
-                class.sent.to_string(),
-                class.came.to_string(),
-                class.delivered.to_string(),
-                lost.join(", "),
-            ]);
-        }
-    }
-    if rows.is_empty() {
-        return String::new();
-    }
-    table(["node", "class", ">taken", ">sent", ">came", ">delivered", "lost"], rows)
+    let links = all.iter().filter_map(|told| told.links.as_ref());
+    carried::by_class(&running.installation, links, |class| !class.lost.is_empty())
 }
 
 /// Declared flows; empty if there is none.
@@ -179,7 +161,7 @@ fn measured(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) 
     let states = all.iter().filter_map(|told| told.flows.as_ref());
     let table =
         flows::measured(&running.installation, states, &links, vocabulary, |module| running.describe(module).ok());
-    if table.is_empty() { table } else { format!("{table}({})\n", flows::LEGEND) }
+    if table.is_empty() { table } else { format!("{table}{}", flows::legend()) }
 }
 
 fn clocks(all: &[NodeReport]) -> String {

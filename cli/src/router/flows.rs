@@ -20,6 +20,7 @@ pub(super) fn of(shell: &Shell, classes: &ClassTable) -> FlowStates {
 fn state(flow: &Flow, counts: &FlowCounts, classes: &ClassTable) -> FlowState {
     let name = |names: &[Name]| names.first().map(|name| classes.format(*name)).unwrap_or_default();
     let (latency, ns) = (counts.latency(), |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
+    let measured = |time: Duration| Some(ns(time)).filter(|ns| *ns > 0);
     let lost = Cause::ALL.into_iter().map(|cause| (cause.word(), counts.lost(cause))).filter(|(_, n)| *n > 0);
     FlowState {
         from: name(&flow.from),
@@ -27,14 +28,14 @@ fn state(flow: &Flow, counts: &FlowCounts, classes: &ClassTable) -> FlowState {
         carries: flow.carries.map(|carries| carries.to_string()).unwrap_or_default(),
         size: flow.size,
         packages: latency.count(),
-        worst_ns: ns(latency.max),
-        mean_ns: latency.mean().map_or(0, ns),
-        p99_ns: latency.quantile(0.99).map_or(0, ns),
         bound_ns: flow.bound.map(ns),
+        kept_worst_ns: flow.bound.and(measured(counts.kept_worst())),
+        worst_ns: measured(latency.max),
+        mean_ns: latency.mean().map(ns),
+        p99_ns: latency.quantile(0.99).map(ns),
         deadline_ns: ns(flow.deadline),
-        kept_worst_ns: ns(counts.kept_worst()),
-        over_bound: counts.over_bound.get(),
-        kept_over_bound: counts.kept_over_bound.get(),
+        over_bound: flow.bound.map(|_| counts.over_bound.get()),
+        kept_over_bound: flow.bound.map(|_| counts.kept_over_bound.get()),
         over_deadline: counts.over_deadline.get(),
         lost: lost.map(|(cause, packages)| CarriedLoss { cause: cause.into(), packages }).collect(),
     }

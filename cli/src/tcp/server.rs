@@ -80,7 +80,7 @@ impl Module for ServerModule {
                     ranges: seen.crowded.ranges,
                     packages: seen.crowded_packages,
                 },
-                overtaken: seen.superseded,
+                superseded: seen.superseded,
                 held_lines: seen.held,
                 classes: classes(&seen.classes),
             },
@@ -156,7 +156,7 @@ mod tests {
             refused: most,
             refusal: "x".repeat(1000),
             crowded: BeyondCrowded { greetings: most, clients: most, ranges: most, packages: most },
-            overtaken: most,
+            superseded: most,
             held_lines: most,
             classes: vec![class; 64],
         };

@@ -6,26 +6,79 @@ use rohrpost::output::plain;
 use rohrpost::survey::Standing;
 use std::cmp::Ordering;
 
-/// A column.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Column {
-    Module,
-    Node,
-    State,
-    Class,
-    Priority,
-    Scheduling,
-    In,
-    Out,
-    Waiting,
-    Lost,
-    P50,
-    P99,
-    Restarts,
-    Cpu,
-    Memory,
-    Pid,
-    Why,
+/// What a column shows of a module.
+enum Content {
+    /// Text, sorted as such.
+    Text(fn(&Row) -> String),
+    /// Text, sorted by a rank.
+    Ranked(fn(&Row) -> String, fn(&Row) -> usize),
+    /// A number, if it is known, and its text; the greatest comes first.
+    Number(fn(&Row) -> Option<f64>, fn(f64) -> String),
+}
+
+use Content::{Number, Ranked, Text};
+
+/// All that is known of a column.
+struct About {
+    head: &'static str,
+    text: &'static str,
+    /// Fixed, so that nothing moves as numbers change.
+    width: u16,
+    /// Narrow terminals drop the greatest first; 0 is always shown.
+    rank: u8,
+    content: Content,
+}
+
+/// Declares the columns from left to right: head, width, rank, content, and the text for help and book.
+macro_rules! columns {
+    ($($name:ident: $head:literal, $width:expr, $rank:literal, $content:expr, $text:literal;)+) => {
+        /// A column.
+        #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+        pub(super) enum Column {
+            $($name,)+
+        }
+
+        impl Column {
+            /// From left to right.
+            pub(super) const ALL: [Self; [$($rank),+].len()] = [$(Self::$name),+];
+
+            const fn about(self) -> About {
+                match self {
+                    $(Self::$name => About { head: $head, text: $text, width: $width, rank: $rank, content: $content },)+
+                }
+            }
+        }
+    };
+}
+
+columns! {
+    Module: "module", NAME_MIN, 0, Text(|row| row.line.module.clone()),
+        "name, and with + the number of its further names";
+    Node: "node", 8, 2, Text(|row| row.line.node.clone()), "where it runs; shown when there are several nodes";
+    State: "state", 8, 1,
+        Ranked(|row| row.line.account.state.to_string(), |row| row.line.account.state.severity()),
+        "starting, on, off, stopped; error; busy: its code does not return; restarting; failed: given up; unreachable";
+    Class: "class", 7, 16, Text(|row| row.class.clone()), "its class, which gives its importance";
+    Priority: "prio", 4, 11, Number(|row| Some(row.line.priority.into()), whole),
+        "class id = priority of its commands, 255 most urgent";
+    Scheduling: "sched", 7, 10, Text(|row| row.line.scheduling.clone()),
+        "as the kernel has it: fifo 1..99, or nice";
+    In: "in/s", 6, 3, Number(|row| row.line.received_per_s, short), "packages received a second";
+    Out: "out/s", 6, 6, Number(|row| row.sent_per_s, short), "packages sent a second";
+    Waiting: "wait", 5, 5, Number(|row| Some(row.line.waiting.into()), whole),
+        "packages that wait in its mailboxes now";
+    Lost: "lost", 6, 4, Number(|row| Some(row.line.losses.lost as f64), short),
+        "packages lost in its mailboxes so far";
+    P50: "p50", 7, 13, Number(|row| row.waited_p50_s, units::short),
+        "half of the packages of the interval waited at most this long";
+    P99: "p99", 7, 7, Number(|row| row.waited_p99_s, units::short), "99 of 100 waited at most this long";
+    Restarts: "rst", 4, 9, Number(|row| Some(row.line.account.restarts.into()), whole),
+        "how often launch has restarted it";
+    Cpu: "cpu%", 6, 8, Number(|row| row.cpu_percent, |percent| format!("{percent:.1}")), "of one processor";
+    Memory: "memory", 6, 12, Number(|row| row.memory_bytes.map(|bytes| bytes as f64), memory),
+        "resident, mailboxes included";
+    Pid: "pid", 7, 15, Number(|row| row.line.pid.map(f64::from), whole), "process";
+    Why: "why", 16, 14, Text(why), "the last error, or the causes of losses";
 }
 
 /// Space between columns.
@@ -35,162 +88,52 @@ const NAME_MIN: u16 = 12;
 const NAME_MAX: u16 = 34;
 
 impl Column {
-    /// From left to right.
-    pub(super) const ALL: [Self; 17] = [
-        Self::Module,
-        Self::Node,
-        Self::State,
-        Self::Class,
-        Self::Priority,
-        Self::Scheduling,
-        Self::In,
-        Self::Out,
-        Self::Waiting,
-        Self::Lost,
-        Self::P50,
-        Self::P99,
-        Self::Restarts,
-        Self::Cpu,
-        Self::Memory,
-        Self::Pid,
-        Self::Why,
-    ];
-
-    /// In order of importance; the first is always shown.
-    const BY_IMPORTANCE: [Self; 17] = [
-        Self::Module,
-        Self::State,
-        Self::Node,
-        Self::In,
-        Self::Lost,
-        Self::Waiting,
-        Self::Out,
-        Self::P99,
-        Self::Cpu,
-        Self::Restarts,
-        Self::Scheduling,
-        Self::Priority,
-        Self::Memory,
-        Self::P50,
-        Self::Why,
-        Self::Pid,
-        Self::Class,
-    ];
-
     pub(super) const fn head(self) -> &'static str {
-        match self {
-            Self::Module => "module",
-            Self::Node => "node",
-            Self::State => "state",
-            Self::Class => "class",
-            Self::Priority => "prio",
-            Self::Scheduling => "sched",
-            Self::In => "in/s",
-            Self::Out => "out/s",
-            Self::Waiting => "wait",
-            Self::Lost => "lost",
-            Self::P50 => "p50",
-            Self::P99 => "p99",
-            Self::Restarts => "rst",
-            Self::Cpu => "cpu%",
-            Self::Memory => "memory",
-            Self::Pid => "pid",
-            Self::Why => "why",
-        }
+        self.about().head
     }
 
-    /// Its meaning, for the help.
+    /// Its meaning, for the help and the book.
     pub(super) const fn text(self) -> &'static str {
-        match self {
-            Self::Module => "name, and with + the number of its further names",
-            Self::Node => "where it runs; shown when there are several nodes",
-            Self::State => {
-                "starting, on, off, stopped; error; busy: its code does not return; restarting; failed: given up; \
-                 unreachable"
-            }
-            Self::Class => "its class, which gives its importance",
-            Self::Priority => "class id = priority of its commands, 255 most urgent",
-            Self::Scheduling => "as the kernel has it: fifo 1..99, or nice",
-            Self::In => "packages received a second",
-            Self::Out => "packages sent a second",
-            Self::Waiting => "packages that wait in its mailboxes now",
-            Self::Lost => "packages lost in its mailboxes so far",
-            Self::P50 => "half of the packages of the interval waited at most this long",
-            Self::P99 => "99 of 100 waited at most this long",
-            Self::Restarts => "how often launch has restarted it",
-            Self::Cpu => "of one processor",
-            Self::Memory => "resident, mailboxes included",
-            Self::Pid => "process",
-            Self::Why => "the last error, or the causes of losses",
-        }
+        self.about().text
     }
 
-    /// Its width. Fixed, so that nothing moves as numbers change.
     const fn width(self) -> u16 {
-        match self {
-            Self::Module => NAME_MIN,
-            Self::State | Self::Node => 8,
-            Self::Class | Self::Pid => 7,
-            Self::Priority | Self::Restarts => 4,
-            Self::Scheduling => 7,
-            Self::In | Self::Out | Self::Lost | Self::Cpu => 6,
-            Self::Waiting => 5,
-            Self::Memory => 6,
-            Self::P50 | Self::P99 => 7,
-            Self::Why => 16,
-        }
+        self.about().width
     }
 
     /// Numbers are aligned to the right.
     pub(super) const fn is_number(self) -> bool {
-        !matches!(self, Self::Module | Self::Node | Self::State | Self::Class | Self::Scheduling | Self::Why)
+        matches!(self.about().content, Number(..))
+    }
+
+    /// In order of importance; the first is always shown.
+    fn by_importance() -> [Self; Self::ALL.len()] {
+        let mut all = Self::ALL;
+        all.sort_by_key(|column| column.about().rank);
+        all
     }
 
     /// Its text for a module.
     pub(super) fn cell(self, row: &Row) -> String {
-        let number = |number: Option<f64>| number.map_or("-".into(), short);
-        let waited = |seconds: Option<f64>| seconds.map_or("-".into(), units::short);
-        match self {
-            Self::Module => row.line.module.clone(),
-            Self::Node => row.line.node.clone(),
-            Self::State => row.line.account.state.to_string(),
-            Self::Class => row.class.clone(),
-            Self::Priority => row.line.priority.to_string(),
-            Self::Scheduling => row.line.scheduling.clone(),
-            Self::In => number(row.line.received_per_s),
-            Self::Out => number(row.sent_per_s),
-            Self::Waiting => row.line.waiting.to_string(),
-            Self::Lost => short(row.line.losses.lost as f64),
-            Self::P50 => waited(row.waited_p50_s),
-            Self::P99 => waited(row.waited_p99_s),
-            Self::Restarts => row.line.account.restarts.to_string(),
-            Self::Cpu => row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}")),
-            Self::Memory => row.memory_bytes.map_or("-".into(), memory),
-            Self::Pid => row.line.pid.map_or("-".into(), |pid| pid.to_string()),
-            Self::Why => why(row),
+        match self.about().content {
+            Text(text) | Ranked(text, _) => text(row),
+            Number(number, text) => number(row).map_or("-".into(), text),
         }
     }
 
     /// The order of two modules by this column: what needs attention comes first.
     pub(super) fn compare(self, a: &Row, b: &Row) -> Ordering {
-        let state = |row: &Row| row.line.account.state;
-        let number = |of: fn(&Row) -> Option<f64>| of(b).unwrap_or(-1.0).total_cmp(&of(a).unwrap_or(-1.0));
-        match self {
-            Self::State => state(a).severity().cmp(&state(b).severity()),
-            Self::Module | Self::Node | Self::Class | Self::Scheduling | Self::Why => self.cell(a).cmp(&self.cell(b)),
-            Self::Priority => b.line.priority.cmp(&a.line.priority),
-            Self::In => number(|row| row.line.received_per_s),
-            Self::Out => number(|row| row.sent_per_s),
-            Self::Waiting => b.line.waiting.cmp(&a.line.waiting),
-            Self::Lost => b.line.losses.lost.cmp(&a.line.losses.lost),
-            Self::P50 => number(|row| row.waited_p50_s),
-            Self::P99 => number(|row| row.waited_p99_s),
-            Self::Restarts => b.line.account.restarts.cmp(&a.line.account.restarts),
-            Self::Cpu => number(|row| row.cpu_percent),
-            Self::Memory => b.memory_bytes.cmp(&a.memory_bytes),
-            Self::Pid => a.line.pid.cmp(&b.line.pid),
+        match self.about().content {
+            Text(text) => text(a).cmp(&text(b)),
+            Ranked(_, rank) => rank(a).cmp(&rank(b)),
+            Number(number, _) => number(b).unwrap_or(-1.0).total_cmp(&number(a).unwrap_or(-1.0)),
         }
     }
+}
+
+/// A whole number, all its digits.
+fn whole(number: f64) -> String {
+    format!("{number:.0}")
 }
 
 /// Why it does not work; else the causes of its losses, or the last error. Replaced packages are no loss.
@@ -218,8 +161,8 @@ pub(super) fn short(number: f64) -> String {
 }
 
 /// Bytes in at most six characters.
-pub(super) fn memory(bytes: u64) -> String {
-    let mib = bytes as f64 / f64::from(1 << 20);
+pub(super) fn memory(bytes: f64) -> String {
+    let mib = bytes / f64::from(1 << 20);
     match mib {
         mib if mib < 99.95 => format!("{mib:.1}M"),
         mib if mib < 9_999.5 => format!("{mib:.0}M"),
@@ -233,7 +176,7 @@ pub(super) fn fit(room: u16, names: u16, nodes: bool) -> Vec<(Column, u16)> {
     let names = names.clamp(NAME_MIN, NAME_MAX);
     let mut chosen = Vec::new();
     let mut used = 0;
-    for column in Column::BY_IMPORTANCE.into_iter().filter(|column| nodes || *column != Column::Node) {
+    for column in Column::by_importance().into_iter().filter(|column| nodes || *column != Column::Node) {
         let width = column.width() + if chosen.is_empty() { 0 } else { GAP };
         // The first column that does not fit ends the list: a less important one never replaces a more important one.
         if used + width > room && !chosen.is_empty() {
@@ -274,8 +217,8 @@ mod tests {
         ] {
             assert_eq!(short(number), text);
         }
-        for (bytes, text) in [(0, "0.0M"), (12_345_678, "11.8M"), (512 << 20, "512M"), (64 << 30, "64G")] {
-            assert_eq!(memory(bytes), text);
+        for (bytes, text) in [(0, "0.0M"), (12_345_678, "11.8M"), (512 << 20, "512M"), (64_u64 << 30, "64G")] {
+            assert_eq!(memory(bytes as f64), text);
         }
     }
 
@@ -286,11 +229,21 @@ mod tests {
             let used: u16 = columns.iter().map(|(_, width)| width + GAP).sum::<u16>() - GAP;
             assert!(used <= room.max(1), "{used} in {room}: {columns:?}");
             let kept = columns.len();
-            let most_important = &Column::BY_IMPORTANCE[..kept];
+            let most_important = &Column::by_importance()[..kept];
             assert!(columns.iter().all(|(column, _)| most_important.contains(column)), "{room}: {columns:?}");
         }
         assert_eq!(fit(21, 20, true).iter().map(|(c, _)| *c).collect::<Vec<_>>(), [Column::Module, Column::State]);
         assert_eq!(fit(168, 20, true).len(), Column::ALL.len());
         assert_eq!(fit(160, 20, false).len(), Column::ALL.len() - 1);
+    }
+    #[test]
+    fn each_rank_is_given_once_and_the_book_lists_the_columns() {
+        let ranks: Vec<usize> = Column::by_importance().iter().map(|column| column.about().rank.into()).collect();
+        assert_eq!(ranks, (0..Column::ALL.len()).collect::<Vec<_>>());
+        let page = include_str!("../../../docs/src/tools.md");
+        let said = page.lines().skip_while(|line| *line != "| column | meaning |").skip(2);
+        let said: Vec<&str> = said.take_while(|line| line.starts_with('|')).collect();
+        let columns = Column::ALL.map(|column| format!("| `{}` | {} |", column.head(), column.text()));
+        assert_eq!(said, columns, "left: docs/src/tools.md, right: Column");
     }
 }

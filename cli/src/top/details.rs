@@ -98,7 +98,13 @@ fn about(installation: &Installation, sample: &Sample, row: &Row) -> String {
         };
         say("process", format!("{}, for {}{restarts}, {}", process.pid, span(since), row.line.scheduling));
         let percent = row.cpu_percent.map_or("-".into(), |percent| format!("{percent:.1}"));
-        say("takes", format!("{percent} % of a processor, {} of memory", row.memory_bytes.map_or("-".into(), memory)));
+        say(
+            "takes",
+            format!(
+                "{percent} % of a processor, {} of memory",
+                row.memory_bytes.map_or("-".into(), |bytes| memory(bytes as f64))
+            ),
+        );
     }
     lines.join("\n")
 }

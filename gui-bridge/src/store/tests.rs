@@ -247,7 +247,7 @@ fn a_closed_store_gives_all_at_once_and_ends() {
 }
 
 #[test]
-fn who_waits_in_vain_can_be_called_off() {
+fn a_reader_that_waits_in_vain_can_be_called_off() {
     let store = store(1);
     let looks = std::cell::Cell::new(0);
     let order = store.next(|| {

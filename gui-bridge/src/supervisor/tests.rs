@@ -149,7 +149,7 @@ fn a_disk_that_stands_still_is_waited_for_and_keeps_nobody_waiting() {
 }
 
 #[test]
-fn who_closes_a_drawing_waits_no_longer_than_it_says() {
+fn closing_a_drawing_waits_no_longer_than_it_says() {
     let folder = tempfile::tempdir().unwrap();
     let path = slow_file(&folder);
     let scene = Scene::open("lab", Sink::file(&path), RATE_HZ, 0).unwrap();

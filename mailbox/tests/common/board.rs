@@ -81,8 +81,8 @@ struct Run {
 
 #[repr(C)]
 struct Front {
-    /// Odd: all senders are asked to hold still. Each time has a number of its own, so that who is slow to go on after
-    /// one is not taken for still in the next.
+    /// Odd: all senders are asked to hold still. Each time has a number of its own, so that a sender that is slow to go
+    /// on after one is not taken for still in the next.
     hold: AtomicU32,
     end: AtomicU32,
     seats: [Seat; SEATS],
@@ -171,7 +171,7 @@ impl Board {
         assert_eq!(before.is_multiple_of(2), hold, "asked twice");
     }
 
-    /// Whether who sits there holds still, and stays so until it is asked to go on.
+    /// Whether the process of this seat holds still, and stays so until it is asked to go on.
     pub(crate) fn is_still(&self, seat: usize) -> bool {
         let hold = self.front.hold.load(SeqCst);
         hold % 2 == 1 && self.seat(seat).still.load(SeqCst) == hold

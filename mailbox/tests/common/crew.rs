@@ -43,7 +43,7 @@ impl Actor {
                 // SAFETY: takes numbers only.
                 unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
                 let orphan = nix::unistd::getppid() != parent;
-                // The alarm first: writing takes time, and whoever writes may be killed meanwhile.
+                // The alarm first: writing takes time, and the writer may be killed meanwhile.
                 std::panic::set_hook(Box::new(|why| {
                     alarm.store(1, SeqCst);
                     eprintln!("{why}");
@@ -139,7 +139,7 @@ pub(crate) fn is_asleep(pid: Pid) -> bool {
 pub(crate) fn alone(ground: &Ground, role: &str) {
     let master = ground.start(role);
     loop {
-        // Longer than it waits for others: then it says itself for whom.
+        // Longer than it waits for others: then it says itself for which.
         match master.told.recv_timeout(2 * PATIENCE) {
             Ok(told) if told == "done" => return master.finish(),
             Ok(told) => println!("{role}: {told}"),

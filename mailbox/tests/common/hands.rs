@@ -18,7 +18,7 @@ const POLLER: Name = Name::new(1, 203, 1, 0);
 /// A mailbox of another node, and that of the router which leads there.
 const FAR: Name = Name::new(1, 204, 1, 0);
 const TRANSIT: Name = Name::new(1, 250, 0, local::TRANSIT);
-/// What the answerer is asked for: a package at once, or when who asks sleeps.
+/// What the answerer is asked for: a package at once, or when the asker sleeps.
 const AT_ONCE: u32 = 1;
 const WHEN_ASLEEP: u32 = 2;
 /// Often enough that nothing is left out that comes every so many times, such as looking at a word without a hint.
@@ -196,7 +196,7 @@ fn answer(ground: &Ground, asked: &AtomicU32, pid: Pid) {
     }
 }
 
-/// All that the one has who does the operations.
+/// All that the process has which does the operations.
 struct Hands {
     board: Board,
     asked: &'static AtomicU32,
@@ -291,13 +291,13 @@ impl Hands {
     }
 
     /// Waits until the sleeper, or the poller, has received all and sleeps.
-    fn asleep(&mut self, who: usize) {
-        until("it has received all", || self.board.seat(who).operations() == self.sent[who]);
-        until("it sleeps", || is_asleep(self.pids[who]));
-        self.sent[who] += 1;
+    fn asleep(&mut self, seat: usize) {
+        until("it has received all", || self.board.seat(seat).operations() == self.sent[seat]);
+        until("it sleeps", || is_asleep(self.pids[seat]));
+        self.sent[seat] += 1;
     }
 
-    fn wake(&mut self, who: usize) {
-        self.to[who].send(&label(LOW, 1), &[b"wake up"]).unwrap();
+    fn wake(&mut self, seat: usize) {
+        self.to[seat].send(&label(LOW, 1), &[b"wake up"]).unwrap();
     }
 }

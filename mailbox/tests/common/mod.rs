@@ -34,7 +34,7 @@ pub(crate) fn shape(slots: u16) -> Shape {
 /// A node in a directory of its own.
 pub(crate) struct Ground {
     path: PathBuf,
-    /// None in a child, whose parent removes it.
+    /// None in a child: its parent removes it.
     _directory: Option<TempDir>,
 }
 
@@ -83,7 +83,7 @@ impl Ground {
         self.start_by(Command::new(std::env::current_exe().unwrap()), role, prepare)
     }
 
-    /// By another program, whose command line ends with this binary.
+    /// By another program; its command line ends with this binary.
     #[allow(dead_code, reason = "each test uses a part")]
     pub(crate) fn start_behind(&self, program: &str, arguments: &[&str], role: &str) -> Process {
         let mut command = Command::new(program);

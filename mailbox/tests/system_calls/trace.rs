@@ -17,7 +17,7 @@ const CALLS: &[(&str, &[&str])] = &[
     ("sleep in poll until a package comes", &["poll", "read"]),
     ("send to a receiver that sleeps", WAKE),
     ("loan and send to a receiver that sleeps", WAKE),
-    // Who sleeps in `poll` is woken through its pipe, which its ringers open when they need it.
+    // A sleeper in `poll` is woken through its pipe, which its ringers open when they need it.
     ("send to a receiver that sleeps in poll", &["futex wake", "openat", "write", "close"]),
 ];
 const SLEEP: &[&str] = &["futex wait"];
@@ -115,7 +115,7 @@ fn name(number: libc::c_long, arguments: [u64; 6]) -> String {
 
 fn check(all: &[Traced]) {
     assert!(CALLS.iter().all(|(name, _)| OPERATIONS.iter().any(|operation| operation.name == *name)));
-    // On a machine whose clock source cannot be read without the kernel, every look at the clock is a call: not ours to
+    // If the machine's clock source cannot be read without the kernel, every look at the clock is a call: not ours to
     // fix.
     let slow_clock = all.iter().any(|(at, calls)| *at == 0 && calls.iter().any(|call| call == CLOCK));
     if slow_clock {

@@ -25,12 +25,35 @@ use quote::quote;
 ///
 /// Doc comments become the texts that tools show. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before an argument,
 /// or under `#[data(1)]`, says what values mean; all its keys are optional.
+///
+/// ```text
+/// #[rohrpost::interface(class = "compass")]
+/// pub trait Compass {
+///     /// Takes the present heading for this one.
+///     #[command(16)]
+///     fn calibrate(&mut self, #[schema(unit = "rad")] heading_rad: f64);
+///
+///     /// The heading, counter-clockwise from east.
+///     #[data(1)]
+///     #[schema(unit = "rad")]
+///     fn heading() -> f64;
+/// }
+/// ```
 #[proc_macro_attribute]
 pub fn interface(attributes: TokenStream, item: TokenStream) -> TokenStream {
     interface::expand(attributes.into(), item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
 }
 
 /// Makes a struct or enum fit to travel in packages: derives `Serialize`, `Deserialize` and [`macro@Schema`].
+///
+/// ```text
+/// #[rohrpost::data]
+/// struct Heading {
+///     /// Counter-clockwise from east.
+///     #[schema(unit = "rad")]
+///     angle_rad: f64,
+/// }
+/// ```
 #[proc_macro_attribute]
 pub fn data(_attributes: TokenStream, item: TokenStream) -> TokenStream {
     let item = proc_macro2::TokenStream::from(item);
@@ -86,6 +109,14 @@ pub fn parameters(attributes: TokenStream, item: TokenStream) -> TokenStream {
 
 /// Makes an enum with variants that carry nothing a type that a parameter can have. In files and on command lines its
 /// variants are words in kebab-case: `TurnLeft` is `turn-left`.
+///
+/// ```text
+/// #[rohrpost::choice]
+/// enum Side {
+///     Left,
+///     TurnRight, // `turn-right` in files
+/// }
+/// ```
 #[proc_macro_attribute]
 pub fn choice(attributes: TokenStream, item: TokenStream) -> TokenStream {
     parameters::expand_choice(attributes.into(), item.into()).unwrap_or_else(syn::Error::into_compile_error).into()

@@ -5,6 +5,22 @@ use crate::{Field, Type};
 use serde::Serialize;
 
 /// What an interface offers. A module answers `describe` with it.
+///
+/// ```
+/// use rohrpost_schema::{DataItem, Description, Field, Type};
+///
+/// let heading = DataItem { number: 1, field: Field::new("heading", Type::F64).said("From east.", "rad") };
+/// let compass = Description {
+///     name: "Compass".into(),
+///     class: "compass".into(),
+///     text: "Tells where north is.".into(),
+///     functions: Vec::new(),
+///     data: vec![heading],
+/// };
+/// assert_eq!(Description::from_bytes(&compass.to_bytes()).unwrap(), compass);
+/// assert_eq!(compass.data_item("heading").unwrap().number, 1);
+/// assert!(compass.function("calibrate").is_none());
+/// ```
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Description {
     /// Name of the trait.
@@ -72,6 +88,20 @@ impl Description {
     /// Tells interfaces apart: callers and servers must have the same. Numbers, types, units, and names of functions
     /// and arguments count (to swap two numbers is a mistake that types do not show); texts and ranges do not. A
     /// mistake goes unseen once in four billion; malice is not what it is for.
+    ///
+    /// ```
+    /// use rohrpost_schema::{DataItem, Description, Field, Type};
+    ///
+    /// let compass = |text: &str, unit: &str| Description {
+    ///     name: "Compass".into(),
+    ///     class: "compass".into(),
+    ///     text: text.into(),
+    ///     functions: Vec::new(),
+    ///     data: vec![DataItem { number: 1, field: Field::new("heading", Type::F64).said("", unit) }],
+    /// };
+    /// assert_eq!(compass("", "rad").hash(), compass("Tells where north is.", "rad").hash());
+    /// assert_ne!(compass("", "rad").hash(), compass("", "deg").hash());
+    /// ```
     pub fn hash(&self) -> u32 {
         hash(&self.written(true))
     }

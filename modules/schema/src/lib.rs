@@ -26,12 +26,12 @@ extern crate self as rohrpost_schema;
 
 mod argument;
 mod bytes;
-mod counters;
 mod decode;
 mod description;
 mod encode;
 mod error;
 mod json;
+mod quantities;
 mod scalar;
 mod serial;
 mod show;
@@ -44,11 +44,11 @@ mod words;
 
 pub use argument::parse_argument;
 pub use bytes::{SchemaError, TYPES_MAX, VERSION, hash};
-pub use counters::{counter_fields, counters};
 pub use decode::decode;
 pub use description::{DataItem, Description, Function};
 pub use encode::encode;
 pub use error::{WalkError, WalkProblem};
+pub use quantities::{counters, quantities, quantity_fields};
 pub use rohrpost_macros::Schema;
 pub use show::{LIST_SHOWN, Shown, numbers};
 pub use tree::{Field, Members, Named, Type};

@@ -71,6 +71,14 @@ pub enum Type {
 }
 
 /// A struct, or a variant of an enum.
+///
+/// ```
+/// use rohrpost_schema::{Field, Members, Named, Type};
+///
+/// let point = Members::Fields(vec![Field::new("x", Type::F64), Field::new("y", Type::F64)]);
+/// let point = Named::new("Point", point).said("A place in the plane.");
+/// assert_eq!(point.members.fields().len(), 2);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Named {
     /// A name that others may rely on: it is of the author's choice, counts in hashes, and stays when code is moved.
@@ -97,6 +105,15 @@ pub enum Members {
 }
 
 /// A type in its place: a field of a struct, an argument of a function, data, a parameter.
+///
+/// ```
+/// use rohrpost_schema::{Field, Type};
+///
+/// let zero = 0_f64.to_le_bytes().to_vec();
+/// let speed = Field::new("speed", Type::F64).said("When nothing is in the way.", "m/s").bounded(Some(zero), None);
+/// assert_eq!(speed.range().unwrap(), "at least 0");
+/// assert_eq!(speed.with_unit("0.5"), "0.5 m/s");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its name; empty where it has none.
@@ -178,11 +195,23 @@ impl Members {
 
 impl Type {
     /// This or nothing.
+    ///
+    /// ```
+    /// use rohrpost_schema::Type;
+    ///
+    /// assert_eq!(Type::option(Type::F64), Type::Option(Box::new(Type::F64)));
+    /// ```
     pub fn option(some: Self) -> Self {
         Self::Option(Box::new(some))
     }
 
     /// A list of these.
+    ///
+    /// ```
+    /// use rohrpost_schema::Type;
+    ///
+    /// assert_eq!(Type::list(Type::F64), Type::List(Box::new(Type::F64)));
+    /// ```
     pub fn list(element: Self) -> Self {
         Self::List(Box::new(element))
     }

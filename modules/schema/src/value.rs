@@ -45,6 +45,12 @@ pub enum Value {
 
 impl Value {
     /// The choice `name` without payload.
+    ///
+    /// ```
+    /// use rohrpost_schema::Value;
+    ///
+    /// assert_eq!(Value::unit_variant("Left"), Value::Variant("Left".into(), Box::new(Value::Null)));
+    /// ```
     pub fn unit_variant(name: impl Into<String>) -> Self {
         Self::Variant(name.into(), Box::new(Self::Null))
     }

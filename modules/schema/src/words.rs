@@ -23,7 +23,7 @@ pub fn describe_result(ty: &Type) -> String {
     }
 }
 
-/// Whether one word names any value of this type: a number, a bool, text, a character, or an enum whose variants
+/// Whether one word names any value of this type: a number, a bool, text, a character, or an enum with variants that
 /// carry nothing. Maps with such keys are [`Value::Map`](crate::Value::Map)s.
 ///
 /// A tool reads an argument as JSON if it starts with `{`, `[` or `"` and its type is no word, else by

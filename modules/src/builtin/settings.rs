@@ -108,7 +108,7 @@ fn wrong_call(installation: &Installation, module: &Configured, called: &Called<
         Err(error) => return Some(format!("names no module: {error}")),
     };
     if installation.classes.name(name.class()) != Some(called.class) {
-        return Some(format!("is `{text}`, but must be of class `{}`, whose functions it calls", called.class));
+        return Some(format!("is `{text}`, but this module calls functions of class `{}`", called.class));
     }
     if installation.module(name).is_none() {
         return Some(format!("is `{text}`, which no [[module]] defines; add one, or name another"));

@@ -187,8 +187,8 @@ impl Module for Sim {
 }
 
 impl Sim {
-    /// System time. A node whose clock is set to the master's begins a new epoch, an hour earlier or later perhaps: the
-    /// robot neither waits for that hour nor drives through it.
+    /// System time. A node that sets its clock to the master's begins a new epoch, an hour earlier or later perhaps:
+    /// the robot neither waits for that hour nor drives through it.
     fn now_ns(&mut self) -> u64 {
         let now = self.clock.now();
         if now.epoch != self.epoch {

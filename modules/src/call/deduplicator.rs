@@ -1,18 +1,18 @@
 //! At most once: decides whether a command runs, is answered from memory, or is refused. Knows no clock and no mailbox.
 //!
-//! A caller repeats a command whose answer does not come. What one incarnation of the server has run, it never runs
+//! A caller repeats a command if the answer does not come. What one incarnation of the server has run, it never runs
 //! again: of each caller it remembers which of the last [`WINDOW`] numbers it has run, and the last [`REPLIES_KEPT`]
 //! answers. A server that was restarted remembers nothing; it can tell, though, that a command was first tried before
 //! its own start, and then says that the outcome is unknown, unless the function is idempotent.
 //!
-//! Whom it remembers is bounded, and shared out by principal: callers that configuration names always find a place, and
-//! nobody else takes all of the others. A caller is remembered as long as its command is valid, at most
-//! [`VALIDITY_MAX`], whatever the caller says.
+//! The number of callers that it remembers is bounded, and shared out by principal: callers that configuration names
+//! always find a place, and nobody else takes all of the others. A caller is remembered as long as its command is
+//! valid, at most [`VALIDITY_MAX`], whatever the caller says.
 //!
-//! A command's age counts its wait with the caller and in the server's mailbox, but not its way in between. So whoever
-//! carries packages drops those that were under way for longer than [`TRANSIT_MAX`], and drops copies. One thing nobody
-//! can tell: a first try that is overtaken by its own repeat, and is on the wire while the server runs that repeat and
-//! is restarted, looks new to the next server.
+//! A command's age counts its wait with the caller and in the server's mailbox, but not its way in between. So routers
+//! drop packages that were under way for longer than [`TRANSIT_MAX`], and drop duplicates. One thing nobody can tell: a
+//! first try that arrives after its own repeat, and is on the wire while the server runs that repeat and is restarted,
+//! looks new to the next server.
 
 use super::Fault;
 use crate::places::Places;
@@ -168,8 +168,8 @@ impl Deduplicator {
         self.callers[at].note(request, error, body, now_ns.saturating_add(left_ns));
     }
 
-    /// Whether there is room for another caller of this principal. Forgets one of whom no repeat can come any more, if
-    /// that is what it takes; never one of whom it can: then a repeat would run twice.
+    /// Whether there is room for another caller of this principal. Forgets a caller from which no repeat can come any
+    /// more, if that is what it takes; never one that can still repeat: then a repeat would run twice.
     fn make_room(&mut self, principal: Principal, now_ns: u64) -> bool {
         let held = self.callers.iter().filter(|caller| caller.until_ns >= now_ns).map(|caller| caller.principal);
         if !self.places.allows(principal, held) {

@@ -16,17 +16,17 @@ pub(super) enum Broken {
     RunsRedelivered,
     /// Nobody has a place of its own.
     NamesNobody,
-    /// Each caller has a share for itself, whosever it is.
+    /// Each caller has a share for itself, instead of each principal.
     SharesByCaller,
     /// All share one share.
     SharesNothing,
     /// A caller is remembered for as long as it says.
     BelievesValidity,
-    /// One that was remembered takes its place again without being asked whose share that is.
+    /// One that was remembered takes its place again without a look at the share that it takes.
     TakesItsPlaceAgain,
 }
 
-/// Callers whose principals always find a place.
+/// Callers of principals that always find a place.
 pub(super) const NAMED: usize = 2;
 /// As long as an envelope can tell.
 const VALID_LONG_NS: u64 = u32::MAX as u64 * 1000;

@@ -1,4 +1,4 @@
-//! Places in the simulation: whose they are, and what must hold of them.
+//! Places in the simulation: which principals hold them, and what must hold of them.
 
 use super::simulation::{NAMED, World};
 use super::{CALLERS_MAX, Deduplicator, Name, Principal, TRANSIT_MAX_NS, VALIDITY_MAX_NS};
@@ -21,7 +21,7 @@ impl World {
         if caller < NAMED { Self::named(caller) } else { Principal::System((2 + caller % self.principals) as u8) }
     }
 
-    /// Callers remembered of whom a repeat can come.
+    /// Callers remembered from which a repeat can come.
     pub(super) fn held(&self) -> impl Iterator<Item = usize> {
         let live = self.deduplicator.callers.iter().filter(|caller| caller.until_ns >= self.now_ns);
         live.map(|caller| usize::from(caller.from.instance()))

@@ -12,8 +12,8 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A command whose answer does not come is sent again after this share of its time, or of the time for which a server
-/// may run it: three tries in all that can be run.
+/// A command without an answer is sent again after this share of its time, or of the time for which a server may run
+/// it: three tries in all that can be run.
 const REPEATS: u32 = 3;
 /// Calls under way at a time, to all servers together.
 pub const CALLS_MAX: usize = 64;

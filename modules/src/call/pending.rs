@@ -39,6 +39,19 @@ impl<T: serde::de::DeserializeOwned> Pending<T> {
 impl<T: serde::de::DeserializeOwned, E: serde::de::DeserializeOwned> Pending<Result<T, E>> {
     /// Waits for the result of a function that has an error of its own.
     ///
+    /// ```
+    /// use rohrpost_modules::call::{CallError, Pending};
+    /// use rohrpost_modules::interfaces::DriveError;
+    ///
+    /// fn has_driven(drive: Pending<Result<(), DriveError>>) -> bool {
+    ///     match drive.wait_result() {
+    ///         Ok(()) => true,
+    ///         Err(CallError::Module(motor, error)) => panic!("{motor} refused: {error}"),
+    ///         Err(_) => false, // it did not answer, say
+    ///     }
+    /// }
+    /// ```
+    ///
     /// # Errors
     /// See [`CallError`].
     pub fn wait_result(self) -> Result<T, CallError<E>> {

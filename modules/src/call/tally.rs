@@ -44,7 +44,7 @@ impl CallOutcome {
 #[derive(Default)]
 pub(super) struct Tallies {
     all: Vec<Tally>,
-    /// Sequence numbers of calls whose time was over before they were answered, and the called modules.
+    /// Sequence numbers of calls that were not answered in their time, and the called modules.
     overdue: VecDeque<(u32, Name)>,
 }
 
@@ -72,8 +72,8 @@ impl Tallies {
         self.of(to).repeated += 1;
     }
 
-    /// An answer came to none of the calls under way: perhaps to one that was given up. `is_of` tells whether who
-    /// answers was called when this one was.
+    /// An answer came to none of the calls under way: perhaps to one that was given up. `is_of` tells whether the
+    /// answering module was called when this one was.
     pub(super) fn came_late(&mut self, sequence: u32, is_of: impl Fn(Name) -> bool) {
         let its = |(number, to): &(u32, Name)| *number == sequence && is_of(*to);
         let Some((_, to)) = self.overdue.iter().position(its).and_then(|at| self.overdue.remove(at)) else { return };

@@ -1,5 +1,6 @@
 //! The router, seen by tools: its links to other nodes, and the common time.
 
+use super::slots::SlotState;
 use crate::interface;
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -39,7 +40,7 @@ pub struct Carried {
 
 /// What went wrong between two routers, since the counting one began.
 ///
-/// Tools, charts and the book take names, units and texts from here, by [`counters`](rohrpost_schema::counters).
+/// Tools, charts and the book take names, units and texts from here, by [`quantities`](rohrpost_schema::quantities).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct LinkCounters {
     /// Datagrams from the peer that never came.
@@ -96,12 +97,16 @@ pub struct ClassCarried {
     /// The class.
     pub class: u8,
     /// Packages taken from modules of this node.
+    #[schema(unit = "packages")]
     pub taken: u64,
-    /// Of these, sent.
+    /// Packages of modules of this node that were sent.
+    #[schema(unit = "packages")]
     pub sent: u64,
-    /// Packages come from other nodes.
+    /// Packages that came from other nodes.
+    #[schema(unit = "packages")]
     pub came: u64,
-    /// Of these, put into mailboxes.
+    /// Packages of other nodes that were put into mailboxes.
+    #[schema(unit = "packages")]
     pub delivered: u64,
     /// Lost, and why.
     pub lost: Vec<CarriedLoss>,
@@ -169,7 +174,7 @@ pub struct Links {
 /// Datagrams that were not taken.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Rejected {
-    /// The node whose address they came from, which anybody can write on a datagram; empty: no node has it.
+    /// The node that has the address they came from, which anybody can write on a datagram; empty: no node has it.
     pub node: String,
     /// In a word: `unsealed`, `other-key`, `not-ours`, `other-incarnation`, `replay`, `forged`, `version`.
     pub cause: String,
@@ -207,7 +212,7 @@ pub struct ClockState {
     pub role: ClockRole,
     /// The master that it follows, or is; empty if there is none yet.
     pub master: String,
-    /// Tells the reigns of masters apart; later ones are greater.
+    /// The term of the master; later terms are greater.
     pub term: u64,
     /// Raised with each step of time.
     pub epoch: u64,
@@ -225,89 +230,6 @@ pub struct ClockState {
     pub exchanges: u64,
     /// Whether the kernel stamps the frames; else they are stamped by the router, and the error is larger.
     pub by_kernel: bool,
-}
-
-/// How a node keeps its time slots. Counts are since its router began, and only grow.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct SlotState {
-    /// The node.
-    pub node: String,
-    /// Slots in which something was sent.
-    pub used: u64,
-    /// Slots in which nothing had to be sent.
-    pub empty: u64,
-    /// Slots that were left out because the router woke up too late for them.
-    pub late: u64,
-    /// Slots that went by while the router stood still.
-    pub skipped: u64,
-    /// Slots without packages because the time was not sure enough.
-    pub silent: u64,
-    /// Why it does not send now; empty if it does.
-    pub why_silent: String,
-    /// Datagrams in slots and synchronisation windows, and their bytes on the wire, all heads counted.
-    pub datagrams: u64,
-    /// See `datagrams`.
-    pub wire_bytes: u64,
-    /// Cycles in which it synchronised the others as the master, and in a silent master's place.
-    pub synchronisations_sent: u64,
-    /// See `synchronisations_sent`.
-    pub replacements_sent: u64,
-    /// Cycles in which the master's synchronisation came, in which a backup's came, and in which none did.
-    pub synchronisations_heard: u64,
-    /// See `synchronisations_heard`.
-    pub replacements_heard: u64,
-    /// See `synchronisations_heard`.
-    pub synchronisations_missed: u64,
-    /// Synchronisations that it left out as the master because it woke up too late for them.
-    pub synchronisations_late: u64,
-    /// Datagrams that were made and missed the end of their slot, since the router stood still just then: they waited
-    /// for the next one.
-    pub held: u64,
-    /// Hellos that it said, having no time of its own, by the time of who had not shown that it lives: who repeats what
-    /// was said brings about some.
-    pub unproven: u64,
-    /// Changes of role: slave, master.
-    pub roles: u64,
-    /// From the router's call to the wire, the median, ns.
-    pub lead_ns: u64,
-    /// Ordinary traffic through the tunnel; none without one.
-    pub tunnel: Option<TunnelState>,
-    /// How the kernel schedules who keeps the slots: `deadline`, `fifo` or `ordinary`.
-    pub scheduled: String,
-    /// The last slots and windows that were used, the oldest first.
-    pub last: Vec<SlotUse>,
-}
-
-/// What ordinary traffic did in a tunnel. Counts are since its router began, and only grow.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct TunnelState {
-    /// Packets taken from the kernel for other nodes.
-    pub sent: u64,
-    /// Packets for other nodes that were dropped, since too many waited.
-    pub dropped: u64,
-    /// Packets for nobody, or not of IPv4.
-    pub stray: u64,
-    /// Packets from other nodes, handed to the kernel.
-    pub received: u64,
-    /// Packets from other nodes that the kernel did not take.
-    pub refused: u64,
-}
-
-/// A slot or synchronisation window that was used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct SlotUse {
-    /// The slot, by its place in the configuration's table; none: the window of synchronisation.
-    pub slot: Option<u16>,
-    /// Beginning and end of sending, system time, ns since 1970.
-    pub begin_ns: u64,
-    /// See `begin_ns`.
-    pub end_ns: u64,
-    /// The first datagram was on the wire so long after the beginning, ns.
-    pub off_ns: i64,
-    /// Whether the kernel's stamp says so; else it is reckoned.
-    pub by_kernel: bool,
-    /// Datagrams in it.
-    pub datagrams: u64,
 }
 
 /// Declared flows that leave a node, in their order in the configuration. Counts are since its router began, and only
@@ -332,29 +254,40 @@ pub struct FlowState {
     /// What it carries, as declared: `data 1`, `reply`. By this, flows between the same modules are told apart. Empty:
     /// the file does not say so.
     pub carries: String,
-    /// Bytes of a body at most, as declared: flows between the same modules that do not say what they carry are told
+    /// Bytes of a body at most, as declared. Flows between the same modules that do not say what they carry are told
     /// apart by it.
+    #[schema(unit = "bytes")]
     pub size: u32,
     /// Packages sent.
+    #[schema(unit = "packages")]
     pub packages: u64,
-    /// The slowest of them, ns; 0 without any.
-    pub worst_ns: u64,
-    /// Their mean, ns.
-    pub mean_ns: u64,
-    /// 99 of 100 were not slower, ns.
-    pub p99_ns: u64,
-    /// The bound, ns; none: without time slots nothing is sure.
+    /// The bound that `check` computes, if all slots are kept; none without time slots.
+    #[schema(unit = "ns")]
     pub bound_ns: Option<u64>,
-    /// The deadline, ns.
+    /// The slowest package since the publishing of which no slot of the node was left out or cut short: the bound is
+    /// about these.
+    #[schema(unit = "ns")]
+    pub kept_worst_ns: Option<u64>,
+    /// The slowest package.
+    #[schema(unit = "ns")]
+    pub worst_ns: Option<u64>,
+    /// The mean of all packages.
+    #[schema(unit = "ns")]
+    pub mean_ns: Option<u64>,
+    /// 99 of 100 packages were not slower.
+    #[schema(unit = "ns")]
+    pub p99_ns: Option<u64>,
+    /// The deadline, `within` in the file.
+    #[schema(unit = "ns")]
     pub deadline_ns: u64,
-    /// The slowest of those since whose publishing no slot of the node was left out or cut short, ns: the bound is
-    /// about these. 0 without any.
-    pub kept_worst_ns: u64,
     /// Packages slower than the bound.
-    pub over_bound: u64,
-    /// Of these, those since whose publishing no slot was left out or cut short.
-    pub kept_over_bound: u64,
+    #[schema(unit = "packages")]
+    pub over_bound: Option<u64>,
+    /// Packages slower than the bound for which all slots were kept.
+    #[schema(unit = "packages")]
+    pub kept_over_bound: Option<u64>,
     /// Packages slower than the deadline.
+    #[schema(unit = "packages")]
     pub over_deadline: u64,
     /// Packages lost in this router, and why.
     pub lost: Vec<CarriedLoss>,

@@ -23,10 +23,13 @@ pub struct ClassPassed {
     /// The class.
     pub class: u8,
     /// Packages that came.
+    #[schema(unit = "packages")]
     pub packages: u64,
-    /// Of these, handed on.
+    /// Packages that were handed on.
+    #[schema(unit = "packages")]
     pub passed: u64,
-    /// Of these, data of which only the newest counts, and a newer one took their place while they waited. No loss.
+    /// Packages of data of which only the newest counts, replaced by newer ones while they waited. No loss.
+    #[schema(unit = "packages")]
     pub replaced: u64,
     /// Lost, and why.
     pub lost: Vec<CarriedLoss>,
@@ -71,18 +74,23 @@ pub struct BeyondLink {
     /// Why not; empty if they do.
     pub why: String,
     /// Connections after the first.
+    #[schema(unit = "connections")]
     pub reconnects: u64,
-    /// Shortest way there and back of late, ns; none: not measured.
+    /// Shortest way there and back of late; none: not measured.
+    #[schema(unit = "ns")]
     pub round_trip_ns: Option<u64>,
-    /// How far off the system time that the server tells is at most here, ns; none: it does not know it.
+    /// How far off the system time that the server tells is at most here; none: it does not know it.
+    #[schema(unit = "ns")]
     pub time_error_ns: Option<u64>,
     /// The node's system time, if it is what the server tells.
     pub time: Option<BeyondTime>,
-    /// How often it took part no more.
+    /// How often it was disconnected.
+    #[schema(unit = "outages")]
     pub outages: u64,
-    /// When that was last; none: never.
+    /// The last time; none: never.
     pub outage: Option<BeyondOutage>,
-    /// Bytes of memory that what waits takes up.
+    /// Memory that waiting packages take up.
+    #[schema(unit = "bytes")]
     pub waiting_bytes: u64,
     /// Classes that sent something there, the most urgent first.
     pub sent: Vec<ClassPassed>,
@@ -102,15 +110,20 @@ pub struct BeyondClient {
     /// Whether it takes part.
     pub takes_part: bool,
     /// Ranges of names that it hosts.
+    #[schema(unit = "ranges")]
     pub ranges: u64,
-    /// Time since its connection was made, ms.
+    /// Time since its connection was made.
+    #[schema(unit = "ms")]
     pub age_ms: u64,
-    /// Time since something came from it, ms.
+    /// Time since something came from it.
+    #[schema(unit = "ms")]
     pub heard_ms: u64,
-    /// Packages lost in queues since it sent more than its part of them; with what others lost that connect with the
-    /// same certificate, or without one from the same address.
+    /// Packages lost in queues because it sent more than its share. Connections with the same certificate, or without
+    /// one from the same address, share one count.
+    #[schema(unit = "packages")]
     pub lost: u64,
-    /// Bytes of memory that it takes up, with what waits for it.
+    /// Memory that it takes up, with what waits for it.
+    #[schema(unit = "bytes")]
     pub bytes: u64,
 }
 
@@ -118,12 +131,16 @@ pub struct BeyondClient {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct BeyondCrowded {
     /// Connections before their hello that gave way to others.
+    #[schema(unit = "connections")]
     pub greetings: u64,
     /// Clients that gave way to those of others, or were not let in.
+    #[schema(unit = "clients")]
     pub clients: u64,
     /// Registrations of too many ranges.
+    #[schema(unit = "registrations")]
     pub ranges: u64,
     /// Packages lost in queues.
+    #[schema(unit = "packages")]
     pub packages: u64,
 }
 
@@ -132,23 +149,28 @@ pub struct BeyondCrowded {
 pub struct BeyondClients {
     /// Where it listens.
     pub address: String,
-    /// Time since it began, ms.
+    /// Time since it began.
+    #[schema(unit = "ms")]
     pub uptime_ms: u64,
     /// The connections that are there; of many the first.
     pub clients: Vec<BeyondClient>,
     /// Connections besides these.
     pub more: u64,
-    /// Clients that took part and do not any more.
+    /// Clients that were connected and are not any more.
+    #[schema(unit = "clients")]
     pub left: u64,
-    /// Connections that might not take part, or not any more.
+    /// Connections that were refused.
+    #[schema(unit = "connections")]
     pub refused: u64,
-    /// Who was the last of them, and why; empty without one.
+    /// The last of them, and why it was refused; empty without one.
     pub refusal: String,
     /// What went beyond the part of one certificate, or one address.
     pub crowded: BeyondCrowded,
-    /// Registrations that a later one of the same client took the place of before they were looked at.
-    pub overtaken: u64,
-    /// Lines of output that were not said one by one, since there were too many of their cause.
+    /// Registrations that a later one of the same client replaced before they were handled.
+    #[schema(unit = "registrations")]
+    pub superseded: u64,
+    /// Lines of output that were only counted, since there were too many of their cause.
+    #[schema(unit = "lines")]
     pub held_lines: u64,
     /// Classes of which something passed, the most urgent first.
     pub classes: Vec<ClassPassed>,
@@ -185,7 +207,7 @@ pub trait Tcp {
     #[data(2)]
     fn clients() -> BeyondClients;
 
-    /// Which names are registered at the TCP router, and by whom.
+    /// Which names are registered at the TCP router, and by which host.
     #[data(3)]
     fn hosts() -> BeyondHosts;
 }

@@ -233,7 +233,7 @@ impl Child {
     }
 
     fn try_spawn(&mut self, now: Instant) -> io::Result<Process> {
-        // First: a process whose words nobody reads would be stuck at the first of them too many.
+        // First: if nobody reads what it prints, a process is stuck as soon as the pipe is full.
         let quiet = self.repeats.is_quiet().then_some(STEADY);
         let pipes = self.printed.begin(quiet.map(|quiet| now + quiet))?;
         // Of a module that has ended by itself others expect that it works, and what waits in its mailboxes comes
@@ -250,7 +250,7 @@ impl Child {
                 Ok(Some(status)) => {
                     self.process = None;
                     self.over = Some((status, now));
-                    // Receivers look for what it left, and whoever sleeps on it wakes.
+                    // Receivers look for what it left, and threads that sleep on it wake.
                     node.announce_death();
                 }
                 Ok(None) => {}

@@ -1,9 +1,10 @@
 //! The end of a launch: all modules stop, the last first.
 //!
-//! Each is told when the one after it has ended, so that nobody loses what it needs while it goes to its safe state.
-//! Who does not end in its time is killed. From then on the next is told after moments, whether or not the one before
-//! has ended: modules that hang wait beside each other, not one after the other. The same holds when the whole has
-//! taken too long. So the end comes within [`IN_ORDER_MAX`], the longest `stop-within`, and a moment for each module.
+//! Each is told when the one after it has ended, so that nobody loses what it needs while it goes to its safe state. A
+//! module that does not end in its time is killed. From then on the next is told after moments, whether or not the one
+//! before has ended: modules that hang wait beside each other, not one after the other. The same holds when the whole
+//! has taken too long. So the end comes within [`IN_ORDER_MAX`], the longest `stop-within`, and a moment for each
+//! module.
 
 use super::child::{Child, Then};
 use rohrpost_mailbox::Node;

@@ -8,7 +8,7 @@ use std::sync::{Arc, Weak};
 
 /// What wakes launch.
 pub enum Event {
-    /// End it all: a signal, or whoever runs launch. Said once more, moments later: at once.
+    /// End it all: a signal, or the program that runs launch. Said once more, moments later: at once.
     Stop,
     /// A child may have ended.
     Child,
@@ -50,7 +50,8 @@ struct Heard {
 }
 
 impl Bell {
-    /// Rings this participant's bell for each event. Whoever could send one being gone is a word to stop, too.
+    /// Rings this participant's bell for each event. When nothing is left that could send one, that is a word to stop,
+    /// too.
     pub(super) fn listen(events: Receiver<Event>, participant: &Arc<Participant>) -> Result<Self, LaunchError> {
         let heard = Arc::new(Heard::default());
         // Weak: when launch has left the node, this thread must not keep its place there.

@@ -20,7 +20,8 @@ const RESOLVED_FILE: &str = "node.json";
 /// Ends modules of this node that still live though no launch watches them, and removes mailboxes that nobody owns.
 pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str) -> Result<Vec<String>, LaunchError> {
     let ours = || {
-        // Who joins or leaves just now has no name in the table, or no number; 0 would be our own process group.
+        // A participant that joins or leaves just now has no name in the table, or no number; 0 would be our own
+        // process group.
         let other = |pid: u32| pid != std::process::id() && pid != 0;
         let named = |name| installation.modules_on(node_name).any(|module| module.name == name);
         node.participants().into_iter().filter(move |p| named(p.module) && other(p.pid)).collect::<Vec<_>>()
@@ -64,8 +65,8 @@ fn send(pid: u32, signal: Signal) {
     }
 }
 
-/// Removes the mailboxes of a module that is not started again: whoever sends there is told so, instead of filling
-/// them. One that cannot be removed does not keep the others.
+/// Removes the mailboxes of a module that is not started again: senders are told so, instead of filling them. One that
+/// cannot be removed does not keep the others.
 ///
 /// Never waits: [`NodeError::Busy`] while somebody else holds the registry.
 pub(super) fn remove_mailboxes(node: &Node, module: &Module) -> Result<(), NodeError> {

@@ -61,7 +61,7 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(2);
 /// While a module is being switched on, its call is looked at so often; an answer wakes launch sooner.
 const LOOK_SWITCHING: Duration = Duration::from_millis(50);
-/// While all modules are being stopped, it is looked so often who may be told next.
+/// While all modules are being stopped, it is looked so often which one may be told next.
 const LOOK_ENDING: Duration = Duration::from_millis(20);
 /// By then no thread of launch's holds its place on the node any more.
 const LET_GO: Duration = Duration::from_secs(1);
@@ -94,6 +94,13 @@ pub struct Launch {
 }
 
 /// The node that is meant: the one named, or the only one.
+///
+/// ```
+/// # use rohrpost_modules::launch::{LaunchError, choose_node};
+/// fn name(installation: &rohrpost_config::Installation) -> Result<&str, LaunchError> {
+///     Ok(&choose_node(installation, None)?.name)
+/// }
+/// ```
 ///
 /// # Errors
 /// [`LaunchError::WhichNode`] and [`LaunchError::NoNode`].
@@ -195,7 +202,7 @@ impl Launch {
         self.note(note);
     }
 
-    /// Removes what those leave that have ended, or were told to stay so, and answers tools: whoever is told that a
+    /// Removes what those leave that have ended, or were told to stay so, and answers tools: a tool that is told that a
     /// module is stopped finds no mailbox of it.
     fn serve(&mut self, ending: bool) {
         // At the end all goes at once, with the node.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  stdout ─▶ thread ─┬─▶ the last lines, for launch to tell when it ends
-//!  stderr ─▶ thread ─┴─▶ held for a moment ─▶ collector: info, warn; error for stderr if the process fails in that moment
+//!  stderr ─▶ thread ─┴─▶ held for a moment ─▶ collector: info, warn; error for stderr if the process fails then
 //! ```
 //!
 //! The threads never wait for launch or the collector, so a module that prints is never kept from it. What is too much
@@ -82,7 +82,7 @@ impl Printed {
     /// `quiet_until`: before then nothing of it is passed on.
     pub(super) fn begin(&mut self, quiet_until: Option<Instant>) -> io::Result<[PipeWriter; 2]> {
         self.pass_on(false);
-        // Of its own: who left processes behind that still print must not mix with what follows.
+        // Of its own: processes that were left behind and still print must not mix with what follows.
         self.lines = Arc::new(Mutex::new(PrintedLines { quiet_until, ..PrintedLines::default() }));
         self.readers.clear();
         let out = self.read("stdout", OutputLevel::Info)?;
@@ -197,7 +197,7 @@ fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<PrintedLines>, whisp
         let pressed = voice.as_ref().and_then(|voice| {
             let mut lines = lock(lines);
             lines.held.push_back(Held { level, time_ns: voice.now_ns(), since: Instant::now(), text: text.clone() });
-            // Who prints so much has to do without the mercy of being held.
+            // Of a process that prints so much, the oldest held line is passed on at once.
             if lines.held.len() > LINES_MAX { lines.held.pop_front() } else { None }
         });
         let mut lines = lock(lines);

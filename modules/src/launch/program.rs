@@ -15,7 +15,7 @@ use std::time::Duration;
 const NICE: i8 = -15;
 
 /// From now on the calling thread, which starts modules, goes before ordinary programs, if it may: then with its usual
-/// niceness, which modules that are not real time begin with. Whoever was started to give way does so.
+/// niceness, which modules that are not real time begin with. A launch that was started to give way does so.
 pub(super) fn hurry() -> Option<i8> {
     let Ok(sys::Scheduling::Normal(usual)) = sys::scheduling() else { return None };
     let may = (NICE + 1..=0).contains(&usual) && sys::schedule(sys::Scheduling::Normal(NICE)).is_ok();

@@ -45,7 +45,7 @@ impl Launch {
             while self.calls[index].switch.is_some() {
                 let turned = self.turn(0..self.children.len(), Duration::MAX, index);
                 self.switch_on(index);
-                // Who is told to stop when the last answer has come has started, and stops as such.
+                // A launch that is told to stop after the last answer has started, and stops as such.
                 if self.calls[index].switch.is_some() {
                     turned?;
                 }
@@ -84,7 +84,7 @@ impl Launch {
         }
     }
 
-    /// A node of whose modules none starts has not started.
+    /// A node has not started if none of its modules starts.
     fn await_any(&mut self) -> Result<(), LaunchError> {
         let is_in_file = |child: &Child| self.installation.module(child.name()).is_some_and(Module::is_in_file);
         let own: Vec<usize> = (0..self.children.len()).filter(|index| is_in_file(&self.children[*index])).collect();

@@ -18,7 +18,7 @@ impl Known {
     /// Writes it, whole, if it has changed. A full /dev/shm is no reason not to look after modules: then it is tried
     /// again.
     pub(crate) fn write(&mut self, node: &Node, mut states: Vec<ChildState>) {
-        // It changes all the time, and whoever wants it asks.
+        // It changes all the time; a tool that wants it asks.
         states.iter_mut().for_each(|state| state.starts_in_ms = None);
         if self.written.as_ref() == Some(&states) {
             return;

@@ -175,7 +175,7 @@ mod tests {
         let excess = Excess::default();
         let start = 3 * SECOND_NS;
         assert_eq!((excess.due_ns(), excess.tell(start), excess.tell_all()), (None, None, None));
-        assert!(excess.add(start), "the first wakes whoever tells");
+        assert!(excess.add(start), "the first wakes the thread that tells");
         assert!(!excess.add(start + 100 * MS));
         assert_eq!(excess.due_ns(), Some(start + 600 * MS));
         assert_eq!(excess.tell(start + 599 * MS), None);

@@ -1,8 +1,8 @@
 //! What modules say, on its way to the output collector (seed 002, 2.2.4).
 //!
 //! ```text
-//!  tracing event ─▶ layer: level? ─▶ allowance ─▶ way: queue ─▶ mailbox output.0.3 ─▶ builtin::output ─▶ ring, file, journal
-//!  panic ──────────────────────────────▲                                                     └─▶ subscribers, `rohrpost log`
+//!  tracing event ─▶ layer: level? ─▶ allowance ─▶ way: queue ─▶ mailbox output.0.3 ─▶ builtin::output
+//!  panic ──────────────────────────────▲             ring, file, journal, subscribers, `rohrpost log` ◀┘
 //! ```
 //!
 //! Every `tracing` event becomes a line. A line goes into a small queue of this process and from there, at once if
@@ -56,8 +56,8 @@ pub(crate) const TRACED: char = '\u{1d}';
 pub struct OutputLine {
     /// System time at which it was said, ns since 1970.
     pub time_ns: u64,
-    /// Module that said it: the 32 bits of its name, which is the sender's; or a module of whose node the sender is
-    /// launch.
+    /// Module that said it: the 32 bits of its name, which is the sender's; or a module of the node of which the sender
+    /// is launch.
     pub module: u32,
     /// How important it is.
     pub level: OutputLevel,

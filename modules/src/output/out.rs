@@ -1,4 +1,4 @@
-//! The one way out of a process to the collector: who has it sends.
+//! The one way out of a process to the collector: the thread that has it sends.
 
 use super::OutputLine;
 use rohrpost_mailbox::{Name, Participant, Sender};

@@ -1,5 +1,5 @@
-//! What this process writes to its standard error: whoever reads it may be gone, or stopped, and neither is a reason to
-//! panic or to wait.
+//! What this process writes to its standard error: its reader may be gone, or stopped, and neither is a reason to panic
+//! or to wait.
 
 use super::{SENT, TRACED};
 use crate::common::OutputLevel;

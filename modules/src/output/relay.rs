@@ -10,7 +10,7 @@ use rohrpost_mailbox::{Name, Participant};
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 
-/// The way to the collector, shared by all for whom this process speaks.
+/// The way to the collector, shared by all modules for which this process speaks.
 pub(crate) struct Relay {
     participant: Arc<Participant>,
     /// Launch's own name, under which it sends.

@@ -1,4 +1,4 @@
-//! The way of a line out of this process: allowances, queues, and whoever finds the way free sends.
+//! The way of a line out of this process: allowances, queues, and the thread that finds the way free sends.
 
 use super::allowance::{Bucket, Excess, Suppressed};
 use super::out::{Out, Outlet};
@@ -70,7 +70,7 @@ struct Waiting {
 /// What is said in the name of one module: by its own process, or by launch for what it printed.
 pub(super) struct Output {
     me: Name,
-    /// Under whose name its packages go: the module's, or launch's.
+    /// The name under which its packages go: the module's, or launch's.
     from: Name,
     to: Name,
     priority: Priority,
@@ -376,7 +376,7 @@ impl Output {
         }
     }
 
-    /// Whoever finds the way taken leaves its line to the one who has it: nobody waits.
+    /// A thread that finds the way taken leaves its line to the one that has it: nobody waits.
     fn drain(&self) {
         // Bounded: a thread that says more and more must not keep this one at it.
         for _ in 0..WAITING_MAX.iter().sum() {
@@ -399,7 +399,7 @@ impl Output {
 
     /// False when nothing more goes through now.
     fn send(&self, way: &mut Outlet, mut line: OutputLine) -> bool {
-        // The line that was held back may be that of another for whom this process speaks.
+        // The line that was held back may be that of another module for which this process speaks.
         let own = line.module() == self.me;
         line.lost = if own { self.lost_now.swap(0, Ordering::Relaxed) } else { 0 };
         let label =

@@ -32,7 +32,7 @@ macro_rules! numbers_with_fraction {
     ($($number:ident)*) => {$(
         impl ParameterType for $number {
             fn within(self, least: Option<&Self>, most: Option<&Self>) -> Option<Self> {
-                // Adding zero makes negative zero a plain one: who divides by it should not find out.
+                // Adding zero makes negative zero a plain one: a division by it should not find out.
                 (self.is_finite() && between(&self, least, most)).then_some(self + 0.0)
             }
         }

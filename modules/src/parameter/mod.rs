@@ -7,7 +7,7 @@
 //! `param set`   ──runtime::parameters────┘
 //! ```
 //!
-//! A value travels as postcard of its type, and whoever has no such type reads it by the description that comes with
+//! A value travels as postcard of its type, and a program without that type reads it by the description that comes with
 //! it: [`Parameter`].
 //!
 //! ```

@@ -42,10 +42,10 @@ struct Settings {
     look: bool,
     /// What to say.
     #[parameter(default = "hello")]
-    greeting: String,
+    motto: String,
 }
 
-const INDEX: [&str; 8] = ["cruise-m-s", "skip", "offset", "count", "share", "side", "look", "greeting"];
+const INDEX: [&str; 8] = ["cruise-m-s", "skip", "offset", "count", "share", "side", "look", "motto"];
 
 fn read(text: &str) -> Result<Settings, String> {
     toml::from_str(&format!("motor = \"motor.0\"\n{text}")).map_err(|error| error.message().to_owned())
@@ -95,7 +95,7 @@ fn a_file_is_read_with_the_same_check() {
         ("side = \"up\"", "`side`: "),
         ("look = 1", "`look`: expected true or false"),
         ("look = 1979-05-27", "`look`: "),
-        ("greeting = 1", "`greeting`: "),
+        ("motto = 1", "`motto`: "),
         ("cruise = 1.0", "unknown field `cruise`"),
         ("cruise_m_s = 1.0", "unknown field `cruise_m_s`"),
     ] {
@@ -107,7 +107,7 @@ fn a_file_is_read_with_the_same_check() {
 #[test]
 fn what_is_set_is_stored_and_negative_zero_is_zero() {
     let mut settings = settings();
-    for (name, text) in [("cruise-m-s", "-0.0"), ("side", "turn_right"), ("greeting", "a\nb"), ("look", "false")] {
+    for (name, text) in [("cruise-m-s", "-0.0"), ("side", "turn_right"), ("motto", "a\nb"), ("look", "false")] {
         let (index, parameter) = parameter(name);
         let bytes = encode(&parameter.field.ty, &parse_argument(&parameter.field.ty, text).unwrap()).unwrap();
         let accepted = settings.accept(index, &bytes).unwrap();
@@ -115,7 +115,7 @@ fn what_is_set_is_stored_and_negative_zero_is_zero() {
         assert_eq!(settings.get(index).unwrap().value, accepted, "{name}");
     }
     assert!(settings.cruise_m_s == 0.0 && settings.cruise_m_s.is_sign_positive());
-    assert_eq!((settings.side, settings.greeting.as_str(), settings.look), (Side::TurnRight, "a\nb", false));
+    assert_eq!((settings.side, settings.motto.as_str(), settings.look), (Side::TurnRight, "a\nb", false));
     assert_eq!(settings.motor, "motor.0");
 }
 
@@ -142,7 +142,11 @@ proptest! {
     #[test]
     fn so_is_one_near_the_edges(steps in -3i64..=3, high: bool) {
         let edge = if high { 1.5f64 } else { 0.0 };
-        let x = if edge == 0.0 && steps < 0 { -f64::from_bits(-steps as u64) } else { f64::from_bits((edge.to_bits() as i64 + steps) as u64) };
+        let x = if edge == 0.0 && steps < 0 {
+            -f64::from_bits(-steps as u64)
+        } else {
+            f64::from_bits((edge.to_bits() as i64 + steps) as u64)
+        };
         prop_assert_eq!(settings().accept(0, &x.to_le_bytes()).is_ok(), if high { steps <= 0 } else { steps >= 0 });
     }
 
@@ -172,9 +176,15 @@ proptest! {
     }
 
     #[test]
-    fn what_is_written_into_a_file_reads_back(cruise in 0.0..=1.5f64, share in 0.1..=0.9f32, count: u64, greeting: String, side: bool) {
+    fn what_is_written_into_a_file_reads_back(
+        cruise in 0.0..=1.5f64,
+        share in 0.1..=0.9f32,
+        count: u64,
+        motto: String,
+        side: bool,
+    ) {
         let mut before = settings();
-        (before.cruise_m_s, before.share, before.count, before.greeting) = (cruise, share, count, greeting);
+        (before.cruise_m_s, before.share, before.count, before.motto) = (cruise, share, count, motto);
         before.side = if side { Side::TurnRight } else { Side::Left };
         let mut text = String::from("motor = \"motor.0\"\n");
         for index in 0..INDEX.len() {

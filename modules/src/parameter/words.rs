@@ -29,6 +29,13 @@ pub fn from_file(ty: &Type, value: &Value) -> Result<Vec<u8>, String> {
 
 /// The bytes of a value that was typed as one word.
 ///
+/// ```
+/// use rohrpost_modules::{parameter::from_word, schema::Type};
+///
+/// assert_eq!(from_word(&Type::F64, "0.5"), Ok(0.5_f64.to_le_bytes().to_vec()));
+/// assert!(from_word(&Type::F64, "fast").is_err());
+/// ```
+///
 /// # Errors
 /// What was expected.
 pub fn from_word(ty: &Type, word: &str) -> Result<Vec<u8>, String> {

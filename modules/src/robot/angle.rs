@@ -30,7 +30,8 @@ mod tests {
         fn wrapping_keeps_the_direction(angle_rad in -1e4..1e4) {
             let wrapped = wrap_rad(angle_rad);
             prop_assert!(wrapped > -PI - 1e-12 && wrapped <= PI);
-            prop_assert!((wrapped.sin() - angle_rad.sin()).abs() < 1e-9 && (wrapped.cos() - angle_rad.cos()).abs() < 1e-9);
+            prop_assert!((wrapped.sin() - angle_rad.sin()).abs() < 1e-9);
+            prop_assert!((wrapped.cos() - angle_rad.cos()).abs() < 1e-9);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A map of free and occupied squares, made from scans whose poses are known.
+//! A map of free and occupied squares, made from scans with known poses.
 //!
 //! Each square holds the log-odds of being occupied, in hundredths. A scan counts once for a square, however many of
 //! its beams cross it, and a square that one beam hits is not cleared by another beam that grazes it. The map grows in

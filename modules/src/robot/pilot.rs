@@ -9,8 +9,8 @@
 //!        └── long enough ── Turn: on the spot, to one side until it is clear: no dithering in corners
 //! ```
 //!
-//! The preferred side makes it turn into doors, as one who keeps a hand on the wall does; changing it by chance now and
-//! then breaks the rounds that such a one would walk for ever.
+//! The preferred side makes it turn into doors, as a hand kept on the wall does; changing it by chance now and then
+//! breaks the rounds that it would go for ever.
 
 use crate::types::{LaserScan, Pose, Twist};
 use nalgebra::Point2;
@@ -96,7 +96,8 @@ enum Mode {
 /// ```
 /// use rohrpost_modules::{robot::pilot::{Pilot, Settings}, types::LaserScan};
 /// let mut pilot = Pilot::new(Settings::default());
-/// let mut scan = LaserScan { start_rad: -1.57, step_rad: 0.0175, range_max_m: 8.0, ranges_m: vec![8.0; 180], pose: None };
+/// let ranges_m = vec![8.0; 180];
+/// let mut scan = LaserScan { start_rad: -1.57, step_rad: 0.0175, range_max_m: 8.0, ranges_m, pose: None };
 /// assert!(pilot.drive(&scan).speed_m_s > 0.1);
 /// scan.ranges_m = vec![0.3; 180];
 /// assert_eq!(pilot.drive(&scan).speed_m_s, 0.0); // turns on the spot

@@ -3,7 +3,7 @@
 //! Stamps of a log are not to be trusted alone:
 //!
 //! - More than [`BEHIND_MAX_S`] behind the largest stamp so far: the record is discarded and counted. The Intel log has
-//!   an ODOM line after each scan whose stamp is next to 0.
+//!   an ODOM line after each scan, with a stamp next to 0.
 //! - Behind by less: the record is kept where the file has it, with its own stamp (the writers of a log take turns as
 //!   they please; the Intel log has 1709 such). Only its due time is held at the largest so far: due times never go
 //!   back.
@@ -36,7 +36,7 @@ pub struct Counters {
     pub scans: u64,
     /// Odometry played.
     pub odometries: u64,
-    /// Records whose stamps are not believed.
+    /// Records with stamps that are not believed.
     pub discarded: u64,
     /// Lines that are broken.
     pub malformed: u64,

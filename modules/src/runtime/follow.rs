@@ -109,7 +109,7 @@ pub(crate) struct Followings {
 }
 
 impl Followings {
-    /// Of a module whose link has this incarnation: nothing yet.
+    /// Of a module with a link of this incarnation: nothing yet.
     pub(crate) fn of(incarnation: u32) -> Self {
         Self { list: Vec::new(), incarnation }
     }
@@ -153,7 +153,7 @@ impl Followings {
         self.list.iter().map(|followed| followed.lost).sum()
     }
 
-    /// Of each: whose data, their number, packages that came, and packages that did not.
+    /// Of each: the publisher, the number of the data, packages that came, and packages that did not.
     pub(crate) fn tallies(&self) -> impl Iterator<Item = (Name, u16, u64, u64)> {
         self.list.iter().map(|followed| (followed.from, followed.wish.number, followed.came, followed.lost))
     }
@@ -193,9 +193,9 @@ impl Followings {
     /// is what newer ones replaced, there or on the way, and no loss.
     ///
     /// A subscription is told by its id and by the incarnation of this incarnation, which nothing before it has had: so
-    /// whoever still sends what an earlier incarnation asked for, in whatever order that subscribed, is not taken for
-    /// another. The publisher and the number are compared besides, since both numbers are no secret; a router lets
-    /// nobody send in the name of another node's module.
+    /// a publisher that still sends what an earlier incarnation asked for, in whatever order that subscribed, is not
+    /// taken for another. The publisher and the number are compared besides, since both numbers are no secret; a router
+    /// lets nobody send in the name of another node's module.
     pub(crate) fn admit(
         &mut self,
         (mailbox, latest): (u8, bool),

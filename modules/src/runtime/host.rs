@@ -1,12 +1,10 @@
 //! How a program that is no module takes part: tools, tests, launch itself.
 
+mod functions;
+
 use crate::call::append;
 use crate::call::{CallError, Link, REPLIES_KEPT};
-use crate::common::{
-    self, Change, DescriptionPart, Exchange, ExchangePage, OutputLevel, ParameterPage, SetParameters, Status,
-    TimeReport,
-};
-use crate::parameter::{Parameter, Refusal};
+use crate::common::{self, DescriptionPart};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
@@ -21,11 +19,6 @@ const DATA_SLOTS: u16 = 128;
 /// Longest description that is asked for, bytes.
 const DESCRIPTION_MAX: usize = 1 << 20;
 
-/// Most parameters of a module that are asked for.
-const PARAMETERS_MAX: u16 = 1024;
-/// Times that parameters are read anew because they were set meanwhile.
-const READS_MAX: usize = 5;
-
 /// Why a tool cannot take part.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
@@ -38,8 +31,7 @@ pub enum ClientError {
     /// All instances of class `tool` that programs run by hand may take are in use.
     #[error(
         "no room for another tool on node `{1}`: programs run by hand have {0} instances there, all in use; end some, \
-        or \
-         widen `tools` in the configuration"
+         or widen `tools` in the configuration"
     )]
     Crowded(usize, String),
     /// The configuration has no such node.
@@ -49,6 +41,22 @@ pub enum ClientError {
 
 /// A tool's place on a node: a link and a data mailbox, under the first free instance of class `tool` but one: that is
 /// launch's.
+///
+/// ```no_run
+/// use rohrpost_modules::runtime::{ToolLink, find_running};
+/// use std::time::Duration;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let installation = rohrpost_config::Installation::load("robot.toml".as_ref())?;
+/// let directory = find_running().pop().ok_or("no node runs")?;
+/// let node = rohrpost_mailbox::Node::open(&directory)?;
+/// let mut tool = ToolLink::join(&installation, &node, "base", Duration::from_secs(1))?;
+/// let pilot = installation.classes.parse_module("pilot.0")?;
+/// println!("it runs for {} ms", tool.status(pilot)?.uptime_ms);
+/// tool.close();
+/// # Ok(())
+/// # }
+/// ```
 pub struct ToolLink {
     /// Sends and calls.
     pub link: Link,
@@ -106,11 +114,28 @@ impl ToolLink {
     }
 
     /// Where the launch of this node takes commands, if one runs.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
+    /// fn modules(tool: &mut ToolLink) -> Result<usize, CallError> {
+    ///     let launcher = tool.launcher();
+    ///     Ok(tool.children(launcher)?.len())
+    /// }
+    /// ```
     pub fn launcher(&self) -> Name {
         self.launcher
     }
 
     /// The mailbox that takes subscribed data; made when it is first asked for.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::ToolLink;
+    /// # use rohrpost_mailbox::CreateError;
+    /// fn wait_for_data(tool: &mut ToolLink) -> Result<bool, CreateError> {
+    ///     let package = tool.data()?.receive_timeout(std::time::Duration::from_secs(1));
+    ///     Ok(package.is_some())
+    /// }
+    /// ```
     ///
     /// # Errors
     /// When it cannot be made.
@@ -125,6 +150,16 @@ impl ToolLink {
 
     /// Calls a common function with a tuple of arguments.
     ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
+    /// # use rohrpost_mailbox::Name;
+    /// use rohrpost_modules::common::{STATUS, Status};
+    ///
+    /// fn status(tool: &mut ToolLink, module: Name) -> Result<Status, CallError> {
+    ///     tool.common(module, STATUS, &())
+    /// }
+    /// ```
+    ///
     /// # Errors
     /// See [`CallError`].
     pub fn common<T: serde::de::DeserializeOwned>(
@@ -137,6 +172,16 @@ impl ToolLink {
     }
 
     /// Calls any function: `write` appends its arguments, `read` takes its result.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
+    /// # use rohrpost_mailbox::Name;
+    /// /// Its function 16 of interface 7, which takes an angle in radians and returns another.
+    /// fn turn(tool: &mut ToolLink, module: Name, angle_rad: f64) -> Result<f64, CallError> {
+    ///     let write = |body: &mut Vec<u8>| Ok(body.extend_from_slice(&angle_rad.to_le_bytes()));
+    ///     tool.call(module, 16, 7, write, |bytes| postcard::from_bytes(bytes))
+    /// }
+    /// ```
     ///
     /// # Errors
     /// See [`CallError`].
@@ -152,7 +197,16 @@ impl ToolLink {
         self.link.wait(call, read)
     }
 
-    /// Begins to call any function, and returns at once; [`Link::poll_as`] tells how it went.
+    /// Begins to call any function, and returns at once; [`Link::poll_for`] tells how it went.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{call::CallError, runtime::ToolLink};
+    /// # use rohrpost_mailbox::Name;
+    /// fn stop_both(tool: &mut ToolLink, left: Name, right: Name) -> Result<(), CallError> {
+    ///     let begun = [tool.begin(left, 16, 7, |_| Ok(()))?, tool.begin(right, 16, 7, |_| Ok(()))?];
+    ///     begun.into_iter().try_for_each(|call| tool.link.wait(call, |_| Ok(())))
+    /// }
+    /// ```
     ///
     /// # Errors
     /// See [`CallError`].
@@ -164,112 +218,6 @@ impl ToolLink {
         write: impl FnOnce(&mut Vec<u8>) -> Result<(), postcard::Error>,
     ) -> Result<u32, CallError> {
         self.link.begin(module, function, interface, self.timeout, write)
-    }
-
-    /// Switches a module on or off.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    pub fn switch(&mut self, module: Name, on: bool) -> Result<(), CallError> {
-        self.common(module, if on { common::ON } else { common::OFF }, &())
-    }
-
-    /// Begins to switch a module on or off, and returns at once; [`Link::poll`] tells how it went.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    pub fn begin_switch(&mut self, module: Name, on: bool) -> Result<u32, CallError> {
-        self.begin(module, if on { common::ON } else { common::OFF }, common::HASH, |_| Ok(()))
-    }
-
-    /// Asks a module how it is.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    pub fn status(&mut self, module: Name) -> Result<Status, CallError> {
-        self.common(module, common::STATUS, &())
-    }
-
-    /// Asks a module for system time as its node has it.
-    ///
-    /// # Errors
-    /// See [`CallError`]. A module built before there was this function says [`crate::call::Fault::Unknown`].
-    pub fn time(&mut self, module: Name) -> Result<TimeReport, CallError> {
-        self.common(module, common::TIME, &())
-    }
-
-    /// Asks a module what came of its exchange with others: the data that it follows, then those that it has called.
-    ///
-    /// # Errors
-    /// See [`CallError`]. A module built before there was this function says [`crate::call::Fault::Unknown`].
-    pub fn exchange(&mut self, module: Name) -> Result<Vec<Exchange>, CallError> {
-        let mut all = Vec::new();
-        loop {
-            let page: ExchangePage = self.common(module, common::EXCHANGE, &(all.len() as u16,))?;
-            let last = page.exchanges.is_empty();
-            all.extend(page.exchanges);
-            if all.len() >= usize::from(page.total) || last {
-                return Ok(all);
-            }
-        }
-    }
-
-    /// Sets which output lines a module sends, and tells which it sent before; none when nothing collects them.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    pub fn output_level(&mut self, module: Name, level: OutputLevel) -> Result<Option<OutputLevel>, CallError> {
-        self.common(module, common::OUTPUT_LEVEL, &(level,))
-    }
-
-    /// Asks a module what it offers.
-    ///
-    /// # Errors
-    /// See [`CallError`].
-    pub fn describe(&mut self, module: Name) -> Result<Description, CallError> {
-        describe(&mut self.link, module, self.timeout)
-    }
-
-    /// Asks a module for its parameters and their values; empty, if it has none.
-    ///
-    /// # Errors
-    /// See [`CallError`]. A module built before there were parameters says [`crate::call::Fault::Unknown`].
-    pub fn parameters(&mut self, module: Name) -> Result<Vec<Parameter>, CallError> {
-        let mut found = Vec::new();
-        let mut changes = None;
-        let mut reads = 0;
-        loop {
-            let from = found.len() as u16;
-            let write = |body: &mut Vec<u8>| append(body, &(from,));
-            let page: ParameterPage =
-                self.call(module, common::PARAMETERS, common::HASH, write, |bytes| postcard::from_bytes(bytes))?;
-            // What it says of itself is a claim.
-            if page.total > PARAMETERS_MAX {
-                let text = format!("its {} parameters are more than {PARAMETERS_MAX}", page.total);
-                return Err(CallError::BadReply(module, text));
-            }
-            // Somebody set some in between: values of one moment belong together.
-            if changes.replace(page.changes).is_some_and(|before| before != page.changes) && reads < READS_MAX {
-                reads += 1;
-                found.clear();
-                changes = None;
-                continue;
-            }
-            let last = page.parameters.is_empty();
-            found.extend(page.parameters);
-            if found.len() >= usize::from(page.total) || last {
-                return Ok(found);
-            }
-        }
-    }
-
-    /// Sets parameters of a module, all of them or none; returns what they were and are.
-    ///
-    /// # Errors
-    /// See [`CallError`] and [`Refusal`].
-    pub fn set_parameters(&mut self, module: Name, wish: &SetParameters) -> Result<Vec<Change>, CallError<Refusal>> {
-        let set: Result<_, Refusal> = self.common(module, common::SET_PARAMETERS, wish).map_err(CallError::widen)?;
-        set.map_err(|refusal| CallError::Module(module, refusal))
     }
 
     /// Removes the tool's mailboxes.

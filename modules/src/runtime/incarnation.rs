@@ -32,7 +32,7 @@ impl<M: Module> Incarnation<M> {
         life
     }
 
-    /// Runs a part of the module's own code. Whoever looks sees which, and since when; what took long is told.
+    /// Runs a part of the module's own code. Tools see which, and since when; what took long is told.
     pub(crate) fn work<T>(
         &mut self,
         work: Work,
@@ -83,7 +83,8 @@ impl<M: Module> Incarnation<M> {
         self.enter(ModuleState::On);
         tracing::info!("is on");
         context.next_tick = context.period.map(|_| Instant::now());
-        // Asked for before the answer goes out: who switches modules on one after the other knows who listens to whom.
+        // Asked for before the answer goes out: a tool that switches modules on one after the other knows which one
+        // subscribes to which.
         context.followings.renew(&mut context.link.borrow_mut(), Instant::now());
         Ok(())
     }

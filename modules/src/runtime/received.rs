@@ -50,6 +50,15 @@ impl Received<'_> {
 
     /// The value, if it came to this mailbox, which takes data from all ([`super::Context::open_mailbox_to_all`]).
     ///
+    /// ```
+    /// # use rohrpost_modules::{runtime::{Received, Unreadable}, types::Pose};
+    /// const POSES: u8 = 3;
+    ///
+    /// fn pose(data: &Received<'_>) -> Result<Option<Pose>, Unreadable> {
+    ///     data.read_from(POSES)
+    /// }
+    /// ```
+    ///
     /// # Errors
     /// It came there, and cannot be read.
     pub fn read_from<T: Data>(&self, mailbox: u8) -> Result<Option<T>, Unreadable> {
@@ -61,6 +70,13 @@ impl Received<'_> {
     }
 
     /// Whether it belongs to this subscription.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{runtime::{Received, Subscription}, types::Odometry};
+    /// fn missed(data: &Received<'_>, odometry: &Subscription<Odometry>) -> u32 {
+    ///     if data.is_of(odometry) { data.head.missed.into() } else { 0 }
+    /// }
+    /// ```
     pub fn is_of<T>(&self, subscription: &Subscription<T>) -> bool {
         (self.mailbox, self.id) == (subscription.mailbox, subscription.id)
     }

@@ -2,11 +2,10 @@
 //! them.
 
 use crate::common::Refused;
-use rohrpost_mailbox::Name;
-use std::time::{Duration, Instant};
+use rohrpost_mailbox::{Name, Throttle, monotonic_ns};
 
 /// They are told at most so often.
-const TELL: Duration = Duration::from_secs(10);
+const TELL_EVERY_NS: u64 = 10_000_000_000;
 
 /// Why a package is not taken.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -56,9 +55,7 @@ impl Cause {
 #[derive(Default)]
 pub(crate) struct Refusals {
     pub(crate) counts: Refused,
-    /// Worth telling, and not told yet.
-    untold: u64,
-    told: Option<Instant>,
+    throttle: Throttle,
 }
 
 impl Refusals {
@@ -66,11 +63,7 @@ impl Refusals {
     pub(crate) fn note(&mut self, cause: Cause, from: Name) {
         let count = self.count(cause).map(|count| *count += 1);
         let Some(words) = cause.words() else { return };
-        self.untold += 1;
-        let now = Instant::now();
-        if self.told.is_none_or(|told| now >= told + TELL) {
-            let packages = std::mem::take(&mut self.untold);
-            self.told = Some(now);
+        if let Some(packages) = self.throttle.note(monotonic_ns(), TELL_EVERY_NS) {
             let counted = if count.is_some() { " (`rohrpost status --json` counts them by cause)" } else { "" };
             tracing::warn!("took nothing of {packages} packages, the last of them from {from}: {words}{counted}");
         }

@@ -32,6 +32,30 @@ const PAUSE: Duration = Duration::from_micros(50);
 ///
 /// Launch tells it by its environment what it is; by hand say `--config FILE --name CLASS.INSTANCE` (and `--off`, to
 /// leave it switched off).
+///
+/// ```
+/// use rohrpost_modules::{Module, ModuleError, runtime::Context};
+///
+/// #[derive(serde::Deserialize)]
+/// #[serde(deny_unknown_fields)]
+/// struct Settings {}
+///
+/// struct Idle;
+///
+/// impl Module for Idle {
+///     type Settings = Settings;
+///     type Interfaces = ();
+///
+///     fn new(_: Settings, _: &mut Context) -> Result<Self, ModuleError> {
+///         Ok(Self)
+///     }
+/// }
+///
+/// fn main() -> std::process::ExitCode {
+///     # if true { return std::process::ExitCode::SUCCESS }
+///     rohrpost_modules::run::<Idle>()
+/// }
+/// ```
 pub fn run<M: Module>() -> ExitCode {
     exit(Start::from_environment().and_then(run_started::<M>))
 }
@@ -48,6 +72,14 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 }
 
 /// Runs a module as something that was started already says: for programs that hold several kinds of module.
+///
+/// ```
+/// # use rohrpost_modules::{Module, runtime::{Start, StartError, run_started}};
+/// fn start<A: Module, B: Module>(first: bool) -> Result<(), StartError> {
+///     let start = Start::from_environment()?;
+///     if first { run_started::<A>(start) } else { run_started::<B>(start) }
+/// }
+/// ```
 ///
 /// # Errors
 /// See [`StartError`].
@@ -133,7 +165,7 @@ impl<M: Module> Running<M> {
     /// Hands out what came to the data mailbox and to the module's own; while the module is off it is dropped.
     fn take_data(&mut self) -> bool {
         let mut any = take(&mut self.data, &mut self.life, &mut self.context);
-        // Taken out meanwhile, since the module is given the context whose they are.
+        // Taken out meanwhile, since the module is given the context that they belong to.
         let mut own = std::mem::take(&mut self.context.own);
         for mailbox in &mut own {
             any |= take(mailbox, &mut self.life, &mut self.context);

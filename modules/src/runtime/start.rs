@@ -43,6 +43,13 @@ pub fn kept() -> Vec<OwnedFd> {
 }
 
 /// What to start.
+///
+/// ```
+/// use rohrpost_modules::runtime::{Start, StartError};
+///
+/// let start = Start::from_arguments(["--name", "pilot.0"].into_iter().map(String::from));
+/// assert!(matches!(start, Err(StartError::Usage(_))), "which configuration?");
+/// ```
 #[derive(Debug)]
 pub struct Start {
     /// The configuration.
@@ -177,7 +184,7 @@ fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
 }
 
 /// On SIGTERM, SIGINT and SIGHUP: ask the loop to end; if it does not within the time, end the process. SIGHUP is how
-/// the kernel wakes a stopped module whose launch has died.
+/// the kernel wakes a stopped module after its launch has died.
 fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<Arc<AtomicBool>, StartError> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGHUP])
@@ -189,7 +196,7 @@ fn stop_on_signals(participant: &Arc<Participant>, within: Duration) -> Result<A
             flag.store(true, Ordering::Release);
             participant.ring();
             std::thread::sleep(within);
-            // Whoever hangs may hang while it prints; then nobody else can, and the end must not wait for that.
+            // A module that hangs may hang while it prints; then nobody else can, and the end must not wait for that.
             let say = move || output::print(&format_args!("does not stop within {within:?}; ended"));
             let _ = std::thread::Builder::new().spawn(say);
             std::thread::sleep(LAST_WORDS);
@@ -227,6 +234,12 @@ fn schedule(wanted: Scheduling) {
 }
 
 /// Directories of the nodes of this user that are launched now.
+///
+/// ```
+/// for node in rohrpost_modules::runtime::find_running() {
+///     println!("{}", node.display());
+/// }
+/// ```
 pub fn find_running() -> Vec<PathBuf> {
     let launched = |node: &Node| node.launcher().is_some();
     nodes()
@@ -237,6 +250,12 @@ pub fn find_running() -> Vec<PathBuf> {
 }
 
 /// Why nodes of this user cannot be looked into that another version of Rohrpost made: [`NodeError::Version`] of each.
+///
+/// ```
+/// for error in rohrpost_modules::runtime::find_other_versions() {
+///     eprintln!("{error}");
+/// }
+/// ```
 pub fn find_other_versions() -> Vec<NodeError> {
     let errors = nodes().into_iter().filter_map(|(_, node)| node.err());
     errors.filter(|error| matches!(error, NodeError::Version(..))).collect()

@@ -203,7 +203,7 @@ pub fn look_at_all(
         if seen.iter().all(Option::is_some) {
             return seen.into_iter().flatten().collect();
         }
-        // Calls are repeated by who looks after them.
+        // The thread that looks after calls repeats them.
         let wake = (Instant::now() + PAGE_PATIENCE / 8).min(deadline);
         wait_any(&mut [link.replies()], Some(wake), || false);
     }

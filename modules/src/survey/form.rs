@@ -251,7 +251,13 @@ travels! {
         sent: u64,
         classes: Vec<ClassTraffic>,
     };
-    struct Shape as ShapeForm { slots: u16, body_bytes_max: u16, full: OverflowPolicy, max_age: Option<Duration>, claims: u8, };
+    struct Shape as ShapeForm {
+        slots: u16,
+        body_bytes_max: u16,
+        full: OverflowPolicy,
+        max_age: Option<Duration>,
+        claims: u8,
+    };
     enum OverflowPolicy as FullForm { Displace, Latest, Reject, };
     struct ClassTraffic as ClassForm {
         class: Option<Class>,

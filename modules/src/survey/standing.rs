@@ -64,11 +64,25 @@ impl Standing {
     }
 
     /// Its place among [`Standing::WORDS`].
+    ///
+    /// ```
+    /// use rohrpost_modules::survey::Standing;
+    ///
+    /// let mut all = [Standing::On, Standing::Failed, Standing::Off];
+    /// all.sort_by_key(|standing| standing.severity());
+    /// assert_eq!(all.map(Standing::word), ["failed", "off", "on"]);
+    /// ```
     pub fn severity(self) -> usize {
         Self::WORDS.iter().position(|word| *word == self.word()).unwrap_or(Self::WORDS.len())
     }
 
     /// Whether it answers when it is asked, as far as one can see.
+    ///
+    /// ```
+    /// use rohrpost_modules::survey::Standing;
+    ///
+    /// assert!(Standing::Error.answers() && !Standing::Busy.answers());
+    /// ```
     pub const fn answers(self) -> bool {
         matches!(self, Self::On | Self::Off | Self::Error)
     }

@@ -14,6 +14,12 @@ impl Cell {
     pub const UNKNOWN: Self = Self(255);
 
     /// Occupied with this probability, 0..=100 percent.
+    ///
+    /// ```
+    /// use rohrpost_modules::types::Cell;
+    ///
+    /// assert_eq!((Cell::percent(40).0, Cell::percent(120).0), (40, 100));
+    /// ```
     pub fn percent(percent: u8) -> Self {
         Self(percent.min(100))
     }

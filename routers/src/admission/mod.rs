@@ -18,7 +18,6 @@ pub use packet::Addresses;
 #[cfg(test)]
 pub(crate) use packet::tests::v4;
 
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::{counts, session};
 use rohrpost_config::{Installation, ROUTER, TCP, TCP_SERVER};
@@ -116,13 +115,11 @@ impl Admission {
     pub fn validate(&self, way: ArrivalPath, head: &Head, body: &[u8]) -> Result<(), NotAdmitted> {
         let is_reply = matches!(head.kind.kind(), Kind::Reply(_));
         match way {
-            ArrivalPath::Lan { is_its_name: false, .. } if !broken!(AdmitsForeignNames) => {
+            ArrivalPath::Lan { is_its_name: false, .. } => {
                 return Err(NotAdmitted::ForeignName);
             }
             // In our own names the server itself speaks: it says that a module of ours is not there.
-            ArrivalPath::Beyond { is_our_name }
-                if (is_our_name && !is_reply || !head.from.is_mailbox()) && !broken!(AdmitsForeignNames) =>
-            {
+            ArrivalPath::Beyond { is_our_name } if is_our_name && !is_reply || !head.from.is_mailbox() => {
                 return Err(NotAdmitted::ForeignName);
             }
             ArrivalPath::Lan { .. } | ArrivalPath::Beyond { .. } => {}
@@ -131,7 +128,7 @@ impl Admission {
         if self.is_routers_own(head.to) || self.is_routers_own(head.from) && !is_reply {
             self.validate_routers_own(way, head, body)?;
         }
-        if self.is_across_systems(way, head) && !broken!(AdmitsRoutersOwn) {
+        if self.is_across_systems(way, head) {
             return Err(NotAdmitted::RoutersOwn);
         }
         if self.access.allows(head) { Ok(()) } else { Err(NotAdmitted::NotAllowed) }
@@ -169,9 +166,9 @@ impl Admission {
             && self.tunnel_end(head.to).is_some()
             && head.kind == PACKET;
         match node.filter(|_| is_tunnel) {
-            None if !broken!(AdmitsRoutersOwn) => Err(NotAdmitted::RoutersOwn),
-            Some(node) if !self.is_packet_of(node, body) && !broken!(AdmitsPackets) => Err(NotAdmitted::BadPacket),
-            _ => Ok(()),
+            None => Err(NotAdmitted::RoutersOwn),
+            Some(node) if !self.is_packet_of(node, body) => Err(NotAdmitted::BadPacket),
+            Some(_) => Ok(()),
         }
     }
 

@@ -4,7 +4,6 @@
 //! several are reassembled at a time. More than there is room for means that fragments were lost: the least important,
 //! then oldest, is given up.
 
-use crate::broken::broken;
 use crate::frame::{Fragment, PARTS_MAX};
 use rohrpost_mailbox::Head;
 
@@ -71,8 +70,7 @@ impl Reassembly {
         is_late: impl FnOnce() -> bool,
         mut tell: impl FnMut(&Head, &[u8], Change),
     ) -> Option<CompletePackage<'_>> {
-        let is_its =
-            |partial: &Partial| partial.first == part.first || broken!(MixesPackages) && partial.head == part.head;
+        let is_its = |partial: &Partial| partial.first == part.first;
         let known = self.partial.iter().position(|partial| partial.is_used && is_its(partial));
         let at = match known {
             Some(at) => at,
@@ -101,7 +99,7 @@ impl Reassembly {
     pub fn delivers(&mut self, newer: &Head, sequence: u64) {
         let flow = |head: &Head| (head.to, head.from, head.priority);
         for older in self.partial.iter_mut().filter(|older| older.is_used && older.first < sequence) {
-            older.is_late |= flow(&older.head) == flow(newer) && !broken!(TakesLate);
+            older.is_late |= flow(&older.head) == flow(newer);
         }
     }
 
@@ -109,7 +107,7 @@ impl Reassembly {
     pub fn expire(&mut self, now_ns: u64, mut tell: impl FnMut(&Head, &[u8], Change)) {
         for at in 0..self.partial.len() {
             let partial = &self.partial[at];
-            if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS && !broken!(KeepsParts) {
+            if partial.is_used && now_ns.saturating_sub(partial.touched_ns) >= PATIENCE_NS {
                 self.give_up(at, &mut tell);
             }
         }
@@ -141,7 +139,7 @@ impl Reassembly {
         if let Some(free) = self.partial.iter().position(|partial| !partial.is_used) {
             return Some(free);
         }
-        if self.partial.len() < PARTIAL_MAX || broken!(Unbounded) {
+        if self.partial.len() < PARTIAL_MAX {
             self.partial.push(Partial::new());
             return Some(self.partial.len() - 1);
         }
@@ -210,7 +208,7 @@ impl Partial {
     fn add(&mut self, now_ns: u64, part: &Fragment<'_>) -> bool {
         let agrees = part.head == self.head && part.count == self.count && part.part_bytes() == self.part_bytes;
         let (word, bit) = (usize::from(part.index) / 64, 1 << (part.index % 64));
-        if !agrees || self.came[word] & bit != 0 && !broken!(CountsPartsTwice) {
+        if !agrees || self.came[word] & bit != 0 {
             return false;
         }
         self.came[word] |= bit;
@@ -224,5 +222,3 @@ impl Partial {
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) use tests::CHECKS;

@@ -2,14 +2,6 @@ use super::*;
 use proptest::prelude::*;
 use rohrpost_mailbox::Priority;
 
-pub(crate) const CHECKS: &[fn()] = &[
-    check_any_order,
-    check_several_at_a_time,
-    check_what_is_missing_is_given_up_after_a_second,
-    check_room,
-    check_copies,
-];
-
 const PART: usize = 100;
 const S: u64 = 1_000_000_000;
 
@@ -40,7 +32,8 @@ fn take(parts: &mut Reassembly, now_ns: u64, part: &Fragment<'_>) -> (Option<u64
     (whole.map(|whole| whole.first), changes)
 }
 
-fn check_any_order() {
+#[test]
+fn parts_come_in_any_order() {
     let cut = Cut::new(5, 10, 450);
     let mut parts = Reassembly::default();
     for index in [3, 0, 4, 1] {
@@ -52,11 +45,7 @@ fn check_any_order() {
 }
 
 #[test]
-fn parts_come_in_any_order() {
-    check_any_order();
-}
-
-fn check_several_at_a_time() {
+fn packages_of_several_levels_come_between_each_other() {
     let (slow, urgent, next) = (Cut::new(5, 10, 300), Cut::new(7, 200, 300), Cut::new(20, 10, 300));
     let mut parts = Reassembly::default();
     for part in [slow.part(0), urgent.part(0), slow.part(1), urgent.part(1), next.part(0), next.part(1)] {
@@ -70,11 +59,7 @@ fn check_several_at_a_time() {
 }
 
 #[test]
-fn packages_of_several_levels_come_between_each_other() {
-    check_several_at_a_time();
-}
-
-fn check_what_is_missing_is_given_up_after_a_second() {
+fn what_is_missing_for_a_second_is_given_up() {
     let cut = Cut::new(5, 10, 300);
     let mut parts = Reassembly::default();
     let mut given_up = Vec::new();
@@ -98,11 +83,7 @@ fn check_what_is_missing_is_given_up_after_a_second() {
 }
 
 #[test]
-fn what_is_missing_for_a_second_is_given_up() {
-    check_what_is_missing_is_given_up_after_a_second();
-}
-
-fn check_room() {
+fn memory_is_bounded_and_the_least_important_gives_way() {
     let mut parts = Reassembly::default();
     for first in 0..PARTIAL_MAX as u64 {
         take(&mut parts, 0, &Cut::new(first * 10, 100 + first as u8 / 4, 300).part(0));
@@ -123,22 +104,13 @@ fn check_room() {
 }
 
 #[test]
-fn memory_is_bounded_and_the_least_important_gives_way() {
-    check_room();
-}
-
-fn check_copies() {
+fn a_part_counts_once() {
     let cut = Cut::new(5, 10, 300);
     let mut parts = Reassembly::default();
     for index in [0, 0, 0, 1, 1] {
         assert_eq!(take(&mut parts, 0, &cut.part(index)).0, None);
     }
     assert_eq!(take(&mut parts, 0, &cut.part(2)).0, Some(5));
-}
-
-#[test]
-fn a_part_counts_once() {
-    check_copies();
 }
 
 #[test]

@@ -13,7 +13,6 @@
 //!
 //! Little-endian; a package head has the order of its options. The check is the CRC-32 of zlib over all other bytes.
 
-use crate::broken::broken;
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 pub use rohrpost_network::{ALIVE_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES as HEAD_BYTES, REFUSAL_BYTES};
 
@@ -141,7 +140,7 @@ impl FrameHead {
         if b[0..2] != MAGIC {
             return Err(BadFrame::Foreign);
         }
-        if b[CHECK] != check(b, &[rest]).to_le_bytes() && !broken!(SkipsCheck) {
+        if b[CHECK] != check(b, &[rest]).to_le_bytes() {
             return Err(BadFrame::Damaged("the check differs"));
         }
         if b[2] != VERSION && b[3] != FrameKind::Refusal as u8 {

@@ -15,7 +15,6 @@ pub(crate) use refusing::write_refusal;
 pub use window::{REORDER_MAX, WINDOW};
 
 use crate::admission::capped;
-use crate::broken::broken;
 use crate::counts::Cause;
 use crate::frame::{BadFrame, Fragment, Frame, FrameHead, NodeIndex, RefusalReason, VERSION};
 use crate::report::{Deliver, Mismatch};
@@ -238,10 +237,10 @@ impl Inbound {
         peer.is_heard(now_ns, &way, deliver);
         way.peer.received.datagrams.add(1);
         way.peer.received.bytes.add(came.bytes as u64);
-        let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS && !broken!(TakesStale);
+        let is_old = now_ns.saturating_sub(came.arrived_ns) > SOCKET_MAX_NS;
         let settings = &self.settings;
         let refused = |head: &Head, body: &[u8]| settings.refuses(from, head, body).or(is_old.then_some(Cause::Stale));
-        let admitted = |head: &Head| if broken!(AdmitsHurry) { *head } else { capped(head) };
+        let admitted = |head: &Head| capped(head);
         match frame {
             Frame::Packages(packages) => {
                 for (index, (package, body)) in (0..).zip(packages) {
@@ -296,5 +295,3 @@ impl Inbound {
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) use tests::CHECKS;

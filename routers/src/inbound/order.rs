@@ -7,7 +7,6 @@
 //! So it is checked when it begins, and [`Reassembly`](crate::fragment::Reassembly) notes whether a newer package of
 //! its flow goes before it.
 
-use crate::broken::broken;
 use crate::fragment::CompletePackage;
 use rohrpost_mailbox::Head;
 
@@ -67,7 +66,7 @@ impl Order {
     /// Whether a package that came in fragments is late; if it is not, it is the newest of its flow.
     pub(super) fn is_whole_late(&mut self, whole: &CompletePackage<'_>) -> bool {
         let position = position(whole.first, 0);
-        let is_late = if broken!(ForgetsBegun) { self.is_late(&whole.head, position) } else { whole.is_late };
+        let is_late = whole.is_late;
         if !is_late {
             self.note(&whole.head, position);
         }
@@ -79,8 +78,8 @@ impl Order {
         let (flow, group) = place(head);
         let (group, mark) = (&self.groups[group], position + 1);
         match group.places.iter().find(|(last, known)| *last != 0 && *known == flow) {
-            Some((last, _)) => mark <= *last && !broken!(TakesLate),
-            None => mark <= group.floor && !broken!(ForgetsFloor),
+            Some((last, _)) => mark <= *last,
+            None => mark <= group.floor,
         }
     }
 

@@ -3,7 +3,6 @@
 use super::doubt::Doubt;
 use super::order::{Order, sequence_of};
 use super::window::{Arrival, SequenceWindow, WINDOW};
-use crate::broken::broken;
 use crate::counts::Cause;
 use crate::fragment::{Change, Reassembly};
 use crate::frame::{Alive, FrameHead, NodeIndex, RefusalReason};
@@ -48,7 +47,7 @@ pub(super) struct Refusing {
     /// No refusal before this time, ns.
     pub(super) not_before_ns: u64,
     pub(super) told: Option<(IpAddr, Mismatch)>,
-    pub(super) told_ns: u64,
+    pub(super) throttle: Throttle,
     pub(super) last_ns: u64,
 }
 
@@ -92,7 +91,7 @@ impl PeerReceiver {
         let was = self.old.iter().position(|old| old.incarnation == head.incarnation);
         let is_silent = way.peer.link.heard_ns.get() + SILENT_AFTER_NS <= now_ns;
         let goes_on = was.is_some_and(|place| head.sequence >= self.old[place].next);
-        let may_go_on = first.is_some() || (is_silent && goes_on) || broken!(TakesOldIncarnations);
+        let may_go_on = first.is_some() || (is_silent && goes_on);
         if was.is_some() && !may_go_on {
             if goes_on && now_ns.saturating_sub(self.began_ns) > OLD_GONE_NS && !self.told.twice {
                 self.told.twice = true;
@@ -102,7 +101,7 @@ impl PeerReceiver {
         }
         let is_first = self.incarnation == 0;
         let is_vouched_for = first.is_some() || way.stats.is_known_incarnation(way.from, head.incarnation);
-        let is_doubted = !is_vouched_for && was.is_none() && !is_first && !broken!(BelievesIncarnations);
+        let is_doubted = !is_vouched_for && was.is_none() && !is_first;
         if is_doubted && !self.doubt.is_confirmed(now_ns, head) {
             return false;
         }
@@ -138,7 +137,7 @@ impl PeerReceiver {
         let next = self.window.next();
         let is_ahead = head.sequence >= next + WINDOW;
         let is_behind = head.sequence + WINDOW < next && !self.is_sure;
-        if !is_ahead && !is_behind || broken!(BelievesJumps) {
+        if !is_ahead && !is_behind {
             self.is_sure |= head.sequence + 1 != next;
             return true;
         }

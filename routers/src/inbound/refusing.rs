@@ -1,7 +1,6 @@
 //! Refusals: of which nodes datagrams are not taken, and how they learn of it, at most once a second each.
 
 use super::{Inbound, REFUSE_EVERY_NS};
-use crate::broken::broken;
 use crate::frame::{self, FrameHead, FrameKind, NodeIndex, Refusal, RefusalReason};
 use crate::link::{PeerLinkState, SILENT_AFTER_NS};
 use crate::report::{Deliver, Mismatch, RouterEvent};
@@ -19,7 +18,7 @@ impl Inbound {
     pub(super) fn mismatch(&self, source: IpAddr, head: &FrameHead) -> Option<Mismatch> {
         let ours = &self.settings;
         let differs = |reason| Mismatch { reason, version: frame::VERSION, digest: Some(head.digest) };
-        if head.digest != ours.digest && !broken!(TakesOtherDigests) {
+        if head.digest != ours.digest {
             return Some(differs(RefusalReason::Digest));
         }
         let is_there = self.is_address_of(head.from, source);
@@ -51,10 +50,10 @@ impl Inbound {
         }
         let is_over = refusing.last_ns + OVER_NS < now_ns;
         refusing.last_ns = now_ns;
+        let is_news = is_over || refusing.told != Some((source, mismatch));
         // Two sources in turns are not reported each time.
-        let is_other = refusing.told != Some((source, mismatch)) && refusing.told_ns + OVER_NS < now_ns;
-        if is_over || is_other {
-            (refusing.told, refusing.told_ns) = (Some((source, mismatch)), now_ns);
+        if is_news && refusing.throttle.note(now_ns, OVER_NS).is_some() {
+            refusing.told = Some((source, mismatch));
             deliver.event(RouterEvent::Refused { source, peer, mismatch });
         }
     }
@@ -64,7 +63,7 @@ impl Inbound {
     /// lost by it.
     pub(crate) fn suspect(&self, now_ns: u64, peer: NodeIndex, mismatch: Mismatch) {
         let is_away = matches!(self.stats.state(peer, now_ns), PeerLinkState::Silent | PeerLinkState::Refused(_));
-        if is_away || broken!(BelievesUnopened) {
+        if is_away {
             self.stats.peer(peer).link.refuse(now_ns, mismatch);
         }
     }
@@ -81,7 +80,7 @@ impl Inbound {
         // A node that refuses us does not hear us, and says so after a second. Anybody can forge a refusal where
         // nothing is sealed, so until then it is doubted.
         let heard_ns = stats.link.hears_us_ns.get();
-        if heard_ns > 0 && heard_ns + SILENT_AFTER_NS > now_ns && !broken!(BelievesRefusals) {
+        if heard_ns > 0 && heard_ns + SILENT_AFTER_NS > now_ns {
             return stats.received.old.add(1);
         }
         stats.link.refuse(now_ns, mismatch);

@@ -6,8 +6,6 @@
 //!           next - 1024                       settled (next - 64)       next
 //! ```
 
-use crate::broken::broken;
-
 /// Sequences that are remembered.
 pub const WINDOW: u64 = 1024;
 /// How many may overtake a datagram before it counts as lost.
@@ -65,7 +63,7 @@ impl SequenceWindow {
             self.advance(sequence, lost);
             return Arrival::Newest;
         }
-        if self.is_duplicate(sequence) && !broken!(TakesCopies) {
+        if self.is_duplicate(sequence) {
             return Arrival::Duplicate;
         }
         self.note(sequence);
@@ -108,8 +106,7 @@ impl SequenceWindow {
     }
 
     fn settle(&mut self, until: u64) -> u64 {
-        let lost =
-            (self.settled..until).filter(|sequence| !self.has(*sequence) && !broken!(CountsNoGaps)).count() as u64;
+        let lost = (self.settled..until).filter(|sequence| !self.has(*sequence)).count() as u64;
         self.settled = self.settled.max(until);
         lost
     }

@@ -1,6 +1,7 @@
 //! What crosses the bridge of a lab, and when: each datagram as it comes in by the port of its sender.
 
 use super::{Lab, LabError};
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::socket::{
     AddressFamily, ControlMessageOwned, LinkAddr, MsgFlags, SockFlag, SockProtocol, SockType, recvmsg, setsockopt,
     socket, sockopt,
@@ -9,13 +10,16 @@ use nix::sys::time::TimeValLike;
 use rohrpost_mailbox::{monotonic_ns, realtime_ns};
 use std::io::{self, IoSliceMut};
 use std::net::IpAddr;
-use std::os::fd::{AsRawFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd};
+use std::time::Duration;
 
 /// Buffer of the capture in the kernel, bytes.
 const RECEIVE_BYTES: usize = 64 << 20;
 /// The longest frame, and more.
 const FRAME_BYTES: usize = 1 << 16;
 const CONTROL_BYTES: usize = 128;
+/// Readings of two clocks; the closest pair counts.
+const READINGS: usize = 100;
 /// `PACKET_OUTGOING` of `packet(7)`: the packet leaves by this port, and was seen when it came by another.
 const OUTGOING: u8 = 4;
 const ETHERNET_BYTES: usize = 14;
@@ -39,8 +43,9 @@ pub struct Crossing<'a> {
 #[derive(Debug)]
 pub struct Capture {
     socket: OwnedFd,
-    /// Of the kernel's stamps before the monotonic clock.
-    ahead_ns: u64,
+    /// By how much the clock of the kernel's stamps is ahead of the monotonic one. Both are slewed alike, so this is
+    /// constant unless somebody sets one.
+    ahead_ns: i64,
     frame: Box<[u8]>,
 }
 
@@ -54,17 +59,29 @@ impl Lab {
             let _inside = self.enter_bridge()?;
             open().map_err(|error| LabError::Device("watch the bridge".into(), error))?
         };
-        Ok(Capture { socket, ahead_ns: realtime_ns() - monotonic_ns(), frame: vec![0; FRAME_BYTES].into() })
+        Ok(Capture::of(socket))
     }
 }
 
 impl Capture {
+    /// Reads from a packet socket that stamps what it receives: one with a filter, say.
+    pub fn of(socket: OwnedFd) -> Self {
+        Self { socket, ahead_ns: realtime_ahead_ns(), frame: vec![0; FRAME_BYTES].into() }
+    }
+
+    /// Waits for a frame, at most so long.
+    pub fn wait(&self, patience: Duration) {
+        let mut polled = [PollFd::new(self.socket.as_fd(), PollFlags::POLLIN)];
+        // An interrupted wait is a short one.
+        let _ = poll(&mut polled, PollTimeout::try_from(patience).unwrap_or(PollTimeout::MAX));
+    }
+
     /// Hands out each UDP datagram that has crossed since. Never waits.
     pub fn drain(&mut self, mut seen: impl FnMut(Crossing<'_>)) {
         let ahead_ns = self.ahead_ns;
         self.drain_stamped(|stamp_ns, frame| {
             if let (Some(stamp_ns), Some((source, port, datagram))) = (stamp_ns, datagram(frame)) {
-                seen(Crossing { at_ns: stamp_ns.saturating_sub(ahead_ns), source, port, datagram });
+                seen(Crossing { at_ns: stamp_ns.saturating_add_signed(-ahead_ns), source, port, datagram });
             }
         });
     }
@@ -92,6 +109,15 @@ impl Capture {
             }
         }
     }
+}
+
+/// From the readings of both clocks that were closest to each other.
+fn realtime_ahead_ns() -> i64 {
+    let read = |_| {
+        let (before, real, after) = (monotonic_ns(), realtime_ns(), monotonic_ns());
+        (after - before, real.cast_signed() - before.midpoint(after).cast_signed())
+    };
+    (0..READINGS).map(read).min().map_or(0, |(_, ahead_ns)| ahead_ns)
 }
 
 fn open() -> io::Result<OwnedFd> {

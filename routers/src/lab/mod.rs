@@ -16,7 +16,6 @@ mod beyond;
 mod capture;
 mod error;
 mod namespace;
-pub mod stall_detector;
 
 pub use capture::{Capture, Crossing};
 pub use error::LabError;

@@ -1,7 +1,6 @@
 //! Makes datagrams: of one package without a copy, of many that wait, of one fragment, or a keep-alive.
 
 use super::{DIRECT_HEAD_BYTES, KeepAlive, Outbound, Package, is_stale};
-use crate::broken::broken;
 use crate::counts::Cause;
 use crate::frame::{self, Fragment, FrameHead, FrameKind, NodeIndex};
 use crate::link::{ALIVE_EVERY_NS, TELL_EVERY_NS};
@@ -56,8 +55,8 @@ impl Outbound {
             let Some(place) = self.queue.first_of(peer, level) else { break };
             let waiting = *self.queue.at(place);
             let size = PACKAGE_HEAD_BYTES + usize::from(waiting.head.len);
-            if waiting.parts > 0 || end + size > datagram.len() {
-                if self.in_slots && !broken!(OvertakesInSlot) {
+            if waiting.fragments > 0 || end + size > datagram.len() {
+                if self.in_slots {
                     break;
                 }
                 // The rest of this level waits; something of a lower level may still fit.
@@ -85,10 +84,10 @@ impl Outbound {
         let peer = waiting.peer;
         let start = PART_START;
         let (len, part_bytes) = (usize::from(waiting.head.len), self.datagram_bytes - start);
-        let first = if waiting.parts == 0 { self.stats.peer(peer).sent.datagrams.get() } else { waiting.first };
-        let offset = usize::from(waiting.parts) * part_bytes;
+        let first = if waiting.fragments == 0 { self.stats.peer(peer).sent.datagrams.get() } else { waiting.first };
+        let offset = usize::from(waiting.fragments) * part_bytes;
         let size = part_bytes.min(len - offset);
-        let (index, count, offset) = (waiting.parts, len.div_ceil(part_bytes) as u16, offset as u32);
+        let (index, count, offset) = (waiting.fragments, len.div_ceil(part_bytes) as u16, offset as u32);
         let part = Fragment { first, index, count, offset, head: waiting.head, bytes: &[] };
         datagram[frame::HEAD_BYTES..start].copy_from_slice(&part.head_bytes());
         self.queue.read(place, &mut datagram[start..start + size]);

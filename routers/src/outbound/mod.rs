@@ -7,8 +7,6 @@
 //!
 //! Each accepted package is sent or lost with a cause; see [`Stats`].
 
-use crate::admission::capped;
-use crate::broken::broken;
 use crate::counts::Cause;
 use crate::frame::{self, Fragment, FrameKind, NodeIndex};
 use crate::link::PeerLinkState;
@@ -21,6 +19,7 @@ use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head, Name, Priority};
 use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
+mod accept;
 mod datagram;
 mod flows;
 mod own;
@@ -176,52 +175,6 @@ impl Outbound {
         }
     }
 
-    /// Takes a package of this node. `alone`: no other waits behind it, so it need not be combined; nor must one that
-    /// is so large that no second of its size would fit. With time slots each package waits for a slot. A package to a
-    /// peer without a keep-alive so far waits, too: the peer doubts the first datagram of an incarnation.
-    pub fn accept(&mut self, now_ns: u64, package: &Package<'_>, alone: bool, report: &mut impl Report) -> Accepted {
-        let head = if broken!(Hurries) { package.head } else { capped(&package.head) };
-        self.stats.out.came(head.priority);
-        let peer = match self.admit(now_ns, &head, package.published_ns) {
-            Ok(peer) => peer,
-            Err((peer, cause)) => {
-                lose(&self.stats, peer, &head, package.body, cause, report);
-                return Accepted::Lost;
-            }
-        };
-        let needs_no_company = alone || self.fills_a_datagram(package.body.len());
-        let (level, sender) = (self.levels[usize::from(head.priority.0)], self.sender_of(head.from));
-        let is_told = self.stats.peer(peer).sent.datagrams.get() > 0;
-        if needs_no_company
-            && is_told
-            && self.reaches(peer)
-            && self.may_leave_at_once(now_ns, level, package.body.len())
-        {
-            return Accepted::Send { to: peer, head: self.direct(now_ns, peer, &head, package) };
-        }
-        let waiting =
-            QueuedPackage { head, published_ns: package.published_ns, peer, sender, level, ..QueuedPackage::default() };
-        let stats = &self.stats;
-        let taken = self.queue.push(waiting, package.body, |gone, body| {
-            stats.waiting[usize::from(gone.level)].take_back(1);
-            lose(stats, Some(gone.peer), &gone.head, body, Cause::Quota, report);
-        });
-        if taken {
-            self.stats.waiting[usize::from(level)].add(1);
-        } else {
-            lose(&self.stats, Some(peer), &head, package.body, Cause::Quota, report);
-        }
-        self.stats.waiting_bytes.set(self.queue.used_bytes());
-        if taken { Accepted::Waits } else { Accepted::Lost }
-    }
-
-    /// Loses a package instead of taking it: its sender has too many.
-    pub fn displace(&self, package: &Package<'_>, report: &mut impl Report) {
-        let head = capped(&package.head);
-        self.stats.out.came(head.priority);
-        lose(&self.stats, self.settings.node_of(head.to), &head, package.body, Cause::Quota, report);
-    }
-
     /// Whether any package waits to leave.
     pub fn waits(&self) -> bool {
         !self.queue.is_empty()
@@ -312,7 +265,8 @@ impl Outbound {
             // Without this fragment the others are worth nothing.
             let level = self.levels[usize::from(part.head.priority.0)];
             let under_way = self.queue.first_of(peer, level);
-            match under_way.filter(|place| self.queue.at(*place).parts > 0 && self.queue.at(*place).first == part.first)
+            match under_way
+                .filter(|place| self.queue.at(*place).fragments > 0 && self.queue.at(*place).first == part.first)
             {
                 Some(place) => self.drop_out(place, Cause::Socket, report),
                 None => self.came_back(peer, &part.head, &[], report),
@@ -333,15 +287,6 @@ impl Outbound {
         lose(&self.stats, Some(peer), head, body, Cause::Socket, report);
     }
 
-    fn admit(&self, now_ns: u64, head: &Head, published_ns: u64) -> Result<NodeIndex, (Option<NodeIndex>, Cause)> {
-        let peer = self.settings.node_of(head.to).filter(|node| *node != self.settings.own);
-        let peer = peer.ok_or((None, Cause::NoRoute))?;
-        match self.why_not(now_ns, peer, published_ns) {
-            Some(cause) => Err((Some(peer), cause)),
-            None => Ok(peer),
-        }
-    }
-
     fn why_not(&self, now_ns: u64, peer: NodeIndex, published_ns: u64) -> Option<Cause> {
         match self.stats.state(peer, now_ns) {
             _ if is_stale(now_ns, published_ns) => Some(Cause::Stale),
@@ -359,7 +304,7 @@ impl Outbound {
 
     /// Peers to which something may leave now.
     fn open(&self) -> u64 {
-        if broken!(WaitsForOne) && self.full != 0 { 0 } else { self.reached & !self.full & self.hearing }
+        self.reached & !self.full & self.hearing
     }
 
     /// Accounts for the rate that real time uses, and copies which peers hear this node.
@@ -402,19 +347,6 @@ impl Outbound {
         self.senders.binary_search_by_key(&raw, |(name, _)| *name).map_or(self.others, |at| self.senders[at].1)
     }
 
-    fn may_leave_at_once(&self, now_ns: u64, level: u8, body_bytes: usize) -> bool {
-        let bytes = DIRECT_HEAD_BYTES + body_bytes;
-        self.queue.is_empty()
-            && bytes <= self.datagram_bytes
-            && !self.in_slots
-            && self.pace.may_leave(now_ns, level).is_ok()
-    }
-
-    /// Two of this size do not fit in a datagram: the queue has no gain.
-    fn fills_a_datagram(&self, body_bytes: usize) -> bool {
-        frame::HEAD_BYTES + 2 * (PACKAGE_HEAD_BYTES + body_bytes) > self.datagram_bytes
-    }
-
     fn is_large(&self, waiting: &QueuedPackage) -> bool {
         DIRECT_HEAD_BYTES + usize::from(waiting.head.len) > self.datagram_bytes
     }
@@ -446,7 +378,7 @@ impl Outbound {
 }
 
 fn is_stale(now_ns: u64, published_ns: u64) -> bool {
-    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS && !broken!(SendsStale)
+    now_ns.saturating_sub(published_ns) > WAIT_MAX_NS
 }
 
 fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause, report: &mut impl Report) {
@@ -457,5 +389,3 @@ fn lose(stats: &Stats, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause:
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) use tests::CHECKS;

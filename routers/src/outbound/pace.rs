@@ -3,7 +3,6 @@
 //! A flood keeps the bucket empty. A package more important than the last one leaves nevertheless, one datagram in
 //! advance: it waits for the datagram on the wire, and not for the rate limit as well.
 
-use crate::broken::broken;
 use crate::settings::Settings;
 
 /// A burst of this length may leave at once: waking up takes a part of it.
@@ -39,10 +38,10 @@ impl Pacer {
 
     /// Whether a datagram with this highest level may leave now; else when.
     pub(super) fn may_leave(&self, now_ns: u64, level: u8) -> Result<(), u64> {
-        let hurries = level < self.level && !broken!(NeverInAdvance);
+        let hurries = level < self.level;
         let ahead_ns = self.ahead_ns + if hurries { self.advance_ns } else { 0 };
         let from_ns = self.through_ns.saturating_sub(ahead_ns);
-        if from_ns <= now_ns || broken!(Unpaced) { Ok(()) } else { Err(from_ns) }
+        if from_ns <= now_ns { Ok(()) } else { Err(from_ns) }
     }
 
     /// A datagram has left; level none: without packages.

@@ -9,7 +9,6 @@
 
 use super::datagram::PART_START;
 use super::{DIRECT_HEAD_BYTES, Outbound};
-use crate::broken::broken;
 use crate::frame::{ALIVE_BYTES, HEAD_BYTES, NodeIndex};
 use crate::queue::QueuedPackage;
 use crate::report::Report;
@@ -30,7 +29,7 @@ impl Outbound {
         behind: Option<Priority>,
         report: &mut impl Report,
     ) -> Option<(NodeIndex, usize)> {
-        let room_bytes = if broken!(OverrunsSlot) { self.datagram_bytes } else { room_bytes.min(self.datagram_bytes) };
+        let room_bytes = room_bytes.min(self.datagram_bytes);
         let datagram = &mut datagram[..room_bytes];
         self.aboard.clear();
         self.announce_to_new_sessions();
@@ -82,18 +81,15 @@ impl Outbound {
         if !self.is_large(waiting) {
             return DIRECT_HEAD_BYTES + len;
         }
-        let left = len - usize::from(waiting.parts) * (self.datagram_bytes - PART_START);
+        let left = len - usize::from(waiting.fragments) * (self.datagram_bytes - PART_START);
         self.datagram_bytes.min(PART_START + left)
     }
 
     /// In a slot a datagram carries nothing less important than what waits for other peers, or in the mailbox: that
     /// would be delayed by the extra bytes.
     fn last_level_of_company(&self, peer: NodeIndex, behind: Option<Priority>) -> u8 {
-        if broken!(AnyCompany) {
-            return LEVELS as u8;
-        }
         let others = self.queue.first_level_besides(peer).unwrap_or(LEVELS as u8);
-        let behind = behind.filter(|_| !broken!(ForgetsMailbox)).map_or(LEVELS as u8, |first| self.level(first));
+        let behind = behind.map_or(LEVELS as u8, |first| self.level(first));
         others.min(behind)
     }
 }

@@ -17,7 +17,6 @@ mod hints;
 mod list;
 mod shares;
 
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 use blocks::{BLOCK_BYTES, Blocks, Chain};
 use hints::Hints;
@@ -49,7 +48,7 @@ pub struct QueuedPackage {
     /// Sequence of the first fragment, if some have left.
     pub first: u64,
     /// How many fragments have left.
-    pub parts: u16,
+    pub fragments: u16,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -93,7 +92,7 @@ pub struct Queue {
 /// Whether only the newest of such packages counts.
 pub fn counts_newest(head: &Head) -> bool {
     let is_data = matches!(head.kind.kind(), Kind::Data(_));
-    is_data && (head.options.has(Options::NEWEST) || broken!(ReplacesAllData))
+    is_data && head.options.has(Options::NEWEST)
 }
 
 #[derive(Clone, Debug, Default)]
@@ -201,12 +200,12 @@ impl Queue {
     /// The waiting package that this one replaces: both are of the same state, no fragment of it has left, and only the
     /// newest of such packages counts.
     pub fn older(&self, newer: &QueuedPackage) -> Option<Place> {
-        let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head) && !broken!(NeverReplaces))?;
+        let hints = self.hints.as_ref().filter(|_| counts_newest(&newer.head))?;
         let is_older = |place: &u32| {
             let QueueEntry { waiting, .. } = &self.entries[*place as usize];
             let is_alike = (waiting.sender, waiting.peer, waiting.level) == (newer.sender, newer.peer, newer.level);
             is_alike
-                && waiting.parts == 0
+                && waiting.fragments == 0
                 && self.entries[*place as usize].of_newest().is_some_and(|head| same_state(head, &newer.head))
         };
         hints.of(&newer.head).find(is_older).map(Place)
@@ -246,11 +245,7 @@ impl Queue {
         let own = &self.senders[sender];
         let lower = usize::from(level) + 1;
         let yielding: u32 = own.blocks[lower..].iter().sum();
-        let quota = if broken!(SharesQuota) {
-            self.entries.len() as u32 - self.used_blocks + own.used
-        } else {
-            self.quota_blocks
-        };
+        let quota = self.quota_blocks;
         if own.used - yielding + needed > quota {
             return false;
         }
@@ -265,12 +260,9 @@ impl Queue {
 
     /// Displaces the newest package of a sender's least important level, from `lower` on; false: there is none.
     fn displace(&mut self, sender: usize, lower: usize, gone: &mut impl FnMut(&QueuedPackage, &[u8])) -> bool {
-        let end = if broken!(DisplacesOldest) { List::first } else { List::last };
-        let Some(last) = self.senders[sender].levels[lower..].iter().rev().find_map(end) else { return false };
+        let Some(last) = self.senders[sender].levels[lower..].iter().rev().find_map(List::last) else { return false };
         let (waiting, beginning) = self.remove(Place(last));
-        if !broken!(ForgetsDisplaced) {
-            gone(&waiting, beginning);
-        }
+        gone(&waiting, beginning);
         true
     }
 
@@ -284,10 +276,6 @@ impl Queue {
         if self.levels == 0 {
             return None;
         }
-        if broken!(IgnoresLevels) {
-            let firsts = self.peers.iter().flatten().filter_map(List::first);
-            return firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place);
-        }
         let level = bits(self.levels.into()).find(|level| self.busy[*level] & peers != 0)?;
         let firsts = bits(self.busy[level] & peers).filter_map(|peer| self.peers[peer][level].first());
         firsts.min_by_key(|place| self.entries[*place as usize].ticket).map(Place)
@@ -296,7 +284,7 @@ impl Queue {
     /// The first package for a peer on a level, if any.
     pub fn first_of(&self, peer: NodeIndex, level: u8) -> Option<Place> {
         let list = &self.peers[usize::from(peer)][usize::from(level)];
-        if broken!(TakesNewest) { list.last() } else { list.first() }.map(Place)
+        list.first().map(Place)
     }
 
     /// The next package behind another, for the same peer and on the same level.
@@ -329,8 +317,8 @@ impl Queue {
     /// A fragment has left: the package cannot be displaced any more.
     pub fn part_left(&mut self, place: Place, first: u64) {
         let entry = &mut self.entries[place.0 as usize];
-        entry.waiting.parts += 1;
-        if entry.waiting.parts == 1 {
+        entry.waiting.fragments += 1;
+        if entry.waiting.fragments == 1 {
             entry.waiting.first = first;
             let (sender, level) = (usize::from(entry.waiting.sender), usize::from(entry.waiting.level));
             let sender = &mut self.senders[sender];
@@ -353,7 +341,7 @@ impl Queue {
             }
         }
         let sender = &mut self.senders[usize::from(waiting.sender)];
-        if waiting.parts == 0 {
+        if waiting.fragments == 0 {
             self.by_sender.remove(&mut sender.levels[level], place.0);
             sender.emptied(level);
             sender.blocks[level] -= body.blocks();
@@ -402,5 +390,3 @@ fn bits(mut word: u64) -> impl Iterator<Item = usize> {
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) use tests::CHECKS;

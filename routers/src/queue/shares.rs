@@ -9,7 +9,6 @@
 //! ```
 
 use super::{Place, Queue, QueuedPackage, Sender};
-use crate::broken::broken;
 
 /// Bytes of a package on the line besides its body, about.
 const HEADS_BYTES: u64 = 32;
@@ -88,7 +87,7 @@ impl Queue {
     /// The place of a sender; a free or a new one, if it has none. So there are at most as many as packages wait, and
     /// one.
     pub fn sender_of(&mut self, share: QueueShare) -> u16 {
-        let number = if broken!(SharesQueue) { 0 } else { share.sender };
+        let number = share.sender;
         let Some(shares) = &mut self.shares else { return 0 };
         let is_known = |(_, (known, _)): &(&Sender, &(u32, usize))| *known == number;
         let known = self.senders.iter().zip(&shares.senders).position(|both| is_known(&both));
@@ -112,7 +111,7 @@ impl Queue {
     /// The next package: the most important of those parties that were served at most this many bytes more than the
     /// least served one.
     pub fn first_shared(&self, window_bytes: u64) -> Option<Place> {
-        let shares = self.shares.as_ref().filter(|_| !broken!(IgnoresShares));
+        let shares = self.shares.as_ref();
         let Some((shares, least)) = shares.and_then(|shares| Some((shares, shares.least_served()?))) else {
             return self.first();
         };

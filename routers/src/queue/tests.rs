@@ -2,9 +2,6 @@ use super::*;
 use proptest::prelude::*;
 use rohrpost_mailbox::{Priority, Type};
 
-pub(crate) const CHECKS: &[fn()] =
-    &[check_order_of_levels, check_displacement, check_senders_have_memory_of_their_own, check_what_gives_way_is_told];
-
 const QUOTA: usize = 16 * BLOCK_BYTES;
 
 fn waiting(id: u16, sender: u16, peer: NodeIndex, level: u8, len: usize) -> QueuedPackage {
@@ -36,7 +33,8 @@ fn drain(queue: &mut Queue) -> Vec<u16> {
     std::iter::from_fn(|| next(queue)).collect()
 }
 
-fn check_order_of_levels() {
+#[test]
+fn urgent_ones_go_first_and_equal_ones_in_order() {
     let mut queue = Queue::new(1, 3, QUOTA);
     for (id, level) in [(0, 31), (1, 4), (2, 4), (3, 0), (4, 31), (5, 4)] {
         assert_eq!(push(&mut queue, id, 0, level, 10), []);
@@ -46,11 +44,7 @@ fn check_order_of_levels() {
 }
 
 #[test]
-fn urgent_ones_go_first_and_equal_ones_in_order() {
-    check_order_of_levels();
-}
-
-fn check_displacement() {
+fn a_sender_over_its_quota_loses_its_own_least_important_and_newest() {
     let mut queue = Queue::new(1, 3, QUOTA);
     for id in 0..16 {
         assert_eq!(push(&mut queue, id, 0, [20, 10][usize::from(id) % 2], 100), []);
@@ -69,11 +63,7 @@ fn check_displacement() {
 }
 
 #[test]
-fn a_sender_over_its_quota_loses_its_own_least_important_and_newest() {
-    check_displacement();
-}
-
-fn check_senders_have_memory_of_their_own() {
+fn no_sender_uses_up_anothers_memory() {
     let mut queue = Queue::new(3, 3, QUOTA);
     for id in 0..100 {
         push(&mut queue, id, 0, 0, 1000);
@@ -85,19 +75,10 @@ fn check_senders_have_memory_of_their_own() {
 }
 
 #[test]
-fn no_sender_uses_up_anothers_memory() {
-    check_senders_have_memory_of_their_own();
-}
-
-fn check_what_gives_way_is_told() {
+fn every_package_that_gives_way_is_told() {
     let mut queue = Queue::new(1, 3, QUOTA);
     let told: usize = (0..64).map(|id| push(&mut queue, id, 0, 31 - id as u8 / 2, 100).len()).sum();
     assert_eq!(told + drain(&mut queue).len(), 64);
-}
-
-#[test]
-fn every_package_that_gives_way_is_told() {
-    check_what_gives_way_is_told();
 }
 
 #[test]
@@ -109,7 +90,7 @@ fn what_has_left_in_part_does_not_give_way() {
     queue.part_left(place, 77);
     assert_eq!(push(&mut queue, 1, 0, 0, 2 * BLOCK_BYTES), [1]);
     assert_eq!(push(&mut queue, 2, 0, 0, BLOCK_BYTES), []);
-    assert_eq!((queue.at(place).first, queue.at(place).parts), (77, 1));
+    assert_eq!((queue.at(place).first, queue.at(place).fragments), (77, 1));
     let mut rest = vec![9; 15 * BLOCK_BYTES - 100];
     queue.read(place, &mut rest);
     assert!(rest.iter().all(|byte| *byte == 0));

@@ -3,7 +3,6 @@
 use super::hello::Hello;
 use super::opening::OpenedHello;
 use super::peer_sessions::{PeerIncarnation, PeerSessions};
-use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
@@ -102,7 +101,7 @@ impl Handshake {
         self.begin();
         let (peer, OpenedHello { hello, key }) = (head.from, *opened);
         self.refresh(now_ns, peer);
-        let proves = self.is_answer(now_ns, peer, hello.answer) || broken!(BeginsUnproven);
+        let proves = self.is_answer(now_ns, peer, hello.answer);
         let begins = may_begin && proves && self.all.incarnation(peer) != Some(head.incarnation);
         if proves {
             // Each challenge serves once: what else was answered to it, or will be, proves nothing any more.

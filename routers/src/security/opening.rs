@@ -7,7 +7,6 @@ use super::peer_sessions::{Known, PeerSessions, Port};
 use super::rejection::{NotOpened, Rejection};
 use super::seal::{self, Seal};
 use super::unverified::UnverifiedIncarnations;
-use crate::broken::broken;
 use crate::frame::{FrameHead, FrameKind, NodeIndex};
 use crate::inbound::window::{Arrival, SequenceWindow};
 use std::sync::Arc;
@@ -112,13 +111,13 @@ impl Opening {
             all.doubt(head.from);
             Rejection::OtherIncarnation
         })?;
-        if heard.window.is_duplicate(head.sequence) && !broken!(OpensTwice) {
+        if heard.window.is_duplicate(head.sequence) {
             return Err(Rejection::Replay.into());
         }
         let text = heard.seals[key].open(seal::of_sequence(head.sequence), datagram).ok_or(Rejection::Forged)?;
         // What the network lost is another's to count.
         let arrival = heard.window.arrive(head.sequence, &mut 0);
-        debug_assert!(arrival != Arrival::Duplicate || broken!(OpensTwice));
+        debug_assert!(arrival != Arrival::Duplicate);
         heard.first.get_or_insert(head.sequence);
         if self.port == Port::Rest {
             past[0].next = heard.window.next();

@@ -10,7 +10,6 @@
 //! counts most, until its age makes it worse than a later one.
 
 use super::frame::TimeAnswer;
-use crate::broken::broken;
 use crate::time::RATE_MAX_PPB;
 use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, TimeSource};
 
@@ -50,7 +49,7 @@ impl RoundTripSample {
     fn error_ns(&self, now_ns: u64) -> u64 {
         let age_ns = now_ns.saturating_sub(self.heard_ns) + self.ways_ns;
         let drift_ns = u128::from(age_ns) * u128::from(RATE_MAX_PPB.unsigned_abs()) / BILLION;
-        let ways_ns = if broken!(TrustsTheWay) { 0 } else { self.ways_ns.div_ceil(2) };
+        let ways_ns = self.ways_ns.div_ceil(2);
         ways_ns + drift_ns as u64 + 1
     }
 }
@@ -70,7 +69,7 @@ impl ServerClockEstimate {
         let Some(ways_ns) = now_ns.checked_sub(answer.asked_ns) else { return false };
         // Clocks of different pace may make the way seem shorter than nothing.
         let sample = RoundTripSample { answer: *answer, heard_ns: now_ns, ways_ns: ways_ns.saturating_sub(there_ns) };
-        if self.contradicts(now_ns, &sample) && !broken!(TakesSmallest) {
+        if self.contradicts(now_ns, &sample) {
             self.forget();
         }
         self.kept[self.next] = Some(sample);
@@ -130,8 +129,6 @@ impl ServerClockEstimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::broken::{Broken, with};
-    use std::panic::catch_unwind;
 
     /// The server's clock is 5 s ahead and its system time 1000 s; both ways take `there` and `back`.
     fn exchange(asked_ns: u64, there: u64, back: u64) -> (u64, TimeAnswer) {
@@ -172,7 +169,8 @@ mod tests {
         assert!((400_000..402_000).contains(&error_ns), "clocks drift 5 ms in 20 s: {error_ns}");
     }
 
-    fn check_contradiction() {
+    #[test]
+    fn what_cannot_all_be_true_is_a_contradiction_and_the_latest_counts() {
         let mut estimate = ServerClockEstimate::default();
         for asked_ns in [0, 1_000_000_000] {
             let (heard_ns, answer) = exchange(asked_ns, 10_000, 10_000);
@@ -188,12 +186,6 @@ mod tests {
         let system = estimate.system(heard_ns).unwrap().at(heard_ns);
         assert!(system.ns.abs_diff(heard_ns + 1_000_000_000_000 + slept_ns) <= 400_000, "{system:?}");
         assert_eq!(estimate.answers(), 3);
-    }
-
-    #[test]
-    fn what_cannot_all_be_true_is_a_contradiction_and_the_latest_counts() {
-        check_contradiction();
-        assert!(with(Broken::TakesSmallest, || catch_unwind(check_contradiction)).is_err(), "the mistake shows");
     }
 
     #[test]

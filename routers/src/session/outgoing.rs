@@ -11,7 +11,6 @@
 use super::WAIT_MAX_NS;
 use super::counts::Cause;
 use super::frame::{Carried, HEAD_BYTES, SessionMessage};
-use crate::broken::broken;
 use crate::queue::{Place, Queue, QueueShare, QueuedPackage, counts_newest};
 use rohrpost_mailbox::Head;
 use rohrpost_network::LEVELS;
@@ -121,9 +120,7 @@ impl Outgoing {
 
     /// The connection is over: what was made ready for it goes with it.
     pub(super) fn cut(&mut self) {
-        if !broken!(SendsCutAgain) {
-            self.ready.clear();
-        }
+        self.ready.clear();
         (self.taken, self.begun, self.hurried, self.sent) = (0, 0, 0, 0);
         self.batch_bytes = BATCH_BYTES;
     }
@@ -138,7 +135,7 @@ impl Outgoing {
     pub(super) fn hurry(&mut self, message: &SessionMessage<'_>) -> u64 {
         let mut frame = Vec::new();
         message.write(&mut frame);
-        let at = if broken!(AsksLast) { self.ready.len() } else { self.next_frame().max(self.hurried) };
+        let at = self.next_frame().max(self.hurried);
         self.hurried = at + frame.len();
         self.ready.splice(at..at, frame);
         self.sent + (self.hurried - self.taken) as u64
@@ -206,7 +203,7 @@ impl Outgoing {
                 if is_stale(now_ns, *published_ns) {
                     let (waiting, beginning) = queue.remove(place);
                     fates.lost(&waiting.head, beginning, cause);
-                } else if !counts_newest(head) || broken!(LooksAtFirst) {
+                } else if !counts_newest(head) {
                     // They came one after the other, but for those that stand in the place of an older one.
                     break;
                 }
@@ -259,13 +256,8 @@ impl Outgoing {
 /// Lets a package wait in the place of an older one; whether it is taken.
 fn replace(queue: &mut Queue, older: Place, newer: QueuedPackage, body: &[u8], fates: &mut impl Fates) -> bool {
     let head = queue.at(older).head;
-    let is_taken = if broken!(LosesItsPlace) {
-        queue.remove(older);
-        queue.push(newer, body, gives_way(newer.sender, fates))
-    } else {
-        queue.replace(older, newer, body, gives_way(newer.sender, fates))
-    };
-    if is_taken && !broken!(ForgetsReplaced) {
+    let is_taken = queue.replace(older, newer, body, gives_way(newer.sender, fates));
+    if is_taken {
         fates.replaced(&head);
     }
     is_taken

@@ -2,7 +2,6 @@
 //! promises.
 
 use super::frame::{BadSessionFrame, HEAD_BYTES, SessionFrameHead, is_tls};
-use crate::broken::broken;
 
 /// One direction of one connection.
 #[derive(Debug, Default)]
@@ -39,9 +38,6 @@ impl Splitter {
                 self.partial.extend_from_slice(std::mem::take(input));
             }
             return Ok(None);
-        }
-        if broken!(ForgetsPieces) {
-            self.partial.clear();
         }
         self.take(HEAD_BYTES, input);
         let Some(bytes) = self.partial.first_chunk() else { return Ok(None) };

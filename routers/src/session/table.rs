@@ -11,7 +11,6 @@
 
 use super::ClientIndex;
 use super::frame::{Objection, RANGES_MAX, Range};
-use crate::broken::broken;
 use rohrpost_mailbox::Name;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -82,16 +81,13 @@ impl RoutingTable {
             return Err(objects(Objection::TooMany, *range, None));
         }
         for range in &wanted {
-            if let Some((held, holder)) = self.in_the_way(client, range).filter(|(held, _)| !is_given_away(held, range))
-            {
+            // What another hosts is never given away.
+            if let Some((held, holder)) = self.in_the_way(client, range) {
                 let objection = if held.holds(range) { Objection::Taken } else { Objection::Crosses };
                 return Err(objects(objection, *range, Some(holder)));
             }
         }
         self.remove(client);
-        if broken!(GoesThroughAll) {
-            self.ranges = self.ranges.iter().map(|(first, hosted)| (*first, *hosted)).collect();
-        }
         for range in &wanted {
             self.ranges.insert(range.first, Hosted { last: range.last, client });
             self.count(range.first.system(), 1);
@@ -173,14 +169,6 @@ fn outermost(mut ranges: Vec<Range>) -> Result<Vec<Range>, Range> {
         }
     }
     Ok(outer)
-}
-
-/// What another hosts is never given away.
-fn is_given_away(held: &Range, wanted: &Range) -> bool {
-    if broken!(TakesInside) && held != wanted && held.holds(wanted) {
-        return true;
-    }
-    broken!(TakesTwice)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@
 mod bad_line;
 mod client;
 mod fault_writer;
-mod hush;
+mod line_throttle;
 mod pace;
 mod seal;
 mod server;

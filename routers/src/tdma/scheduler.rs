@@ -4,7 +4,6 @@ use super::GATE_NS;
 use super::lead::Lead;
 use super::table::{SlotTable, UNPROVEN_CYCLES, Window, WindowKind};
 use super::tx_window::{Carries, TransmitWindow};
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::{Clock, JOINING_SYNCS, Role, Stamp, SyncCounts, TIME_BYTES, TimeEstimate, Unsteady};
 
@@ -250,8 +249,7 @@ impl SlotScheduler {
         if tx_window.carries == Carries::Hello && tx_window.datagrams() > 0 {
             self.counts.unproven += 1;
             let pause_ns = UNPROVEN_CYCLES * self.table.cycle_ns();
-            self.hello_from_ns =
-                tx_window.begin_ns.saturating_add(if broken!(AsksWithoutPause) { 0 } else { pause_ns });
+            self.hello_from_ns = tx_window.begin_ns.saturating_add(pause_ns);
         }
         if let WindowKind::Slot { .. } = tx_window.window.kind {
             *match (tx_window.carries, tx_window.datagrams()) {
@@ -271,7 +269,7 @@ impl SlotScheduler {
     fn reckon(&self, now_ns: u64, clock: &Clock) -> Result<(TimeEstimate, Carries), Silent> {
         let allowance_ns = self.table.allowance_ns();
         let is_sure = |estimate: &TimeEstimate| estimate.bound_ns(now_ns) <= allowance_ns;
-        let own = clock.estimate().filter(|own| is_sure(own) || broken!(SendsWhenUnsure));
+        let own = clock.estimate().filter(|own| is_sure(own));
         let coarse = || clock.coarse(now_ns).filter(is_sure).map(|coarse| (coarse, Carries::Time));
         let carries = if clock.is_beginning() { Carries::Time } else { Carries::All };
         let overheard = || clock.overheard(now_ns).map(|(_, estimate)| (estimate, Carries::Hello));
@@ -334,9 +332,7 @@ impl SlotScheduler {
     }
 
     fn plan(&self, window: Window, estimate: &TimeEstimate, carries: Carries) -> Option<Planned> {
-        let is_soon = broken!(AsksTooSoon) && carries == Carries::Time;
-        let soon_ns = if is_soon { self.table.allowance_ns() } else { 0 };
-        let begin_ns = estimate.first_ns(window.begin_ns - soon_ns)?;
+        let begin_ns = estimate.first_ns(window.begin_ns)?;
         let end_ns = estimate.last_ns(window.end_ns)?;
         let call_ns = begin_ns.saturating_sub(self.lead.ns());
         Some(Planned { window, wake_ns: call_ns.saturating_sub(self.spin_ns), call_ns, begin_ns, end_ns, carries })
@@ -358,11 +354,11 @@ impl SlotScheduler {
             return WindowVerdict::Early;
         }
         let is_slot = matches!(window.kind, WindowKind::Slot { .. });
-        if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS) && !broken!(NoLateGate) {
+        if is_slot && now_ns > planned.begin_ns.saturating_add(GATE_NS) {
             return WindowVerdict::Late;
         }
         let (bound_ns, allowance_ns) = (estimate.bound_ns(planned.end_ns), self.table.allowance_ns());
-        if bound_ns > allowance_ns && !broken!(SendsWhenUnsure) {
+        if bound_ns > allowance_ns {
             return WindowVerdict::Silent(Silent::BoundTooLarge { bound_ns, allowance_ns });
         }
         let goes_by_own = carries == Carries::All || clock.is_beginning();

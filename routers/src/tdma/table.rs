@@ -10,7 +10,6 @@
 //! its guard begins. Configuration has checked that windows do not overlap (`rohrpost check`).
 
 use super::wire::Wire;
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::InSlots;
 use rohrpost_network::Tdma;
@@ -226,7 +225,7 @@ impl SlotTable {
     /// None after the year 2554.
     fn window(&self, kind: WindowKind, cycle: u64, offset_ns: u64, length_ns: u64) -> Option<Window> {
         let begin_ns = cycle.checked_mul(self.cycle_ns)?.checked_add(offset_ns)?;
-        let guard_ns = if broken!(IgnoresGuard) { 0 } else { self.guard_ns };
+        let guard_ns = self.guard_ns;
         let end_ns = begin_ns.checked_add(length_ns.saturating_sub(guard_ns))?;
         Some(Window { kind, cycle, begin_ns, end_ns })
     }

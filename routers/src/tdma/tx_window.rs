@@ -3,7 +3,6 @@
 use super::LATE_NS;
 use super::table::{Window, WindowKind};
 use super::wire::Wire;
-use crate::broken::broken;
 use crate::time::Allowed;
 use rohrpost_network::HAND_OVER;
 
@@ -108,7 +107,7 @@ impl TransmitWindow {
     /// When a datagram handed over now is on the wire: not before those handed over earlier.
     fn starts_ns(&self, now_ns: u64) -> u64 {
         let at_once_ns = now_ns.saturating_add(self.lead_ns);
-        if broken!(ForgetsHandedOver) { at_once_ns } else { self.free_ns.max(at_once_ns) }
+        self.free_ns.max(at_once_ns)
     }
 
     /// Datagrams so far.
@@ -134,7 +133,7 @@ impl TransmitWindow {
     /// What the clock may send in it.
     pub fn allowed(&self) -> Allowed {
         match self.window.kind {
-            _ if self.carries == Carries::Hello && !broken!(TellsUnproven) => Allowed::Nothing,
+            _ if self.carries == Carries::Hello => Allowed::Nothing,
             WindowKind::Synchronisation { .. } => {
                 Allowed::Synchronisation { cycle: self.window.cycle, nominal_ns: self.window.begin_ns }
             }

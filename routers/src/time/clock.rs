@@ -1,14 +1,12 @@
 //! A node's part in keeping time: the core behind the thread with the socket.
 
 mod master;
-mod mistaken;
 mod other_tables;
 mod overhearing;
 mod slave;
 mod slots;
 mod steady;
 
-use super::broken::Broken;
 use super::clock_model::{ClockModel, EVEN_PPB};
 use super::election::{Election, ElectionState, Origin};
 use super::history::{History, RATE_MAX};
@@ -102,8 +100,6 @@ pub struct Clock {
     steadiness: Steadiness,
     /// State for time slots; none in free mode.
     slots: Option<Box<SlotClock>>,
-    #[cfg(any(test, feature = "broken-variants"))]
-    pub(super) broken: Option<Broken>,
 }
 
 impl Clock {
@@ -149,8 +145,6 @@ impl Clock {
             others: Others::new(settings.nodes),
             steadiness: Steadiness::default(),
             slots: None,
-            #[cfg(any(test, feature = "broken-variants"))]
-            broken: None,
             settings,
         }
     }
@@ -305,9 +299,7 @@ impl Clock {
 
     /// Forgets measurements of another timeline.
     fn forget(&mut self) {
-        if !self.is(Broken::OldSamples) {
-            self.history.clear();
-        }
+        self.history.clear();
         if self.slots.is_some() {
             self.history.fades(2.0 * RATE_MAX);
         }

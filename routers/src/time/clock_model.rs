@@ -120,11 +120,12 @@ impl ClockModel {
     ) {
         let slew_ppb = i128::from(by_ns) * BILLION / i128::from(within_ns.max(1));
         let slew_ppb = slew_ppb.clamp(-i128::from(SLEW_MAX_PPB), i128::from(SLEW_MAX_PPB)) as i64;
-        // The slew begins a lead late, and may end one late.
-        let overshoot_ns =
-            (u128::from(slew_ppb.unsigned_abs()) * 2 * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128);
-        let error_ns = error_ns.saturating_add(overshoot_ns as u64).saturating_add(ROUNDING_NS);
-        self.turn(now_ns, now_ns, pace_ppb.saturating_add_signed(slew_ppb));
+        let slewed_ppb = pace_ppb.saturating_add_signed(slew_ppb);
+        // The pace, which may be that of an earlier slew, changes a lead late; the slew may end one late.
+        let late_ppb = u128::from(self.record.pace_ppb.abs_diff(slewed_ppb)) + u128::from(slew_ppb.unsigned_abs());
+        let overshoot_ns = (late_ppb * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128) as u64;
+        let error_ns = error_ns.saturating_add(overshoot_ns).saturating_add(ROUNDING_NS);
+        self.turn(now_ns, now_ns, slewed_ppb);
         let slew_drift_ns_s = slew_ppb.unsigned_abs();
         let error_ns = error_ns.min(ERROR_UNKNOWN_NS);
         self.record = TimeRecord { error_ns, drift_ns_s: drift_ns_s + slew_drift_ns_s, ..self.record };
@@ -195,6 +196,24 @@ pub(super) fn wander_ns_s(span_ns: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_slew_that_another_one_ends_counts_for_the_bound_until_the_pace_has_changed() {
+        let (begin_ns, ahead_ns, within_ns) = (1_000_000_000, 600_000, 2_000_000_000);
+        let mut line = ClockModel::unsynchronised(begin_ns, begin_ns, 0);
+        line.step(begin_ns, 1, begin_ns, EVEN_PPB, 0, 0);
+        line.bend(begin_ns, ahead_ns, within_ns, EVEN_PPB, ahead_ns.unsigned_abs(), 0);
+        // On the way there an exact source says that the line is right now.
+        let now_ns = begin_ns + within_ns / 2;
+        let true_ns = line.at(now_ns).ns;
+        line.bend(now_ns, 0, within_ns, EVEN_PPB, 0, 0);
+        for later_ns in [0, SLOWER_LEAD_NS / 2, SLOWER_LEAD_NS, 10 * SLOWER_LEAD_NS] {
+            let off_ns = line.at(now_ns + later_ns).ns.abs_diff(true_ns + later_ns);
+            let error_ns = line.error_ns(now_ns + later_ns);
+            assert!(off_ns <= error_ns, "{off_ns} ns off after {later_ns} ns, bound {error_ns}");
+            assert!(error_ns < 1_000, "the lead alone: {error_ns}");
+        }
+    }
 
     #[test]
     fn a_line_that_is_straightened_late_says_how_far_it_went_too_far() {

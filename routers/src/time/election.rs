@@ -3,7 +3,6 @@
 use super::message::{Request, Sync};
 use super::unverified::UnverifiedPeers;
 use super::{TAKEOVER_HALF_INTERVALS, Term};
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 
 /// Minimum time in which a master must answer: one exchange, some datagrams of which may be lost.
@@ -370,9 +369,6 @@ impl Election {
     /// When it is this node's turn. A master that is heard but answers nobody is deaf, and is replaced as well.
     fn takeover_ns(&self, now_ns: u64, origin: Origin) -> Option<u64> {
         self.rank()?;
-        if broken!(BeginsAtOnce) && (origin, self.state) == (Origin::New, ElectionState::Listening) {
-            return Some(now_ns);
-        }
         let (since_ns, patience_ns, last) = match self.state {
             ElectionState::Listening => (self.quiet_since_ns, self.silence_ns(), self.lost),
             ElectionState::Slave(of) => (of.answered_ns, self.silence_ns().max(self.deaf_ns), Some(of.node)),

@@ -5,7 +5,6 @@
 
 use super::RATE_MAX_PPB;
 use super::clock_model::{ClockModel, EVEN_PPB};
-use crate::broken::broken;
 use rohrpost_mailbox::TimeRecord;
 
 /// The first answers are often slow; the line begins after this many.
@@ -55,7 +54,7 @@ impl Follower {
             }
             let by_ns = there.ns.wrapping_sub(self.line.at(now_ns).ns).cast_signed();
             let whole_ns = error_ns.saturating_add(by_ns.unsigned_abs());
-            if by_ns.unsigned_abs() > error_ns.saturating_add(self.line.error_ns(now_ns)) && !broken!(TakesSmallest) {
+            if by_ns.unsigned_abs() > error_ns.saturating_add(self.line.error_ns(now_ns)) {
                 return self.distrusts(now_ns);
             }
             // The line continues where it is more exact.
@@ -92,11 +91,9 @@ impl Follower {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::broken::{Broken, with};
     use crate::time::UNSYNCHRONISED_NS;
     use proptest::prelude::*;
     use rohrpost_mailbox::TimeSource;
-    use std::panic::catch_unwind;
 
     const SECOND_NS: u64 = 1_000_000_000;
     /// System time is so far ahead of the local clock, which is `fast_ppb` fast.
@@ -147,11 +144,6 @@ mod tests {
 
     #[test]
     fn two_times_that_cannot_both_be_true_are_a_contradiction_and_no_choice() {
-        check_contradiction();
-        assert!(with(Broken::TakesSmallest, || catch_unwind(check_contradiction)).is_err(), "the mistake shows");
-    }
-
-    fn check_contradiction() {
         let mut follower = Follower::new(0, 5, None);
         let begin = |follower: &mut Follower, from_ns: u64, ahead_ns: u64, answers: u64| {
             (0..u64::from(HEARD_MIN)).for_each(|n| {

@@ -58,11 +58,6 @@
 //!
 //! Nothing here has a socket, a thread or a clock: `shell::clock` has.
 
-#[cfg_attr(
-    not(any(test, feature = "broken-variants")),
-    allow(dead_code, unreachable_pub, reason = "mistakes are asked for, and none is made")
-)]
-mod broken;
 mod clock;
 mod clock_model;
 mod coarse;
@@ -79,8 +74,6 @@ mod tests;
 mod types;
 mod unverified;
 
-#[cfg(any(test, feature = "broken-variants"))]
-pub use broken::Broken;
 pub use clock::{Allowed, Clock};
 pub use coarse::JOINING_SYNCS;
 pub use estimate::TimeEstimate;

@@ -6,7 +6,6 @@
 //! nothing of the others for [`YIELDS_NS`]. The greater claim continues until the others must have heard it. If they
 //! continue nevertheless, they do not hear it, and it falls silent, too.
 
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 
 /// Silence of a node that yields, after it last heard the others.
@@ -71,7 +70,7 @@ impl Others {
             other.since_ns = local_ns;
         }
         other.heard_ns = local_ns;
-        if (theirs > own && !broken!(NeverYieldsToOthers)) || local_ns.saturating_sub(other.since_ns) > grace_ns {
+        if theirs > own || local_ns.saturating_sub(other.since_ns) > grace_ns {
             other.told_ns = local_ns;
             other.follows(local_ns);
         }

@@ -3,7 +3,6 @@
 
 use super::TimeEstimate;
 use super::coarse::{Coarse, JOINING_SYNCS};
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 
 /// Incarnations of one node that are kept apart; of more, the one that was silent for longest is forgotten.
@@ -105,19 +104,16 @@ impl UnverifiedPeers {
 
     /// End of the time in which a frame of a peer that may be alive counts; 0: there was none.
     pub(super) fn until_ns(&self) -> u64 {
-        if broken!(IgnoresUnproven) {
-            return 0;
-        }
         self.span_ns.map_or(0, |(first_ns, last_ns)| last_ns.min(self.ends_ns(first_ns)))
     }
 
     /// Whether unverified frames still count.
     pub(super) fn is_patient(&self, now_ns: u64) -> bool {
-        self.span_ns.is_none_or(|(first_ns, _)| now_ns < self.ends_ns(first_ns)) && !broken!(IgnoresUnproven)
+        self.span_ns.is_none_or(|(first_ns, _)| now_ns < self.ends_ns(first_ns))
     }
 
     fn ends_ns(&self, first_ns: u64) -> u64 {
-        if broken!(WaitsForEver) { u64::MAX } else { first_ns.saturating_add(self.patience_ns) }
+        first_ns.saturating_add(self.patience_ns)
     }
 
     /// If frames came after patience was over: the distance between two nodes that begin a time, so that the second

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 /// A round of packages comes so much after the one before: a few in each cycle, at any moment of it.
 pub(crate) const PAUSE: Duration = Duration::from_micros(2300);
 
-/// With this number nodes get acquainted; it counts for nothing else.
-const GREETING: u16 = u16::MAX;
+/// With this number nodes begin a peer session; it counts for nothing else.
+const FIRST_WORD: u16 = u16::MAX;
 
 /// These nodes speak to each other for so many rounds, and lose nothing.
 pub(crate) fn talk(segment: &Segment, listeners: &mut Listeners, nodes: &[u8], rounds: u16) {
@@ -69,7 +69,7 @@ impl Listeners {
             while let Some(package) = receiver.try_receive() {
                 let from = usize::from(package.head().from.instance());
                 match package.head().id {
-                    GREETING => greeted[from] = true,
+                    FIRST_WORD => greeted[from] = true,
                     id => heard[from].push(id),
                 }
             }
@@ -92,7 +92,7 @@ impl Listeners {
         self.greeted.iter_mut().flatten().for_each(|greeted| *greeted = false);
         while !talkers.iter().all(|talker| self.greeted[usize::from(talker.to)][usize::from(talker.from)]) {
             assert!(began.elapsed() < PATIENCE, "nodes that greeted each node: {:?}", self.greeted);
-            talkers.iter_mut().for_each(|talker| talker.say(GREETING));
+            talkers.iter_mut().for_each(|talker| talker.say(FIRST_WORD));
             std::thread::sleep(PAUSE);
             self.listen();
         }

@@ -4,7 +4,7 @@ use super::calls::{Calls, assert_once};
 use super::flow::{PLAIN, Sink, Source, balance};
 use super::{Field, TRANSIT_MAX};
 use crate::harness::wait;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::time::Duration;
 
 const IMPAIR: &str = "loss=5%,delay=2ms,reorder=5%,duplicate=1%,seed=7";

@@ -5,7 +5,7 @@ use super::flow::{ALONE_BYTES, PLAIN, Sink, Source, URGENT, balance, carried, lo
 use crate::harness::{halt, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::LinkState;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::time::Duration;
 
 /// Datagrams that a node's kernel dropped because a buffer was full.

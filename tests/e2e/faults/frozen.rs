@@ -6,7 +6,7 @@ use crate::harness::{PATIENCE, halt, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::time::{Duration, Instant};
 
 /// Longer than any package may be in flight.

@@ -5,7 +5,7 @@ use crate::harness::{halt, runs, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::{ClockRole, ClockState, LinkState, RouterInterface};
 use rohrpost_mailbox::{SystemClock, SystemTime, monotonic_ns};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;

@@ -7,7 +7,7 @@ use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_mailbox::{Head, Type};
 use rohrpost_routers::frame::{FrameHead, FrameKind};
-use rohrpost_routers::lab::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::net::UdpSocket;
 use std::time::Duration;
 

@@ -2,5 +2,5 @@
 
 #![forbid(unsafe_code)]
 
-mod harm;
 pub mod sim;
+pub mod stall_detector;

@@ -6,11 +6,10 @@ mod simulated;
 use rohrpost_config::{Flow, Installation, bounds};
 use rohrpost_mailbox::Name;
 use rohrpost_network::Bound;
-use rohrpost_routers::broken::Broken as Mistaken;
 use rohrpost_testbed::sim::calls::{Attempt, Guard, Ruling};
 use rohrpost_testbed::sim::declared::PERIOD_MIN_PERCENT;
 use rohrpost_testbed::sim::plan::Plan;
-use rohrpost_testbed::sim::run::{Mistake, run, run_broken};
+use rohrpost_testbed::sim::run::run;
 use simulated::{for_all, number};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -168,16 +167,6 @@ fn no_declared_flow_is_later_than_its_bound() {
     eprintln!("{} flows took {median:.2} of their bounds, one of ten {many:.2}, {most:.2} at most", shares.len());
     assert!(late.is_empty(), "{} flows were later than computed:\n{}", late.len(), late.join("\n"));
     assert!(many > 2.0 / 3.0, "bounds that are never nearly reached say little");
-}
-
-/// A router that makes datagrams without a look at its mailbox fills them with what is less important than what waits
-/// there.
-#[test]
-fn what_waits_in_the_mailbox_is_not_forgotten() {
-    let mistake = Mistake::Packages(Mistaken::ForgetsMailbox);
-    let notices = |seed| !run_broken(Plan::declared(seed), |_| Box::new(NoCalls), mistake).problems.is_empty();
-    let found = (0..BROKEN_SEEDS).find(|seed| notices(*seed));
-    assert!(found.is_some(), "went unnoticed in {BROKEN_SEEDS} networks");
 }
 
 #[test]

@@ -11,19 +11,19 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("what_comes_as_the_level_sinks_is_next", 2),
     ("no_alert_is_lost", 1),
     ("a_new_owner_says_its_own_level", 2),
-    ("who_dies_before_it_alerts_is_heard", 2),
+    ("a_sender_that_dies_before_its_alert_is_heard", 2),
     ("two_alerts_are_two", 1),
     ("a_state_raised_to_the_level_is_found", 1),
     ("the_newest_is_found_in_its_place", 1),
-    ("who_is_displaced_is_counted_and_not_received", 2),
+    ("a_displaced_package_is_counted_and_not_received", 2),
     ("displacing_keeps_the_order", 2),
-    ("who_outranks_all_is_not_refused", 3),
+    ("a_sender_that_outranks_all_is_not_refused", 3),
     ("two_displace_two", 3),
     ("the_newest_replaces_what_waits", 2),
     ("the_newest_reuses_the_only_slot", 2),
     ("the_newest_keeps_its_place", 2),
     ("a_word_comes_back_with_the_newer_package", 3),
-    ("who_is_displaced_is_not_replaced_too", 2),
+    ("a_displaced_package_is_not_replaced_too", 2),
     ("a_retired_mailbox_counts_the_replaced", 3),
     ("no_wake_up_is_lost", 3),
     ("no_wake_up_is_lost_between_two", 2),
@@ -102,7 +102,7 @@ pub(crate) const BROKEN: &[Broken] = &[
             "if self.word(slot).compare_exchange(claim.word.0, word.0, Ordering::Acquire, Ordering::Relaxed).is_err() \
              {",
         )],
-        caught_by: "who_is_displaced_is_counted_and_not_received",
+        caught_by: "a_displaced_package_is_counted_and_not_received",
         says: RACE,
     },
     // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All of them
@@ -290,7 +290,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "publishing_gives_the_order",
         says: WRONG,
     },
-    // The first look meets the second package of a sender, whose first came behind it, and is not followed by another.
+    // The first look meets the second package of a sender; the first came behind it, and no other look follows.
     Broken {
         name: "no_look_for_more",
         edits: &[edit("queue", "if !slots.any_hint() {", "if true {")],
@@ -335,7 +335,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "the_urgent_passes_what_is_known",
         says: WRONG,
     },
-    // Who read the higher level did not alert, and is overlooked.
+    // A sender that read the higher level did not alert, and is overlooked.
     Broken {
         name: "no_look_at_the_new_level",
         edits: &[edit(
@@ -360,7 +360,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Neither sees the other: the sender reads the old level, the receiver the old hints.
     Broken {
         name: "no_fence_j",
-        edits: &[edit("hot", "is seen by that look.\n        seq_cst_accesses();\n", "is seen by that look.\n")],
+        edits: &[edit("hot", "did not alert.\n        seq_cst_accesses();\n", "did not alert.\n")],
         caught_by: "what_comes_as_the_level_sinks_is_next",
         says: WRONG,
     },
@@ -407,7 +407,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     Broken {
         name: "a_death_raises_no_doubt",
         edits: &[edit("queue", "        self.level = NO_LEVEL;\n    }", "    }")],
-        caught_by: "who_dies_before_it_alerts_is_heard",
+        caught_by: "a_sender_that_dies_before_its_alert_is_heard",
         says: WRONG,
     },
     // The state's newer package waits until all that was known has been received.
@@ -437,7 +437,7 @@ pub(crate) const BROKEN: &[Broken] = &[
             "if self.change(slot, last, word) {",
             "if { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
         )],
-        caught_by: "who_is_displaced_is_counted_and_not_received",
+        caught_by: "a_displaced_package_is_counted_and_not_received",
         says: WRONG,
     },
     // The receiver's entry is stale: it takes whatever lies in the slot, here a package still being written.
@@ -448,14 +448,14 @@ pub(crate) const BROKEN: &[Broken] = &[
             "self.change(slot, seen, word).then_some",
             "{ self.word(slot).swap(word.0, Ordering::AcqRel); true }.then_some",
         )],
-        caught_by: "who_is_displaced_is_counted_and_not_received",
+        caught_by: "a_displaced_package_is_counted_and_not_received",
         says: RACE,
     },
     // The receiver takes the last package that could be displaced, and the mailbox is empty: still it is called full.
     Broken {
         name: "displace_overlooks_freed_slots",
         edits: &[edit("slots", "*word == FREE || word.is_ready()", "word.is_ready()")],
-        caught_by: "who_outranks_all_is_not_refused",
+        caught_by: "a_sender_that_outranks_all_is_not_refused",
         says: WRONG,
     },
     // The loss shows nowhere.
@@ -546,7 +546,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "the_newest_keeps_its_place",
         says: WRONG,
     },
-    // The older one is gone, and who dies now has told nobody.
+    // The older one is gone, and a sender that dies now has told nobody.
     Broken {
         name: "replaces_unmarked",
         edits: &[edit(
@@ -682,7 +682,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "no_wake_up_is_lost_in_poll",
         says: ENDLESS,
     },
-    // To save the others the system call. Who dies now takes along what the others would have written.
+    // To save the others the system call. A ringer that dies now takes along what the others would have written.
     Broken {
         name: "the_first_ringer_clears_polling",
         edits: &[edit(
@@ -775,7 +775,7 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "a_displacer_dies",
         says: WRONG,
     },
-    // Who died between word and hint has told nobody.
+    // A sender that died between word and hint has told nobody.
     Broken {
         name: "rescan_looks_nowhere",
         edits: &[edit("queue", "(0..slots.count()).for_each(|slot| self.defer(slot));", "let _ = slots;")],

@@ -152,7 +152,7 @@ pub(crate) fn a_new_owner_says_its_own_level() {
 }
 
 /// The urgent sender dies before it alerts. When its death is noticed its package is next.
-pub(crate) fn who_dies_before_it_alerts_is_heard() {
+pub(crate) fn a_sender_that_dies_before_its_alert_is_heard() {
     let (mailbox, queue) = one_received(&[(10, 1), (10, 2), (10, 3)]);
     let mut receiver = Receiver { queue, ..mailbox.receiver() };
     let dead = mailbox.dies_sending(1, OverflowPolicy::Displace, "publish: hint", &[(20, 9)]);
@@ -209,7 +209,7 @@ pub(crate) fn the_newest_is_found_in_its_place() {
 // ---- full mailboxes ----
 
 /// One slot, wanted by an unimportant sender, an important one and the receiver.
-pub(crate) fn who_is_displaced_is_counted_and_not_received() {
+pub(crate) fn a_displaced_package_is_counted_and_not_received() {
     let mailbox = Mailbox::new(1);
     let low = mailbox.send_from(1, OverflowPolicy::Displace, &[(10, 10)]);
     let high = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
@@ -237,8 +237,8 @@ pub(crate) fn displacing_keeps_the_order() {
     assert!(mailbox.all_free());
 }
 
-/// Two slots, both full, a receiver that empties them, and one sender who outranks all: there is always room for it.
-pub(crate) fn who_outranks_all_is_not_refused() {
+/// Two slots, both full, a receiver that empties them, and one sender that outranks all: there is always room for it.
+pub(crate) fn a_sender_that_outranks_all_is_not_refused() {
     let mailbox = Mailbox::new(2);
     mailbox.sender(1, OverflowPolicy::Displace).send_all(&[(10, 10), (11, 11)]);
     let high = mailbox.send_from(2, OverflowPolicy::Displace, &[(20, 20)]);
@@ -308,8 +308,8 @@ pub(crate) fn the_newest_keeps_its_place() {
     assert!(mailbox.all_free());
 }
 
-/// 1 in one slot, 2 in the other, then 3 where 1 was and in its place of the order: the word of 3 is that of 1. Who saw
-/// 1 and comes late takes 3, whole; and nobody misses anything.
+/// 1 in one slot, 2 in the other, then 3 where 1 was and in its place of the order: the word of 3 is that of 1. A
+/// receiver that saw 1 and comes late takes 3, whole; and nothing is missed.
 pub(crate) fn a_word_comes_back_with_the_newer_package() {
     let mailbox = Mailbox::new(2);
     let mut first = mailbox.sender(1, OverflowPolicy::Latest);
@@ -340,7 +340,7 @@ pub(crate) fn a_word_comes_back_with_the_newer_package() {
 }
 
 /// A state is sent anew while somebody more important takes a slot: each is received or counted, once.
-pub(crate) fn who_is_displaced_is_not_replaced_too() {
+pub(crate) fn a_displaced_package_is_not_replaced_too() {
     let mailbox = Mailbox::new(1);
     let state = mailbox.send_from(1, OverflowPolicy::Latest, &[(10, 1), (10, 2)]);
     let high = mailbox.send_from(2, OverflowPolicy::Latest, &[(20, 20)]);
@@ -396,7 +396,7 @@ pub(crate) fn no_wake_up_is_lost_between_two() {
 }
 
 /// The package for which the receiver would wake is displaced: that which took its place wakes it. So does, without any
-/// package, whoever has other work for the receiver; here the sender that was refused.
+/// package, a thread that has other work for the receiver; here the sender that was refused.
 pub(crate) fn no_wake_up_is_lost_when_displaced() {
     let mailbox = Mailbox::new(1);
     let low = mailbox.send_from(1, OverflowPolicy::Displace, &[(10, 10)]);
@@ -413,7 +413,7 @@ pub(crate) fn no_wake_up_is_lost_when_displaced() {
     high.join().unwrap();
 }
 
-/// As the two before, by one who sleeps in `poll`, where the kernel compares nothing.
+/// As the two before, with a receiver that sleeps in `poll`, where the kernel compares nothing.
 pub(crate) fn no_wake_up_is_lost_in_poll() {
     let mailbox = Mailbox::new(2);
     let sender = mailbox.send_from(1, OverflowPolicy::Reject, &[(10, 1), (10, 2)]);
@@ -432,7 +432,7 @@ pub(crate) fn no_wake_up_is_lost_in_poll_between_two() {
     other.join().unwrap();
 }
 
-/// One who rang dies before it writes into the pipe: whoever rings after that wakes the sleeper all the same.
+/// A ringer dies before it writes into the pipe: the next ringer wakes the sleeper all the same.
 pub(crate) fn a_dead_ringer_takes_no_wake_up_along() {
     let mailbox = Mailbox::new(1);
     let dead = mailbox.dies_sending(1, OverflowPolicy::Reject, "bell: rung", &[(10, 1)]);
@@ -526,7 +526,7 @@ pub(crate) fn a_replaced_mailbox_hides_no_loss() {
 }
 
 /// As before, with a package that is published and displaced while the owner looks for the last time: its sender holds
-/// it for accepted, so it is found by the owner, or counted by who displaced it, where it goes on.
+/// it for accepted, so the owner finds it, or the sender that displaced it counts it, where it goes on.
 pub(crate) fn a_replaced_mailbox_hides_no_late_loss() {
     let mailbox = Mailbox::new(1);
     let low = mailbox.send_from(1, OverflowPolicy::Displace, &[(10, 10)]);
@@ -579,9 +579,9 @@ pub(crate) fn a_sender_dies_after_its_hint() {
     a_sender_dies("publish: hint", true);
 }
 
-/// The dead one had displaced a package: the loss is counted, by whoever frees the slot if not by the dead.
+/// The dead one had displaced a package: the loss is counted, by the receiver that frees the slot if not by the dead.
 ///
-/// At least once: who dies between counting and publishing has counted it, and whoever frees the slot cannot know.
+/// At least once: a sender that dies between counting and publishing has counted it, which the receiver cannot know.
 pub(crate) fn a_displacer_dies() {
     let mailbox = Mailbox::new(1);
     mailbox.sender(3, OverflowPolicy::Displace).send(10, 10);
@@ -617,7 +617,7 @@ fn a_replacer_dies(slots: usize, step: &'static str) {
     assert!(died || received.contains(&2));
     let (first, replaced) = (received.contains(&1), mailbox.replaced());
     assert!(first || replaced == 1, "hidden");
-    // Who dies between saying that it replaces and replacing is believed: then the older one is counted and received.
+    // A sender that dies between saying that it replaces and replacing is believed: the older one is counted, received.
     assert!(!(first && replaced > 0) || step == "replace: marked");
     assert!(mailbox.all_free());
 }

@@ -16,13 +16,13 @@ use loom::cell::UnsafeCell;
 use loom::thread::{self, JoinHandle};
 use std::sync::{Arc, Mutex};
 
-/// A mailbox whose bodies are one number each, watched by loom for races.
+/// A mailbox with bodies of one number each, watched by loom for races.
 pub(super) struct Mailbox {
     pub(super) hot: Hot,
     pub(super) words: Vec<AtomicU64>,
     pub(super) bodies: Vec<UnsafeCell<u8>>,
     bell: Arc<Sleeper>,
-    /// Not 0: the receiver has something else to do. Whoever says so rings.
+    /// Not 0: the receiver has something else to do. The thread that says so rings.
     pub(super) other: AtomicU32,
     /// One bit for each dead participant.
     pub(super) dead: AtomicU32,
@@ -82,7 +82,12 @@ impl Mailbox {
     }
 
     /// Sends these packages (priority, body) from a thread of its own; returns the bodies of the accepted ones.
-    pub(super) fn send_from(self: &Arc<Self>, participant: u16, full: OverflowPolicy, packages: &'static [(u8, u8)]) -> JoinHandle<Vec<u8>> {
+    pub(super) fn send_from(
+        self: &Arc<Self>,
+        participant: u16,
+        full: OverflowPolicy,
+        packages: &'static [(u8, u8)],
+    ) -> JoinHandle<Vec<u8>> {
         let mailbox = self.clone();
         thread::spawn(move || mailbox.sender(participant, full).send_all(packages))
     }
@@ -100,7 +105,7 @@ impl Mailbox {
             let died = dies_at(step, || {
                 mailbox.sender(participant, full).send_all(packages);
             });
-            // The kernel releases the lock by which others see it alive; whoever notices that rings.
+            // The kernel releases the lock by which others see it alive; a process that notices that rings.
             mailbox.dead.fetch_or(u32::from(died) << participant, Ordering::Release);
             if died {
                 mailbox.ring();
@@ -146,7 +151,8 @@ impl Mailbox {
         }
     }
 
-    /// A futex that never returns early: who is not rung does not wake, and loom gives up on a program without end.
+    /// A futex that never returns early: a receiver that is not rung does not wake, and loom gives up on a program
+    /// without end.
     pub(super) fn sleep(&self, seen: u32) {
         while self.bell.rings.load(Ordering::Relaxed) == seen {
             thread::yield_now();

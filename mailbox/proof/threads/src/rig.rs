@@ -25,7 +25,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Body([u64; 4]);
 
-/// What became of packages, counted by whoever did it.
+/// What became of packages, counted by the thread that did it.
 #[derive(Default)]
 pub(crate) struct Counts {
     pub(crate) accepted: Count,
@@ -34,7 +34,7 @@ pub(crate) struct Counts {
     pub(crate) gave_way: Count,
     pub(crate) unfinished: Count,
     pub(crate) closed: Count,
-    /// Taken from who lives: never.
+    /// Taken from a living sender: never.
     reclaimed: Count,
 }
 
@@ -92,7 +92,7 @@ impl Mailbox {
     }
 
     fn is_dead(&self, by: Claimant) -> bool {
-        // The kernel's lock, by which others see who lives, orders as much.
+        // The kernel's lock, by which others see which ones live, orders as much.
         self.dead.load(Ordering::Acquire) >> by.participant & 1 != 0
     }
 
@@ -152,12 +152,12 @@ impl Mailbox {
         self.is_true();
     }
 
-    /// No loss is hidden. One may be counted twice: by who filled when the mailbox was given up, and by who gave it up.
+    /// No loss is hidden. One may be counted twice: by the sender that filled when the mailbox was given up, and by the
+    /// owner that gave it up.
     pub(crate) fn hides_no_loss(&self) {
         let (accepted, known) = self.accepted_and_known();
         assert!(accepted <= known, "{accepted} were accepted, of {known} it is known what became of them");
-        // A claim whose victim was settled stays: it is no longer what its sender knows, and nobody claims here any
-        // more.
+        // A claim with a settled victim stays: it is no longer what its sender knows, and nobody claims here any more.
         let waits = |slot: &usize| !matches!(self.slots().load(*slot).state(), State::Free | State::Filling { .. });
         assert_eq!((0..self.words.len()).find(waits), None, "a slot still holds a package");
         self.is_true();
@@ -278,7 +278,7 @@ impl Receiver {
         Self { mailbox, queue: Queue::new(mailbox.words.len()) }
     }
 
-    /// Takes over what another receiver left, who died with packages in hand.
+    /// Takes over what another receiver left when it died with packages in hand.
     pub(crate) fn adopting(mailbox: &'static Mailbox) -> Self {
         mailbox.slots().adopt(|_| add(&mailbox.counts.closed));
         let mut receiver = Self::new(mailbox);

@@ -122,7 +122,7 @@ pub(crate) fn adopting() {
     mailbox.is_accounted();
 }
 
-/// Mailboxes are given up under their senders, who go on in the next.
+/// Mailboxes are given up under their senders, which go on in the next.
 pub(crate) fn retiring() {
     for _ in 0..scaled(200) {
         let [old, new] = [2, 2].map(Mailbox::new);

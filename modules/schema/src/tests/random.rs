@@ -144,7 +144,10 @@ proptest! {
     }
 
     #[test]
-    fn random_bytes_never_panic(ty in types(), bytes in vec(prop_oneof![Just(0), Just(1), Just(255), any::<u8>()], 0..200)) {
+    fn random_bytes_never_panic(
+        ty in types(),
+        bytes in vec(prop_oneof![Just(0), Just(1), Just(255), any::<u8>()], 0..200),
+    ) {
         for start in 0..bytes.len().min(4) {
             if let Ok(value) = decode(&ty, &bytes[start..]) {
                 check_value(&ty, &value);

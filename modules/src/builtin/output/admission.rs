@@ -34,8 +34,8 @@ pub(super) struct Admission {
     unreadable: Throttle,
 }
 
-/// Who says lines: a principal, by itself or through launch, which passes on what it prints. Each of both ways has an
-/// allowance where the lines come from, and so it has here.
+/// The writer of lines: a principal, by itself or through launch, which passes on what it prints. Each of both ways has
+/// an allowance where the lines come from, and so it has here.
 struct Writer {
     principal: Principal,
     by_launch: bool,
@@ -65,7 +65,7 @@ impl Admission {
         )
     }
 
-    /// Judges a line, and bounds what it claims. Says whose share it used.
+    /// Judges a line, and bounds what it claims. Says which principal's share it used.
     pub(super) fn validate(
         &mut self,
         installation: &Installation,
@@ -91,9 +91,9 @@ impl Admission {
         if !writer.share.take(came.mono_ns) {
             let told = writer.beyond.note(came.mono_ns, TELL_NS);
             self.counts.beyond_share += 1;
-            let who = installation.classes.format(named);
+            let name = installation.classes.format(named);
             let told =
-                told.map(|lines| format!("{lines} lines were dropped: more than the share of whoever says {who}'s"));
+                told.map(|lines| format!("{lines} lines were dropped: more than the share of the principal of {name}"));
             return Err(NotTaken(told));
         }
         let lost_max = u64::from(rate) * LANES * (quiet_ns / SECOND_NS + 1) + u64::from(burst) * LANES + WAITING_LINES;

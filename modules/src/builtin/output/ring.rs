@@ -1,5 +1,5 @@
-//! The newest lines, numbered as they came. Who says much loses its own lines first: of all who said something, the one
-//! with the most lines gives way, so that nobody says so much that what others said is gone.
+//! The newest lines, numbered as they came. A principal that says much loses its own lines first: of all principals,
+//! the one with the most lines gives way, so that nobody says so much that what others said is gone.
 
 use crate::output::OutputLine;
 use rohrpost_config::Principal;
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn who_says_much_loses_its_own_lines_and_nobody_elses() {
+    fn a_loud_principal_loses_its_own_lines_and_nobody_elses() {
         let mut ring = Ring::new(10);
         for number in 0..1000 {
             let (principal, text) = if number % 250 == 100 { (QUIET, "evidence") } else { (LOUD, "noise") };

@@ -22,7 +22,8 @@ impl Child {
             self.printed.pass_on(false);
             return self.ended_as_told(&ending, &how, now);
         }
-        // Whoever waits for its work expects it to go on as configured; but what a person has switched off stays off.
+        // Modules that wait for its work expect it to go on as configured; but what a person has switched off stays
+        // off.
         self.turn_on &= self.configured_on;
         let printed = self.printed.below();
         // Started again, it would find the same configuration.

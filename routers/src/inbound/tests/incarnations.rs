@@ -12,7 +12,8 @@ fn data(from: NodeIndex, to: NodeIndex) -> Head {
 
 use crate::frame::{Alive, FrameHead, FrameKind, NodeIndex};
 
-pub(super) fn check_silence() {
+#[test]
+fn a_peer_without_a_datagram_for_a_second_is_silent() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     let states = |end: &End, now_ns| end.stats.state(1, now_ns);
     assert_eq!(states(&base, START + S - 1), PeerLinkState::Unknown);
@@ -33,11 +34,6 @@ pub(super) fn check_silence() {
 }
 
 #[test]
-fn a_peer_without_a_datagram_for_a_second_is_silent() {
-    check_silence();
-}
-
-#[test]
 fn a_stalled_router_waits_for_its_peers_anew() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
@@ -50,7 +46,8 @@ fn a_stalled_router_waits_for_its_peers_anew() {
     assert_eq!(base.stats.state(1, START + 6 * S), PeerLinkState::Silent);
 }
 
-pub(super) fn check_restart() {
+#[test]
+fn a_restarted_peer_is_known_by_its_incarnation() {
     let mut base = End::new(0, |_| {});
     let lives = |incarnation| End::new(1, |settings| settings.incarnation = incarnation);
     let (mut first, mut second) = (lives(11), lives(12));
@@ -80,11 +77,6 @@ pub(super) fn check_restart() {
     assert_eq!(base.log.events[2..], [RouterEvent::Twice { peer: 1 }]);
     assert_eq!(base.log.delivered.len(), 2 + 30);
     base.assert_balanced();
-}
-
-#[test]
-fn a_restarted_peer_is_known_by_its_incarnation() {
-    check_restart();
 }
 
 #[test]
@@ -140,7 +132,8 @@ fn what_a_life_that_is_over_sent_before_does_not_bring_it_back() {
     base.assert_balanced();
 }
 
-pub(super) fn check_one_way() {
+#[test]
+fn a_one_way_link_is_noticed() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
     let (mut unheard_ns, mut alive) = (None, Vec::new());
@@ -165,11 +158,6 @@ pub(super) fn check_one_way() {
 }
 
 #[test]
-fn a_one_way_link_is_noticed() {
-    check_one_way();
-}
-
-#[test]
 fn a_peer_that_is_heard_again_has_a_second_to_hear_us() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     base.meet(START, &mut arm);
@@ -191,7 +179,8 @@ fn a_peer_that_is_heard_again_has_a_second_to_hear_us() {
     assert!(denied_ns.is_some_and(|denied_ns| denied_ns < START + 4 * S + 200 * MS));
 }
 
-pub(super) fn check_socket() {
+#[test]
+fn what_waited_in_the_socket_is_not_delivered() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
     for (waited_ns, delivered) in [(SOCKET_MAX_NS, 1), (SOCKET_MAX_NS + 1, 1)] {
         let (_, bytes) = arm.send(START, data(1, 0), b"old", true).unwrap();
@@ -201,11 +190,6 @@ pub(super) fn check_socket() {
     }
     assert_eq!(base.log.causes(), [Cause::Stale]);
     base.assert_balanced();
-}
-
-#[test]
-fn what_waited_in_the_socket_is_not_delivered() {
-    check_socket();
 }
 
 /// What a router of node 1 could have sent to node 0.
@@ -222,7 +206,8 @@ pub(super) fn quick(settings: &mut Settings) {
 
 const LAST: u64 = (1 << 48) - 1;
 
-pub(super) fn check_jump() {
+#[test]
+fn one_datagram_that_is_far_ahead_changes_nothing() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, quick));
     let mut send = || arm.send(START, data(1, 0), b"", true).unwrap().1;
     (0..3).for_each(|_| base.take(START, 1, &send()));
@@ -241,11 +226,7 @@ pub(super) fn check_jump() {
 }
 
 #[test]
-fn one_datagram_that_is_far_ahead_changes_nothing() {
-    check_jump();
-}
-
-pub(super) fn check_forged_incarnations() {
+fn lives_that_one_datagram_each_tells_of_change_nothing() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, quick));
     let mut send = || arm.send(START, data(1, 0), b"", true).unwrap().1;
     base.take(START, 1, &send());
@@ -262,11 +243,6 @@ pub(super) fn check_forged_incarnations() {
     }
     assert_eq!(base.log.events[1..], [RouterEvent::Restarted { peer: 1 }; 2]);
     assert_eq!(base.stats.peer(1).received.restarts.get(), 1000);
-}
-
-#[test]
-fn lives_that_one_datagram_each_tells_of_change_nothing() {
-    check_forged_incarnations();
 }
 
 #[test]

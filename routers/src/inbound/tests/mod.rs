@@ -12,27 +12,8 @@ use crate::harness::{End, MS, S, START, head, module};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-pub(crate) const CHECKS: &[fn()] = &[
-    check_window,
-    check_order,
-    check_floor,
-    incarnations::check_silence,
-    incarnations::check_restart,
-    incarnations::check_jump,
-    incarnations::check_forged_incarnations,
-    check_whole,
-    incarnations::check_one_way,
-    incarnations::check_socket,
-    refusals::check_digest,
-    refusals::check_damaged,
-    refusals::check_forged_refusals,
-    names::check_names,
-    names::check_routers,
-    names::check_priority,
-    names::check_priority_of_parts,
-];
-
-fn check_window() {
+#[test]
+fn a_window_knows_gaps_and_copies() {
     use Arrival::{Duplicate, Newest, Reordered, Returned};
     let mut window = SequenceWindow::joining(3);
     let mut lost_in_all = 0;
@@ -64,11 +45,6 @@ fn check_window() {
 }
 
 #[test]
-fn a_window_knows_gaps_and_copies() {
-    check_window();
-}
-
-#[test]
 fn a_router_that_joins_late_misses_nothing_sent_before() {
     let mut lost = 0;
     let mut window = SequenceWindow::joining(5000);
@@ -82,7 +58,8 @@ fn a_router_that_joins_late_misses_nothing_sent_before() {
     assert_eq!((lost, window.close()), (5000 - 63, 63), "a restarted peer's are ours from the first on");
 }
 
-fn check_order() {
+#[test]
+fn what_is_older_than_what_was_delivered_is_late() {
     let mut order = Order::default();
     let (a, b) = (head(module(50, 0), module(60, 1), 90), head(module(50, 0), module(61, 1), 90));
     let urgent = Head { priority: rohrpost_mailbox::Priority(91), ..a };
@@ -105,11 +82,7 @@ fn check_order() {
 use rohrpost_mailbox::Head;
 
 #[test]
-fn what_is_older_than_what_was_delivered_is_late() {
-    check_order();
-}
-
-fn check_floor() {
+fn a_full_table_costs_packages_but_not_the_order() {
     let mut order = Order::default();
     let flow = |n: u32| Head { from: rohrpost_mailbox::Name::from_raw(0x0100_0000 + n), ..Head::default() };
     // Many more flows than there are places.
@@ -118,13 +91,9 @@ fn check_floor() {
     assert_eq!(again, 0, "nothing older than what was delivered, also of flows that were forgotten");
 }
 
-#[test]
-fn a_full_table_costs_packages_but_not_the_order() {
-    check_floor();
-}
-
 /// A large package, then packages of many flows, then its last fragment.
-fn check_whole() {
+#[test]
+fn a_package_in_parts_is_late_only_if_something_newer_of_its_flow_went_before_it() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, incarnations::quick));
     let large = head(module(50, 0), module(200, 1), 90);
     arm.queue(START, large, &[1; 4000]);
@@ -145,11 +114,6 @@ fn check_whole() {
     parts[1..].iter().for_each(|part| base.take(START, 1, part));
     assert_eq!(base.log.causes(), [crate::counts::Cause::Late]);
     base.assert_balanced();
-}
-
-#[test]
-fn a_package_in_parts_is_late_only_if_something_newer_of_its_flow_went_before_it() {
-    check_whole();
 }
 
 proptest! {

@@ -34,10 +34,6 @@ fn causes(end: &mut End, packages: &[Head]) -> Vec<Option<Cause>> {
 
 #[test]
 fn a_node_speaks_for_its_own_names_alone() {
-    check_names();
-}
-
-pub(super) fn check_names() {
     let mut end = End::new(0, |settings| settings.network.security = Security::Keys);
     let of = |from: Name| head(module(200, 0), from, 60);
     let foreign = Some(Cause::ForeignName);
@@ -70,10 +66,6 @@ fn guarded() -> End {
 
 #[test]
 fn a_routers_own_mailboxes_take_nothing_but_packets_of_the_tunnel() {
-    check_routers();
-}
-
-pub(super) fn check_routers() {
     let mut end = guarded();
     let router = |node, local| module(250, node).with_local(local);
     let packet = Head { kind: PACKET, ..head(router(0, 4), router(1, 4), 0) };
@@ -98,10 +90,6 @@ pub(super) fn check_routers() {
 
 #[test]
 fn no_package_of_another_node_hurries_more_than_it_may() {
-    check_priority();
-}
-
-pub(super) fn check_priority() {
     let mut end = End::new(0, |_| {});
     let of = |kind, from, to| Head { kind, ..head(module(to, 0).with_local(local::DATA), module(from, 1), 255) };
     let (command, reply, data) = (Type::command(16), Type::reply(16), Type::data(1));
@@ -121,10 +109,6 @@ pub(super) fn check_priority() {
 
 #[test]
 fn nor_does_one_that_comes_in_parts() {
-    check_priority_of_parts();
-}
-
-pub(super) fn check_priority_of_parts() {
     let mut end = End::new(0, |_| {});
     let package = Head { len: 4, ..head(module(90, 0).with_local(local::DATA), module(60, 1), 255) };
     for (index, bytes) in [(0, b"ab"), (1, b"cd")] {

@@ -16,7 +16,8 @@ fn datagram(change: impl FnOnce(&mut Settings)) -> Vec<u8> {
     direct.map_or_else(|| unreachable!("there is a route"), |(_, datagram)| datagram)
 }
 
-pub(super) fn check_digest() {
+#[test]
+fn another_configuration_is_refused_and_told() {
     let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |settings| settings.digest = 8));
     let foreign = datagram(|settings| settings.digest = 8);
     let theirs = Mismatch { reason: RefusalReason::Digest, version: VERSION, digest: Some(8) };
@@ -49,11 +50,6 @@ pub(super) fn check_digest() {
     base.take(now_ns, 1, &datagram(|settings| settings.incarnation = 999));
     assert_eq!((base.stats.state(1, now_ns), base.log.delivered.len()), (PeerLinkState::Alive, 1));
     assert!(base.stats.state(1, now_ns + 10 * S) == PeerLinkState::Silent, "and a refusal holds for a while only");
-}
-
-#[test]
-fn another_configuration_is_refused_and_told() {
-    check_digest();
 }
 
 #[test]
@@ -119,7 +115,8 @@ fn a_peer_that_does_not_know_our_address_takes_nothing_though_it_is_heard() {
     assert!(matches!(base.stats.state(1, now_ns), PeerLinkState::Refused(_)), "what it sends says nothing of that");
 }
 
-pub(super) fn check_forged_refusals() {
+#[test]
+fn refusals_of_a_peer_that_hears_us_part_nobody() {
     for reason in [RefusalReason::Version, RefusalReason::Digest, RefusalReason::Stranger] {
         let (mut base, mut arm) = (End::new(0, |_| {}), End::new(1, |_| {}));
         let state = |base: &End, now_ns| base.stats.state(1, now_ns);
@@ -151,11 +148,7 @@ pub(super) fn check_forged_refusals() {
 }
 
 #[test]
-fn refusals_of_a_peer_that_hears_us_part_nobody() {
-    check_forged_refusals();
-}
-
-pub(super) fn check_damaged() {
+fn damaged_and_foreign_datagrams_change_nothing() {
     let mut base = End::new(0, |_| {});
     let good = datagram(|_| {});
     for at in 0..good.len() {
@@ -171,9 +164,4 @@ pub(super) fn check_damaged() {
     assert_eq!(base.stats.foreign.get(), 4);
     base.take(START, 1, &good);
     assert_eq!(base.log.delivered.len(), 1);
-}
-
-#[test]
-fn damaged_and_foreign_datagrams_change_nothing() {
-    check_damaged();
 }

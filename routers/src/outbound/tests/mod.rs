@@ -1,5 +1,4 @@
 use super::*;
-use crate::broken::{Broken, with};
 use crate::counts::Cause;
 use crate::frame::{Alive, Frame};
 use crate::harness::{ENVELOPE, End, MS, S, START, head, module};
@@ -10,19 +9,6 @@ use rohrpost_mailbox::Type;
 
 mod flows;
 mod slot;
-
-pub(crate) const CHECKS: &[fn()] = &[
-    check_what_does_not_go,
-    check_pace,
-    check_advance,
-    check_packages_do_not_hurry,
-    check_order_on_the_wire,
-    check_waiting_too_long,
-    slot::check_strict_order,
-    slot::check_room,
-    slot::check_company,
-    slot::check_company_behind,
-];
 
 /// The packages of a datagram, by their ids; a fragment stands for its package.
 fn ids(datagram: &[u8]) -> Vec<u16> {
@@ -78,7 +64,8 @@ fn a_package_that_no_second_could_join_waits_for_no_company() {
     end.assert_balanced();
 }
 
-fn check_order_on_the_wire() {
+#[test]
+fn levels_go_in_order_and_datagrams_are_filled() {
     let mut end = End::new(0, |_| {});
     for (peer, priority, len) in
         [(1, 90, 700), (2, 250, 10), (1, 90, 800), (1, 250, 10), (1, 90, 10), (1, 10, 300), (2, 90, 10), (1, 200, 1000)]
@@ -94,11 +81,6 @@ fn check_order_on_the_wire() {
             (1, vec![2, 4]),
         ],
     );
-}
-
-#[test]
-fn levels_go_in_order_and_datagrams_are_filled() {
-    check_order_on_the_wire();
 }
 
 #[test]
@@ -136,7 +118,8 @@ fn the_largest_package_goes_in_the_smallest_datagrams() {
     end.assert_balanced();
 }
 
-fn check_what_does_not_go() {
+#[test]
+fn what_goes_to_a_node_that_is_not_there_is_lost_with_its_cause() {
     let mismatch = Mismatch { reason: crate::frame::RefusalReason::Digest, version: 1, digest: Some(1) };
     check_cause(|_| {}, Cause::Silent);
     let unheard = |end: &End| {
@@ -166,11 +149,6 @@ fn check_cause(set: impl Fn(&End), cause: Cause) {
 }
 
 #[test]
-fn what_goes_to_a_node_that_is_not_there_is_lost_with_its_cause() {
-    check_what_does_not_go();
-}
-
-#[test]
 fn names_that_nobody_has_and_names_of_this_node_have_no_route() {
     let mut end = End::new(0, |_| {});
     for name in [module(50, 0), module(50, 3), Name::new(2, 50, 1, 0), Name::NONE, Name::from_raw(u32::MAX)] {
@@ -181,7 +159,8 @@ fn names_that_nobody_has_and_names_of_this_node_have_no_route() {
     end.assert_balanced();
 }
 
-fn check_waiting_too_long() {
+#[test]
+fn what_waits_too_long_is_dropped() {
     let mut end = End::new(0, |settings| settings.network.rate_bytes_s = 70_000);
     // A seventh of a second each: less important ones never have their turn.
     for _ in 0..12 {
@@ -206,11 +185,7 @@ fn check_waiting_too_long() {
 }
 
 #[test]
-fn what_waits_too_long_is_dropped() {
-    check_waiting_too_long();
-}
-
-fn check_packages_do_not_hurry() {
+fn a_package_is_no_more_urgent_than_its_sender_or_its_caller() {
     let mut end = End::new(0, |_| {});
     for (kind, priority, leaves) in [
         (Type::command(16), 250, 100),
@@ -226,11 +201,7 @@ fn check_packages_do_not_hurry() {
 }
 
 #[test]
-fn a_package_is_no_more_urgent_than_its_sender_or_its_caller() {
-    check_packages_do_not_hurry();
-}
-
-fn check_pace() {
+fn the_rate_is_kept() {
     const RATE: u64 = 1_000_000;
     let mut end = End::new(0, |settings| settings.network.rate_bytes_s = RATE);
     let (mut bytes, mut now_ns, mut waits) = (0, START, 0);
@@ -252,13 +223,9 @@ fn check_pace() {
     assert!(waits > 500);
 }
 
-#[test]
-fn the_rate_is_kept() {
-    check_pace();
-}
-
 /// While a flood keeps the wire busy, a package more important than the last one may leave before its time.
-fn check_advance() {
+#[test]
+fn what_is_more_important_than_a_flood_does_not_wait_for_the_pace() {
     let mut end = End::new(0, |settings| settings.network.rate_bytes_s = 1_000_000);
     end.hears(1, START);
     end.leave(START + 10 * MS);
@@ -300,11 +267,6 @@ fn plenty_is_what_fills_datagrams_and_half_a_quota_and_not_a_dozen_small_package
     assert!(count > 100, "a datagram of small ones has company: {count}");
     assert!(end.stats.waiting_bytes.get() <= quota_bytes, "before anything is lost");
     assert_eq!(end.log.lost.len(), 0);
-}
-
-#[test]
-fn what_is_more_important_than_a_flood_does_not_wait_for_the_pace() {
-    check_advance();
 }
 
 #[test]
@@ -403,15 +365,9 @@ proptest! {
     }
 }
 
+/// Packages to the one wait, in order; those to the other leave meanwhile, also at once, and it gets keep-alives.
 #[test]
 fn a_way_without_room_is_passed_over() {
-    check_one_way_without_room();
-    let broken = || with(Broken::WaitsForOne, check_one_way_without_room);
-    assert!(std::panic::catch_unwind(broken).is_err(), "a mistake is noticed");
-}
-
-/// Packages to the one wait, in order; those to the other leave meanwhile, also at once, and it gets keep-alives.
-fn check_one_way_without_room() {
     let mut end = End::new(0, |_| {});
     end.hears(1, START);
     end.hears(2, START);

@@ -65,7 +65,8 @@ impl End {
     }
 }
 
-pub(super) fn check_strict_order() {
+#[test]
+fn a_package_that_does_not_fit_is_passed_by_no_less_important_one() {
     let mut end = in_slots(&[1000]);
     for (peer, priority, len) in [(1, 10, 10), (1, 90, 900), (2, 90, 600), (2, 20, 10)] {
         end.queue(START, to(peer, priority), &vec![0; len]);
@@ -85,11 +86,7 @@ pub(super) fn check_strict_order() {
 }
 
 #[test]
-fn nothing_overtakes_what_is_more_important_and_does_not_fit() {
-    check_strict_order();
-}
-
-pub(super) fn check_room() {
+fn a_datagram_leaves_only_if_it_fits() {
     let mut end = in_slots(&[1000]);
     for len in [400, 500, 100] {
         end.queue(START, to(1, 90), &vec![0; len]);
@@ -103,11 +100,7 @@ pub(super) fn check_room() {
 }
 
 #[test]
-fn a_datagram_leaves_only_if_it_fits() {
-    check_room();
-}
-
-pub(super) fn check_company() {
+fn company_is_no_less_important_than_what_waits_for_others() {
     let mut end = in_slots(&[1000]);
     for (peer, priority) in [(1, 200), (1, 90), (1, 40), (2, 90), (2, 10)] {
         end.queue(START, to(peer, priority), b"small");
@@ -118,11 +111,7 @@ pub(super) fn check_company() {
 }
 
 #[test]
-fn company_is_no_less_important_than_what_waits_for_others() {
-    check_company();
-}
-
-pub(super) fn check_company_behind() {
+fn company_is_no_less_important_than_what_waits_in_the_mailbox() {
     let mut end = in_slots(&[1000]);
     for priority in [200, 90, 88, 40] {
         end.queue(START, to(1, priority), b"small");
@@ -132,11 +121,6 @@ pub(super) fn check_company_behind() {
     // Packages of the level of the first in the mailbox go along; the rest is asked for again when that was accepted.
     assert_eq!(ids, [vec![0, 1, 2], vec![3]]);
     end.assert_balanced();
-}
-
-#[test]
-fn company_is_no_less_important_than_what_waits_in_the_mailbox() {
-    check_company_behind();
 }
 
 #[test]

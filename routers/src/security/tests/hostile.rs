@@ -99,8 +99,8 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
             let mut datagram = sent.clone();
             match router.opening[port as usize].open(&mut datagram) {
                 Ok(Opened::Frame(head, _)) => panic!("datagram {number} was taken: {head:?}, {sent:?}"),
-                Ok(Opened::Hello(head, greeting)) => {
-                    let greeted = router.handshake.receive(number, &head, &greeting, &mut room);
+                Ok(Opened::Hello(head, hello)) => {
+                    let greeted = router.handshake.receive(number, &head, &hello, &mut room);
                     assert!(!greeted.begins, "an incarnation began by datagram {number}: {sent:?}");
                 }
                 Err(_) => {}

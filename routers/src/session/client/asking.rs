@@ -5,7 +5,6 @@
 //!           │ as long as the stream moves, nobody is gone
 //! ```
 
-use crate::broken::broken;
 use crate::session::{ASK_EVERY_NS, SILENT_AFTER_NS, SLOW_SILENT_AFTER_NS};
 
 /// The first questions follow each other closer: one of them is quick.
@@ -60,8 +59,8 @@ impl Asking {
         let is_past = |past_ns: u64, after_ns: u64| now_ns.saturating_sub(past_ns) > after_ns;
         let could_ns = match (self.left_ns, self.waits) {
             (Some(left_ns), _) => left_ns,
-            (None, Some(_)) if !broken!(AsksLast) => moved_ns,
-            (None, _) => heard_ns,
+            (None, Some(_)) => moved_ns,
+            (None, None) => heard_ns,
         };
         is_past(heard_ns, after_ns) && is_past(could_ns, after_ns - ASK_EVERY_NS)
     }

@@ -1,7 +1,5 @@
 //! When to try again: soon at first, then less often, and never all clients at once.
 
-use crate::broken::broken;
-
 /// The longest first wait.
 const FIRST_NS: u64 = 100_000_000;
 /// The longest wait.
@@ -33,9 +31,6 @@ impl Backoff {
 
     /// A connection failed: wait so long, ns. From half of what doubles each time to all of it.
     pub(super) fn next_ns(&mut self) -> u64 {
-        if broken!(NeverBacksOff) {
-            return FIRST_NS / 100;
-        }
         let longest_ns = (FIRST_NS << self.failures).min(BACKOFF_MAX_NS);
         self.failures = (self.failures + 1).min(DOUBLINGS_MAX);
         longest_ns / 2 + self.draw() % (longest_ns / 2)

@@ -3,7 +3,6 @@
 use super::asking::Asking;
 use super::{Client, ClientEvent, ClientHost, ClientPackage, ClientState, REGISTER_AGAIN_NS, Registration, Reported};
 use crate::admission::{ArrivalPath, NotAdmitted, capped};
-use crate::broken::broken;
 use crate::session::counts::Cause;
 use crate::session::estimate::ServerClockEstimate;
 use crate::session::frame::{
@@ -47,7 +46,7 @@ impl Client {
 
     fn welcomed(&mut self, now_ns: u64, welcome: &Welcome, host: &mut impl ClientHost) {
         let (yours, ours) = (self.settings.common, welcome.common);
-        if yours != ours && !broken!(TakesOtherCommon) {
+        if yours != ours {
             let text = "the TCP router";
             let refusal = SessionRefusal { version: VERSION, reason: SessionRefusalReason::Common, yours, ours, text };
             return self.refused(now_ns, &refusal, host);
@@ -79,7 +78,7 @@ impl Client {
     }
 
     fn take(&mut self, now_ns: u64, carried: &Carried<'_>, host: &mut impl ClientHost) {
-        let head = if broken!(AdmitsHurry) { carried.head } else { capped(&carried.head) };
+        let head = capped(&carried.head);
         let carried = Carried { head, ..*carried };
         self.inn.came(head.priority);
         let Some(session) = self.session(now_ns) else { return };
@@ -89,7 +88,7 @@ impl Client {
         let published_ns = u64::try_from(i128::from(carried.published_ns) + shift).unwrap_or(0).min(now_ns);
         let delivered = match self.validate(&carried, host) {
             Err(cause) => Err(cause),
-            Ok(()) if oldest_ns > AGE_MAX_NS && !broken!(DeliversOld) => Err(Cause::Stale),
+            Ok(()) if oldest_ns > AGE_MAX_NS => Err(Cause::Stale),
             Ok(()) => host.deliver(&Carried { published_ns, ..carried }).map_err(Cause::from),
         };
         match delivered {

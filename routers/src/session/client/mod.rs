@@ -22,7 +22,6 @@ use super::outgoing::Outgoing;
 use super::splitter::Splitter;
 use super::{ErrorReplies, HANDSHAKE_MAX_NS, LOOK_EVERY_NS, STALLED_AFTER_NS};
 use crate::admission::Admission;
-use crate::broken::broken;
 use crate::report::NotDelivered;
 use asking::Asking;
 use backoff::Backoff;
@@ -310,9 +309,7 @@ impl Client {
             self.backoff.lasted();
         }
         self.state = ClientState::Away { until_ns: now_ns + self.backoff.next_ns() };
-        if !broken!(RegistersOnce) {
-            self.registration = Registration::Due(now_ns);
-        }
+        self.registration = Registration::Due(now_ns);
         (self.is_blocked, self.is_slow) = (false, false);
         self.outgoing.cut();
     }
@@ -385,7 +382,7 @@ impl Client {
         let is_stalled = now_ns.saturating_sub(self.moved_ns) > STALLED_AFTER_NS;
         match self.state {
             ClientState::Handshake { until_ns } => now_ns >= until_ns,
-            _ => (is_silent && !broken!(WaitsForSilent)) || is_stalled,
+            _ => is_silent || is_stalled,
         }
     }
 

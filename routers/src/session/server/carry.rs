@@ -3,7 +3,6 @@
 use super::member::{Member, RoundTrip, TimeRequest};
 use super::{Server, ServerHost};
 use crate::admission::capped;
-use crate::broken::broken;
 use crate::queue::QueueShare;
 use crate::session::counts::Cause;
 use crate::session::frame::{
@@ -20,11 +19,11 @@ impl Server {
         let head = capped(&carried.head);
         // A sender without a publishing time, or with one in the future, has published it now.
         let published_ns = if carried.published_ns == 0 { now_ns } else { carried.published_ns.min(now_ns) };
-        let hops = if broken!(KeepsHops) { carried.hops } else { carried.hops.saturating_add(1) };
+        let hops = carried.hops.saturating_add(1);
         let carried = Carried { head, published_ns, hops, ..*carried };
         let hosts = self.table.client_of(head.from) == Some(from);
         let is_own = hosts || self.is_to_host(from, head.from);
-        let objection = if !is_own && !broken!(TakesForeignNames) {
+        let objection = if !is_own {
             Some(Cause::Foreign)
         } else if carried.hops > HOPS_MAX {
             Some(Cause::Hops)
@@ -40,7 +39,7 @@ impl Server {
 
     fn carry_to_one(&mut self, now_ns: u64, from: ClientIndex, carried: &Carried<'_>, host: &mut impl ServerHost) {
         // What a client cannot deliver itself does not come back to it.
-        let to = self.table.client_of(carried.head.to).filter(|to| *to != from || broken!(HandsBack));
+        let to = self.table.client_of(carried.head.to).filter(|to| *to != from);
         match to {
             Some(to) => {
                 self.counts.came(carried.head.priority);
@@ -63,7 +62,7 @@ impl Server {
             let to = in_system(carried.head.to, system);
             let Some(client) = self.table.client_of(to) else { continue };
             is_reached = true;
-            let reaches_itself = client == from || system == own && reaches_own && !broken!(ToOwnTwice);
+            let reaches_itself = client == from || system == own && reaches_own;
             if reaches_itself {
                 continue;
             }

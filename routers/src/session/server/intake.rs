@@ -2,7 +2,6 @@
 
 use super::member::{MemberState, PendingRefusal, RoundTrip, TimeRequest};
 use super::{Server, ServerEvent, ServerHost};
-use crate::broken::broken;
 use crate::session::frame::{
     BadSessionFrame, HELLO_LENGTH_MAX, LENGTH_MAX, NAME_BYTES_MAX, SessionHello, SessionMessage, SessionRefusalReason,
 };
@@ -97,7 +96,7 @@ impl Server {
 
     fn difference(&self, hello: &SessionHello<'_>) -> Option<Difference> {
         let settings = &self.settings;
-        if hello.common != settings.common && !broken!(TakesOtherCommon) {
+        if hello.common != settings.common {
             let digests = (hello.common, settings.common);
             return Some(Difference { reason: SessionRefusalReason::Common, digests, holder: settings.name.clone() });
         }
@@ -106,7 +105,7 @@ impl Server {
         let first = || self.places.of_system(hello.system).and_then(|first| self.member(first));
         let held = own.or_else(|| first().map(|member| (member.name.as_str(), member.system_digest)));
         let (holder, digest) = held.filter(|(_, digest)| *digest != hello.system_digest)?;
-        (!broken!(TakesOtherSystems)).then(|| Difference {
+        Some(Difference {
             reason: SessionRefusalReason::System,
             digests: (hello.system_digest, digest),
             holder: holder.to_owned(),

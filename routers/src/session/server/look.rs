@@ -4,7 +4,6 @@
 use super::member::{Member, MemberState};
 use super::work::WORK_SHARE;
 use super::{Server, ServerEvent, ServerHost};
-use crate::broken::broken;
 use crate::session::counts::Cause;
 use crate::session::frame::SessionRefusalReason;
 use crate::session::{ClientIndex, FRAME_MAX_NS, HANDSHAKE_MAX_NS, LOOK_EVERY_NS};
@@ -51,15 +50,13 @@ impl Server {
         host.event(ServerEvent::Left { name: &member.name, why });
         self.places.leaves(now_ns, client, member);
         let (principal, ranges) = (member.principal_id, member.registrations.ranges);
-        if ranges > 0 && !broken!(KeepsNames) {
+        if ranges > 0 {
             self.table.remove(client);
         }
         if let Some(uses) = self.places.principals.uses_mut(principal) {
             uses.ranges = uses.ranges.saturating_sub(ranges);
         }
-        if !broken!(ForgetsGone) {
-            self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));
-        }
+        self.with_ledger(now_ns, client, host, |outgoing, ledger| outgoing.give_up(Cause::Gone, ledger));
     }
 }
 
@@ -70,13 +67,10 @@ fn objection(now_ns: u64, member: &Member) -> Option<(SessionRefusalReason, &'st
     let silent_after_ns = if frame_ns.is_some() { SLOW_SILENT_AFTER_NS } else { SILENT_AFTER_NS };
     match member.state {
         MemberState::Leaving { .. } => None,
-        MemberState::Handshake if broken!(GreetsForEver) => None,
         MemberState::Handshake => {
             (since(member.began_ns) > HANDSHAKE_MAX_NS).then_some((SessionRefusalReason::Silent, "no hello"))
         }
-        MemberState::Member if since(member.heard_ns) > silent_after_ns && !broken!(WaitsForSilent) => {
-            Some((SessionRefusalReason::Silent, ""))
-        }
+        MemberState::Member if since(member.heard_ns) > silent_after_ns => Some((SessionRefusalReason::Silent, "")),
         MemberState::Member if frame_ns.is_some_and(|began_ns| since(began_ns) > FRAME_MAX_NS) => {
             Some((SessionRefusalReason::Silent, "a frame did not end"))
         }

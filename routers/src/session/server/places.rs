@@ -11,7 +11,6 @@ use super::member::{Member, MemberState};
 use super::principal::{Principal, Principals};
 use super::work::WORK_SHARE;
 use super::{Server, ServerHost};
-use crate::broken::broken;
 use crate::session::ClientIndex;
 use crate::session::frame::{SessionHello, SessionRefusalReason};
 use std::collections::{BTreeMap, BTreeSet};
@@ -102,10 +101,6 @@ impl Server {
     fn oldest_handshake(&self, address: &Principal) -> Option<ClientIndex> {
         let handshakes = &self.places.handshakes;
         let (largest, most) = handshakes.largest()?;
-        if broken!(CrowdsOut) {
-            let handshake = |(_, member): &(ClientIndex, &Member)| member.state == MemberState::Handshake;
-            return self.present().filter(handshake).min_by_key(|(_, member)| member.began_ns).map(|(index, _)| index);
-        }
         let owner = if handshakes.count_of(address) == most { address } else { largest };
         handshakes.ends_of(owner).map(|(oldest, _)| oldest)
     }
@@ -150,7 +145,7 @@ impl Server {
         if own > 1 && own == most {
             self.places.crowded.clients += 1;
         }
-        newest.filter(|_| most >= own + 2 && !broken!(CrowdsOut))
+        newest.filter(|_| most >= own + 2)
     }
 
     /// The place is free; the next client in it is another.

@@ -8,11 +8,9 @@
 
 use super::work::{PendingRegistration, RANGES_SHARE, REGISTER_EVERY_NS, WORK_MAX, WORK_OF_ONE};
 use super::{Server, ServerEvent, ServerHost};
-use crate::broken::broken;
 use crate::session::ClientIndex;
 use crate::session::frame::{Objection, Range, Ranges, RegistrationVerdict, SessionRefusalReason};
 use crate::session::server::member::{Member, PendingVerdict};
-use crate::session::table::ENTRIES_MAX;
 use rohrpost_mailbox::Name;
 
 impl Server {
@@ -39,7 +37,7 @@ impl Server {
         let Some(member) = self.member_mut(client) else { return };
         let of_client = &mut member.registrations;
         let is_its_turn = now_ns >= of_client.next_ns && of_client.waiting.is_none() && is_left;
-        if is_its_turn || broken!(RegistersAtOnce) {
+        if is_its_turn {
             return self.validate(now_ns, client, ranges.number, ranges, host);
         }
         let waiting = PendingRegistration { number: ranges.number, ranges: ranges.collect() };
@@ -108,7 +106,7 @@ impl Server {
         let may = |range: &Range| range.first.system() == system && range.last.system() == system && rights.may(range);
         let (before, work) = (self.table.count_of(client), self.work_of(client, ranges.len()));
         let used = self.places.principals.uses(principal).map_or(0, |uses| uses.ranges);
-        let room = if broken!(FillsTable) { ENTRIES_MAX } else { (RANGES_SHARE + before).saturating_sub(used) };
+        let room = (RANGES_SHARE + before).saturating_sub(used);
         let ranges: Vec<Range> = ranges.collect();
         let mut conflict = self.table.register(client, room, may, ranges.iter().copied()).err();
         while let Some(impostor) = conflict.and_then(|conflict| self.impostor(client, conflict.holder?)) {

@@ -12,8 +12,6 @@ use rohrpost_mailbox::{Class, Head, Name, Priority, Type, local};
 const ROUTER: Class = Class(103);
 const BARRED: Class = Class(60);
 
-pub(super) const CHECKS: &[fn()] = &[check_admission, check_leaving];
-
 /// A client of system 2, in which only class 40 may command modules of class 60, joined to its server.
 fn guarded() -> Ground {
     let rule = config::Access { class: BARRED, callers: vec![Class(40)], line: 12 };
@@ -37,7 +35,8 @@ fn brought(ground: &mut Ground, head: Head) -> Result<u8, Cause> {
     Err(causes[0])
 }
 
-fn check_admission() {
+#[test]
+fn what_the_server_brings_is_admitted_as_on_the_lan() {
     let ours = module(1);
     let (router, tool) = (Name::new(2, ROUTER.0, 0, 0), Name::new(3, 32, 40, local::REPLIES));
     let (command, reply, data) = (Type::command(16), Type::reply(16), Type::data(1));
@@ -62,11 +61,6 @@ fn check_admission() {
 }
 
 #[test]
-fn what_the_server_brings_is_admitted_as_on_the_lan() {
-    check_admission();
-}
-
-#[test]
 fn a_refused_command_names_its_rule() {
     let mut ground = guarded();
     let head = Head { to: module(1), from: Name::new(3, 32, 40, 1), kind: Type::command(16), ..Head::default() };
@@ -88,15 +82,11 @@ fn crossed(kind: Type, to: Name, from: Name) -> u8 {
     ground.ends[1].2.delivered[0].0.priority.0
 }
 
-fn check_leaving() {
+#[test]
+fn a_program_that_says_the_greatest_priority_sends_with_its_own() {
     let low = Name::new(1, 100, 9, 0);
     assert_eq!(crossed(Type::command(16), module(1), low), 100);
     assert_eq!(crossed(Type::reply(16), module(1).with_local(1), low), 60);
     assert_eq!(crossed(Type::data(1), module(1).with_local(2), low), 100);
     assert_eq!(crossed(Type::data(1), module(1).with_local(2), module(0)), 60);
-}
-
-#[test]
-fn a_program_that_says_the_greatest_priority_sends_with_its_own() {
-    check_leaving();
 }

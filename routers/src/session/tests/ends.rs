@@ -12,19 +12,8 @@ use crate::session::server::{self, MemberState};
 use crate::session::{Cause, HANDSHAKE_MAX_NS, SILENT_AFTER_NS};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Priority, Type};
 
-pub(super) const CHECKS: &[fn()] = &[
-    check_digests,
-    check_a_name_is_hosted_once,
-    check_packages_go_to_the_host_of_the_name,
-    check_hops,
-    check_slow_greetings,
-    check_silence,
-    check_to_all,
-    check_age,
-    check_pieces,
-];
-
-fn check_digests() {
+#[test]
+fn a_client_with_another_digest_takes_no_part_and_is_told_both() {
     let settings = client_settings(0, 9);
     let wrong = client::ClientSettings { common: 0xabc, ..settings.clone() };
     let ground = Ground::new([(wrong, ranges(0))]);
@@ -43,11 +32,7 @@ fn check_digests() {
 }
 
 #[test]
-fn a_client_with_another_digest_takes_no_part_and_is_told_both() {
-    check_digests();
-}
-
-fn check_a_name_is_hosted_once() {
+fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
     let mut ground = Ground::new([(client_settings(0, 8), ranges(0)), (client_settings(3, 9), ranges(0))]);
     let words = ground.ends[1].2.events.clone();
     assert!(words.len() == 1 && words[0].contains("is hosted by client 0; end it"), "{words:?}");
@@ -61,11 +46,7 @@ fn check_a_name_is_hosted_once() {
 }
 
 #[test]
-fn a_name_that_is_hosted_is_refused_naming_the_holder_until_that_one_goes() {
-    check_a_name_is_hosted_once();
-}
-
-fn check_packages_go_to_the_host_of_the_name() {
+fn packages_go_to_the_host_of_the_name_and_never_back() {
     let mut ground = Ground::clients(4);
     let (between, behind) = (Name::new(1, 105, 0, 0), Name::new(1, 106, 1, 0));
     ground.send(1, between, 0);
@@ -80,11 +61,7 @@ fn check_packages_go_to_the_host_of_the_name() {
 }
 
 #[test]
-fn packages_go_to_the_host_of_the_name_and_never_back() {
-    check_packages_go_to_the_host_of_the_name();
-}
-
-fn check_hops() {
+fn a_package_that_goes_round_is_stopped() {
     let mut ground = Ground::clients(3);
     ground.send(0, module(1), 3);
     assert_eq!(ground.ends[1].2.delivered[0].1, 4, "one further");
@@ -96,11 +73,7 @@ fn check_hops() {
 }
 
 #[test]
-fn a_package_that_goes_round_is_stopped() {
-    check_hops();
-}
-
-fn check_slow_greetings() {
+fn a_client_without_a_hello_is_closed_and_keeps_no_other_out() {
     let mut ground = Ground::clients(1);
     let slow = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said).unwrap();
     // Bytes come all the time, and never a whole hello.
@@ -122,16 +95,12 @@ fn check_slow_greetings() {
         let _ = ground.server.accept(ground.now_ns, address(100, 0), &mut ground.said);
     }
     ground.settle();
-    let greeting = ground.server.clients().filter(|(_, _, state)| *state == MemberState::Handshake).count();
-    assert!(greeting <= 4 && ground.ends[0].0.is_up(), "{greeting}");
+    let waiting = ground.server.clients().filter(|(_, _, state)| *state == MemberState::Handshake).count();
+    assert!(waiting <= 4 && ground.ends[0].0.is_up(), "{waiting}");
 }
 
 #[test]
-fn a_client_without_a_hello_is_closed_and_keeps_no_other_out() {
-    check_slow_greetings();
-}
-
-fn check_silence() {
+fn a_silent_end_is_gone() {
     let mut ground = Ground::clients(2);
     ground.ends[1].1 = None;
     for _ in 0..SILENT_AFTER_NS / (100 * MS) + 5 {
@@ -145,11 +114,7 @@ fn check_silence() {
 }
 
 #[test]
-fn a_silent_end_is_gone() {
-    check_silence();
-}
-
-fn check_to_all() {
+fn what_goes_to_all_systems_comes_once_to_each() {
     // Clients 0 and 3 are of system 1; 0 reaches its own system, 3 does not.
     let all = Name::new(ALL_SYSTEMS, 40, 0, 0);
     let at = |system| Name::new(system, 40, 0, 0);
@@ -169,11 +134,6 @@ fn check_to_all() {
 }
 
 #[test]
-fn what_goes_to_all_systems_comes_once_to_each() {
-    check_to_all();
-}
-
-#[test]
 fn what_goes_to_all_systems_is_lost_where_its_own_node_hosts_the_name_and_nobody_is_there() {
     let mut ground = Ground::clients(1);
     let counts = |ground: &Ground| {
@@ -189,7 +149,8 @@ fn what_goes_to_all_systems_is_lost_where_its_own_node_hosts_the_name_and_nobody
     assert_eq!(counts(&ground), (2, 1, 1));
 }
 
-fn check_age() {
+#[test]
+fn what_the_streams_held_for_too_long_is_not_delivered() {
     let mut ground = Ground::clients(2);
     let head =
         Head { to: module(1), from: module(0).with_local(1), len: 8, kind: Type::command(16), ..Head::default() };
@@ -216,11 +177,7 @@ fn check_age() {
 }
 
 #[test]
-fn what_the_streams_held_for_too_long_is_not_delivered() {
-    check_age();
-}
-
-fn check_pieces() {
+fn frames_that_come_byte_by_byte_are_whole() {
     let mut ground = Ground::clients(2);
     let head = Head { to: module(1), from: module(0), len: 3, ..Head::default() };
     let mut bytes = Vec::new();
@@ -231,11 +188,6 @@ fn check_pieces() {
     bytes.iter().for_each(|byte| ground.server.received(ground.now_ns, place, &[*byte], &mut ground.said));
     ground.settle();
     assert_eq!(ground.ends[1].2.delivered.len(), 3);
-}
-
-#[test]
-fn frames_that_come_byte_by_byte_are_whole() {
-    check_pieces();
 }
 
 #[test]

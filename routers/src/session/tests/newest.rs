@@ -8,8 +8,6 @@ use crate::session::frame::{HEAD_BYTES, LENGTH_MAX, SessionFrameHead, SessionMes
 use crate::session::outgoing::{Fates, Outgoing, Parcel};
 use rohrpost_mailbox::{Head, Options, Priority, Type};
 
-pub(super) const CHECKS: &[fn()] = &[check_the_newest_goes, check_others_are_kept, check_what_stands_behind];
-
 const DATA: Type = Type::data(1);
 const COMMAND: Type = Type::command(16);
 
@@ -88,7 +86,8 @@ fn newest(id: u16) -> Head {
     Head { kind: DATA, id, from: module(1), options: Options::NEWEST, ..Head::default() }
 }
 
-fn check_the_newest_goes() {
+#[test]
+fn of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first() {
     let mut end = Stalled::new();
     end.send(newest(1), 10, 100);
     end.send(Head { kind: COMMAND, id: 7, from: module(1), ..Head::default() }, 70, 50);
@@ -105,11 +104,7 @@ fn check_the_newest_goes() {
 }
 
 #[test]
-fn of_data_of_which_only_the_newest_counts_that_goes_in_the_place_of_the_first() {
-    check_the_newest_goes();
-}
-
-fn check_others_are_kept() {
+fn nothing_else_is_replaced() {
     let unmarked = Head { options: Options::default(), ..newest(1) };
     let all = [
         (newest(1), "the first"),
@@ -134,11 +129,7 @@ fn check_others_are_kept() {
 }
 
 #[test]
-fn nothing_else_is_replaced() {
-    check_others_are_kept();
-}
-
-fn check_what_stands_behind() {
+fn what_stands_behind_a_fresh_one_is_given_up_in_time() {
     let mut end = Stalled::new();
     end.send(newest(1), 1, 10);
     end.send(Head { kind: COMMAND, id: 7, from: module(1), ..Head::default() }, 70, 10);
@@ -148,11 +139,6 @@ fn check_what_stands_behind() {
     end.outgoing.look(end.now_ns, Cause::Stale, &mut end.log);
     assert_eq!(end.log.lost, [(7, Cause::Stale)], "though what stands before it is fresh");
     assert_eq!(end.leaves(), [(1, 2)]);
-}
-
-#[test]
-fn what_stands_behind_a_fresh_one_is_given_up_in_time() {
-    check_what_stands_behind();
 }
 
 #[test]

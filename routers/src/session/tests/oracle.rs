@@ -3,9 +3,9 @@
 use super::plan::ROUTER;
 use crate::report::NotDelivered;
 use crate::session::frame::{Carried, Range};
-use crate::session::tests::chance::Chance;
 use crate::session::{AGE_MAX_NS, Cause, ErrorReplies, client, server};
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Kind, Name, Options, local};
+use rohrpost_testbed::sim::chance::Chance;
 use std::collections::BTreeMap;
 
 /// What clocks of different pace make of two seconds.

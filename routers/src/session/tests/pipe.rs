@@ -1,6 +1,6 @@
 //! One direction of a connection: bytes in their order, late, in pieces of any size, or not at all.
 
-use crate::session::tests::chance::Chance;
+use rohrpost_testbed::sim::chance::Chance;
 use std::collections::VecDeque;
 
 const MS: u64 = 1_000_000;

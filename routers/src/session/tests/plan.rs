@@ -4,30 +4,18 @@ use crate::admission::Admission;
 use crate::session::client::ClientSettings;
 use crate::session::frame::Range;
 use crate::session::server::{OwnNodes, ServerSettings};
-use crate::session::tests::chance::Chance;
 use rohrpost_mailbox::{Class, Name};
+use rohrpost_testbed::sim::chance::Chance;
+use rohrpost_testbed::sim::clock::Clock;
 use std::net::SocketAddr;
 
 pub(super) const QUOTA: usize = 80 * 1024;
 pub(super) const COMMON: u64 = 7;
 
-/// A computer's monotonic clock.
-#[derive(Clone, Copy)]
-pub(super) struct Clock {
-    base_ns: u64,
-    ppb: i64,
-}
-
-impl Clock {
-    pub(super) fn new(chance: &mut Chance) -> Self {
-        // Two of them differ by at most 200 ppm.
-        Self { base_ns: chance.scale(1_000_000_000, 1 << 50), ppb: chance.around(100_000) }
-    }
-
-    pub(super) fn at(&self, true_ns: u64) -> u64 {
-        let drift_ns = i128::from(true_ns) * i128::from(self.ppb) / 1_000_000_000;
-        self.base_ns + true_ns.saturating_add_signed(drift_ns as i64)
-    }
+/// The clock of a computer; two of them differ by at most 200 ppm.
+pub(super) fn clock(chance: &mut Chance) -> Clock {
+    let monotonic_ns = chance.scale(1_000_000_000, 1 << 50);
+    Clock::new(monotonic_ns, monotonic_ns, chance.around(100_000))
 }
 
 pub(super) struct Plan {

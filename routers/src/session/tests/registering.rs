@@ -67,19 +67,12 @@ fn coming_at_once(clients: usize) -> Duration {
     work
 }
 
-pub(super) fn check_growth() {
-    check_growth_from(256);
-}
-
-fn check_growth_from(clients: usize) {
+#[test]
+fn when_eight_times_as_many_clients_come_at_once_the_server_works_about_eight_times_as_long() {
+    let clients = 512;
     let least = |clients| (0..3).map(|_| coming_at_once(clients)).min().unwrap();
     let (few, many) = (least(clients), least(8 * clients));
     let text = format!("{clients} clients of {RANGES} ranges: {few:?}, {}: {many:?}", 8 * clients);
     eprintln!("{text}");
     assert!(many < few * 8 * 3, "{text}; each with each would take 64 times as long");
-}
-
-#[test]
-fn when_eight_times_as_many_clients_come_at_once_the_server_works_about_eight_times_as_long() {
-    check_growth_from(512);
 }

@@ -11,16 +11,6 @@ use crate::session::server::{self, MemberState, OwnNode, OwnNodes, Rights, Serve
 use crate::session::{Cause, ClientIndex, ENTRIES_MAX};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
 
-pub(super) const CHECKS: &[fn()] = &[
-    check_memory_of_a_queue,
-    check_a_line,
-    check_ranges_of_one,
-    check_connections_of_one,
-    check_greetings_of_one,
-    check_what_others_host,
-    check_names_of_the_file,
-];
-
 /// A package of a client comes to the server.
 fn send(ground: &mut Ground, from: usize, to: usize, priority: u8, kind: Type, len: usize) {
     let place = ground.ends[from].1.unwrap();
@@ -55,7 +45,8 @@ fn lost(ground: &Ground, priority: u8, cause: Cause) -> u64 {
     ground.server.counts().class(Priority(priority)).lost(cause)
 }
 
-fn check_memory_of_a_queue() {
+#[test]
+fn a_flood_of_a_queue_displaces_no_sender_with_less_in_it() {
     let mut ground = Ground::clients(3);
     let robot = ground.ends[2].1.unwrap();
     let data = Type::data(1);
@@ -82,7 +73,8 @@ fn check_memory_of_a_queue() {
 }
 
 /// A client that sends more than an equal share gives way, however important its packages are.
-fn check_equal_parts() {
+#[test]
+fn two_senders_have_equal_parts_of_a_queue() {
     let mut ground = Ground::clients(3);
     let robot = ground.ends[2].1.unwrap();
     for (client, priority) in [(0, 250), (1, 60)] {
@@ -101,12 +93,7 @@ fn check_equal_parts() {
 }
 
 #[test]
-fn a_flood_of_a_queue_displaces_no_sender_with_less_in_it() {
-    check_memory_of_a_queue();
-    check_equal_parts();
-}
-
-fn check_a_line() {
+fn an_urgent_flood_of_a_line_leaves_others_their_share() {
     let mut ground = Ground::clients(3);
     let robot = ground.ends[2].1.unwrap();
     // 32 kB a second, as the shell measures it.
@@ -127,11 +114,7 @@ fn check_a_line() {
 }
 
 #[test]
-fn an_urgent_flood_of_a_line_leaves_others_their_share() {
-    check_a_line();
-}
-
-fn check_ranges_of_one() {
+fn one_certificate_does_not_fill_the_table_however_often_it_connects() {
     let clients = 12;
     let settings = |client: usize| (client_settings(3 * client, 100 + client as u64), Vec::new());
     let mut ground = Ground::with_room((clients as u16, clients as u16), (0..clients).map(settings));
@@ -166,11 +149,6 @@ fn check_ranges_of_one() {
     assert!(ground.server.crowded().ranges > 10, "{:?}", ground.server.crowded());
 }
 
-#[test]
-fn one_certificate_does_not_fill_the_table_however_often_it_connects() {
-    check_ranges_of_one();
-}
-
 /// A client that says hello from an address; its place, or none.
 fn joins(ground: &mut Ground, client: usize, from: usize) -> Option<ClientIndex> {
     let mut end =
@@ -186,7 +164,8 @@ fn is_member(ground: &Ground, place: ClientIndex) -> bool {
     ground.server.clients().any(|(index, _, state)| index == place && state == MemberState::Member)
 }
 
-fn check_connections_of_one() {
+#[test]
+fn one_address_does_not_take_all_places_of_clients() {
     let mut ground = Ground::with_room((6, 6), []);
     let greedy: Vec<_> = (0..6).map(|client| joins(&mut ground, client, 1).unwrap()).collect();
     // One after the other comes from an address of its own, until all have equal parts.
@@ -204,11 +183,7 @@ fn check_connections_of_one() {
 }
 
 #[test]
-fn one_address_does_not_take_all_places_of_clients() {
-    check_connections_of_one();
-}
-
-fn check_greetings_of_one() {
+fn one_address_does_not_push_others_out_before_their_hello() {
     let mut ground = Ground::with_room((4, 4), []);
     let mut accept = |from, connection| {
         ground.now_ns += MS;
@@ -224,11 +199,7 @@ fn check_greetings_of_one() {
 }
 
 #[test]
-fn one_address_does_not_push_others_out_before_their_hello() {
-    check_greetings_of_one();
-}
-
-fn check_what_others_host() {
+fn of_what_one_client_hosts_no_other_gets_a_part() {
     let inside = Range::module(Name::new(1, 104, 0, 0));
     let own = |client: usize| client_settings(client, 100 + client as u64);
     let ends = [(own(0), ranges(0)), (own(1), ranges(1)), (own(3), vec![inside])];
@@ -250,11 +221,7 @@ fn check_what_others_host() {
 }
 
 #[test]
-fn of_what_one_client_hosts_no_other_gets_a_part() {
-    check_what_others_host();
-}
-
-fn check_names_of_the_file() {
+fn what_the_file_gives_a_node_no_other_client_gets_where_nobody_shows_a_certificate() {
     let node = |client: usize| OwnNode {
         name: format!("client {client}"),
         names: ranges(client).into_iter().collect(),
@@ -297,9 +264,4 @@ fn check_names_of_the_file() {
         ground.ends[3].0.is_up() && !ground.ends[0].0.is_up() && told.iter().any(|text| text.contains("own address")),
         "{told:?}"
     );
-}
-
-#[test]
-fn what_the_file_gives_a_node_no_other_client_gets_where_nobody_shows_a_certificate() {
-    check_names_of_the_file();
 }

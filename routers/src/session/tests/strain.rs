@@ -11,8 +11,6 @@ use crate::session::server::Rights;
 use crate::session::{Cause, LOOK_EVERY_NS};
 use rohrpost_mailbox::{Head, Name};
 
-pub(super) const CHECKS: &[fn()] = &[check_many_registrations, check_a_cut_connection];
-
 /// As many ranges as a client may host.
 pub(super) fn many(client: usize, first_class: u8) -> Vec<Range> {
     let system = system_of(client);
@@ -27,7 +25,8 @@ pub(super) fn register(ground: &mut Ground, client: usize, number: u32, ranges: 
     ground.server.received(ground.now_ns, place, &bytes, &mut ground.said);
 }
 
-fn check_many_registrations() {
+#[test]
+fn of_many_registrations_of_one_client_the_first_and_the_last_are_looked_at() {
     let mut ground = Ground::clients(3);
     ground.now_ns += S;
     ground.settle();
@@ -46,11 +45,6 @@ fn check_many_registrations() {
     ground.now_ns += LOOK_EVERY_NS;
     ground.settle();
     assert_eq!((hosted(&ground), ground.server.superseded()), (RANGES_MAX - 499, 498), "the last counts");
-}
-
-#[test]
-fn of_many_registrations_of_one_client_the_first_and_the_last_are_looked_at() {
-    check_many_registrations();
 }
 
 #[test]
@@ -136,7 +130,8 @@ fn a_client_keeps_packages_until_its_registration_is_answered() {
     assert_eq!(ground.server.counts().lost_for(Cause::Foreign), 0);
 }
 
-fn check_a_cut_connection() {
+#[test]
+fn what_was_ready_for_a_connection_that_broke_is_gone_with_it() {
     let mut ground = Ground::clients(2);
     let head = Head { to: module(1), from: module(0).with_local(1), len: 100, ..Head::default() };
     let (client, _, notes) = &mut ground.ends[0];
@@ -154,11 +149,6 @@ fn check_a_cut_connection() {
         matches!(SessionMessage::parse(head, rest), Ok(SessionMessage::Hello(_))),
         "nothing else goes by the next one"
     );
-}
-
-#[test]
-fn what_was_ready_for_a_connection_that_broke_is_gone_with_it() {
-    check_a_cut_connection();
 }
 
 #[test]

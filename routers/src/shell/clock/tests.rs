@@ -1,9 +1,9 @@
 //! Clocks on this computer, each with a wrong monotonic clock of its own: so the true error of each reading is known.
 
 use super::{ClockParts, ClockService, ClockSnapshot, Skew};
-use crate::lab::stall_detector::{Watched, repeated_on_stall};
 use crate::time::{Exchange, Role, TimeSettings};
 use rohrpost_mailbox::monotonic_ns;
+use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};

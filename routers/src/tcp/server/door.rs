@@ -2,7 +2,7 @@
 
 use super::{LISTENER, ServerConnection, ServerError, ServerThread};
 use crate::session::ClientIndex;
-use crate::tcp::hush::Topic;
+use crate::tcp::line_throttle::Topic;
 use crate::tcp::seal::ServerSeal;
 use crate::tcp::stream::Stream;
 use nix::sys::epoll::{EpollEvent, EpollFlags};

@@ -4,13 +4,13 @@ use crate::session::frame::SessionRefusalReason;
 use crate::session::server::{ServerEvent, ServerHost};
 use crate::session::{Cause, ErrorReplies};
 use crate::tcp::fault_writer::FaultWriter;
-use crate::tcp::hush::{Hush, Topic};
+use crate::tcp::line_throttle::{LineThrottle, Topic};
 use rohrpost_mailbox::monotonic_ns;
 
 /// Reports events, and answers for receivers that are not reached.
 pub(super) struct ServerReporter {
     fault_writer: FaultWriter,
-    hush: Hush,
+    throttle: LineThrottle,
     /// Clients that took part and do not any more.
     pub(super) left: u64,
     /// Connections that might not take part.
@@ -21,7 +21,7 @@ pub(super) struct ServerReporter {
 
 impl ServerReporter {
     pub(super) fn new(fault_writer: FaultWriter) -> Self {
-        Self { fault_writer, hush: Hush::default(), left: 0, refused: 0, refusal: String::new() }
+        Self { fault_writer, throttle: LineThrottle::default(), left: 0, refused: 0, refusal: String::new() }
     }
 
     /// Says and keeps why one may not take part.
@@ -33,21 +33,21 @@ impl ServerReporter {
 
     /// Says it, unless there was such a line a moment ago.
     pub(super) fn says(&mut self, topic: Topic, line: &str) {
-        if let Some(line) = self.hush.line(monotonic_ns(), topic, line) {
+        if let Some(line) = self.throttle.line(monotonic_ns(), topic, line) {
             tell(topic, &line);
         }
     }
 
     /// Says what was held back, as far as it is time.
     pub(super) fn says_held(&mut self, now_ns: u64) {
-        while let Some((topic, line)) = self.hush.next_held(now_ns) {
+        while let Some((topic, line)) = self.throttle.next_held(now_ns) {
             tell(topic, &line);
         }
     }
 
     /// Lines held back so far.
     pub(super) fn held(&self) -> u64 {
-        self.hush.held
+        self.throttle.held
     }
 }
 

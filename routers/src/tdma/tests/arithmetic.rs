@@ -139,7 +139,8 @@ fn moments_have_owners() {
     }
 }
 
-pub(super) fn windows_end_where_their_guard_begins() {
+#[test]
+fn windows_end_where_their_guard_begins() {
     let window = table(0).next_window(7 * CYCLE).unwrap();
     let expected = Window {
         kind: WindowKind::Synchronisation { rank: 0 },

@@ -92,7 +92,8 @@ impl Ear {
     }
 }
 
-pub(super) fn a_hello_leaves_in_one_of_four_cycles_and_nothing_else() {
+#[test]
+fn a_hello_leaves_in_one_of_four_cycles_and_nothing_else() {
     let mut ear = Ear::new(2);
     for _ in 0..8 {
         assert!(matches!(ear.scheduler.next(ear.now_ns, &ear.clock), Next::Silent { why: Silent::NoTime, .. }));
@@ -133,7 +134,8 @@ fn a_frame_that_is_read_before_the_clock_first_runs_delays_no_longer_than_any_ot
     assert!(begins.is_some_and(|begins| begins.abs_diff(LISTENS) <= 3 * CYCLE), "{begins:?}");
 }
 
-pub(super) fn a_node_that_hears_unverified_frames_begins_no_time_for_a_while() {
+#[test]
+fn a_node_that_hears_unverified_frames_begins_no_time_for_a_while() {
     let begins = Ear::new(1).begins_within(SECOND, |ear| ear.pass(CYCLE));
     assert!(begins.is_some_and(|begins| begins.abs_diff(LISTENS) <= 2 * CYCLE), "in silence: {begins:?}");
     let overhears = |ear: &mut Ear| ear.overhears().unwrap();
@@ -151,7 +153,8 @@ pub(super) fn a_node_that_hears_unverified_frames_begins_no_time_for_a_while() {
     );
 }
 
-pub(super) fn a_new_master_steps_back_until_patience_is_over() {
+#[test]
+fn a_new_master_steps_back_until_patience_is_over() {
     let mut ear = Ear::new(1);
     ear.begins_within(SECOND, |ear| ear.pass(CYCLE)).unwrap();
     let first_ns = ear.now_ns;

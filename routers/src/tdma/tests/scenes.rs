@@ -38,7 +38,8 @@ fn holds(world: &World, seed: u64) {
     world.assert_alone(&format!("seed {seed}; {}", tell(world)));
 }
 
-pub(super) fn nodes_join_one_by_one_and_never_meet() {
+#[test]
+fn nodes_join_one_by_one_and_never_meet() {
     for seed in seeds() {
         let mut world = World::new(seed);
         world.stalls = 50;
@@ -72,12 +73,13 @@ fn is_replaced(world: &mut World, other: NodeIndex, died: u64) -> [u64; 2] {
     assert!(world.run_until(3 * CYCLE, stands_in), "no replacement: {}", tell(world));
     let stood_in = world.now;
     assert_eq!(world.clock(2).term(), term, "the role has not changed yet");
-    let reigns = |world: &World| world.clock(other).role() == Role::Master;
-    assert!(world.run_until(5 * CYCLE, reigns), "no takeover: {}", tell(world));
+    let is_master = |world: &World| world.clock(other).role() == Role::Master;
+    assert!(world.run_until(5 * CYCLE, is_master), "no takeover: {}", tell(world));
     [stood_in - died, world.now - died]
 }
 
-pub(super) fn a_master_dies_and_no_slot_is_lost() {
+#[test]
+fn a_master_dies_and_no_slot_is_lost() {
     for seed in seeds() {
         let mut world = agreed(seed);
         assert_eq!(world.counts(1).syncs.replacements_sent, 0, "seed {seed}: the master was heard each time");
@@ -109,7 +111,8 @@ pub(super) fn a_master_dies_and_no_slot_is_lost() {
     }
 }
 
-pub(super) fn a_master_of_which_two_syncs_are_missing_remains_it() {
+#[test]
+fn a_master_of_which_two_syncs_are_missing_remains_it() {
     for seed in seeds() {
         for (master, other) in [(0, 1), (1, 0)] {
             let mut world = agreed(seed);
@@ -174,12 +177,13 @@ fn a_master_with_packages_that_come_lives() {
         );
         assert!(world.counts(1).syncs.replacements_sent >= 9, "seed {seed}: its Syncs are missing all the same");
         world.packages_come = false;
-        let reigns = |world: &World| world.clock(1).role() == Role::Master;
-        assert!(world.run_until(4 * CYCLE, reigns), "seed {seed}: nothing comes any more: {}", tell(&world));
+        let is_master = |world: &World| world.clock(1).role() == Role::Master;
+        assert!(world.run_until(4 * CYCLE, is_master), "seed {seed}: nothing comes any more: {}", tell(&world));
     }
 }
 
-pub(super) fn two_masters_become_one() {
+#[test]
+fn two_masters_become_one() {
     for seed in seeds() {
         let mut world = agreed(seed);
         for other in [0, 2] {

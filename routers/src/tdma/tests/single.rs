@@ -133,7 +133,8 @@ fn a_node_listens_then_asks_then_sends() {
     assert_eq!(planned.call_ns - planned.wake_ns, 100 * US, "to be spun");
 }
 
-pub(super) fn what_is_late_is_not_sent() {
+#[test]
+fn what_is_late_is_not_sent() {
     for (after_ns, sends) in
         [(-1, None), (0, Some(true)), (GATE_NS as i64, Some(true)), (GATE_NS as i64 + 1, Some(false))]
     {
@@ -148,7 +149,8 @@ pub(super) fn what_is_late_is_not_sent() {
     }
 }
 
-pub(super) fn silence_begins_right_above_the_allowance() {
+#[test]
+fn silence_begins_right_above_the_allowance() {
     let mut one = Lonely::joined();
     one.clock.poll_in(one.now_ns + SECOND, Allowed::Nothing, &mut [0; TIME_BYTES]);
     let allowance_ns = one.scheduler.table().allowance_ns();
@@ -178,7 +180,8 @@ pub(super) fn silence_begins_right_above_the_allowance() {
     panic!("it never falls silent");
 }
 
-pub(super) fn no_frame_starts_before_its_slot() {
+#[test]
+fn no_frame_starts_before_its_slot() {
     let mut one = Lonely::joined();
     // From the call to the wire it takes 12, 13, … µs.
     for sample in 0..300 {
@@ -197,7 +200,8 @@ pub(super) fn no_frame_starts_before_its_slot() {
     assert_eq!(one.scheduler.lead_ns().1, 2_500, "the quickest of all, by the least that its stamp says");
 }
 
-pub(super) fn what_was_handed_over_counts() {
+#[test]
+fn what_was_handed_over_counts() {
     let mut one = Lonely::joined();
     let (planned, verdict) = one.judged(0);
     let WindowVerdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
@@ -255,7 +259,8 @@ fn slots_that_went_by_are_counted() {
     assert_eq!((counts.skipped - before.skipped, counts.silent), (4, before.silent));
 }
 
-pub(super) fn a_replacement_is_a_sign_of_life_and_nothing_else() {
+#[test]
+fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     let mut one = Lonely::joined();
     one.cycle += 1;
     one.now_ns += CYCLE;
@@ -275,7 +280,8 @@ pub(super) fn a_replacement_is_a_sign_of_life_and_nothing_else() {
     assert_eq!(one.clock.sync_counts().missed, counts.missed + 3, "three cycles without the master's");
 }
 
-pub(super) fn a_node_that_turns_while_the_first_master_lives_is_not_sure() {
+#[test]
+fn a_node_that_turns_while_the_first_master_lives_is_not_sure() {
     for (silence, is_sure) in [(0, false), (4 * CYCLE, true)] {
         let mut one = Lonely::joined();
         (one.cycle, one.now_ns) = (one.cycle + silence / CYCLE, one.now_ns + silence);

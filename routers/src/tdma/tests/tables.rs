@@ -44,7 +44,8 @@ fn agreed(seed: u64) -> World {
     world
 }
 
-pub(super) fn a_node_with_an_edited_file_beside_others_sends_nothing() {
+#[test]
+fn a_node_with_an_edited_file_beside_others_sends_nothing() {
     for (seed, (field, edit)) in (0..).zip(EDITS) {
         for (node, digest) in [(0, 3), (1, 9), (2, 9), (0, 9)] {
             let mut world = agreed(seed);
@@ -69,7 +70,8 @@ pub(super) fn a_node_with_an_edited_file_beside_others_sends_nothing() {
     }
 }
 
-pub(super) fn of_two_tables_that_meet_one_goes_on() {
+#[test]
+fn of_two_tables_that_meet_one_goes_on() {
     for (seed, (field, edit)) in (0..).zip(EDITS) {
         for digest in [3, 9] {
             let mut world = World::new(seed);

@@ -10,6 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rohrpost_mailbox::TimeRecord;
 use rohrpost_network::{Tdma, TimeSlot};
+use rohrpost_testbed::sim::clock::Clock as Hardware;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -90,8 +91,7 @@ pub(super) struct One {
     pub(super) clock: Option<Clock>,
     pub(super) scheduler: SlotScheduler,
     pub(super) file: File,
-    offset_ns: u64,
-    rate_ppb: i64,
+    hardware: Hardware,
     page: Option<TimeRecord>,
     /// When it acts next, true time, and for which window.
     wakes: u64,
@@ -104,18 +104,7 @@ pub(super) struct One {
 
 impl One {
     pub(super) fn local_ns(&self, true_ns: u64) -> u64 {
-        let fast = i128::from(true_ns) * i128::from(self.rate_ppb) / 1_000_000_000;
-        (i128::from(true_ns) + fast) as u64 + self.offset_ns
-    }
-
-    /// The first true moment at which its clock shows this.
-    fn true_ns(&self, local_ns: u64) -> u64 {
-        let even = i128::from(local_ns.saturating_sub(self.offset_ns));
-        let mut at = (even * 1_000_000_000 / (1_000_000_000 + i128::from(self.rate_ppb)) - 2).max(0) as u64;
-        while self.local_ns(at) < local_ns {
-            at += 1;
-        }
-        at
+        self.hardware.at(true_ns).monotonic_ns
     }
 }
 
@@ -143,8 +132,11 @@ impl World {
             clock: None,
             scheduler: SlotScheduler::new(table(own), 0),
             file: File::right(),
-            offset_ns: random.random_range(SECOND..100 * SECOND),
-            rate_ppb: random.random_range(-80_000..=80_000),
+            hardware: Hardware::new(
+                random.random_range(SECOND..100 * SECOND),
+                WALL_NS,
+                random.random_range(-80_000..=80_000),
+            ),
             page: None,
             wakes: u64::MAX,
             planned: None,
@@ -191,11 +183,8 @@ impl World {
 
     /// From now on a node's clock is faster by this much.
     pub(super) fn warms(&mut self, node: NodeIndex, by_ppb: i64) {
-        let now = self.now;
-        let one = &mut self.nodes[usize::from(node)];
-        let shows_ns = one.local_ns(now);
-        one.rate_ppb += by_ppb;
-        one.offset_ns -= one.local_ns(now) - shows_ns;
+        let hardware = &mut self.nodes[usize::from(node)].hardware;
+        hardware.set_rate(self.now, hardware.rate_ppb() + by_ppb);
     }
 
     /// Is stalled from shortly before its next synchronisation window until this long after its beginning.
@@ -206,8 +195,9 @@ impl World {
         };
         assert!(self.run_until(2 * CYCLE, |world| window(world).is_some()), "it has to synchronise");
         let begin_ns = window(self).map_or(0, |planned| planned.begin_ns);
+        let now = self.now;
         let one = &mut self.nodes[usize::from(node)];
-        one.frozen_until = one.true_ns(begin_ns) + late_ns;
+        one.frozen_until = one.hardware.when(begin_ns, now) + late_ns;
     }
 
     pub(super) fn clock(&self, node: NodeIndex) -> &Clock {
@@ -297,7 +287,7 @@ impl World {
         let stalls = self.stalls > 0 && self.random.random_ratio(1, self.stalls.max(1));
         let late = if stalls { self.random.random_range(0..3 * MS) } else { late };
         let one = &mut self.nodes[usize::from(node)];
-        one.wakes = one.true_ns(wakes_ns).max(at + 1) + late;
+        one.wakes = one.hardware.when(wakes_ns, at).max(at + 1) + late;
         one.planned = planned;
     }
 

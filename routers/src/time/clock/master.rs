@@ -1,7 +1,6 @@
 //! A clock as a master: it states the time, and answers when frames left and came.
 
 use super::{Clock, Draft, Left, Slave};
-use crate::broken::broken;
 use crate::frame::NodeIndex;
 use crate::time::clock_model::EVEN_PPB;
 use crate::time::election::{ElectionState, Origin};
@@ -37,7 +36,7 @@ impl Clock {
             slave.next_ns = 0;
         }
         (slave.answered_ns, slave.eager) = (Some(received.ns), request.eager);
-        if request.far && !broken!(NeverBeginsEpoch) {
+        if request.far {
             self.begin_epoch(received.ns, request.epoch);
         }
         let reply = Draft::Reply { id: request.id, came: received };

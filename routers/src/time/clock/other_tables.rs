@@ -1,7 +1,6 @@
 //! A clock in time slots beside nodes of another configuration: which part continues its time, and which is silent.
 
 use super::Clock;
-use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::stats::Stats;
 use crate::time::election::ElectionState;
@@ -28,7 +27,7 @@ impl Clock {
         }
         let theirs = claim(head, &TimeMessage::parse(head.kind, rest)?).ok_or(Ignored::OtherTable)?;
         // Without slots two times do not disturb each other.
-        if self.slots.is_none() || broken!(DeafToOtherTables) {
+        if self.slots.is_none() {
             return Err(Ignored::OtherTable);
         }
         let own = self.claim(now_ns);
@@ -41,7 +40,7 @@ impl Clock {
     /// of these counters; `local_ns`: now by the clock of time. A master with followers lets refusers be; with the
     /// greater claim it continues its time.
     pub(super) fn refused_by(&mut self, packages: &Stats, now_ns: u64, local_ns: u64) {
-        if self.slots.is_none() || broken!(DeafToOtherTables) {
+        if self.slots.is_none() {
             return;
         }
         let own = self.claim(local_ns);

@@ -3,7 +3,6 @@
 
 use super::Clock;
 use super::other_tables::claim;
-use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::time::election::ElectionState;
 use crate::time::message::TimeMessage;
@@ -22,9 +21,6 @@ impl Clock {
     /// # Errors
     /// [`Ignored`]: it changed nothing.
     pub fn overhear(&mut self, now_ns: u64, received: Stamp, head: &FrameHead, rest: &[u8]) -> Result<(), Ignored> {
-        if broken!(TakesUnproven) {
-            return self.handle(now_ns, received, head, rest);
-        }
         let is_other = head.digest != self.settings.digest;
         if !self.is_ours(&FrameHead { digest: self.settings.digest, ..*head }) {
             return Err(Ignored::Stranger);
@@ -34,7 +30,7 @@ impl Clock {
         }
         let message = TimeMessage::parse(head.kind, rest)?;
         let theirs = claim(head, &message).filter(|_| is_other);
-        if self.is_parted(now_ns) || (is_other && broken!(DeafToOtherTables)) {
+        if self.is_parted(now_ns) {
             if theirs.is_some() {
                 self.others.overhears(head.from, received.ns, head.digest);
             }

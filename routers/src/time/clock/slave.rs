@@ -2,7 +2,6 @@
 
 use super::{Clock, Draft, EXCHANGE_NS_MIN, PendingExchange, rate_of};
 use crate::frame::FrameHead;
-use crate::time::broken::Broken;
 use crate::time::clock_model::{EVEN_PPB, wander_ns_s};
 use crate::time::election::{ElectionState, Followed, SyncOutcome};
 use crate::time::history::{Estimate, OffsetSample};
@@ -27,9 +26,6 @@ impl Clock {
         let is_contested = self.is_contested(received.ns);
         let was_master = matches!(self.election.state(), ElectionState::Master(_));
         let followed = self.is_followed(now_ns);
-        if was_master && self.is(Broken::Stubborn) {
-            return Err(Ignored::Late);
-        }
         let heard = self.election.sync(head.from, head.incarnation, sync, received.ns, followed);
         match heard {
             SyncOutcome::Ignored => {
@@ -75,9 +71,8 @@ impl Clock {
         if (head.from, head.incarnation, reply.began) != (master.node, master.incarnation, master.began) {
             return Err(Ignored::Unasked);
         }
-        let any = self.is(Broken::AnyReply);
         let mut asked = self.asked.iter_mut();
-        let asked = asked.find(|asked| (asked.exchange.id == reply.id || any) && asked.exchange.request_sent_ns != 0);
+        let asked = asked.find(|asked| asked.exchange.id == reply.id && asked.exchange.request_sent_ns != 0);
         let mut exchange = asked.map(std::mem::take).ok_or(Ignored::Unasked)?.exchange;
         exchange.sync_left_ns = reply.sync_ns;
         exchange.request_came_ns = reply.request_ns;
@@ -115,7 +110,7 @@ impl Clock {
         let target_ns = now_ns.saturating_add_signed(estimate.offset_ns);
         let epoch = self.line.record().epoch;
         let by_ns = target_ns.wrapping_sub(self.line.at(now_ns).ns).cast_signed();
-        if master.epoch > epoch || self.is(Broken::Steps) {
+        if master.epoch > epoch {
             let error_ns = self.bound_ns(&estimate, estimate.offset_ns, &master);
             self.line.step(now_ns, master.epoch, target_ns, pace_ppb, error_ns, drift_ns_s);
         } else if master.epoch < epoch || by_ns.unsigned_abs() > STEP_MIN_NS {
@@ -153,8 +148,7 @@ impl Clock {
     pub(super) fn bound_ns(&self, estimate: &Estimate, offset_ns: i64, master: &Followed) -> u64 {
         let (above, below) = (estimate.high_ns.saturating_sub(offset_ns), offset_ns.saturating_sub(estimate.low_ns));
         let off_ns = above.max(below).unsigned_abs();
-        let off_ns = if self.is(Broken::HalfBound) { off_ns / 2 } else { off_ns };
-        off_ns.saturating_add(if self.is(Broken::NoMasterError) { 0 } else { master.error_ns })
+        off_ns.saturating_add(master.error_ns)
     }
 
     /// Growth of the bound until the horizon, ns a second.
@@ -171,9 +165,7 @@ impl Clock {
     /// Without a master for longer than the horizon, the rate may have changed more: the bound grows faster.
     pub(super) fn keep_bound(&mut self, now_ns: u64) {
         let (until_ns, span_ns) = self.stated;
-        if self.is(Broken::NoDrift) {
-            self.line.restate(self.line.record().error_ns, 0);
-        } else if until_ns <= now_ns && self.is_held_over() {
+        if until_ns <= now_ns && self.is_held_over() {
             let record = self.line.record();
             let drift_ns_s = record.drift_ns_s.saturating_add(wander_ns_s(span_ns));
             self.line.restate(record.error_ns, drift_ns_s.min(2 * RATE_MAX_PPB.unsigned_abs()));

@@ -5,7 +5,6 @@
 //! sample's interval includes that drift.
 
 use super::{Clock, Draft};
-use crate::broken::broken;
 use crate::frame::{FrameHead, NodeIndex};
 use crate::stats::Stats;
 use crate::time::clock_model::EVEN_PPB;
@@ -171,11 +170,6 @@ impl Clock {
             Allowed::Synchronisation { cycle, nominal_ns } => {
                 self.next_sync(now_ns, cycle, nominal_ns).or_else(|| self.take_draft(is_reply))
             }
-            Allowed::Slot if broken!(SyncInForeignWindow) => {
-                let cycle = self.line.at(now_ns).ns / self.interval_ns;
-                let sync = self.next_sync(now_ns, cycle, cycle * self.interval_ns);
-                sync.or_else(|| self.take_draft(|_| true))
-            }
             Allowed::Slot => self.take_draft(|draft| !(replies_wait && is_reply(draft))),
         }
     }
@@ -195,7 +189,7 @@ impl Clock {
             let is_master = self.is_master();
             let slots = self.slots.as_mut()?;
             (slots.synced_cycle, slots.next, slots.is_warm) = (cycle, 0, false);
-            slots.beginning = slots.beginning.saturating_sub(u8::from(!broken!(BeginsForEver)));
+            slots.beginning = slots.beginning.saturating_sub(1);
             if slots.beginning == 0 {
                 slots.overheard.forget();
                 self.election.overhears(&slots.overheard);
@@ -285,7 +279,7 @@ impl Clock {
         let is_measured = self.timeline == sync.began;
         let off_ns = slots.coarse.off_ns(received.ns, self.line.at(received.ns).ns);
         let is_other = sync.epoch != self.line.record().epoch || off_ns > slots.settings.allowance_ns;
-        slots.unsure |= (contested || (!is_measured && is_other)) && !broken!(KeepsOwnTime);
+        slots.unsure |= contested || (!is_measured && is_other);
         slots.counts.heard += u64::from(sync.cycle != slots.heard_cycle);
         if slots.heard_cycle != 0 {
             slots.counts.missed += sync.cycle.saturating_sub(slots.heard_cycle).saturating_sub(1);
@@ -330,9 +324,6 @@ impl Clock {
         self.election.replaced(received.ns);
         slots.counts.replacements_heard += u64::from(sync.cycle != slots.lives_cycle);
         slots.lives_cycle = slots.lives_cycle.max(sync.cycle);
-        if broken!(ReplacementCalibrates) {
-            slots.coarse.add(sync.epoch, sync.sent_ns, received.ns, 0);
-        }
         Ok(())
     }
 }
@@ -344,9 +335,6 @@ impl Clock {
         let slots = self.slots.as_ref().filter(|slots| !slots.unsure && self.line.is_synchronised())?;
         let record = *self.line.record();
         let error_ns = record.error_ns.saturating_sub(slots.master_error_ns);
-        if broken!(TrustsItself) {
-            return Some(TimeEstimate::new(TimeRecord { error_ns: 0, drift_ns_s: 0, ..record }));
-        }
         Some(TimeEstimate::new(TimeRecord { error_ns, ..record }))
     }
 
@@ -416,7 +404,7 @@ impl Clock {
         };
         match self.election.state() {
             ElectionState::Master(_) => true,
-            ElectionState::Slave(master) => self.may_synchronise() && (is_missing(&master) || broken!(ReplacesHeard)),
+            ElectionState::Slave(master) => self.may_synchronise() && is_missing(&master),
             ElectionState::Listening => false,
         }
     }

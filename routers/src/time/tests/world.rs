@@ -2,12 +2,12 @@
 //! every node's page at every moment against the promises of the module.
 
 use crate::frame::{FrameHead, NodeIndex};
-use crate::time::{Broken, Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
+use crate::time::{Clock, Role, SentId, Stamp, Step, TIME_BYTES, Term, TimeSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rohrpost_mailbox::TimeRecord;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use rohrpost_testbed::sim::events::Events;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 mod check;
@@ -47,18 +47,14 @@ pub(super) struct World {
     masters: Vec<NodeIndex>,
     nodes: Vec<Node>,
     random: ChaCha8Rng,
-    events: BinaryHeap<Reverse<(u64, u64)>>,
-    bodies: BTreeMap<u64, Event>,
-    next_event: u64,
+    events: Events<Event>,
     terms: BTreeMap<u64, TermTime>,
     /// Which nodes hear which.
     cut: Vec<Vec<bool>>,
     pub(super) replay: String,
-    pub(super) broken: Option<Broken>,
     /// When a node became master, and which.
-    pub(super) reigns: Vec<(u64, NodeIndex)>,
+    pub(super) begun: Vec<(u64, NodeIndex)>,
     pub(super) ignored: u64,
-    pub(super) failures: u32,
     /// True errors and bounds of slaves, ns, since it was emptied last.
     pub(super) errors: Vec<(u64, u64)>,
 }
@@ -89,16 +85,12 @@ impl World {
             masters: masters.to_vec(),
             nodes: (0..nodes).map(|_| node(&mut random)).collect(),
             random,
-            events: BinaryHeap::new(),
-            bodies: BTreeMap::new(),
-            next_event: 0,
+            events: Events::default(),
             terms: BTreeMap::new(),
             cut: vec![vec![false; nodes.into()]; nodes.into()],
             replay: format!("seed {seed}, {nodes} nodes, interval {interval:?}"),
-            broken: None,
-            reigns: Vec::new(),
+            begun: Vec::new(),
             ignored: 0,
-            failures: 0,
             errors: Vec::new(),
         };
         world.push(world.now, Event::SnapshotRequest);
@@ -120,10 +112,7 @@ impl World {
             digest: 7,
             incarnation,
         };
-        let mut clock = Clock::new(settings, one.oscillator.local_ns(at), wall_ns, one.page);
-        if let Some(broken) = self.broken {
-            clock.break_it(broken);
-        }
+        let clock = Clock::new(settings, one.oscillator.local_ns(at), wall_ns, one.page);
         one.clock = Some(clock);
         self.wake(node, at);
     }
@@ -220,10 +209,8 @@ impl World {
         }
     }
 
-    /// A broken clock is expected to fail, and the world continues.
     pub(super) fn fail(&mut self, what: &str) {
-        assert!(self.broken.is_some(), "{what}; at {} ms; {}", self.now / MS, self.replay);
-        self.failures += 1;
+        panic!("{what}; at {} ms; {}", self.now / MS, self.replay);
     }
 
     fn tell(&self) -> String {
@@ -240,9 +227,7 @@ impl World {
     }
 
     fn push(&mut self, at: u64, event: Event) {
-        self.events.push(Reverse((at, self.next_event)));
-        self.bodies.insert(self.next_event, event);
-        self.next_event += 1;
+        self.events.push(at, event);
     }
 
     fn wake(&mut self, node: NodeIndex, at: u64) {
@@ -251,8 +236,7 @@ impl World {
     }
 
     fn step(&mut self) {
-        let Some(Reverse((at, number))) = self.events.pop() else { panic!("nothing happens any more") };
-        let event = self.bodies.remove(&number).unwrap();
+        let (at, event) = self.events.pop().expect("something happens");
         self.now = self.now.max(at);
         let frozen_until = |world: &Self, node: NodeIndex| world.nodes[usize::from(node)].frozen_until;
         match event {

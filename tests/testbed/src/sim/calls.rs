@@ -81,7 +81,7 @@ pub struct Call {
 
 /// A command that waits in a server's mailbox.
 #[derive(Clone, Copy, Debug)]
-pub struct Waiting {
+pub struct QueuedCommand {
     /// Number of the package.
     pub number: u32,
     /// Which call it is a try of.
@@ -106,7 +106,7 @@ pub struct Server {
     /// How many faults keep it dead now.
     pub dead: u32,
     /// Commands in its mailbox.
-    pub waiting: VecDeque<Waiting>,
+    pub waiting: VecDeque<QueuedCommand>,
 }
 
 impl Server {
@@ -174,7 +174,7 @@ impl Calls {
         now: Now,
         from: Name,
         dies: bool,
-    ) -> Option<(Waiting, Option<Answer>)> {
+    ) -> Option<(QueuedCommand, Option<Answer>)> {
         let waiting = server.waiting.pop_front()?;
         let call = &self.all[waiting.call];
         let attempt = Attempt {
@@ -201,16 +201,16 @@ impl Calls {
             }
         }
         if dies {
-            // A package whose receiver dies a second time is dropped.
+            // A package is dropped when its receiver dies a second time.
             if !waiting.redelivered {
-                server.waiting.push_front(Waiting { redelivered: true, ..waiting });
+                server.waiting.push_front(QueuedCommand { redelivered: true, ..waiting });
             }
             return None;
         }
         Some((waiting, answer))
     }
 
-    fn run(&mut self, oracle: &mut Oracle, now: Now, life: u32, waiting: &Waiting) {
+    fn run(&mut self, oracle: &mut Oracle, now: Now, life: u32, waiting: &QueuedCommand) {
         let call = &mut self.all[waiting.call];
         let on_the_way = waiting.age_ns == 0 && waiting.posted_ns < waiting.published_true_ns;
         call.unknowable |= on_the_way && call.life.is_some_and(|before| before != life);

@@ -41,9 +41,9 @@ impl Clock {
         Self { true_ns: 0, monotonic_ns, rate_ppb, slewed_ppb, unslewed_ns, slept_ns, realtime_less_monotonic_ns }
     }
 
-    /// What it shows at a true time that is not before the last change of its rate.
+    /// What it shows at a true time; before the last change of its rate, as if that had always been so.
     pub fn at(&self, true_ns: u64) -> Now {
-        let since = i128::from(true_ns - self.true_ns);
+        let since = i128::from(true_ns) - i128::from(self.true_ns);
         let fast = |ppb: i64| since * i128::from(ppb) / BILLION;
         let monotonic_ns = (i128::from(self.monotonic_ns) + since + fast(self.rate_ppb + self.slewed_ppb)) as u64;
         let unslewed_ns = (i128::from(self.unslewed_ns) + since + fast(self.rate_ppb)) as u64;

@@ -1,5 +1,5 @@
-//! Which faults divide a network with time slots, whom they part, and for how long that excuses two nodes that transmit
-//! at once.
+//! Which faults divide a network with time slots, which nodes they part, and for how long that excuses two nodes that
+//! transmit at once.
 
 use super::fault::{Fault, Planned};
 use super::spans::MS;
@@ -21,24 +21,24 @@ pub struct Division {
     pub from_ns: u64,
     /// When it is over, and what it kept up has come, true ns.
     pub until_ns: u64,
-    /// Whom it parts.
+    /// The nodes that it parts.
     pub parts: Parts,
 }
 
-/// Whom a fault parts.
+/// The nodes that a fault parts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Parts {
     /// These two: one does not hear the other, or too late.
     Cut(usize, usize),
-    /// Those whose bit is set from all others.
+    /// The nodes of which the bit is set from all others.
     Split(u64),
     /// This one from all others, which hear nothing of it meanwhile: it stands still, or has not begun. Only of those
-    /// who go by other configurations: all others know its slots.
+    /// that go by other configurations: all others know its slots.
     Still(usize),
 }
 
 impl Parts {
-    /// Whom a fault parts; none if it leaves links as they are.
+    /// The nodes that a fault parts; none if it leaves links as they are.
     fn of(fault: &Fault) -> Option<Self> {
         match *fault {
             Fault::Cut { from, to } | Fault::Bad { from, to, .. } => Some(Self::Cut(from, to)),
@@ -63,8 +63,8 @@ impl Parts {
 pub struct Divisions {
     all: Vec<Division>,
     cycle_ns: u64,
-    /// Who is divided from another that began anew meanwhile must ask it before it goes by its time: where slots are
-    /// rare, that takes so much longer, ns.
+    /// A node that is divided from another that began anew meanwhile must ask it before it goes by its time: where
+    /// slots are rare, that takes so much longer, ns.
     pub(super) asks_ns: u64,
 }
 
@@ -73,7 +73,7 @@ impl Divisions {
     pub fn of(faults: &[Planned], cycle_ns: u64) -> Self {
         let all = faults.iter().filter_map(|planned| {
             let parts = Parts::of(&planned.fault)?;
-            // What it has kept up still comes, and nothing overtakes it.
+            // What it has kept up still comes, and nothing comes before it.
             let way_ns = if let Fault::Bad { quality, .. } = planned.fault { quality.way_ns_max() } else { 0 };
             Some(Division { from_ns: planned.from_ns, until_ns: planned.until_ns + way_ns, parts })
         });
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_excuses_those_whom_it_parts_when_it_lasts_and_no_others() {
+    fn a_fault_excuses_the_nodes_that_it_parts_when_it_lasts_and_no_others() {
         let own = |node, rank| sends(node, rank, Basis::Own);
         let heard = |node, is_misled| sends(node, 0, Basis::Heard { is_misled });
         let begins = |node, since_ns| sends(node, node as u8, Basis::Begins { since_ns });
@@ -139,7 +139,7 @@ mod tests {
         let healed = |cycles: u64| (AT_NS - S, AT_NS - cycles * CYCLE_NS);
         for (parts, (from_ns, until_ns), one, other, began_ns, excused, why) in [
             (cut, long, own(0, 0), own(1, 1), 0, true, "two masters that are parted"),
-            (cut, long, own(2, 0), own(3, 1), 0, true, "those who follow two masters that are parted"),
+            (cut, long, own(2, 0), own(3, 1), 0, true, "followers of two masters that are parted"),
             (cut, long, own(0, 0), own(1, 0), 0, false, "one time"),
             (cut, long, own(2, 2), own(3, 1), 0, false, "a master of neither is at that end"),
             (cut, (long.0 + 1, long.1), own(0, 0), own(1, 1), 0, false, "too short for two times"),
@@ -149,11 +149,11 @@ mod tests {
             (Parts::Split(0b0101), long, own(0, 0), own(1, 1), 0, true, "on two sides"),
             (Parts::Split(0b0101), long, own(0, 0), own(2, 2), 0, false, "on one side"),
             (Parts::Split(0b0101), long, own(0, 0), own(2, 3), 0, true, "its master is on the other"),
-            (cut, (0, 1), heard(1, true), own(2, 0), 0, true, "who asks by what came too late"),
-            (cut, (0, 1), heard(1, false), own(2, 0), 0, false, "who asks by what came in time"),
+            (cut, (0, 1), heard(1, true), own(2, 0), 0, true, "it asks by what came too late"),
+            (cut, (0, 1), heard(1, false), own(2, 0), 0, false, "it asks by what came in time"),
             (cut, (0, 1), begins(0, AT_NS - BEGINNERS_CYCLES * CYCLE_NS), begins(1, 0), 0, true, "two that just began"),
             (cut, (0, 1), begins(0, AT_NS - BEGINNERS_CYCLES * CYCLE_NS - 1), begins(1, 0), 0, false, "long ago"),
-            (cut, (0, 1), begins(0, AT_NS), own(1, 1), 0, false, "one of whom has time"),
+            (cut, (0, 1), begins(0, AT_NS), own(1, 1), 0, false, "one of them has time"),
         ] {
             let divisions =
                 Divisions { all: vec![Division { from_ns, until_ns, parts }], cycle_ns: CYCLE_NS, asks_ns: 0 };

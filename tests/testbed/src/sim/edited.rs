@@ -1,5 +1,5 @@
-//! Networks with time slots on whose wire are nodes with other tables: routers that were started anew from a file that
-//! somebody has edited.
+//! Networks with time slots that share the wire with nodes of other tables: routers that were started anew from a file
+//! that somebody has edited.
 
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// Edited files of a network.
 const EDITIONS: u64 = 3;
-/// Whoever was refused, or heard another time, says nothing for so long; then all have the right file.
+/// A node that was refused, or heard another time, says nothing for so long; then all have the right file.
 const LISTENS_NS: u64 = 10 * S;
 
 /// What somebody has edited.
@@ -113,7 +113,7 @@ impl Edit {
 }
 
 impl Plan {
-    /// A network with time slots some of whose routers are started from edited files, one after the other or many at
+    /// A network with time slots in which some routers are started from edited files, one after the other or many at
     /// once; in the end all have the right one.
     pub fn edited(seed: u64) -> Self {
         let mut plan = Self::slotted_of(seed, (3, 6), 3);

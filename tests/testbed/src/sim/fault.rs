@@ -25,7 +25,7 @@ pub enum Fault {
         /// To here.
         to: usize,
     },
-    /// Those whose bit is set, and the others, do not reach each other.
+    /// The nodes of which the bit is set, and the others, do not reach each other.
     Split {
         /// Bit of each node.
         side: u64,
@@ -83,7 +83,7 @@ pub enum Fault {
     },
     /// Somebody repeats all that a node is told of the time, so much later.
     Echo {
-        /// Who.
+        /// The receiver.
         to: usize,
         /// See above.
         delay_ns: u64,
@@ -102,7 +102,7 @@ pub enum Fault {
     },
     /// Datagrams that no router of this installation sent.
     Foreign {
-        /// To whom.
+        /// The receiver.
         to: usize,
         /// How many.
         count: u64,
@@ -116,16 +116,16 @@ pub enum Fault {
     },
     /// Datagrams such as a router could have sent, of an incarnation that never was or of a place far from its own.
     Forged {
-        /// In whose name.
+        /// The node that they name as their sender.
         from: usize,
-        /// To whom.
+        /// The receiver.
         to: usize,
         /// How many.
         count: u64,
     },
     /// Datagrams that were sent long ago come once more.
     Replay {
-        /// To whom.
+        /// The receiver.
         to: usize,
         /// How many.
         count: u64,

@@ -100,19 +100,19 @@ impl World<'_> {
             }
             Fault::Replay { to, count } => {
                 for _ in 0..count.min(self.old.len() as u64) {
-                    let (whose, life, arrived) = self.chance.pick_ref(&self.old).clone();
-                    // To whom it was for, mostly. A router that began since cannot know it from one that is new: that
-                    // the wire keeps nothing for long is relied on.
-                    let is_same = self.stations[whose].router.as_ref().is_some_and(|router| router.life == life);
-                    let to = if is_same && self.chance.percent(80) { whose } else { to };
-                    if to == whose && !is_same && !self.plan.sealed {
+                    let (receiver, life, arrived) = self.chance.pick_ref(&self.old).clone();
+                    // To the router that it was for, mostly. One that began since cannot tell it from a new datagram:
+                    // that the wire keeps nothing for long is relied on.
+                    let is_same = self.stations[receiver].router.as_ref().is_some_and(|router| router.life == life);
+                    let to = if is_same && self.chance.percent(80) { receiver } else { to };
+                    if to == receiver && !is_same && !self.plan.sealed {
                         continue;
                     }
                     let alters = self.plan.sealed && self.chance.percent(50);
                     let bytes = if alters { altered(&arrived.bytes, &mut self.chance) } else { arrived.bytes.clone() };
                     let arrived = Arrived { bytes, ..arrived };
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
-                    let life = (to == whose && !self.plan.sealed).then_some(life);
+                    let life = (to == receiver && !self.plan.sealed).then_some(life);
                     self.at(at_ns, Event::Again { to, life, arrived });
                 }
             }
@@ -195,7 +195,7 @@ impl World<'_> {
         }
     }
 
-    /// A package of somebody who means harm.
+    /// A package of a hostile program.
     fn intrude(&mut self, node: usize) {
         let nodes = self.stations.len();
         let [to, third] = [1, 2].map(|further| (node + further) % nodes);

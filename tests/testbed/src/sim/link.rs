@@ -14,7 +14,7 @@ pub struct Quality {
     pub loss_ppm: u32,
     /// Sent twice.
     pub copy_ppm: u32,
-    /// Overtaken by others: delayed by up to ten times delay and jitter.
+    /// Reordered: delayed by up to ten times delay and jitter.
     pub reorder_ppm: u32,
     /// Bits flipped.
     pub damage_ppm: u32,
@@ -26,8 +26,8 @@ impl Quality {
     /// What comes out at all has been on its way for so long at most, ns.
     pub fn way_ns_max(&self) -> u64 {
         let way_ns = self.delay_ns + self.jitter_ns;
-        let overtaken_ns = if self.reorder_ppm > 0 { (11 * way_ns).min(WIRE_NS_MAX / 2) } else { 0 };
-        way_ns.max(overtaken_ns) + if self.rate_bytes_s > 0 { WAIT_NS_MAX } else { 0 }
+        let reordered_ns = if self.reorder_ppm > 0 { (11 * way_ns).min(WIRE_NS_MAX / 2) } else { 0 };
+        way_ns.max(reordered_ns) + if self.rate_bytes_s > 0 { WAIT_NS_MAX } else { 0 }
     }
 }
 

@@ -22,10 +22,10 @@ pub struct Account {
 pub struct Sending {
     /// Its packages.
     pub account: Account,
-    /// Datagrams whose most urgent package is of a lower level than this.
+    /// Datagrams in which the most urgent package is of a lower level than this.
     pub(super) below: [u64; LEVELS],
     /// Packages of each module that wait.
-    pub(super) waiting: Table<Name, Waiting>,
+    pub(super) waiting: Table<Name, WaitingPackages>,
     /// The one that came last.
     pub(super) newest: u32,
     /// All that has left is through then, at the configured rate, on the node's monotonic clock.
@@ -35,7 +35,7 @@ pub struct Sending {
 }
 
 #[derive(Default, Debug)]
-pub(super) struct Waiting {
+pub(super) struct WaitingPackages {
     /// Level, place among all, number.
     pub(super) packages: BTreeSet<(usize, u64, u32)>,
     pub(super) bytes: usize,

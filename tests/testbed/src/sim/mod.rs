@@ -14,6 +14,7 @@ pub mod clock;
 pub mod declared;
 pub mod divided;
 mod edited;
+pub mod events;
 pub mod fault;
 mod faults;
 pub mod host;

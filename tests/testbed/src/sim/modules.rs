@@ -1,6 +1,6 @@
 //! The modules of a simulated network: they post data and commands, run commands, and read what comes.
 
-use super::calls::Waiting;
+use super::calls::QueuedCommand;
 use super::host::{DATA_MAILBOXES, Parcel};
 use super::package::Answer;
 use super::package::{Role, SendStage, admitted};
@@ -169,7 +169,7 @@ impl World<'_> {
                 Role::Report { call } => self.calls.answered(&mut self.oracle, now, call, Answer::NotRun),
                 Role::Command { call, age_ns } => {
                     let Some(server) = self.servers.get_mut(&head.to.module()) else { continue };
-                    server.waiting.push_back(Waiting {
+                    server.waiting.push_back(QueuedCommand {
                         number,
                         call,
                         age_ns,

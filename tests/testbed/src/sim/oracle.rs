@@ -52,7 +52,7 @@ pub struct Oracle {
     pub well_ns: u64,
     /// System time.
     pub times: Times,
-    /// Who transmits when, with time slots.
+    /// Which node transmits when, with time slots.
     pub wire: Wire,
     /// The master, and its term, that all nodes must agree on by now.
     pub master: Option<(Option<NodeIndex>, Term)>,

@@ -39,8 +39,8 @@ pub enum Role {
         /// Which call.
         call: usize,
     },
-    /// What nobody needs, from who wants to do harm: a program that writes what it likes in its heads, and whose router
-    /// caps no priority.
+    /// What nobody needs, from a hostile program: it writes what it likes in its heads, and its router caps no
+    /// priority.
     Intruder,
 }
 
@@ -64,7 +64,7 @@ pub struct Package {
     pub head: Head,
     /// Where its modules are.
     pub from_node: NodeIndex,
-    /// For whom.
+    /// The node that it is for.
     pub to_node: NodeIndex,
     /// What it is for.
     pub role: Role,

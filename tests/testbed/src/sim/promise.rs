@@ -37,7 +37,7 @@ pub enum Promise {
     /// What a router says of its peers and of losses on the wire is so.
     Links,
     /// Nothing is delivered that is not admitted: where datagrams are sealed, in the name of another node; to a
-    /// router's own mailbox; with more priority than its sender, or who asked for it, may have.
+    /// router's own mailbox; with more priority than its sender, or the module that asked for it, may have.
     Admission,
     /// A while after the last fault all is well.
     Recovery,
@@ -45,15 +45,15 @@ pub enum Promise {
     TimeBound,
     /// System time never goes back within an epoch.
     TimeForward,
-    /// One master in a term, and one master a while after the last fault; who sends in its place does so only when it
-    /// was not heard, and nobody goes by it.
+    /// One master in a term, and one master a while after the last fault; a node that sends in its place does so only
+    /// when it was not heard, and nobody goes by it.
     OneMaster,
     /// With time slots no two nodes transmit at once, unless a fault parts them: see [`Divisions::excuse`].
     ///
     /// [`Divisions::excuse`]: super::divided::Divisions::excuse
     Exclusive,
     /// With time slots each datagram is on the wire in a window of its sender, before its guard, as the sender reckons,
-    /// and none is sent in a window whose wake-up came too late.
+    /// and none is sent in a window for which the wake-up came too late.
     InWindow,
     /// With time slots nobody sends while its own bound is greater than what is allowed, or while it is further off in
     /// truth.

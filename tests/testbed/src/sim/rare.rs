@@ -10,14 +10,14 @@ use rohrpost_network::TimeSlot;
 
 /// From one slot of a node to its next.
 const RARE_NS: u64 = 500 * MS;
-/// Commands wait for a slot, and so do answers: who is to be answered waits for both, and for repeats.
+/// Commands wait for a slot, and so do answers: a caller waits for both, and for repeats.
 const ANSWERED_NS: u64 = 2 * S;
 /// Six nodes.
 const MANY: (u64, u64) = (6, 6);
 
 /// Two times that a division brought about may both go on for so many rare slots after it: their masters say that they
-/// are followed for four after they were asked last, and who is divided from one waits for four before it turns to the
-/// other.
+/// are followed for four after they were asked last, and a node that is divided from one waits for four before it turns
+/// to the other.
 const DIVIDED_SLOTS: u64 = 8;
 
 fn is_rare(seed: u64) -> bool {
@@ -100,7 +100,8 @@ impl Plan {
         2 * S + slot_ns * 4 * self.nodes.len() as u64
     }
 
-    /// All is well only when who began last has joined; and who was divided from another joins it as if it began.
+    /// All is well only when the node that began last has joined; and a node that was divided from another joins it as
+    /// if it began.
     fn give_time_to_join(&mut self) {
         let (joins_ns, is_rare) = (self.joins_ns(), is_rare(self.seed));
         self.fixed_ns += joins_ns;

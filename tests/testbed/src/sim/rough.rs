@@ -3,12 +3,12 @@
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
 use super::link::Quality;
-use super::plan::{Calls, Flow, Plan, Shape};
+use super::plan::{CallPlan, Flow, Plan, Shape};
 use super::spans::{DRAIN_NS, MS, RECOVERY_NS, S, US, WELL_NS};
 use rohrpost_mailbox::local;
 
 /// When all faults are over.
-const MENDED_NS: u64 = 7 * S;
+const FIXED_NS: u64 = 7 * S;
 /// A frame that is late on one of the two ways only: the worst that may happen to clocks.
 const SLOW: Quality = Quality { delay_ns: 8 * MS, reorder_ppm: 200_000, ..QUALITY };
 /// Ten times as many wake-ups as usual are too late, of a million.
@@ -38,9 +38,9 @@ impl Plan {
         };
         plan.quality = QUALITY;
         (plan.masters, plan.has_stamps, plan.checksum) = (vec![0, 1, 2], true, false);
-        plan.fixed_ns = MENDED_NS;
-        plan.timed_ns = MENDED_NS + 2 * S;
-        plan.traffic_end_ns = MENDED_NS + RECOVERY_NS + WELL_NS;
+        plan.fixed_ns = FIXED_NS;
+        plan.timed_ns = FIXED_NS + 2 * S;
+        plan.traffic_end_ns = FIXED_NS + RECOVERY_NS + WELL_NS;
         plan.end_ns = plan.traffic_end_ns + DRAIN_NS;
         plan.stepped_ns = plan.timed_ns + super::spans::EPOCH_PAUSE_NS;
         plan.rough_traffic(&mut chance);
@@ -67,7 +67,7 @@ impl Plan {
             let large = Flow { period_ns: 600 * MS, bytes: (20_000, 50_000), burst: 12, ..mixed };
             self.flows.extend([steady, mixed, large]);
             let valid_for_ns = chance.between(100, 2000) * MS;
-            self.calls.push(Calls { node, from, to, period_ns: 50 * MS, valid_for_ns, priority: u8::MAX });
+            self.calls.push(CallPlan { node, from, to, period_ns: 50 * MS, valid_for_ns, priority: u8::MAX });
         }
     }
 
@@ -91,7 +91,7 @@ impl Plan {
         fault(at_ms + 1700, at_ms + 3400, Fault::Freeze { node: 1, whole: false });
     }
 
-    /// With time slots: frames are lost, copied and overtaken all the time, threads wake too late again and again,
+    /// With time slots: frames are lost, copied and reordered all the time, threads wake too late again and again,
     /// every router stands still and dies, and what the first master says comes too late. After so much two nodes may
     /// transmit at once only where the plan says that the network is divided; all else that is promised holds at any
     /// time.

@@ -28,29 +28,8 @@ pub struct Outcome {
 
 /// Runs a plan.
 pub fn run(plan: Plan, guard: NewGuard, trace: bool) -> Outcome {
-    run_with(plan, guard, trace, |_| {})
-}
-
-/// Runs a plan in which every router makes a mistake.
-pub fn run_broken(plan: Plan, guard: NewGuard, mistake: Mistake) -> Outcome {
-    match mistake {
-        Mistake::Packages(broken) => rohrpost_routers::broken::with(broken, || run(plan, guard, false)),
-        Mistake::Time(broken) => run_with(plan, guard, false, move |ticking| ticking.clock().break_it(broken)),
-    }
-}
-
-/// A mistake of a core.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Mistake {
-    /// Of those that carry packages.
-    Packages(rohrpost_routers::broken::Broken),
-    /// Of the one that keeps time.
-    Time(rohrpost_routers::time::Broken),
-}
-
-fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticking) + 'static) -> Outcome {
     let plan = Rc::new(plan);
-    let layers = routers(&plan, change);
+    let layers = routers(&plan);
     let mut world = World::new(plan.clone(), guard, layers, trace);
     world.run();
     let oracle = world.oracle;
@@ -61,7 +40,7 @@ fn run_with(plan: Plan, guard: NewGuard, trace: bool, change: impl Fn(&mut Ticki
 }
 
 /// Routers as this version has them.
-fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayers<'static> {
+fn routers(plan: &Rc<Plan>) -> NewLayers<'static> {
     let plan = plan.clone();
     Box::new(move |node, edition, life, now, page| {
         let incarnation = incarnation(plan.seed, life);
@@ -73,7 +52,6 @@ fn routers(plan: &Rc<Plan>, change: impl Fn(&mut Ticking) + 'static) -> NewLayer
             let all = seals::peer_sessions(&settings);
             (packages, ticking) = (packages.sealed(&all, incarnation), ticking.sealed(&all, plan.slots.is_some()));
         }
-        change(&mut ticking);
         if let Some(slots) = plan.slots_of(edition) {
             let (own, nodes) = (settings.own, plan.nodes.len() as u8);
             let table = SlotTable::new(&slots.table, &slots.masters, own, nodes, settings.overhead_bytes());

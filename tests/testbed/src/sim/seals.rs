@@ -1,4 +1,4 @@
-//! Sealed datagrams in a simulated network: what the layers seal with, and what those do who have no key.
+//! Sealed datagrams in a simulated network: what the layers seal with, and what attackers do without the key.
 
 use super::chance::Chance;
 use rohrpost_routers::frame::{self, FrameHead};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Of all routers.
 const KEY: [u8; KEY_BYTES] = [0x5a; KEY_BYTES];
 
-/// Whom an incarnation of a router knows; nobody yet.
+/// The peer sessions of an incarnation of a router; none yet.
 pub(super) fn peer_sessions(settings: &Settings) -> Arc<PeerSessions> {
     PeerSessions::new(
         RouterIdentity::of(settings),
@@ -75,7 +75,7 @@ pub(super) fn incarnation(datagram: &[u8]) -> u64 {
     FrameHead::read(datagram).map_or(0, |(head, _)| head.incarnation)
 }
 
-/// What somebody makes of a datagram who knows the format, and not the key.
+/// What an attacker makes of a datagram that knows the format, and not the key.
 pub(super) fn altered(datagram: &[u8], chance: &mut Chance) -> Rc<[u8]> {
     let mut bytes = damage(datagram, chance).to_vec();
     frame::write_check(&mut bytes);

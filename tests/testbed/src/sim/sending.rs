@@ -145,8 +145,8 @@ impl Oracle {
         }
     }
 
-    /// In time slots nothing leaves while something more important waits, whoever it is for and however large: of those
-    /// that something can be sealed to. `behind`: the first that waits in the mailbox.
+    /// In time slots nothing leaves while something more important waits, whichever node it is for and however large:
+    /// of those that something can be sealed to. `behind`: the first that waits in the mailbox.
     pub fn is_strict(
         &mut self,
         now: Now,

@@ -22,9 +22,9 @@ const STILL_NS_MAX: u64 = 200 * MS;
 /// What a network with time slots has besides.
 #[derive(Clone, Debug)]
 pub struct Slots {
-    /// Who may send when.
+    /// Which node may send when.
     pub table: Tdma,
-    /// Who may be master, in order.
+    /// The nodes that may be master, in order.
     pub masters: Vec<NodeIndex>,
     /// Wake-ups beyond what the late gate lets through, of a million.
     pub late_ppm: u32,

@@ -6,8 +6,9 @@
 
 use super::chance::Chance;
 use super::clock::{Clock, Now};
-use super::host::Host;
+use super::host::{Host, Parcel};
 use super::oracle::Oracle;
+use super::package::Role;
 use super::plan::Plan;
 use super::trace::Trace;
 use std::collections::VecDeque;
@@ -54,6 +55,11 @@ pub struct Io<'a> {
 }
 
 impl Io<'_> {
+    /// Whether a package is one of a program that writes what it likes in its heads.
+    pub(super) fn is_intruders(&self, parcel: &Parcel) -> bool {
+        self.oracle.packages[parcel.number as usize].role == Role::Intruder
+    }
+
     /// The thread was busy for so long: what it does next is later.
     pub fn works(&mut self, for_ns: u64) {
         if for_ns > 0 {
@@ -90,7 +96,7 @@ pub struct Sent {
 pub struct Arrived {
     /// Socket that has it.
     pub port: Port,
-    /// Node whose address it comes from; none: an address that no node has.
+    /// Node that has the address it comes from; none: an address that no node has.
     pub source: Option<usize>,
     /// Its bytes.
     pub bytes: Rc<[u8]>,
@@ -165,7 +171,7 @@ pub struct Station {
 }
 
 impl Station {
-    /// One whose router has not begun yet.
+    /// One of which the router has not begun yet.
     pub fn new(clock: Clock) -> Self {
         Self {
             clock,

@@ -1,8 +1,8 @@
 //! What system time is, by the simulation's own clock: the time of each term, and what every node's page says of it.
 //!
-//! The time of a term is its master's line, as it stood when the master began to reign, shifted so that it goes on from
-//! the time that this node had followed before. A page's bound must contain its distance from the time of the term that
-//! it follows.
+//! The time of a term is its master's line, as it stood when its term began, shifted so that it goes on from the time
+//! that this node had followed before. A page's bound must contain its distance from the time of the term that it
+//! follows.
 
 use super::clock::{Clock, Now};
 use super::promise::{Problem, Promise};
@@ -36,7 +36,7 @@ struct Page {
     /// Its clock did what bounds exclude: since when its router can have noticed, true ns; none: it has not run since.
     is_changed: bool,
     noticed_ns: Option<u64>,
-    /// When its router looked last, true ns: who stands still notices nothing.
+    /// When its router looked last, true ns: a router that stands still notices nothing.
     looked_ns: u64,
     /// For how long the computer had slept when that was written.
     slept_ns: u64,
@@ -74,7 +74,7 @@ impl Times {
 
     /// What a node's page says, for its next router.
     ///
-    /// As whoever reads the page has it: of a computer that has slept since, nobody knows how far off it is.
+    /// As a reader of the page has it: of a computer that has slept since, nobody knows how far off it is.
     pub fn page(&self, now: Now, node: usize) -> Option<TimeRecord> {
         let page = self.pages.get(node)?;
         page.record.map(|record| record.after_sleep(now.slept_ns.saturating_sub(page.slept_ns)))
@@ -109,7 +109,7 @@ impl Times {
     /// Looks at a node after its layer of time did anything: whether it is master.
     pub fn look(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
         if core.role() == Role::Master {
-            self.reigns(now, node, core, problems);
+            self.leads(now, node, core, problems);
         }
     }
 
@@ -179,7 +179,7 @@ impl Times {
     }
 
     /// A master that was none before begins a term, which goes on from the time before unless an epoch began.
-    fn reigns(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
+    fn leads(&mut self, now: Now, node: usize, core: &Core, problems: &mut Vec<Problem>) {
         let (digest, term, record) = (core.digest(), core.term(), *core.record());
         if let Some(known) = self.lines.get(&(digest, term)) {
             if known.node != node {

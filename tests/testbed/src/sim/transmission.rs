@@ -13,7 +13,7 @@ pub enum Basis {
         /// All that it heard was on its way for too long.
         is_misled: bool,
     },
-    /// What it has heard of those who have not shown that they live: it asks whether they do.
+    /// What it has heard of nodes that have not shown that they live: it asks whether they do.
     Overheard {
         /// Somebody repeats what they said once, or it was on its way for too long.
         is_misled: bool,
@@ -32,14 +32,14 @@ impl Basis {
     }
 }
 
-/// By what a node sends, and by whose time.
+/// By what a node sends, and by which node's time.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Says {
     /// By what it finds its windows.
     pub basis: Basis,
     /// Of its configuration.
     pub digest: u64,
-    /// The term whose time that is, as far as it knows.
+    /// The term of that time, as far as it knows.
     pub term: Term,
     /// The line by which it reckons.
     pub estimate: Option<TimeEstimate>,
@@ -48,13 +48,13 @@ pub struct Says {
 /// A datagram that is being transmitted.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmission {
-    /// Who does.
+    /// The node that transmits.
     pub node: usize,
     /// By what.
     pub basis: Basis,
     /// Of its configuration.
     pub digest: u64,
-    /// The term whose time it keeps.
+    /// The term of the time that it keeps.
     pub term: Term,
     /// The master of that term.
     pub master: Option<usize>,

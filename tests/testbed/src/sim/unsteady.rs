@@ -1,4 +1,4 @@
-//! Networks whose computers sleep, and whose clocks time daemons slew.
+//! Networks in which computers sleep, and time daemons slew clocks.
 
 use super::chance::Chance;
 use super::fault::{Fault, Planned};
@@ -7,7 +7,7 @@ use super::spans::{MS, S};
 
 /// What daemons slew by, ns a second: what the kernel does by itself, and what chrony may.
 const SLEWED_PPB: [i64; 6] = [500_000, -500_000, 300_000, -1_000_000, 20_000_000, -83_000_000];
-/// Whose clock was not steady joins so much later, ns.
+/// A node with a clock that was not steady joins so much later, ns.
 const STEADY_NS: u64 = S;
 /// How far off a computer is that counts how long it slept, ns: some read that from a clock that counts seconds.
 const WRONG_NS: u64 = 400_000_000;
@@ -18,7 +18,7 @@ impl Plan {
         let mut plan = Self::new(seed);
         plan.disturb_clocks();
         plan.time();
-        // Who is too far off waits for an epoch.
+        // A node that is too far off waits for an epoch.
         plan.end_ns = plan.end_ns.max(plan.stepped_ns + S);
         plan
     }
@@ -39,7 +39,7 @@ impl Plan {
             let node = chance.below(self.nodes.len() as u64) as usize;
             let from_ns = chance.between(S / 2, last_ns);
             let until_ns = chance.between(from_ns + 100 * MS, self.fixed_ns);
-            // One thing after the other: who sleeps is not slewed meanwhile.
+            // One thing after the other: a computer that sleeps is not slewed meanwhile.
             if self.faults.iter().all(|other| node_of(&other.fault) != Some(node)) {
                 let fault = match chance.percent(50) {
                     true => Fault::Sleep { node, wrong_ns: chance.below(WRONG_NS) as i64 },

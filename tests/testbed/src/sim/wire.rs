@@ -60,7 +60,7 @@ impl Wire {
         let called_ns = estimate.system_ns(self.called_ns[node]);
         let window = slots.window(node, called_ns + LEAD_NS.1);
         let is_well = window.as_ref().is_some_and(|(window, late_ns)| {
-            // Who does not know its lead yet may end later by as much, who does by what it varies.
+            // A node that does not know its lead yet may end later by as much, others by what it varies.
             let ends = end_ns <= window.end + LEAD_NS.1 + SLACK_NS;
             begin_ns + SLACK_NS >= window.start && ends && called_ns <= window.start + late_ns + SLACK_NS
         });

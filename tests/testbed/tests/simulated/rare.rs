@@ -28,10 +28,10 @@ fn sealed_networks_of_rare_slots_and_of_one_master_keep_their_promises() {
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED);
 }
 
-/// 21 has shown masters that took over from each other all the time, since who asks in rare slots is answered seldom;
-/// so has 3.
+/// 21 has shown masters that took over from each other all the time, since a node that asks in rare slots is answered
+/// seldom; so has 3.
 #[test]
-fn who_begins_in_a_sealed_network_of_rare_slots_joins_in_time() {
+fn a_node_that_begins_in_a_sealed_network_of_rare_slots_joins_in_time() {
     if let Some(seed) = number("ROHRPOST_SIM_SEED") {
         return replay(Plan::rare_joining(seed));
     }
@@ -40,7 +40,7 @@ fn who_begins_in_a_sealed_network_of_rare_slots_joins_in_time() {
     let seed = |index| if index == seeds { 21 } else { first + index };
     for (seed, outcome) in for_all(seeds + 1, |index| (seed(index), run(Plan::rare_joining(seed(index)), guard, false)))
     {
-        assert!(outcome.problems.is_empty(), "{}", told("who_begins_in_a_sealed", seed, &outcome.problems[0]));
+        assert!(outcome.problems.is_empty(), "{}", told("a_node_that_begins_in_a_sealed", seed, &outcome.problems[0]));
         let joined = outcome.seen.get("joined").copied().unwrap_or(0);
         assert!(joined >= 2 * Plan::rare_joining(seed).nodes.len() as u64, "seed {seed}: {joined} have joined");
     }

@@ -72,7 +72,7 @@ fn a_receiver_dies_dropping_stale_packages() {
 }
 
 #[test]
-fn who_mends_what_a_death_left_dies_too() {
+fn an_owner_that_fixes_what_a_death_left_dies_too() {
     for first in ["send", "displace", "receive", "adopt", "close"] {
         for fatal in 1.. {
             let first_survived = Cell::new(false);

@@ -1,4 +1,4 @@
-//! Deaths of those who make and remove nodes, participants and mailboxes.
+//! Deaths of processes that make and remove nodes, participants and mailboxes.
 
 use crate::aftermath::{adopt_and_drain, empty};
 use crate::ground::{Ground, LOW, MAILBOX, each_step, send};
@@ -43,7 +43,7 @@ fn a_joiner_dies() {
 }
 
 #[test]
-fn who_begins_to_watch_dies() {
+fn a_participant_that_begins_to_watch_dies() {
     each_step(
         "watch",
         1,
@@ -118,7 +118,7 @@ fn a_remover_of_an_orphan_dies() {
 }
 
 #[test]
-fn who_cleans_up_dies() {
+fn a_process_that_cleans_up_dies() {
     each_step("clean up", 5, Ground::orphan, |ground, (), death| {
         assert!(death.is_some() || !ground.path().exists());
         let found = adopt_and_drain(ground, u64::from(death.is_some()));

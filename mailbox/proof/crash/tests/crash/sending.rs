@@ -30,8 +30,8 @@ fn a_sender_dies_sending() {
     });
 }
 
-/// The receiver works off less important packages that it knows, and looks at nothing else unless somebody alerts. Who
-/// dies before it alerts has left a package that is found when the death is noticed, and then it is first.
+/// The receiver works off less important packages that it knows, and looks at nothing else unless somebody alerts. A
+/// sender that dies before it alerts has left a package that is found when the death is noticed, and then it is first.
 #[test]
 fn a_sender_dies_above_the_level() {
     let scene = |ground: &Ground| {
@@ -86,7 +86,7 @@ fn a_sender_dies_replacing(others: u32, steps_min: u64) {
             None => &[(0, 1)],
             // It had said that it would, and is believed.
             Some("replace: marked") => &[(1, 1)],
-            // Counted by itself, then by whoever freed its slot.
+            // Counted by itself, then by the receiver that freed its slot.
             Some("counters: loss" | "publish: ticket") => &[(0, 2)],
             Some(_) => &[(1, 0), (0, 1)],
         };

@@ -77,7 +77,7 @@ impl World {
         self.oracle.saw("client restarted");
         let node = &mut self.nodes[index];
         node.incarnation += 2;
-        let now_ns = node.clock.at(self.now_ns);
+        let now_ns = node.clock.at(self.now_ns).monotonic_ns;
         node.client = Client::new(client_settings(index, node.incarnation), ranges(index), now_ns);
         node.wake_ns = 0;
         self.oracle.clients[index].up_ns = None;

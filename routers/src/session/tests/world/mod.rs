@@ -4,13 +4,14 @@ mod faults;
 mod streams;
 
 use super::oracle::{Known, SessionOracle, Teller};
-use super::plan::{Clock, Plan, client_settings, loud, module, ranges, server_settings, shared, system_of};
+use super::plan::{Plan, client_settings, clock, loud, module, ranges, server_settings, shared, system_of};
 use crate::admission::capped;
 use crate::session::LOOK_EVERY_NS;
 use crate::session::client::{self, Client, ClientPackage};
 use crate::session::server::{self, Server};
-use crate::session::tests::chance::Chance;
 use rohrpost_mailbox::{ALL_SYSTEMS, Head, Name, Options, Priority, TimeRecord, TimeSource, Type};
+use rohrpost_testbed::sim::chance::Chance;
+use rohrpost_testbed::sim::clock::Clock;
 use streams::Connection;
 
 pub(super) const MS: u64 = 1_000_000;
@@ -53,8 +54,8 @@ impl World {
     pub(super) fn new(plan: Plan) -> Self {
         let mut chance = Chance::new(plan.seed);
         let node = |index: usize, chance: &mut Chance| {
-            let (clock, incarnation) = (Clock::new(chance), chance.bits() | 1);
-            let client = Client::new(client_settings(index, incarnation), ranges(index), clock.at(0));
+            let (clock, incarnation) = (clock(chance), chance.bits() | 1);
+            let client = Client::new(client_settings(index, incarnation), ranges(index), clock.at(0).monotonic_ns);
             Node { client, clock, frozen_until_ns: 0, wake_ns: 0, incarnation, attempts: 0, chance: chance.fork() }
         };
         let nodes: Vec<Node> = (0..plan.clients).map(|index| node(index, &mut chance)).collect();
@@ -72,7 +73,7 @@ impl World {
             now_ns: 0,
             oracle,
             server: Server::new(server_settings(server_incarnation)),
-            server_clock: Clock::new(&mut chance),
+            server_clock: clock(&mut chance),
             server_incarnation,
             server_down_until_ns: 0,
             server_wake_ns: 0,
@@ -106,7 +107,7 @@ impl World {
 
     /// What must hold at any moment.
     fn look(&mut self) {
-        let (server_ns, system_ns) = (self.server_clock.at(self.now_ns), SYSTEM_NS + self.now_ns);
+        let (server_ns, system_ns) = (self.server_clock.at(self.now_ns).monotonic_ns, SYSTEM_NS + self.now_ns);
         let record = TimeRecord {
             epoch: 1,
             source: TimeSource::Master,
@@ -118,7 +119,7 @@ impl World {
         };
         self.server.set_time(Some(record));
         for (index, node) in self.nodes.iter().enumerate() {
-            let now_ns = node.clock.at(self.now_ns);
+            let now_ns = node.clock.at(self.now_ns).monotonic_ns;
             let session = node.client.session(now_ns).filter(|_| node.client.is_up() && self.is_reached(index));
             if let Some(session) = session.filter(|session| session.ns.abs_diff(server_ns) > session.error_ns) {
                 self.oracle.problems.push(format!("client {index}: session clock {session:?}, in truth {server_ns}"));
@@ -198,7 +199,7 @@ impl World {
         let (number, body) = self.oracle.post(from, capped(&head), is_forged);
         self.oracle.saw("posted");
         let node = &mut self.nodes[from];
-        let now_ns = node.clock.at(self.now_ns);
+        let now_ns = node.clock.at(self.now_ns).monotonic_ns;
         let mut teller = Teller { oracle: &mut self.oracle, client: from, chance: &mut node.chance };
         node.client.send(now_ns, &ClientPackage { head, body: &body, published_ns: now_ns, hops: 0 }, &mut teller);
         node.wake_ns = 0;
@@ -206,7 +207,7 @@ impl World {
     }
 
     fn poll_server(&mut self) {
-        let now_ns = self.server_clock.at(self.now_ns);
+        let now_ns = self.server_clock.at(self.now_ns).monotonic_ns;
         if now_ns < self.server_wake_ns || self.now_ns < self.server_down_until_ns {
             return;
         }
@@ -236,7 +237,7 @@ impl World {
     }
 
     fn poll_client(&mut self, index: usize) {
-        let now_ns = self.nodes[index].clock.at(self.now_ns);
+        let now_ns = self.nodes[index].clock.at(self.now_ns).monotonic_ns;
         if now_ns < self.nodes[index].wake_ns || self.now_ns < self.nodes[index].frozen_until_ns {
             return;
         }

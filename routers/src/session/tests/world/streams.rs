@@ -30,7 +30,7 @@ impl World {
 
     fn carry_up(&mut self, at: usize) {
         let connection = &mut self.connections[at];
-        let now_ns = self.server_clock.at(self.now_ns);
+        let now_ns = self.server_clock.at(self.now_ns).monotonic_ns;
         let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
         while let Some(index) = connection.index {
             let Some(bytes) = connection.up.read(self.now_ns) else { break };
@@ -56,7 +56,7 @@ impl World {
         if !connection.is_client_open || self.now_ns < node.frozen_until_ns {
             return;
         }
-        let now_ns = node.clock.at(self.now_ns);
+        let now_ns = node.clock.at(self.now_ns).monotonic_ns;
         let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
         while let Some(bytes) = connection.down.read(self.now_ns) {
             node.client.received(now_ns, &bytes, &mut teller);
@@ -77,11 +77,11 @@ impl World {
     pub(super) fn connect(&mut self, index: usize) {
         let node = &mut self.nodes[index];
         node.attempts += 1;
-        let now_ns = node.clock.at(self.now_ns);
+        let now_ns = node.clock.at(self.now_ns).monotonic_ns;
         let is_there = self.now_ns >= self.server_down_until_ns;
         let mut teller = Teller { oracle: &mut self.oracle, client: usize::MAX, chance: &mut self.host };
         let from = address(index, node.attempts);
-        let place = self.server_clock.at(self.now_ns);
+        let place = self.server_clock.at(self.now_ns).monotonic_ns;
         let Some(place) = is_there.then(|| self.server.accept(place, from, &mut teller)).flatten() else {
             let mut teller = Teller { oracle: &mut self.oracle, client: index, chance: &mut node.chance };
             return node.client.closed(now_ns, &mut teller);

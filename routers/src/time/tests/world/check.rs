@@ -24,7 +24,7 @@ impl World {
     /// Everything that must hold of a node at any moment.
     pub(super) fn check(&mut self, node: NodeIndex) {
         let (now, local_ns) = (self.now, self.local_ns(node));
-        self.check_reign(node);
+        self.check_term(node);
         let one = &mut self.nodes[usize::from(node)];
         let is_slave = one.clock.as_ref().is_some_and(|clock| clock.role() == Role::Slave);
         if let Some(clock) = &one.clock {
@@ -57,7 +57,7 @@ impl World {
     }
 
     /// A new master begins a term, which continues the time before unless an epoch began.
-    fn check_reign(&mut self, node: NodeIndex) {
+    fn check_term(&mut self, node: NodeIndex) {
         let one = &self.nodes[usize::from(node)];
         let Some(clock) = one.clock.as_ref().filter(|clock| clock.role() == Role::Master) else { return };
         let (term, record, oscillator) = (clock.term(), *clock.record(), one.oscillator);
@@ -75,6 +75,6 @@ impl World {
             begun.shift_ns = before.at(self.now) - begun.at(self.now);
         }
         self.terms.insert(term.0, begun);
-        self.reigns.push((self.now, node));
+        self.begun.push((self.now, node));
     }
 }

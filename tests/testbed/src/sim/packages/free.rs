@@ -1,9 +1,7 @@
 //! Packages where there are no time slots: the driver of the shell on a simulated platform.
 
 use super::{LISTEN_NS, Packages};
-use crate::harm::harmful;
 use crate::sim::clock::Now;
-use crate::sim::package::Role;
 use crate::sim::station::{Arrived, Io, Layer, Port};
 use rohrpost_mailbox::Priority;
 use rohrpost_routers::driver::{
@@ -81,11 +79,17 @@ impl Inlet for FreeSystem<'_, '_> {
     }
 
     fn take<T>(&mut self, what: impl FnOnce(&mut Self, &Package<'_>, bool) -> T) -> Option<T> {
-        let parcel = self.packages.take_parcel(self.io)?;
+        let parcel = loop {
+            let parcel = self.packages.take_parcel(self.io)?;
+            if !self.io.is_intruders(&parcel) {
+                break parcel;
+            }
+            self.packages.accept_uncapped(self.io, &parcel);
+            self.packages.took(self.io, parcel);
+        };
         let is_alone = self.io.host.transit.is_empty();
-        let does_harm = self.io.oracle.packages[parcel.number as usize].role == Role::Intruder;
         let package = Package { head: parcel.head, published_ns: parcel.published_ns, body: &parcel.body };
-        let result = harmful(does_harm, || what(self, &package, is_alone));
+        let result = what(self, &package, is_alone);
         self.packages.took(self.io, parcel);
         Some(result)
     }

@@ -28,7 +28,7 @@ use rohrpost_routers::driver::{Answer, NotSent, RxDriver};
 use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
 use rohrpost_routers::inbound;
 use rohrpost_routers::intake::hurries;
-use rohrpost_routers::outbound::Outbound;
+use rohrpost_routers::outbound::{Accepted, Outbound, Package};
 use rohrpost_routers::report::Report;
 use rohrpost_routers::security::{PeerSessions, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
@@ -145,6 +145,21 @@ impl Packages {
     fn took(&mut self, io: &mut Io<'_>, parcel: Parcel) {
         io.oracle.queued(io.now, io.life, parcel.number, self.settings.network.quota_bytes);
         self.in_hand = Some(parcel);
+    }
+
+    /// The router of an intruder lets its program write any priority, which no router that ships does.
+    fn accept_uncapped(&mut self, io: &mut Io<'_>, parcel: &Parcel) -> Accepted {
+        let package = Package { head: parcel.head, published_ns: parcel.published_ns, body: &parcel.body };
+        let (now_ns, (outbound, mut report)) = (io.now.monotonic_ns, self.queue(io));
+        let accepted = outbound.accept_capped(now_ns, &package, false, &mut report);
+        drop(report);
+        if let Accepted::Send { to, head } = &accepted
+            && self.hand_over(io, *to, &[&head[..], &parcel.body].concat()).is_err()
+        {
+            let (outbound, mut report) = self.queue(io);
+            outbound.unsent(head, &parcel.body, &mut report);
+        }
+        accepted
     }
 
     /// The queue, and what takes its reports of losses.

@@ -3,10 +3,8 @@
 //! `sim/slotted` calls this; without slots, `free` has another driver.
 
 use super::{PORT, Packages, address, checked};
-use crate::harm::harmful;
 use crate::sim::clock::Now;
 use crate::sim::host::TRANSIT_SLOTS;
-use crate::sim::package::Role;
 use crate::sim::station::{Io, Sent};
 use rohrpost_mailbox::{Head, Priority};
 use rohrpost_routers::driver::{Answer, NotSent};
@@ -50,11 +48,13 @@ impl Transit for Hands<'_, '_> {
         let Self { packages, io } = self;
         let parcel = packages.take_parcel(io)?;
         let head = parcel.head;
-        let does_harm = io.oracle.packages[parcel.number as usize].role == Role::Intruder;
-        let package = Package { head, published_ns: parcel.published_ns, body: &parcel.body };
-        let (now_ns, (outbound, mut report)) = (io.now.monotonic_ns, packages.queue(io));
-        let accepted = harmful(does_harm, || outbound.accept(now_ns, &package, false, &mut report));
-        drop(report);
+        let accepted = if io.is_intruders(&parcel) {
+            packages.accept_uncapped(io, &parcel)
+        } else {
+            let package = Package { head, published_ns: parcel.published_ns, body: &parcel.body };
+            let (now_ns, (outbound, mut report)) = (io.now.monotonic_ns, packages.queue(io));
+            outbound.accept(now_ns, &package, false, &mut report)
+        };
         packages.took(io, parcel);
         Some((head, accepted))
     }

@@ -1,6 +1,6 @@
 //! The parts of a plan, each drawn by chance: the configuration, nodes, links, traffic, faults.
 
-use super::{Calls, Flow, NodePlan, Plan, SYSTEM, Shape};
+use super::{CallPlan, Flow, NodePlan, Plan, SYSTEM, Shape};
 use crate::sim::chance::Chance;
 use crate::sim::fault::{Fault, Planned};
 use crate::sim::link::Quality;
@@ -64,7 +64,7 @@ impl Plan {
             // All commands of a module, so that they overtake each other nowhere.
             let hurries = (from.raw() ^ self.seed as u32).is_multiple_of(5);
             let priority = if hurries { u8::MAX } else { from.class().0 };
-            self.calls.push(Calls { node, from, to, period_ns, valid_for_ns, priority });
+            self.calls.push(CallPlan { node, from, to, period_ns, valid_for_ns, priority });
         }
     }
 

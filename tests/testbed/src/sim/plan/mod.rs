@@ -75,12 +75,12 @@ pub struct Flow {
 
 /// A module that calls a function of another, again and again.
 #[derive(Clone, Copy, Debug)]
-pub struct Calls {
+pub struct CallPlan {
     /// Node of the caller.
     pub node: usize,
     /// The module that calls.
     pub from: Name,
-    /// Whose function it is.
+    /// The module that it is a function of.
     pub to: Name,
     /// From one call to the next, ns.
     pub period_ns: u64,
@@ -101,21 +101,21 @@ pub struct Plan {
     pub nodes: Vec<NodePlan>,
     /// Of all links, unless a fault says otherwise; after the faults only its delay and jitter are left.
     pub quality: Quality,
-    /// Who may send when; none: everyone, as packages come.
+    /// Which node may send when; none: each one, as packages come.
     pub slots: Option<Slots>,
     /// The same in files that somebody has edited; the first is edition 1.
     pub edited: Vec<Slots>,
     /// Data.
     pub flows: Vec<Flow>,
     /// Commands.
-    pub calls: Vec<Calls>,
+    pub calls: Vec<CallPlan>,
     /// What goes wrong.
     pub faults: Vec<Planned>,
-    /// Who may be master of time, in order.
+    /// The nodes that may be master of time, in order.
     pub masters: Vec<NodeIndex>,
     /// Whether kernels stamp datagrams.
     pub has_stamps: bool,
-    /// Whether routers seal what they send. Then those who send what was recorded also alter it.
+    /// Whether routers seal what they send. Then replayed datagrams are altered, too.
     pub sealed: bool,
     /// Whether damaged datagrams are dropped by the kernel, as UDP's checksum has it; else the routers get them.
     pub checksum: bool,

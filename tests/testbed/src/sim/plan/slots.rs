@@ -17,7 +17,8 @@ use std::time::Duration;
 const CYCLE_NS_MAX: u64 = 20 * MS;
 /// A master is given so long at least to answer.
 const DEAF_NS: u64 = 200 * MS;
-/// Where datagrams are sealed, who joins needs so much longer: it hears some Syncs more, and hellos pass to and fro.
+/// Where datagrams are sealed, a joining node needs so much longer: it hears some Syncs more, and hellos pass to and
+/// fro.
 const SEALED_JOINS_NS: u64 = 400 * MS;
 /// Bytes of the largest datagram there may be, with all around it.
 const TIME_WIRE_BYTES: usize = TIME_BYTES + AROUND_BYTES;
@@ -77,11 +78,11 @@ impl Plan {
         plan
     }
 
-    /// When all must be well, and when it ends. Nobody is let off: the run goes on until who needs an epoch has had it,
-    /// and then all must be well.
+    /// When all must be well, and when it ends. Nobody is let off: the run goes on until each node that needs an epoch
+    /// has had it, and then all must be well.
     pub(in crate::sim) fn time_slots(&mut self) {
         self.time();
-        // Who joins hears some Syncs before it asks, and so long a master is given to answer.
+        // A joining node hears some Syncs before it asks, and so long a master is given to answer.
         let joins_ns = 2 * u64::from(JOINING_SYNCS) * self.shape.interval_ns + DEAF_NS;
         let joins_ns =
             joins_ns + if self.sealed { SEALED_JOINS_NS + SEALED_JOINS_CYCLES * self.shape.interval_ns } else { 0 };
@@ -91,7 +92,7 @@ impl Plan {
         self.end_ns = self.traffic_end_ns + DRAIN_NS;
     }
 
-    /// What seals takes its part of each slot; and who joins must get to know the others first.
+    /// What seals takes its part of each slot; and a joining node must begin its peer sessions first.
     pub(in crate::sim) fn seal_slots(&mut self) {
         let Some(slots) = &mut self.slots else { return };
         // As the table was made: over two links a frame of time is on its way for a quarter of the guard at most.

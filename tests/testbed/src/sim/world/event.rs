@@ -1,8 +1,7 @@
-//! What happens in a world, and in which order.
+//! What happens in a world.
 
 use crate::sim::station::{Arrived, Port};
 use rohrpost_mailbox::Name;
-use std::cmp::Ordering;
 
 /// What happens.
 pub(in crate::sim) enum Event {
@@ -21,7 +20,7 @@ pub(in crate::sim) enum Event {
     /// It is over.
     End { fault: usize },
     /// All faults are over.
-    Mended,
+    Fixed,
     /// The next package of a flow, or the next of its burst.
     Flow { flow: usize },
     /// The next call of a caller.
@@ -32,28 +31,4 @@ pub(in crate::sim) enum Event {
     Serve { node: usize, module: Name },
     /// All is looked at; clocks wander.
     SnapshotRequest,
-}
-
-/// An event in its place among all: by time, and at one moment in the order in which they were planned.
-pub(super) struct Entry {
-    pub(super) at_ns: u64,
-    pub(super) ticket: u64,
-    pub(super) event: Event,
-}
-
-impl PartialEq for Entry {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-impl Eq for Entry {}
-impl PartialOrd for Entry {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Entry {
-    fn cmp(&self, other: &Self) -> Ordering {
-        (self.at_ns, self.ticket).cmp(&(other.at_ns, other.ticket))
-    }
 }

@@ -13,6 +13,7 @@ pub(super) use event::Event;
 use super::calls::{Calls, NewGuard, Server};
 use super::chance::Chance;
 use super::clock::{Clock, Now};
+use super::events::Events;
 use super::host::DATA_MAILBOXES;
 use super::link::Link;
 use super::oracle::Oracle;
@@ -25,10 +26,8 @@ use super::times::Left;
 use super::times::Times;
 use super::trace::Trace;
 use super::wire::Wire;
-use event::Entry;
 use rohrpost_mailbox::{Name, local};
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// Makes the layers of a router that begins to live: node, which edition of the configuration it has, incarnation, its
@@ -40,8 +39,7 @@ pub struct World<'a> {
     /// What is to happen.
     pub plan: Rc<Plan>,
     pub(super) now_ns: u64,
-    events: BinaryHeap<Reverse<Entry>>,
-    ticket: u64,
+    events: Events<Event>,
     pub(super) chance: Chance,
     /// The computers.
     pub stations: Vec<Station>,
@@ -70,7 +68,7 @@ const LOOK_NS: u64 = 50 * MS;
 const OLD_MAX: usize = 64;
 
 impl<'a> World<'a> {
-    /// A network as planned. `layers` makes routers, `guard` those who let commands run.
+    /// A network as planned. `layers` makes routers, `guard` makes what lets commands run.
     pub fn new(plan: Rc<Plan>, guard: NewGuard, layers: NewLayers<'a>, trace: bool) -> Self {
         let mut chance = Chance::new(plan.seed ^ 0x5eed);
         let count = plan.nodes.len();
@@ -93,8 +91,7 @@ impl<'a> World<'a> {
         (oracle.wire, oracle.well_ns) = (Wire::new(count), plan.fixed_ns + RECOVERY_NS);
         let mut world = Self {
             now_ns: 0,
-            events: BinaryHeap::new(),
-            ticket: 0,
+            events: Events::default(),
             stations,
             links: vec![vec![Link::new(plan.quality); count]; count],
             servers,
@@ -122,7 +119,7 @@ impl<'a> World<'a> {
             self.at(its.from_ns, Event::Begin { fault });
             self.at(its.until_ns, Event::End { fault });
         }
-        self.at(plan.fixed_ns, Event::Mended);
+        self.at(plan.fixed_ns, Event::Fixed);
         for (flow, its) in plan.flows.iter().enumerate() {
             let later_ns = if plan.moment_of(its).is_some() { 0 } else { self.chance.below(its.period_ns) };
             let at_ns = plan.traffic_begin_ns + later_ns;
@@ -136,8 +133,7 @@ impl<'a> World<'a> {
     }
 
     pub(super) fn at(&mut self, at_ns: u64, event: Event) {
-        self.ticket += 1;
-        self.events.push(Reverse(Entry { at_ns, ticket: self.ticket, event }));
+        self.events.push(at_ns, event);
     }
 
     /// The clocks of a node.
@@ -147,12 +143,12 @@ impl<'a> World<'a> {
 
     /// Runs to the end, or to the first broken promise.
     pub fn run(&mut self) -> &[Problem] {
-        while let Some(Reverse(entry)) = self.events.pop() {
-            if entry.at_ns > self.plan.end_ns || !self.oracle.problems.is_empty() {
+        while let Some((at_ns, event)) = self.events.pop() {
+            if at_ns > self.plan.end_ns || !self.oracle.problems.is_empty() {
                 break;
             }
-            self.now_ns = entry.at_ns;
-            self.happen(entry.event);
+            self.now_ns = at_ns;
+            self.happen(event);
         }
         if self.oracle.problems.is_empty() {
             self.look();
@@ -192,7 +188,7 @@ impl<'a> World<'a> {
             Event::Start { node } => self.start(node),
             Event::Begin { fault } => self.begin(fault),
             Event::End { fault } => self.end(fault),
-            Event::Mended => self.fix(),
+            Event::Fixed => self.fix(),
             Event::Flow { flow } => self.flow(flow),
             Event::Call { caller } => self.call(caller),
             Event::Try { call } => self.try_call(call),

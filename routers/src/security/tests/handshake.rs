@@ -67,7 +67,8 @@ fn until_the_new_incarnation_has_answered_the_old_one_is_heard() {
 }
 
 /// All hellos that ever were, said again to a router that lives, begin nothing and end nothing.
-pub(super) fn check_only_a_living_incarnation_begins() {
+#[test]
+fn only_a_living_incarnation_begins() {
     let mut kept = Vec::new();
     let mut b = Router::new(1, 200);
     for incarnation in 0..40 {
@@ -86,11 +87,6 @@ pub(super) fn check_only_a_living_incarnation_begins() {
     assert_eq!((b.all.incarnation(0), b.all.challenge(0)), (Some(300), challenge));
     let still = a.seal(Port::Packages, 1, b"still here").unwrap();
     assert!(b.open(Port::Packages, &still).is_ok());
-}
-
-#[test]
-fn only_a_living_incarnation_begins() {
-    check_only_a_living_incarnation_begins();
 }
 
 #[test]
@@ -190,8 +186,8 @@ fn recorded_questions_cost_a_bounded_number_of_answers() {
     let question = a.ask(1);
     let mut answer_at = |now_ns| {
         let (mut datagram, mut room) = (question.clone(), [0; HELLO_DATAGRAM_BYTES]);
-        let Ok(Opened::Hello(head, greeting)) = b.opening[0].open(&mut datagram) else { panic!() };
-        b.handshake.receive(now_ns, &head, &greeting, &mut room).reply_bytes.is_some()
+        let Ok(Opened::Hello(head, hello)) = b.opening[0].open(&mut datagram) else { panic!() };
+        b.handshake.receive(now_ns, &head, &hello, &mut room).reply_bytes.is_some()
     };
     let mut answered_in = |from_ns: u64| (0..1000).filter(|later| answer_at(from_ns + later)).count();
     assert_eq!(answered_in(PER_NS), ANSWERS_MAX as usize);
@@ -223,8 +219,8 @@ fn nothing_is_sealed_to_an_incarnation_before_the_last_word_has_left() {
     let (mut a, mut b) = (Router::new(0, 100), Router::new(1, 200));
     let mut answer = b.greet(&a.ask(1)).unwrap().1.unwrap();
     let mut room = [0; HELLO_DATAGRAM_BYTES];
-    let Ok(Opened::Hello(head, greeting)) = a.opening[0].open(&mut answer) else { panic!() };
-    let greeted = a.handshake.receive(0, &head, &greeting, &mut room);
+    let Ok(Opened::Hello(head, hello)) = a.opening[0].open(&mut answer) else { panic!() };
+    let greeted = a.handshake.receive(0, &head, &hello, &mut room);
     assert!(greeted.begins && greeted.reply_bytes.is_some());
     assert_eq!((a.all.known(), a.seal(Port::Packages, 1, b"too early")), (0, Err(NoSession)));
     assert_eq!((a.handshake.begin(), a.all.known()), (Some(1), 0b10));

@@ -50,14 +50,14 @@ pub fn repeated_on_stall(watched: Watched, test: impl Fn() + RefUnwindSafe) {
         move || stalls.end()
     };
     match tried(test, begin, say) {
-        Outcome::Passed => {}
-        Outcome::Failed(panic) => resume_unwind(panic),
-        Outcome::Unknown => say("SKIPPED, not tested: what needs time slots, on a computer that has no time"),
+        TestOutcome::Passed => {}
+        TestOutcome::Failed(panic) => resume_unwind(panic),
+        TestOutcome::Unknown => say("SKIPPED, not tested: what needs time slots, on a computer that has no time"),
     }
 }
 
 /// Result of a test.
-enum Outcome {
+enum TestOutcome {
     Passed,
     /// With what it panicked at last.
     Failed(Box<dyn Any + Send>),
@@ -69,11 +69,11 @@ fn tried<End: FnOnce() -> WakeDelay>(
     test: impl Fn() + RefUnwindSafe,
     begin: impl Fn() -> End,
     tell: impl Fn(&str),
-) -> Outcome {
+) -> TestOutcome {
     let mut is_hopeless = true;
     for left in (0..TRIES).rev() {
         let end = begin();
-        let Err(panic) = catch_unwind(&test) else { return Outcome::Passed };
+        let Err(panic) = catch_unwind(&test) else { return TestOutcome::Passed };
         let seen = end();
         is_hopeless &= seen.has_no_time();
         if left == 0 && is_hopeless {
@@ -90,10 +90,10 @@ fn tried<End: FnOnce() -> WakeDelay>(
             words(panic.as_ref())
         ));
         if fails {
-            return Outcome::Failed(panic);
+            return TestOutcome::Failed(panic);
         }
     }
-    Outcome::Unknown
+    TestOutcome::Unknown
 }
 
 /// The first words of a panic.
@@ -209,9 +209,9 @@ mod tests {
             move || if is_test { seen } else { alone }
         };
         let outcome = match tried(test, begin, |_| {}) {
-            Outcome::Passed => Some(Ok(())),
-            Outcome::Failed(panic) => Some(Err(words(panic.as_ref()))),
-            Outcome::Unknown => None,
+            TestOutcome::Passed => Some(Ok(())),
+            TestOutcome::Failed(panic) => Some(Err(words(panic.as_ref()))),
+            TestOutcome::Unknown => None,
         };
         (outcome, times.load(Ordering::Relaxed))
     }

@@ -1,0 +1,28 @@
+//! Each mistake: what it does wrong, how the routers' sources change for it, and where it shows.
+
+mod carrying;
+mod lan;
+pub mod planted;
+mod session;
+mod slots;
+mod time;
+
+pub use planted::{Edit, Group};
+
+/// All mistakes.
+pub const GROUPS: &[Group] = &[
+    carrying::CARRYING,
+    lan::ADMISSION,
+    lan::CROWDED,
+    lan::FORGED,
+    lan::LAN,
+    session::SESSION,
+    slots::IN_SLOT,
+    slots::SLOTS,
+    slots::JOINING,
+    slots::UNPROVEN,
+    slots::UNSTEADY,
+    slots::TABLES,
+    time::TIME,
+    time::FOLLOWER,
+];

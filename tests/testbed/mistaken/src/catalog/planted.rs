@@ -1,0 +1,37 @@
+//! What a mistake of the catalogue consists of.
+
+/// A change of a source. `from` is there exactly once, so a mistake cannot rot unseen.
+pub struct Edit {
+    /// Below `routers/src`.
+    pub file: &'static str,
+    /// The source as it is.
+    pub from: &'static str,
+    /// The same with the mistake, if `broken!` says so.
+    pub to: &'static str,
+}
+
+pub(super) const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
+    Edit { file, from, to }
+}
+
+/// A mistake.
+pub struct Planted {
+    /// Its name, as in [`Mistake`](crate::mistakes::Mistake).
+    pub name: &'static str,
+    /// The core, and what it does wrong.
+    pub text: &'static str,
+    /// The routers' own test that fails with it.
+    pub shows_in: &'static str,
+    /// The changes.
+    pub edits: &'static [Edit],
+}
+
+/// Mistakes that show in networks of one kind.
+pub struct Group {
+    /// The name of its constant in [`Mistake`](crate::mistakes::Mistake).
+    pub name: &'static str,
+    /// What they have in common.
+    pub text: &'static str,
+    /// All of them.
+    pub mistakes: &'static [Planted],
+}
