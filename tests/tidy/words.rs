@@ -22,24 +22,12 @@ const QUOTES: &[&str] = &["tests/tidy/words.rs"];
 /// Files that quote lines of others, which may be wider there than where they come from.
 const WIDE: &str = "tests/testbed/mistaken/src/catalog/";
 
-/// A word or a width that is wrong, and where it stands.
-pub(crate) struct Mistake {
-    /// The folder whose count it belongs to: a member of the workspace, or a part of one.
-    pub(crate) folder: String,
-    /// File, line, and what would be right.
-    pub(crate) text: String,
-}
-
-/// What is wrong in a file.
-pub(crate) fn mistakes(root: &Path, file: &Path) -> Vec<Mistake> {
+/// What is wrong in a file: file, line, and what would be right.
+pub(crate) fn mistakes(root: &Path, file: &Path) -> Vec<String> {
     let name = file.strip_prefix(root).unwrap().to_str().unwrap();
-    let parts: Vec<&str> = name.split('/').collect();
-    let folder = parts[..parts.len().saturating_sub(1).min(2)].join("/");
     let text = std::fs::read_to_string(file).unwrap();
     let mut mistakes = Vec::new();
-    let mut found = |line: usize, what: String| {
-        mistakes.push(Mistake { folder: folder.clone(), text: format!("{name}:{}: {what}", line + 1) });
-    };
+    let mut found = |line: usize, what: String| mistakes.push(format!("{name}:{}: {what}", line + 1));
     for (index, line) in text.lines().enumerate() {
         let columns = line.chars().count();
         if columns > COLUMNS_MAX && !is_drawing(line) && !name.starts_with(WIDE) {
@@ -71,7 +59,7 @@ fn words_and_wide_lines_are_found_where_they_stand() {
     let wide = "/".repeat(COLUMNS_MAX + 1);
     std::fs::write(&file, format!("// a whole line\nfn only_who_lives() {{}}\n{wide}\n// Mends it.\n")).unwrap();
     let found: Vec<String> =
-        mistakes(folder.path(), &file).iter().map(|found| found.text.split(';').next().unwrap().to_owned()).collect();
+        mistakes(folder.path(), &file).iter().map(|found| found.split(';').next().unwrap().to_owned()).collect();
     assert_eq!(
         found,
         ["bad.rs:2: `who`: a thing is \"it\" or \"that\"", "bad.rs:3: 121 columns", "bad.rs:4: `mends`: fix"]

@@ -44,7 +44,13 @@ macro_rules! columns {
 
             const fn about(self) -> About {
                 match self {
-                    $(Self::$name => About { head: $head, text: $text, width: $width, rank: $rank, content: $content },)+
+                    $(Self::$name => About {
+                        head: $head,
+                        text: $text,
+                        width: $width,
+                        rank: $rank,
+                        content: $content,
+                    },)+
                 }
             }
         }

@@ -42,7 +42,7 @@ fn run_with(mistake: Mistake, plan: Plan) -> Outcome {
     with(mistake, || run(plan, guard, false))
 }
 
-/// The first seed whose network shows a mistake.
+/// The first seed with a network that shows a mistake.
 fn noticed(mistake: Mistake, plan: fn(u64) -> Plan, seeds: u64) -> Option<(u64, Promise)> {
     (0..seeds).find_map(|seed| {
         let outcome = run_with(mistake, plan(seed));

@@ -27,7 +27,7 @@ pub struct Slotted {
     packages: Packages,
     time: Ticking,
     driver: SlotDriver,
-    watch: Watch,
+    watch: WindowWatch,
     /// It does nothing before, ns of its monotonic clock: it sleeps or is busy.
     wake_ns: u64,
     /// When something is due for it, at the latest.
@@ -35,8 +35,8 @@ pub struct Slotted {
 }
 
 /// What is watched over windows.
-struct Watch {
-    /// Who sends may be off by half of the guard.
+struct WindowWatch {
+    /// A sender may be off by half of the guard.
     allowance_ns: u64,
     cycle_ns: u64,
     /// By what this node sends in the window, and how many datagrams were sent before.
@@ -53,7 +53,7 @@ struct Watch {
 struct Ground<'a, 'b> {
     packages: &'a mut Packages,
     time: &'a mut Ticking,
-    watch: &'a mut Watch,
+    watch: &'a mut WindowWatch,
     io: &'a mut Io<'b>,
 }
 
@@ -150,9 +150,9 @@ impl Ground<'_, '_> {
     fn made(&mut self) {
         self.packages.makes(self.io.now);
         self.io.works(MAKING_NS);
-        let is_mended = self.io.now.true_ns >= self.io.plan.fixed_ns;
+        let is_fixed = self.io.now.true_ns >= self.io.plan.fixed_ns;
         if let Some(slots) = &self.io.plan.slots {
-            let still_ns = slots.still_ns(is_mended, self.io.chance);
+            let still_ns = slots.still_ns(is_fixed, self.io.chance);
             self.io.works(still_ns);
         }
     }
@@ -231,7 +231,7 @@ impl Ground<'_, '_> {
         }
     }
 
-    /// Whoever sends is off the time of its master by half of the guard at most, whatever it says itself.
+    /// A sender is off the time of its master by half of the guard at most, whatever it states itself.
     fn off_the_master(&mut self, says: &Says) {
         let io = &mut *self.io;
         let Some(estimate) = says.estimate else { return };
@@ -248,7 +248,7 @@ impl Slotted {
     /// An incarnation that begins now, of these two.
     pub fn new(packages: Packages, time: Ticking, settings: &Settings, table: SlotTable, now: Now) -> Self {
         let (time, spin_ns) = (time.in_slots(&table), spin_ns(table.cycle_ns()));
-        let watch = Watch {
+        let watch = WindowWatch {
             allowance_ns: table.allowance_ns(),
             cycle_ns: table.cycle_ns(),
             window: (Says::default(), 0),
@@ -278,7 +278,7 @@ impl Slotted {
         };
     }
 
-    /// Whoever begins takes part in time.
+    /// A node that begins takes part in time.
     fn watch_joining(&mut self, io: &mut Io<'_>) {
         let Some(since_ns) = self.watch.joins_since_ns else { return };
         let took_ns = io.now.true_ns - since_ns;
@@ -327,9 +327,8 @@ impl Layer for Slotted {
         let off_ns = io.oracle.times.off_ns(io.now, io.node, (clock.digest(), clock.term()));
         let masters = clock.master().and_then(|master| io.oracle.times.page(io.now, master.into()));
         let is_of_later_epoch = masters.is_some_and(|page| page.epoch < clock.record().epoch);
-        // Who is further off than it may be says nothing, and slews for up to five seconds, or waits until a master
-        // begins an epoch, see
-        // [`EPOCH_PAUSE_NS`](super::spans::EPOCH_PAUSE_NS).
+        // A node that is further off than it may be says nothing, and slews for up to five seconds, or waits until a
+        // master begins an epoch, see [`EPOCH_PAUSE_NS`](super::spans::EPOCH_PAUSE_NS).
         let waits = is_of_later_epoch || off_ns.is_some_and(|off_ns| off_ns > self.watch.allowance_ns);
         if waits && io.now.true_ns < io.plan.stepped_ns {
             io.oracle.saw("waits for an epoch");
@@ -350,7 +349,7 @@ impl Layer for Slotted {
     }
 }
 
-/// Whoever goes by what it heard asks what time it is, or who lives; by what it overheard, who lives.
+/// By what a node heard it asks for the time, or which peers live; by what it overheard, which peers live.
 fn may_send(basis: Basis, sent: &Sent) -> bool {
     let Ok((head, _)) = FrameHead::read(&sent.bytes) else { return false };
     match basis {

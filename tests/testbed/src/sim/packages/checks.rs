@@ -90,7 +90,8 @@ impl Packages {
         }
     }
 
-    /// At the end all losses on the wire are known, but of who came so late that what is missing may still come.
+    /// At the end all losses on the wire are known, except those of a peer that was heard first so late that what is
+    /// missing may still come.
     pub(super) fn check_losses(&self, io: &mut Io<'_>) {
         let is_settled = |peer: &usize| io.now.monotonic_ns - self.present_since_ns[*peer] > SETTLED_NS;
         for peer in (0..io.plan.nodes.len()).filter(|peer| *peer != io.node).filter(is_settled) {

@@ -27,7 +27,7 @@ struct TimeFrame {
     came_ns: u64,
 }
 
-/// Whom a node hears of which it does not know whether it lives.
+/// A peer that a node hears, and of which it does not know whether it lives.
 pub(in crate::sim) struct UnverifiedPeer {
     pub(in crate::sim) estimate: TimeEstimate,
     pub(in crate::sim) term: Term,
@@ -169,7 +169,7 @@ impl TimeWatch {
         }
     }
 
-    /// No Sync leaves in the place of a master whose own of this cycle has come.
+    /// No Sync leaves in the place of a master if that one's Sync of this cycle has come.
     fn sends(&self, io: &mut Io<'_>, datagram: &[u8; TIME_BYTES]) {
         let Ok((head, rest)) = FrameHead::parse(datagram) else { return };
         if let Ok(TimeMessage::Sync(sync)) = TimeMessage::parse(head.kind, rest)
@@ -187,13 +187,13 @@ impl TimeWatch {
     }
 
     /// Whether all of the last frames that told the time were on their way for longer than `way_ns`, with what clocks
-    /// may have drifted since: who asks relies on one that was not.
+    /// may have drifted since: a node that asks relies on one that was not.
     pub(super) fn is_misled(&self, now: Now, way_ns: u64) -> bool {
         are_late(&self.told, now, way_ns)
     }
 
-    /// By what this node would say a hello that knows no time: whom it hears, by which term, and whether it [is
-    /// misled](Self::is_misled).
+    /// By what this node would say a hello without knowing the time: which peer it hears, by which term, and whether it
+    /// [is misled](Self::is_misled).
     pub(super) fn overheard(&self, clock: &Clock, now: Now, way_ns: u64) -> Option<UnverifiedPeer> {
         let (from, estimate) = clock.overheard(now.monotonic_ns)?;
         // Of several incarnations of a node it does not say by which: then any of them may mislead it.
