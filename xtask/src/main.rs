@@ -9,6 +9,7 @@ mod demo;
 mod failure;
 mod fuzz;
 mod picture;
+mod stages;
 mod tsan;
 mod venv;
 
@@ -19,7 +20,8 @@ cargo demo [--no-gui] [ARGS...]   the same as `cargo xtask demo`
 cargo xtask demo [--no-gui] [ARGS...]
     Builds `rohrpost` and, unless --no-gui is given, the GUI bridge; then runs `rohrpost demo ARGS...`.
 cargo xtask test
-    All tests: the workspace's, the GUI bridge's, and those that need Rerun's command line.
+    All tests: the workspace's, the GUI bridge's, and those that need Rerun's command line. Every stage runs, even if
+    one failed; a table of stages and their times comes last.
 cargo xtask ci
     Format, clippy for both builds, then all tests.
 cargo xtask fuzz [TARGET...] [--seconds N] | --short
@@ -35,8 +37,8 @@ fn main() -> ExitCode {
     let (command, rest) = args.split_first().map_or(("help", &[][..]), |(first, rest)| (first.as_str(), rest));
     let done = match command {
         "demo" => demo::run(rest),
-        "test" => checks::test(),
-        "ci" => checks::ci(),
+        "test" => Ok(checks::test()),
+        "ci" => Ok(checks::ci()),
         "fuzz" => fuzz::run(rest),
         "tsan" => tsan::run(),
         "picture" => picture::run(rest),
