@@ -100,16 +100,12 @@ fn ask<T: serde::de::DeserializeOwned>(launch: &mut Launch, module: Name, interf
     launch.tool().call(module, FIRST_FUNCTION, interface, |_| Ok(()), read).ok()
 }
 
-/// The summary: packages, losses and latencies by class, and their result; and
-/// whether all is well.
+/// The summary: the result, then packages, losses and latencies by class; and whether all is well.
 fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
     let survey = launch.survey()?;
-    let mut text = print_classes(launch.installation(), &survey.classes);
     let received = saturating_sum(survey.classes.iter().map(|class| class.received));
     let lost = saturating_sum(survey.classes.iter().map(ClassTraffic::lost_in_all));
-    text.push_str("(data and replies carry the class of the module that asked for them)\n");
-    text.push_str(&format!("\n{received} packages received, {lost} lost\n"));
-    let mut well = true;
+    let (mut text, mut well) = (format!("{received} packages received, {lost} lost\n"), true);
     if let Some(played) = progress(launch) {
         let Progress { scans, odometries, discarded, malformed, .. } = played;
         if played.finished && scans + odometries == 0 {
@@ -134,5 +130,8 @@ fn summary(launch: &mut Launch) -> Result<(String, bool), Failure> {
             text.push_str(&format!("{name} is in error: {}\n", status.error));
         }
     }
+    text.push('\n');
+    text.push_str(&print_classes(launch.installation(), &survey.classes));
+    text.push_str("(data and replies carry the class of the module that asked for them)\n");
     Ok((text, well))
 }
