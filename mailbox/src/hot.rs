@@ -94,8 +94,8 @@ impl Slots<'_> {
         self.hot.receiver.0.sleeping.store(0, Ordering::Relaxed);
     }
 
-    /// Has the line of the hints come here to be written, as it will be: looked at first, it would come twice. A
-    /// receiver that looks again and again keeps it, and nothing moves until a sender takes it.
+    /// Prefetches the hints' cache line for writing. A read first would fetch the line twice. A receiver that looks
+    /// again and again keeps it, and nothing moves until a sender takes it.
     pub(crate) fn expect_hints(&self) {
         prefetch_to_write(&raw const self.hot.ready);
     }

@@ -1,5 +1,5 @@
-//! Mailboxes that this process has mapped to send to them: each once. A router's, into which all goes that is for other
-//! nodes, would else be mapped for each mailbox there.
+//! Mailboxes that this process has mapped to send to them: each once. Without this table a process would map the
+//! router's mailbox once for each remote mailbox that it sends to.
 
 use crate::memory::{Mapping, Region, Use};
 use std::fs::File;

@@ -4,9 +4,9 @@ use crate::word::Claimant;
 
 /// Where a sender looks for a free slot first.
 ///
-/// As long as the receiver keeps up, in few slots by turns: their lines are still in the caches of both, and the next
-/// can be fetched while the receiver reads the last. When these are in use, onwards through all, so that a long queue
-/// is not searched for each package anew.
+/// While the receiver keeps up, the sender rotates through a few slots: their cache lines stay in both caches, and the
+/// next can be fetched while the receiver reads the last. When these are in use, the search goes on through all slots
+/// from the last position, so a long queue is not searched again for each package.
 pub(crate) struct Place {
     /// The slot that the next search begins with, if it is not for the home.
     cursor: usize,

@@ -22,7 +22,7 @@ const HEAD_BYTES: usize = 24;
 const RANGE_BYTES: usize = 8;
 
 const FILE: &str = "routes";
-/// Of the same form: for names that the other leads nowhere.
+/// The same format, for names that `routes` does not contain.
 const BEYOND: &str = "routes.beyond";
 
 impl Node {

@@ -415,8 +415,9 @@ impl<'a> Slots<'a> {
         }
     }
 
-    /// Of a mailbox given up: tells `lost` the victims of the senders that still fill, since they could only count them
-    /// here, where nobody looks any more. They find their claim changed, and go on as after any other retirement.
+    /// For a retired mailbox: passes to `lost` the packages displaced by claims that are still filling. Their senders
+    /// could count them only in this mailbox, which nobody reads any more. They find their claim changed, and go on as
+    /// after any other retirement.
     pub(crate) fn settle(&self, mut lost: impl FnMut(Victim)) {
         for slot in 0..self.count {
             let word = self.load(slot);

@@ -173,8 +173,8 @@ pub(crate) struct TimePage {
     index: SeqLatch,
     writer_pid: AtomicU32,
     padding: AtomicU32,
-    /// As [`Watched`] has them; 0: nothing was seen. Of a writer that died meanwhile they do not fit together, which
-    /// its next incarnation takes for a clock that is not to be believed.
+    /// The fields of [`Watched`]; 0: none. If a writer dies while it writes them, they are inconsistent, and its next
+    /// incarnation treats the clock as not steady.
     watched: [AtomicU64; 6],
     records: [SharedRecord; 2],
 }

@@ -152,8 +152,7 @@ pub struct TimeReport {
     pub epoch: u64,
     /// How far off it is at most, ns.
     pub error_ns: u64,
-    /// Where it comes from: `local`, `master`, `simulation`, `log`. Of several nodes, those have one clock that have
-    /// the master's.
+    /// Where it comes from: `local`, `master`, `simulation`, `log`. Only nodes with source `master` share one clock.
     pub source: String,
 }
 

@@ -5,8 +5,8 @@
 //!  │ own places of each named principal │ open places: for all others, and for what the named hold beyond their own │
 //! ```
 //!
-//! Of the open places a principal gets another one only while it holds fewer of them than are free. So n principals
-//! that take all they can hold one part of n + 1 each, and as many places are free for the next one.
+//! A principal gets another open place only while it holds fewer open places than are free. So n greedy principals hold
+//! 1/(n+1) of them each, and 1/(n+1) stays free.
 
 use rohrpost_config::Principal;
 

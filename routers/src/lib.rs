@@ -9,8 +9,8 @@
 //! In time slots (`tdma`) a node sends all of this in its own windows only.
 //!
 //! Cores have no socket, thread or clock: time comes as an argument, datagrams as bytes. The same code runs with real
-//! sockets (`shell`, `tcp`) and in a simulation of whole networks (`tests/testbed`), with time slots up to the thread's
-//! own loop (`driver`).
+//! sockets (`shell`, `tcp`) and in a simulation of whole networks (`tests/testbed`), up to what the threads decide
+//! (`driver`).
 //!
 //! # Reading order
 //!
@@ -18,7 +18,7 @@
 //!    `admission`: what may enter. `security`: seals, challenge and response, before `inbound`.
 //! 2. `time`: master, follower, election. `tdma`: the scheduler of time slots.
 //! 3. `session`, `tcp`: clients and server beyond the LAN. `shell`: threads and sockets of the LAN.
-//! 4. `driver`: what the thread of the time slots does, over its clock, mailbox and wire.
+//! 4. `driver`: what the threads that send, receive and keep time do, over clock, mailbox and wire.
 //! 5. `stats`, `flows`, `report`: what is counted and reported. `impair`, `lab`: a bad network, nodes in namespaces.
 //!
 //! # Invariants

@@ -1,7 +1,7 @@
 //! Calls: a command with an envelope, its reply, and what may go wrong between.
 //!
-//! `envelope` is the bytes, `once` decides on the server's side whether a command runs, `link` is the caller's side,
-//! `tally` counts what came of its calls.
+//! `envelope` is the bytes, `deduplicator` decides on the server's side whether a command runs, `link` is the caller's
+//! side, `tally` counts what came of its calls.
 
 mod absent;
 mod deduplicator;

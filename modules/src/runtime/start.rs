@@ -36,8 +36,8 @@ pub(crate) mod environment {
     pub(crate) const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
 }
 
-/// What launch keeps for all processes of this module, one after the other, in its order. To be asked for once. Nothing
-/// of a module for which it keeps nothing, and of one that was started by hand.
+/// Descriptors that launch keeps across restarts of this module, in launch's order. Call this once. Empty if launch
+/// keeps none, or the module was started by hand.
 pub fn kept() -> Vec<OwnedFd> {
     sys::handed_on()
 }

@@ -32,8 +32,7 @@ pub enum LookFailure {
     Silent(Duration),
 }
 
-/// A look at another node, under way. SnapshotRequest after it with [`Distant::poll`]; give it up with
-/// [`Distant::forget`].
+/// A snapshot request to another node. Call [`Distant::poll`] until it is complete; cancel it with [`Distant::forget`].
 pub struct Distant {
     launcher: Name,
     what: SnapshotRequest,

@@ -41,8 +41,8 @@ impl AnswerQueue {
         }
     }
 
-    /// From an address that no node has comes the time of another configuration. That is refused once in a while; where
-    /// all is sealed, a refusal could not be believed.
+    /// Refuses time of another configuration from an address that is no node's, once in a while. With sealing nothing
+    /// is sent: the sender could not trust the refusal.
     pub(super) fn refuse(&mut self, now_ns: u64, to: IpAddr) {
         if self.refusal.is_none() && self.hellos.is_none() && self.refused_ns + REFUSE_EVERY_NS <= now_ns {
             self.refused_ns = now_ns;

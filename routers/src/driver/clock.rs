@@ -10,7 +10,9 @@
 //! sends in windows.
 
 use super::cpu_budget::CpuBudget;
-use super::time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeSource};
+use super::time_platform::{
+    TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeSource,
+};
 use crate::frame::{BadFrame, FrameHead, NodeIndex};
 use crate::security::{NotOpened, Opened, Opening, PeerSessions, Port, Rejection, Sealing, Tally};
 use crate::time::{Clock, InSlots, Looked, SentId, Stamp, Step, TIME_BYTES, TimeSettings, Unsteady};
@@ -76,8 +78,8 @@ struct Seals {
 }
 
 impl ClockDriver {
-    /// Of a router that begins, and why its clock is not one to measure by, if that was not known before. What an
-    /// earlier incarnation wrote in the node's page goes on.
+    /// Makes the driver of a starting router. Also returns why its clock is not steady, if the page did not say so
+    /// already. Continues the page of the earlier incarnation.
     pub fn new(settings: TimeSettings, addresses: Box<[IpAddr]>, start: TimeStart) -> (Self, Option<Unsteady>) {
         let TimeStart { looked, monotonic_ns, realtime_ns, page, watched } = start;
         let (system, now_ns) = (settings.system, looked.local_ns);
@@ -166,8 +168,11 @@ impl ClockDriver {
         }
         let mut datagram = [0; TIME_DATAGRAM_BYTES];
         for _ in 0..most {
-            let Some(came) = on.receive(&mut datagram) else { break };
-            self.hear(on, &came, &mut datagram[..came.bytes]);
+            match on.receive(&mut datagram) {
+                TimeInput::Datagram(came) => self.hear(on, &came, &mut datagram[..came.bytes]),
+                TimeInput::Kept => {}
+                TimeInput::Nothing => break,
+            }
         }
     }
 

@@ -24,8 +24,8 @@ pub trait Inlet {
     fn outlet(&mut self) -> &mut Self::Outlet;
     /// How important the first package is; none: there is none.
     fn first(&mut self) -> Option<Priority>;
-    /// Lends out the most important package, with whether it is alone in the mailbox. None: there is none.
-    fn take<T>(&mut self, what: impl FnOnce(&mut Self::Outlet, &Package<'_>, bool) -> T) -> Option<T>;
+    /// Lends out the most important package, with what looks whether it is alone in the mailbox. None: there is none.
+    fn take<T>(&mut self, what: impl FnOnce(&mut Self::Outlet, &Package<'_>, &dyn Fn() -> bool) -> T) -> Option<T>;
 }
 
 /// An outlet beside which there may be another, for what is not real time.
@@ -108,7 +108,7 @@ pub struct FreeDriver {
 }
 
 impl FreeDriver {
-    /// Of a router that begins.
+    /// Makes the driver of a starting router.
     pub fn new(settings: &Arc<Settings>) -> Self {
         Self { settings: settings.clone(), transmitter: Transmitter::new(settings), polled_ns: 0 }
     }
@@ -164,7 +164,7 @@ impl FreeDriver {
             let accepts = on.take(|outlet, package, is_alone| {
                 let is_rest = settings.is_rest(&package.head) && give_to_rest(outlet, package);
                 if !is_rest {
-                    transmitter.accept(outlet, package, taken == 0 && is_alone);
+                    transmitter.accept(outlet, package, taken == 0 && is_alone());
                 }
                 !is_rest
             });

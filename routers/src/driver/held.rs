@@ -22,8 +22,8 @@ impl HeldDatagram {
     }
 }
 
-/// Whether a datagram of this router carries more than what is not real time. What is most important stands first in
-/// it. Where it is to be sealed, it has no check yet.
+/// Whether a datagram of this router carries real-time packages or a router message. What is most important stands
+/// first in it. Where it is to be sealed, it has no check yet.
 pub(super) fn is_real_time(datagram: &[u8], network: &Network) -> bool {
     let Some((kind, _, rest)) = kind_of_own(datagram) else { return false };
     let head = match kind {

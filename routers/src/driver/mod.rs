@@ -36,5 +36,5 @@ pub use platform::{NotSent, Platform, SlotEvent};
 pub use rest::{RestDriver, RestInlet, RestStep};
 pub use rx::{RxDriver, RxPlatform};
 pub use slots::{SlotDriver, SlotStep};
-pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeSource};
+pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeSource};
 pub use timing::spin_ns;

@@ -46,7 +46,7 @@ pub struct RestDriver {
 }
 
 impl RestDriver {
-    /// Of a router that begins.
+    /// Makes the driver of a starting router.
     pub fn new(settings: &Settings) -> Self {
         Self { transmitter: Transmitter::new(settings) }
     }

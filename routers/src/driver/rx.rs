@@ -32,7 +32,7 @@ pub struct RxDriver {
 }
 
 impl RxDriver {
-    /// Of a router that begins, with its gate where datagrams are sealed.
+    /// Makes the driver of a starting router, with its gate where datagrams are sealed.
     pub fn new(settings: &Settings, stats: &Arc<Stats>, gate: Option<Gate>) -> Self {
         let (inbound, stats) = (Inbound::new(settings, stats.clone()), stats.clone());
         Self { inbound, stats, gate, in_slots: settings.tdma.is_some(), is_rest: false, is_new: true }

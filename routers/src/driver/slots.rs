@@ -86,7 +86,7 @@ struct First {
 }
 
 impl SlotDriver {
-    /// Of a router that begins at `now_ns`, with its sessions where datagrams are sealed.
+    /// Makes the driver of a router that starts at `now_ns`, with its sessions where datagrams are sealed.
     pub fn new(
         settings: &Arc<Settings>,
         peer_sessions: Option<&Arc<PeerSessions>>,

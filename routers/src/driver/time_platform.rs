@@ -21,6 +21,17 @@ pub struct TimeArrival {
     pub stamp: Stamp,
 }
 
+/// What came of a look at the socket.
+#[derive(Clone, Copy, Debug)]
+pub enum TimeInput {
+    /// A datagram.
+    Datagram(TimeArrival),
+    /// A datagram that an impairment keeps for now.
+    Kept,
+    /// Nothing.
+    Nothing,
+}
+
 /// What a clock counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct TimeCounts {
@@ -42,8 +53,8 @@ pub trait TimePlatform {
     fn looked(&self) -> Looked;
     /// The next datagram that left, and when.
     fn next_left(&mut self) -> Option<(SentId, Stamp)>;
-    /// The next datagram that came.
-    fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> Option<TimeArrival>;
+    /// The next datagram that came. Reads the socket once at most: the driver bounds how often.
+    fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> TimeInput;
     /// When an impairment has more, local ns.
     fn held_ns(&self) -> u64 {
         u64::MAX

@@ -157,8 +157,8 @@ impl Gate {
         }
     }
 
-    /// Lets the incarnation begin that what was taken last has shown to live; whether one does. To be done when the
-    /// reply has left.
+    /// Starts the session with the incarnation that the last hello proved alive; returns whether there is one. Call it
+    /// after the reply has left.
     pub fn begin(&mut self, now_ns: u64) -> bool {
         let began = self.handshake.as_mut().and_then(Handshake::begin);
         if let Some(peer) = began {

@@ -8,8 +8,8 @@ use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use std::sync::Arc;
 
-/// Challenges of one peer that are answered in [`PER_NS`], at most: replayed ones must not cost much. Of more than half
-/// as many, a random share is.
+/// Challenges of one peer answered in [`PER_NS`], at most: replays must stay cheap. If more than half this many came in
+/// the period before, a random share is answered.
 pub const ANSWERS_MAX: u32 = 10;
 /// See [`ANSWERS_MAX`].
 pub const PER_NS: u64 = 100_000_000;
@@ -120,8 +120,9 @@ impl Handshake {
         HelloOutcome { proves, begins, reply_bytes: may.then(|| self.all.hello(peer, key, reply, datagram)) }
     }
 
-    /// Lets the incarnation begin that has shown that it lives, if one has; of which peer. The reply was handed to the
-    /// network before: it says from which sequence on we are to be heard, and what left before it would not be taken.
+    /// Starts the session with the incarnation that proved that it lives, if there is one, and returns its peer. The
+    /// reply was handed to the network before: it says from which sequence on we are to be heard, and what left before
+    /// it would not be taken.
     pub fn begin(&mut self) -> Option<NodeIndex> {
         let (peer, session) = self.begins.take()?;
         self.all.begin(peer, session);

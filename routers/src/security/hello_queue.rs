@@ -39,8 +39,8 @@ impl HelloQueue {
         Self { peers: vec![PeerHellos::default(); all.router.nodes.into()].into(), all: all.clone(), next: 0 }
     }
 
-    /// A hello that is to leave. It takes the place of the one before; but a reply by which an incarnation begins gives
-    /// way to another of that sort alone.
+    /// A hello that is to leave. It replaces the waiting hello. A reply that starts a session is replaced only by
+    /// another such reply.
     ///
     /// # Panics
     /// If the datagram is shorter than a hello.

@@ -18,7 +18,7 @@
 //! incarnation will be heard, so nothing that an incarnation had sent before is taken either.
 //!
 //! ```text
-//!  arrivals:   Gate: Opening (packages), Handshake ───── PeerSessions ──────▶ tx_thread: Sealing (packages)
+//!  rx_thread:  Gate: Opening (packages), Handshake ───── PeerSessions ──────▶ tx_thread: Sealing (packages)
 //!                                                                        └────▶ clock:     Sealing, Opening (time)
 //! ```
 //!

@@ -182,8 +182,7 @@ impl Opening {
         all.is_peer(head.from) && head.to == all.router.own && head.system == all.router.system
     }
 
-    /// From which sequence on the incarnation of a peer is heard that was opened last; what is missing from there on is
-    /// lost.
+    /// First sequence that counts for the peer's last opened incarnation; missing sequences from there on are lost.
     pub(super) fn first(&self, peer: NodeIndex) -> u64 {
         self.peers[usize::from(peer)].made.as_ref().and_then(|heard| heard.first).unwrap_or(0)
     }
@@ -229,9 +228,8 @@ impl Opening {
     }
 }
 
-/// From which sequence on an incarnation is heard that becomes the present one, and has it stand first among those that
-/// are remembered. Of an incarnation that is forgotten again and again nothing is opened twice as long as no more than
-/// [`PAST`] routers of one node live at once.
+/// Moves an incarnation that becomes the present one to the front of the remembered ones, and returns its first
+/// acceptable sequence. Nothing is opened twice as long as at most [`PAST`] routers of one node live at once.
 fn remembered(past: &mut [Past; PAST], incarnation: u64) -> u64 {
     let at = past.iter().position(|past| past.incarnation == incarnation);
     past[..=at.unwrap_or(PAST - 1)].rotate_right(1);

@@ -225,9 +225,9 @@ impl PeerSessions {
         next.store(sequence + 1, Ordering::Relaxed);
     }
 
-    /// Key between two incarnations. Time is sealed to the node instead: a node that joins time slots must hear it
-    /// before anybody knows that it lives, and takes nothing for proven that was said before the hello by which the
-    /// other's incarnation began.
+    /// Key between two incarnations. Time is sealed to the node instead, since a joining node must read it before it is
+    /// authenticated. The joining node treats as unverified all time sent before the hello that started the peer's
+    /// session.
     pub(super) fn binding(&self, port: Port, from: Endpoint, to: Endpoint) -> Binding {
         let to = if port == Port::Time { Endpoint::any(to.node) } else { to };
         Binding { purpose: port.purpose(), system: self.router.system, from, to }

@@ -78,7 +78,7 @@ pub struct SessionClassCounts {
     pub packages: Count,
     /// Of these, handed to the next connection; at a client, delivered.
     pub passed: Count,
-    /// Of these, such of which only the newest counts, and a newer one came while they waited.
+    /// Packages of newest-only data that a newer one replaced while they waited.
     pub replaced: Count,
     lost: [Count; Cause::ALL.len()],
 }

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!  a node, a laptop, a foreign program                the server                            another client
-//!  packages ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ Table: which host? ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ mailboxes
+//!  packages ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ RoutingTable: host? ─▶ Outgoing ═ bytes ═▶ Splitter ─▶ mailboxes
 //!               └── Client: reconnects, registers, asks the time          └── of each client, bounded, by priority
 //! ```
 //!

@@ -34,10 +34,10 @@ impl Inlet for TransitInlet {
         self.transit.waits().1
     }
 
-    fn take<T>(&mut self, what: impl FnOnce(&mut Sending, &Package<'_>, bool) -> T) -> Option<T> {
+    fn take<T>(&mut self, what: impl FnOnce(&mut Sending, &Package<'_>, &dyn Fn() -> bool) -> T) -> Option<T> {
         let waiting = self.transit.try_receive()?;
         let package = Package { head: *waiting.head(), published_ns: waiting.published_ns(), body: waiting.body() };
-        Some(what(&mut self.sending, &package, !waiting.is_followed()))
+        Some(what(&mut self.sending, &package, &|| !waiting.is_followed()))
     }
 }
 

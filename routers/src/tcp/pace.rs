@@ -5,14 +5,13 @@
 //!  full ──── bytes that were taken meanwhile ──── full again          bytes / time = rate, if always wanted
 //! ```
 //!
-//! As long as nothing is known little is held at a time; a connection that takes much more than that and is never full
-//! is fast.
+//! While the rate is unknown, the limit is small. A connection that takes much more and never fills up counts as fast.
 
 use crate::session::BATCH_BYTES;
 
 /// Limits what the kernel has not sent yet: what leaves in this time.
 const UNSENT_NS: u64 = 250_000_000;
-/// The same and what is under way to the other end: what leaves in so long, or in two round trips. With less than one
+/// Limits unsent and unacknowledged bytes together: what leaves in this time or in two round trips. With less than one
 /// round trip the limit itself would slow the connection down, more and more; two let it grow.
 const HELD_NS: u64 = 1_000_000_000;
 const UNSENT_BYTES_MIN: u64 = 4 * 1024;
@@ -89,7 +88,7 @@ impl ConnectionPace {
         self.round_trip_ns = self.round_trip_ns.into_iter().chain(took_ns).min();
     }
 
-    /// So many bytes were taken, and whether that was all there was. What is to be held from now on, if that changes.
+    /// Records that the kernel took `bytes`, and whether those were all. Returns the new limits if they change.
     pub(super) fn wrote(&mut self, bytes: usize, is_all: bool, now_ns: impl FnOnce() -> u64) -> Option<Holding> {
         self.taken += bytes as u64;
         if !is_all {

@@ -285,7 +285,7 @@ impl Sealed {
         if taken == 0 { Err(io::ErrorKind::WouldBlock.into()) } else { Ok(taken) }
     }
 
-    /// Opens what the socket has. Of records that carry nothing TLS bears but a few, so that this ends.
+    /// Decrypts what the socket has. The loop ends, since TLS accepts only a few empty records.
     pub(super) fn read(&mut self, into: &mut [u8], socket: &mut (impl io::Read + io::Write)) -> io::Result<usize> {
         loop {
             match io::Read::read(&mut self.0.reader(), into) {

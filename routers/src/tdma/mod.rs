@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  Clock ─ system time, its bound ─▶ SlotScheduler ─ next ──▶ a window, in local time: when to wake and call ─▶ driver
-//!  Table ─ windows in system time ─▶     │      ◀─ validate ── it is awake: now                        sleeps, spins
+//!  SlotTable ─ windows in system time ─▶ │      ◀─ validate ── it is awake: now                        sleeps, spins
 //!                                        └────── TransmitWindow ─▶ datagrams, while the wire is free before the guard
 //! ```
 //!

@@ -121,8 +121,10 @@ impl ClockModel {
         let slew_ppb = i128::from(by_ns) * BILLION / i128::from(within_ns.max(1));
         let slew_ppb = slew_ppb.clamp(-i128::from(SLEW_MAX_PPB), i128::from(SLEW_MAX_PPB)) as i64;
         let slewed_ppb = pace_ppb.saturating_add_signed(slew_ppb);
-        // The pace, which may be that of an earlier slew, changes a lead late; the slew may end one late.
-        let late_ppb = u128::from(self.record.pace_ppb.abs_diff(slewed_ppb)) + u128::from(slew_ppb.unsigned_abs());
+        // A pace, which may be that of an earlier slew, becomes slower a lead late: at the beginning or at the end.
+        let (begin_ppb, end_ppb) =
+            (self.record.pace_ppb.saturating_sub(slewed_ppb), slewed_ppb.saturating_sub(pace_ppb));
+        let late_ppb = u128::from(begin_ppb) + u128::from(end_ppb);
         let overshoot_ns = (late_ppb * u128::from(SLOWER_LEAD_NS)).div_ceil(BILLION as u128) as u64;
         let error_ns = error_ns.saturating_add(overshoot_ns).saturating_add(ROUNDING_NS);
         self.turn(now_ns, now_ns, slewed_ppb);

@@ -2,8 +2,8 @@
 //!
 //! A virtual machine loses its processors to others for a tenth of a second now and then; then slots are left out,
 //! masters are replaced, packages become too old, and all of that is right. So a test fails here if it fails on a
-//! computer that ran meanwhile, or if it fails whenever it is tried. What a thread that only wants to wake up misses of
-//! the time is the measure.
+//! computer that ran meanwhile, or if it fails whenever it is tried. The measure is the share of time by which a thread
+//! that only sleeps and wakes up is late.
 
 use nix::sched::{CpuSet, sched_setaffinity};
 use nix::unistd::Pid;
@@ -26,7 +26,8 @@ const TAKEN_MAX: f64 = 0.05;
 const HOPELESS: f64 = 0.25;
 /// A test that fails this often in a row is wrong.
 const TRIES: usize = 5;
-/// After the last, so long is looked whether it is the computer that has no time, or the test that takes it.
+/// After the last try the detector measures for this long without the test: it tells a busy computer from a test that
+/// takes the time itself.
 const ALONE: Duration = Duration::from_secs(1);
 
 /// Threads with a watched processor time.

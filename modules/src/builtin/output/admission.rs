@@ -1,5 +1,5 @@
-//! Which lines are taken: those said in the sender's own name, as many as its share, and of what they say of time and
-//! losses what can be. Knows no clock and no mailbox.
+//! Admits lines sent in the sender's own name, up to its share, and corrects impossible times and loss counts. Knows no
+//! clock and no mailbox.
 
 use crate::interfaces::RefusedLines;
 use crate::output::{Bucket, LANES, OutputLine, WAITING_LINES, cut, iso};

@@ -1,4 +1,4 @@
-//! Each part of the incoming half; those that a broken variant must fail are in `CHECKS`.
+//! Each part of the incoming half.
 
 mod incarnations;
 mod names;

@@ -233,8 +233,8 @@ impl Server {
         self.present().map(|(_, member)| member.outgoing.waiting()).sum()
     }
 
-    /// A client has proven, before its hello, of which system it is, and what people call it: it may say no other in
-    /// its hello, and all that shows the same is one principal. `rights`: which names of that system it may host.
+    /// Records the system and name in a client's certificate, before its hello. The hello must name the same; clients
+    /// with the same certificate name are one principal. `rights`: which names of that system it may host.
     pub fn certify(&mut self, client: ClientIndex, system: u8, name: &str, rights: Rights) {
         if let Some(member) = self.member_mut(client) {
             name.clone_into(&mut member.name);

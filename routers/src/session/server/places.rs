@@ -136,7 +136,7 @@ impl Server {
         true
     }
 
-    /// The newest client of the principal that has most, if a further one of another's still leaves that with fewer.
+    /// The newest client of the principal with most clients, if that principal has at least two more than `owner`.
     fn gives_way_to(&mut self, owner: &Principal) -> Option<ClientIndex> {
         let members = &self.places.principals.members;
         let own = self.places.principals.id_of(owner).map_or(0, |id| members.count_of(&id));

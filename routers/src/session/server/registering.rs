@@ -2,7 +2,7 @@
 //! leaves the others their time.
 //!
 //! ```text
-//!  register ─┬─ its turn, and work is left for it ───▶ Table ─▶ verdict
+//!  register ─┬─ its turn, and work is left for it ───▶ RoutingTable ─▶ verdict
 //!            └─ else it waits; a later one takes its place ──▲ at each look, in turn
 //! ```
 
@@ -85,8 +85,8 @@ impl Server {
         self.work_of(client, ranges) <= self.registering.left.min(left)
     }
 
-    /// A holder of names that gives way: both say that they are nodes of the file, and the other alone comes from where
-    /// the file says it is.
+    /// The present holder, if it loses its names: the new client connects from the address in the file; the holder has
+    /// neither that address nor a certificate.
     fn impostor(&self, client: ClientIndex, holder: ClientIndex) -> Option<ClientIndex> {
         let is_known = |index| self.member(index).is_some_and(|member| member.certified.is_some() || member.is_at_home);
         let comes_home = self.member(client).is_some_and(|member| member.is_at_home);

@@ -6,7 +6,7 @@ use super::socket::{ReceivedDatagram, TimeSocket};
 use super::state::{ClockSnapshot, ClockState};
 use super::{ClockError, ClockParts};
 use crate::driver::{
-    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeStart,
+    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeStart,
 };
 use crate::frame::NodeIndex;
 use crate::impair::{Impairment, ImpairmentStep};
@@ -166,21 +166,22 @@ impl TimePlatform for TimeSystem {
         }
     }
 
-    fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> Option<TimeArrival> {
-        loop {
-            let came = self.socket.receive(datagram).map(|ReceivedDatagram { bytes, source, realtime_ns }| {
-                let now_ns = self.local.now_ns();
-                let stamp = realtime_ns.and_then(|ns| self.local.stamp(ns)).unwrap_or(Stamp::by_us(now_ns));
-                (now_ns, TimeArrival { bytes, source, stamp })
-            });
-            let Some(impairment) = &mut self.impairment else { return Some(came?.1) };
-            if let Some((since_ns, TimeArrival { bytes, source, stamp })) = came {
-                impairment.push(since_ns, DelayedArrival { source, stamp, since_ns }, &datagram[..bytes]);
-            }
-            if let Some(held) = self.take_held(datagram) {
-                return Some(held);
-            }
-            came?;
+    fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> TimeInput {
+        let came = self.socket.receive(datagram).map(|ReceivedDatagram { bytes, source, realtime_ns }| {
+            let now_ns = self.local.now_ns();
+            let stamp = realtime_ns.and_then(|ns| self.local.stamp(ns)).unwrap_or(Stamp::by_us(now_ns));
+            (now_ns, TimeArrival { bytes, source, stamp })
+        });
+        let Some(impairment) = &mut self.impairment else {
+            return came.map_or(TimeInput::Nothing, |(_, came)| TimeInput::Datagram(came));
+        };
+        if let Some((since_ns, TimeArrival { bytes, source, stamp })) = came {
+            impairment.push(since_ns, DelayedArrival { source, stamp, since_ns }, &datagram[..bytes]);
+        }
+        match self.take_held(datagram) {
+            Some(held) => TimeInput::Datagram(held),
+            None if came.is_some() => TimeInput::Kept,
+            None => TimeInput::Nothing,
         }
     }
 

@@ -32,8 +32,8 @@ pub enum Parts {
     Cut(usize, usize),
     /// The nodes of which the bit is set from all others.
     Split(u64),
-    /// This one from all others, which hear nothing of it meanwhile: it stands still, or has not begun. Only of those
-    /// that go by other configurations: all others know its slots.
+    /// This node from all others, while it is stalled or has not started. It counts only for nodes with another
+    /// configuration; nodes with the same one know its slots.
     Still(usize),
 }
 
@@ -63,8 +63,8 @@ impl Parts {
 pub struct Divisions {
     all: Vec<Division>,
     cycle_ns: u64,
-    /// A node that is divided from another that began anew meanwhile must ask it before it goes by its time: where
-    /// slots are rare, that takes so much longer, ns.
+    /// Extra time, ns, that a node needs with rare slots: it must ask a peer that restarted during the division before
+    /// it follows that peer's time.
     pub(super) asks_ns: u64,
 }
 

@@ -91,8 +91,8 @@ impl Plan {
         }
     }
 
-    /// So long a router needs at most from its beginning until it sends, however rare the slots are: see the oracle,
-    /// Security.
+    /// Longest time from a router's start to its first datagram, however rare its slots are: see
+    /// `docs/src/security.md`.
     fn joins_ns(&self) -> u64 {
         let Some(slots) = &self.slots else { return 0 };
         let rarest = slots.table.slots.iter().map(|slot| slot.period).max().unwrap_or(1).max(4);

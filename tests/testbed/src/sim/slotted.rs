@@ -39,7 +39,7 @@ struct WindowWatch {
     /// A sender may be off by half of the guard.
     allowance_ns: u64,
     cycle_ns: u64,
-    /// By what this node sends in the window, and how many datagrams were sent before.
+    /// The time basis on which this node sends in the window, and the number of datagrams sent before it.
     window: (Says, usize),
     /// When the window began in which it last said a hello by what it had overheard, local ns.
     asked_ns: Option<u64>,
@@ -187,12 +187,12 @@ impl Ground<'_, '_> {
         }
     }
 
-    /// By what it has only overheard it says a hello seldom.
+    /// A node that has only unverified time sends at most one hello in [`UNPROVEN_CYCLES`] cycles.
     fn answered_overheard(&mut self, tx_window: &TransmitWindow) {
         let is_misled = self.time.overheard(self.io.now, self.watch.allowance_ns).is_some_and(|voice| voice.is_misled);
         let (io, watch) = (&mut *self.io, &mut *self.watch);
         io.oracle.saw(if is_misled { "asked by an echo" } else { "asked by what was overheard" });
-        // Where a window begins is known by a estimate of just now, and each may be off by so much.
+        // The begin of a window comes from the current estimate, and each estimate may be off by the allowance.
         let least_ns = UNPROVEN_CYCLES * watch.cycle_ns - 2 * watch.allowance_ns;
         if let Some(before_ns) = watch.asked_ns.replace(tx_window.begin_ns)
             && tx_window.begin_ns - before_ns < least_ns
@@ -203,8 +203,8 @@ impl Ground<'_, '_> {
         }
     }
 
-    /// By what this node sends now: by its own time if that may be off by half of the guard at most, as it says; else
-    /// by what it heard.
+    /// The time basis for sending now: the node's own time if its stated bound is at most half of the guard, else what
+    /// it heard.
     fn says(&self, carries: Carries) -> Says {
         let (io, now_ns, allowed_ns) = (&*self.io, self.io.now.monotonic_ns, self.watch.allowance_ns);
         let clock = self.time.core();
@@ -349,7 +349,7 @@ impl Layer for Slotted {
     }
 }
 
-/// By what a node heard it asks for the time, or which peers live; by what it overheard, which peers live.
+/// A node with heard time may send a Request, a warm-up and a hello. A node with unverified time may send a hello only.
 fn may_send(basis: Basis, sent: &Sent) -> bool {
     let Ok((head, _)) = FrameHead::read(&sent.bytes) else { return false };
     match basis {

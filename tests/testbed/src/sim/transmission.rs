@@ -2,7 +2,7 @@
 
 use rohrpost_routers::time::{Term, TimeEstimate};
 
-/// By what a node finds its windows.
+/// Source of the time from which a node computes its windows.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub enum Basis {
     /// Time that it has measured, or its own as a master.
@@ -32,7 +32,7 @@ impl Basis {
     }
 }
 
-/// By what a node sends, and by which node's time.
+/// The time basis of a transmission, and the term that it follows.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Says {
     /// By what it finds its windows.

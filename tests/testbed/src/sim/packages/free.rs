@@ -78,7 +78,7 @@ impl Inlet for FreeSystem<'_, '_> {
         self.io.host.transit.waits().1
     }
 
-    fn take<T>(&mut self, what: impl FnOnce(&mut Self, &Package<'_>, bool) -> T) -> Option<T> {
+    fn take<T>(&mut self, what: impl FnOnce(&mut Self, &Package<'_>, &dyn Fn() -> bool) -> T) -> Option<T> {
         let parcel = loop {
             let parcel = self.packages.take_parcel(self.io)?;
             if !self.io.is_intruders(&parcel) {
@@ -89,7 +89,7 @@ impl Inlet for FreeSystem<'_, '_> {
         };
         let is_alone = self.io.host.transit.is_empty();
         let package = Package { head: parcel.head, published_ns: parcel.published_ns, body: &parcel.body };
-        let result = what(self, &package, is_alone);
+        let result = what(self, &package, &|| is_alone);
         self.packages.took(self.io, parcel);
         Some(result)
     }

@@ -10,7 +10,7 @@ use super::station::{Arrived, Io, Layer, Port, STRANGER, Sent};
 use super::times::Left;
 use rohrpost_mailbox::{ERROR_UNKNOWN_NS, TimeRecord, Watched};
 use rohrpost_routers::driver::{
-    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimePlatform, TimeStart,
+    ClockDriver, ClockStep, TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeStart,
 };
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
 use rohrpost_routers::security::PeerSessions;
@@ -99,14 +99,14 @@ impl TimePlatform for TimeSystem<'_, '_> {
         self.socket.stamps.pop_front()
     }
 
-    fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> Option<TimeArrival> {
-        let arrived = self.socket.came.pop_front()?;
+    fn receive(&mut self, datagram: &mut [u8; TIME_DATAGRAM_BYTES]) -> TimeInput {
+        let Some(arrived) = self.socket.came.pop_front() else { return TimeInput::Nothing };
         // What is longer is none of time, and is cut off by the kernel.
         let bytes = if arrived.bytes.len() > datagram.len() { 0 } else { arrived.bytes.len() };
         datagram[..bytes].copy_from_slice(&arrived.bytes[..bytes]);
         let (source, stamp) = (arrived.source.map_or(STRANGER, address), self.socket.stamp(self.io, arrived.stamp));
         self.watch.reads(arrived);
-        Some(TimeArrival { bytes, source, stamp })
+        TimeInput::Datagram(TimeArrival { bytes, source, stamp })
     }
 
     fn send(&mut self, to: NodeIndex, datagram: &[u8]) {

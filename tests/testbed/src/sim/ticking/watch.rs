@@ -47,7 +47,7 @@ fn told(io: &Io<'_>, arrived: &Arrived, head: &FrameHead, own: u64, message: &Ti
     Some(TimeFrame { term, is_other: head.digest != own, way_ns, came_ns })
 }
 
-/// Of as many as count for what a node goes by.
+/// Appends a frame of time, and keeps the last ones that a node uses to find its windows.
 fn note(all: &mut VecDeque<TimeFrame>, told: TimeFrame) {
     all.push_back(told);
     if all.len() > usize::from(JOINING_SYNCS) {
@@ -192,8 +192,8 @@ impl TimeWatch {
         are_late(&self.told, now, way_ns)
     }
 
-    /// By what this node would say a hello without knowing the time: which peer it hears, by which term, and whether it
-    /// [is misled](Self::is_misled).
+    /// The unverified peer by whose time this node would send a hello: its estimate, its term, and whether the node [is
+    /// misled](Self::is_misled).
     pub(super) fn overheard(&self, clock: &Clock, now: Now, way_ns: u64) -> Option<UnverifiedPeer> {
         let (from, estimate) = clock.overheard(now.monotonic_ns)?;
         // Of several incarnations of a node it does not say by which: then any of them may mislead it.
