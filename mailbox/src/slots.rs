@@ -416,8 +416,7 @@ impl<'a> Slots<'a> {
     }
 
     /// For a retired mailbox: passes to `lost` the packages displaced by claims that are still filling. Their senders
-    /// could count them only in this mailbox, which nobody reads any more. They find their claim changed, and go on as
-    /// after any other retirement.
+    /// could count them here only, where nobody reads any more. They go on as after any other retirement.
     pub(crate) fn settle(&self, mut lost: impl FnMut(Victim)) {
         for slot in 0..self.count {
             let word = self.load(slot);

@@ -192,7 +192,7 @@ impl TimeWatch {
         are_late(&self.told, now, way_ns)
     }
 
-    /// The unverified peer by whose time this node would send a hello: its estimate, its term, and whether the node [is
+    /// The unverified peer by which this node would send a hello: its estimate, its term, and whether the node [is
     /// misled](Self::is_misled).
     pub(super) fn overheard(&self, clock: &Clock, now: Now, way_ns: u64) -> Option<UnverifiedPeer> {
         let (from, estimate) = clock.overheard(now.monotonic_ns)?;
