@@ -34,7 +34,7 @@ pub enum ContentsError {
     Number {
         /// What stands in its place.
         number: String,
-        /// Of which kind.
+        /// Its kind.
         kind: &'static str,
         /// The smallest number of that kind.
         first: u16,

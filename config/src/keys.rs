@@ -92,7 +92,7 @@ pub enum KeysError {
         "keys {newest} and {older} are both valid; when all nodes have both, `rohrpost keys finish` drops key {older}"
     )]
     Rotating {
-        /// Of the newer one.
+        /// Id of the newer key.
         newest: NonZeroU8,
         /// Number of the older one.
         older: NonZeroU8,

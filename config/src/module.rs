@@ -172,7 +172,7 @@ impl Module {
 /// Lines at which parts of a module stand, for checks across modules.
 pub(crate) struct Lines {
     pub(crate) mailboxes: MailboxLines,
-    /// Of each name in [`Module::calls`].
+    /// Line of each name in [`Module::calls`].
     pub(crate) calls: Vec<usize>,
 }
 

@@ -67,9 +67,9 @@ fn read_tunnel(item: &Item<'_>, nodes: &[Node]) -> Option<Tunnel> {
 
 /// Lines in the file.
 pub(crate) struct TdmaLines {
-    /// Of the section.
+    /// Line of the section.
     table: usize,
-    /// Of its slots, in their order.
+    /// Lines of its slots, in their order.
     slots: Vec<usize>,
 }
 

@@ -23,7 +23,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::f32::consts::TAU;
 use std::time::{Duration, Instant};
 
-/// Of the circle on which nodes stand, and how far a link's words are from the straight way, points of the view.
+/// Radius of the circle of nodes, and distance of a link's words from the straight line, points of the view.
 const RADIUS: f32 = 260.0;
 const ASIDE: f32 = 34.0;
 const NODE: palette::Rgb = [86, 180, 233];

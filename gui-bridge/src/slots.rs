@@ -205,7 +205,7 @@ impl View for Flows {
     }
 }
 
-/// Of all nodes' flows, by their place in the configuration.
+/// Colour of a flow, by its place in the configuration.
 fn colour(installation: &Installation, flow: &FlowState) -> usize {
     let format = |name| installation.classes.format(name);
     let carries = |known: &Flow| known.carries.map(|carries| carries.to_string()).unwrap_or_default();

@@ -45,7 +45,7 @@ impl ModuleState {
 /// One participant's line.
 #[repr(C, align(64))]
 pub(crate) struct Entry {
-    /// Of its present or last user; 0: never used.
+    /// Incarnation of its present or last user; 0: never used.
     pub(crate) incarnation: AtomicU32,
     pub(crate) pid: AtomicU32,
     /// The futex word it sleeps on.

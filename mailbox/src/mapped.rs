@@ -7,7 +7,8 @@ use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::sync::{Mutex, PoisonError, Weak};
 
-/// Of this process, on whichever nodes. Not on any hot path: asked when a sender is made, or enters another mailbox.
+/// All segments that this process has mapped. Not on any hot path: read when a sender is made, or enters another
+/// mailbox.
 static MAPPED: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
 
 struct Kept {

@@ -57,7 +57,7 @@ pub mod local {
     pub const REPLIES: u8 = 1;
     /// Takes data that the module subscribed to; ids above are the module's own.
     pub const DATA: u8 = 2;
-    /// Of a router: takes packages for other nodes; their heads keep the name they are for.
+    /// A router's mailbox that takes packages for other nodes; their heads keep the name they are for.
     pub const TRANSIT: u8 = 3;
 }
 

@@ -19,9 +19,9 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// So many slots make a home.
+    /// Slots of a home.
     const HOME: usize = 4;
-    /// So many searches the home is left alone when its next slot was in use.
+    /// Searches for which the home is left alone after its next slot was in use.
     const AWAY: u32 = 32;
 
     pub(crate) fn of(me: Claimant) -> Self {

@@ -186,7 +186,7 @@ impl Participant {
 /// What stood under a name before.
 enum Predecessor {
     None,
-    /// Of the same shape: adopted.
+    /// A mailbox of the same shape is adopted.
     Same(Segment, Held),
     /// To be given up; its counters go on in the next.
     Other(Segment),

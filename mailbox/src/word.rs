@@ -121,17 +121,17 @@ impl Word {
         Self(self.0 & !(TAKEN << STATE) | READY << STATE | REDELIVERED)
     }
 
-    /// Of a ready or taken package.
+    /// Whether a ready or taken package may have been delivered before.
     pub(crate) const fn is_redelivered(self) -> bool {
         self.0 & REDELIVERED != 0
     }
 
-    /// Of a ready or taken package.
+    /// Priority of a ready or taken package.
     pub(crate) const fn priority(self) -> Priority {
         Priority((self.0 >> PRIORITY) as u8)
     }
 
-    /// Of a ready or taken package: its place in the order of publishing.
+    /// Place of a ready or taken package in the order of publishing.
     pub(crate) const fn ticket(self) -> u64 {
         self.0 & TICKET
     }

@@ -13,7 +13,7 @@ use rohrpost_config::Principal;
 /// How many places there are, and of which principals.
 pub(crate) struct Places {
     named: Box<[Principal]>,
-    /// Of each named principal.
+    /// Places of each named principal.
     own: usize,
     open: usize,
 }

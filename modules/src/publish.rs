@@ -26,7 +26,7 @@ pub(crate) struct Newest {
     pub(crate) value: Vec<u8>,
 }
 
-/// Of a request that subscribes.
+/// What a subscriber's request asks for.
 #[derive(Clone, Copy)]
 pub(crate) struct RequestOrigin {
     /// Reply mailbox of the subscriber.
@@ -39,7 +39,7 @@ pub(crate) struct RequestOrigin {
     pub(crate) to: Name,
     /// Its priority; the data carry the same.
     pub(crate) priority: Priority,
-    /// Of the data only the newest counts, and they say so.
+    /// Only the newest of the data counts, and their options say so.
     pub(crate) newest: bool,
 }
 

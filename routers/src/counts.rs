@@ -84,7 +84,7 @@ pub struct Side {
 pub struct ClassCounts {
     /// Packages: taken from this node's senders; or come from other nodes, with those of which only fragments came.
     pub packages: Count,
-    /// Of these, sent; or delivered.
+    /// Packages sent; or delivered.
     pub passed: Count,
     /// Bytes of the bodies of those that passed.
     pub body_bytes: Count,

@@ -85,7 +85,7 @@ pub struct FlowCounts {
     kept_worst_ns: AtomicU64,
     /// Packages that took longer than the bound.
     pub over_bound: Count,
-    /// Of these, packages with all slots kept: there should be none.
+    /// Those with all slots kept: there should be none.
     pub kept_over_bound: Count,
     /// Packages that took longer than the deadline.
     pub over_deadline: Count,

@@ -25,7 +25,7 @@ pub enum WalkProblem {
     /// The type ends before the bytes do. Another version of the type wrote them.
     #[error("{} too many", count(*bytes, "byte"))]
     BytesLeft {
-        /// So many.
+        /// Bytes that are left.
         bytes: usize,
     },
     /// A list or map claims more elements than the rest of the bytes can hold.
@@ -65,7 +65,7 @@ pub enum WalkProblem {
     NoSuchVariant {
         /// The number in the bytes.
         index: u64,
-        /// So many are known.
+        /// Number of known ones.
         known: usize,
     },
     /// A value or word of the wrong kind.

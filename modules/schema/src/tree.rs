@@ -18,27 +18,27 @@ pub enum Type {
     Bool,
     /// A whole number from 0, of 8 bits.
     U8,
-    /// Of 16 bits.
+    /// 16 bits.
     U16,
-    /// Of 32 bits.
+    /// 32 bits.
     U32,
-    /// Of 64 bits; also `usize`.
+    /// 64 bits; also `usize`.
     U64,
-    /// Of 128 bits.
+    /// 128 bits.
     U128,
     /// A whole number with a sign, of 8 bits.
     I8,
-    /// Of 16 bits.
+    /// 16 bits.
     I16,
-    /// Of 32 bits.
+    /// 32 bits.
     I32,
-    /// Of 64 bits; also `isize`.
+    /// 64 bits; also `isize`.
     I64,
-    /// Of 128 bits.
+    /// 128 bits.
     I128,
     /// A number with a fraction, of 32 bits.
     F32,
-    /// Of 64 bits.
+    /// 64 bits.
     F64,
     /// One character.
     Char,
@@ -50,7 +50,7 @@ pub enum Type {
     Option(Box<Type>),
     /// Any number of one type.
     List(Box<Type>),
-    /// So many of one type.
+    /// A fixed number of values of one type.
     Array(u32, Box<Type>),
     /// Keys, and what belongs to each.
     Map(Box<Type>, Box<Type>),

@@ -72,7 +72,7 @@ pub(super) struct Sim {
     settings: Settings,
     simulator: Simulator,
     clock: SystemClock,
-    /// Of system time: in another one it may be any time.
+    /// Epoch of system time; another epoch may have any time.
     epoch: u64,
     odometry: Every,
     laser: Every,

@@ -92,7 +92,7 @@ enum Place {
     WasRun,
     /// It was not run by this server.
     New,
-    /// Of an earlier incarnation of the caller. If that still waits, it is to know why it is not served.
+    /// A request of an earlier incarnation of the caller. If that still waits, it learns why it is not served.
     Earlier,
     /// Older than what is remembered.
     Before,

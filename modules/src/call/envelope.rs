@@ -27,9 +27,9 @@ pub struct CallEnvelope {
 /// Before a reply's result.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ReplyEnvelope {
-    /// Of the caller, as its command had it.
+    /// Incarnation of the caller, as its command had it.
     pub incarnation: u32,
-    /// Of the command.
+    /// Sequence number of the command.
     pub sequence: u32,
 }
 

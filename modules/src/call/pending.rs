@@ -22,7 +22,7 @@ pub struct Pending<T> {
 }
 
 impl<T: serde::de::DeserializeOwned> Pending<T> {
-    /// Of a call that [`super::Link::begin`] began.
+    /// Handle of a call that [`super::Link::begin`] began.
     pub fn new(link: Caller, sequence: u32, to: Name) -> Self {
         Self { link, sequence, to, result: std::marker::PhantomData }
     }

@@ -34,7 +34,7 @@ pub(super) enum CallOutcome {
 }
 
 impl CallOutcome {
-    /// Of a call that ended with this fault.
+    /// Counter for a call that ended with this fault.
     pub(super) fn by(fault: &Fault) -> Self {
         if fault.is_of_this_try() { Self::Refused } else { Self::Answered }
     }

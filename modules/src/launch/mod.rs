@@ -78,7 +78,7 @@ pub struct Launch {
     node_name: String,
     node: Arc<Node>,
     children: Vec<Child>,
-    /// Of each child.
+    /// The call under way of each child.
     calls: Vec<UnderWay>,
     tool: ToolLink,
     counter: Counter,

@@ -73,7 +73,7 @@ struct Held {
 }
 
 impl Printed {
-    /// Of a module; `voice` speaks for it, if anybody listens.
+    /// Lines of a module; `voice` publishes them, if anybody subscribes.
     pub(super) fn new(voice: Option<OutputProxy>) -> Self {
         Self { lines: Arc::default(), readers: Vec::new(), voice, told: Vec::new() }
     }

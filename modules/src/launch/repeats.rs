@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-/// So many ends in a row are told whole: all that the usual policy allows.
+/// Ends in a row that are reported in full: all that the usual policy allows.
 const WHOLE: u32 = 5;
 /// Then the tenth is told, the twentieth, the fortieth and so on, and one after this time at the latest.
 const LATEST: Duration = Duration::from_secs(600);
@@ -24,7 +24,7 @@ pub(super) enum Tell {
 /// The ends of one module, as far as they were told.
 #[derive(Default)]
 pub(super) struct Repeats {
-    /// Of the end that was told whole last, as [`comparable`].
+    /// Cause of the end that was reported in full last, as [`comparable`].
     cause: String,
     told_at: Option<Instant>,
     untold: u32,

@@ -10,7 +10,7 @@ const QUIET_NS: u64 = SECOND_NS / 2;
 /// A flood that goes on is told of so often.
 const LATEST_NS: u64 = 5 * SECOND_NS;
 
-/// So many a second, and so many at once after a pause.
+/// Limits lines: a number a second, and a burst after a pause.
 ///
 /// It is a bucket of tokens, seen from the other side: the time at which it will be full again says how many are
 /// missing (the generic cell rate algorithm). So one number is all of it, and taking is one compare-and-swap.

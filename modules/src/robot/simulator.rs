@@ -63,7 +63,7 @@ pub struct Settings {
     pub turn_rate_max_rad_s: f64,
     /// Speeding up and braking.
     pub acceleration_max_m_s2: f64,
-    /// Of turning, speeding up and braking.
+    /// Angular acceleration limit, for turning faster and slower.
     pub turn_acceleration_max_rad_s2: f64,
     /// Without a command for so long, the wheels are braked.
     pub dead_man_ns: u64,

@@ -43,7 +43,7 @@ pub struct Context {
     pub(crate) installation: Arc<Installation>,
     pub(crate) link: Caller,
     pub(crate) endpoints: Vec<Name>,
-    /// Of each endpoint, the hash of the interface that the module serves there, if it serves one.
+    /// For each endpoint the hash of the interface that the module serves there, if it serves one.
     served: Vec<Option<u32>>,
     /// Numbers and names of the functions of all of them.
     pub(crate) functions: Vec<(u16, String)>,

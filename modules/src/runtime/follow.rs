@@ -84,7 +84,7 @@ impl<T> Subscription<T> {
 struct Followed {
     from: Name,
     wish: Subscribe,
-    /// Of the request: whether only the newest counts.
+    /// Options of the request: whether only the newest counts.
     options: Options,
     interface: u32,
     /// A request under way.
@@ -104,12 +104,12 @@ struct Followed {
 pub(crate) struct Followings {
     /// A subscription's id is its place here; none is used twice in an incarnation.
     list: Vec<Followed>,
-    /// Of this incarnation of the module, as its requests carry it.
+    /// Incarnation of the module, as its requests carry it.
     incarnation: u32,
 }
 
 impl Followings {
-    /// Of a module with a link of this incarnation: nothing yet.
+    /// Subscriptions of a module with a link of this incarnation: none yet.
     pub(crate) fn of(incarnation: u32) -> Self {
         Self { list: Vec::new(), incarnation }
     }
@@ -153,7 +153,7 @@ impl Followings {
         self.list.iter().map(|followed| followed.lost).sum()
     }
 
-    /// Of each: the publisher, the number of the data, packages that came, and packages that did not.
+    /// For each subscription the publisher, the number of the data, packages received and packages missed.
     pub(crate) fn tallies(&self) -> impl Iterator<Item = (Name, u16, u64, u64)> {
         self.list.iter().map(|followed| (followed.from, followed.wish.number, followed.came, followed.lost))
     }

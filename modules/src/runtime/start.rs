@@ -32,7 +32,7 @@ pub(crate) mod environment {
     pub(crate) const RESTARTS: &str = "ROHRPOST_RESTARTS";
     /// Set: it begins switched off, and launch switches it on when it is time.
     pub(crate) const OFF: &str = "ROHRPOST_OFF";
-    /// So long it keeps its lines of output to itself: those before it said the like and ended soon.
+    /// Time for which it keeps its lines of output to itself, ms: earlier processes printed the like and ended soon.
     pub(crate) const QUIET_MS: &str = "ROHRPOST_QUIET_MS";
 }
 

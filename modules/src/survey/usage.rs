@@ -17,7 +17,7 @@ pub struct Usage {
 }
 
 impl Usage {
-    /// Of this process; none when it has ended.
+    /// Usage of this process; none when it has ended.
     pub fn of(pid: u32) -> Option<Self> {
         let read = |file| std::fs::read_to_string(format!("/proc/{pid}/{file}")).ok();
         Some(Self { cpu: cpu(&read("stat")?)?, memory_bytes: memory(read)? })

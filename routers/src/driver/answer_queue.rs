@@ -29,7 +29,7 @@ impl AnswerQueue {
         Self { refusal: None, refused_ns: 0, hellos: peer_sessions.map(HelloQueue::new), settings: settings.clone() }
     }
 
-    /// Of each peer the newest hellos wait; refusals wait where they are, one after the other.
+    /// Keeps the newest hellos of each peer; refusals wait in the channel, one after the other.
     pub(super) fn look(&mut self, on: &mut impl Platform, now_ns: u64) {
         while self.refusal.is_none()
             && let Some(answer) = on.next_answer()

@@ -24,7 +24,7 @@ use std::sync::Arc;
 const WRITE_TRIES: usize = 8;
 /// However long nothing comes: so often it looks whether the computer has slept, or its clock is slewed, ns.
 const LOOKS_EVERY_NS: u64 = 100_000_000;
-/// So many datagrams are taken before what is due is sent.
+/// Datagrams taken before what is due is sent.
 const BURST: usize = 64;
 
 /// What a clock begins with.

@@ -37,7 +37,7 @@ pub enum TimeInput {
 pub struct TimeCounts {
     /// Exchanges so far.
     pub exchanges: u64,
-    /// Of the last exchange: whether all its stamps were the kernel's.
+    /// Whether all stamps of the last exchange were the kernel's.
     pub by_kernel: bool,
     /// Datagrams that were not taken.
     pub ignored: u64,
@@ -76,11 +76,11 @@ pub trait TimePlatform {
 /// How a frame of time is judged.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TimeSource {
-    /// Of an incarnation that is known to live.
+    /// From an incarnation that is known to live.
     Proven,
-    /// Of one that may be over.
+    /// From an incarnation that may be over.
     Unproven,
-    /// Of another configuration.
+    /// From a node with another configuration.
     OtherTable,
     /// From an address that is not that of its node.
     WrongAddress,

@@ -77,7 +77,7 @@ pub struct FrameHead {
     pub from: NodeIndex,
     /// Node it is for.
     pub to: NodeIndex,
-    /// Of the sender's configuration.
+    /// Digest of the sender's configuration.
     pub digest: u64,
     /// Distinguishes this incarnation of the sending router from its others; never 0.
     pub incarnation: u64,
@@ -98,7 +98,7 @@ pub enum BadFrame {
     /// Sealed, but no seal is expected here.
     #[error("sealed, and this node's configuration says `security = \"none\"`; launch all nodes from the same file")]
     Sealed,
-    /// Of this format, but malformed.
+    /// This format, but malformed.
     #[error("damaged: {0}")]
     Damaged(&'static str),
 }
@@ -219,7 +219,7 @@ pub enum Frame<'a> {
     Alive(Alive),
     /// The sender takes nothing from the receiver.
     Refusal(Refusal),
-    /// Of the time protocol; `time` parses it.
+    /// A message of the time protocol; `time` parses it.
     Time(&'a [u8]),
 }
 

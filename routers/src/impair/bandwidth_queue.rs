@@ -31,7 +31,7 @@ pub struct BandwidthQueue {
     on_way: VecDeque<(u64, usize)>,
     last_due_ns: u64,
     bytes: VecDeque<u8>,
-    /// Of these, how many have arrived.
+    /// How many of these have arrived.
     arrived: usize,
 }
 

@@ -53,7 +53,7 @@ pub struct NodeSpec {
 pub struct Lab {
     nodes: Vec<Node>,
     hub: Namespace,
-    /// Of all links at first, bytes.
+    /// Largest packet of all links at first, bytes.
     mtu: u32,
 }
 

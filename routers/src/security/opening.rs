@@ -14,9 +14,9 @@ use std::sync::Arc;
 /// A datagram with a valid seal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Opened<'a> {
-    /// Of the peer's present incarnation to our present one, and not opened before: its head and what was sealed.
+    /// A frame from the peer's present incarnation to our present one, not opened before: its head and its text.
     Frame(FrameHead, &'a [u8]),
-    /// Of some incarnation of the peer, perhaps long ago: for the [`Handshake`](super::Handshake) alone.
+    /// A hello from some incarnation of the peer, perhaps an old one: for the [`Handshake`](super::Handshake) alone.
     Hello(FrameHead, OpenedHello),
 }
 

@@ -46,7 +46,7 @@ pub struct RouterIdentity {
     pub own: NodeIndex,
     /// Nodes that there are.
     pub nodes: NodeIndex,
-    /// Of its configuration.
+    /// Digest of its configuration.
     pub digest: u64,
     /// Its incarnation, from a source of random numbers that is fit for keys: if two incarnations had one, they would
     /// use a nonce twice. Not 0.

@@ -18,7 +18,7 @@ pub enum Rejection {
     /// Not from another node of ours to this one.
     #[error("it is not from one of our nodes to this one")]
     NotOurs,
-    /// Of an incarnation of its node, or to one of ours, that is over or has not begun.
+    /// From an incarnation of its node, or to one of ours, that is over or has not begun.
     #[error("it is of another incarnation of that node")]
     OtherIncarnation,
     /// It came before, or is so old that it cannot be told.
@@ -33,7 +33,7 @@ pub enum Rejection {
     /// It comes from another address than the node has that it says it is from.
     #[error("it comes from another address than its node has in our configuration")]
     Address,
-    /// Of another wire format: nothing more can be told of it.
+    /// In another wire format: nothing more can be said of it.
     #[error("it is of another wire format; run the same version of Rohrpost on all nodes")]
     Version,
 }

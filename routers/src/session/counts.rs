@@ -76,7 +76,7 @@ pub struct SessionCounts {
 pub struct SessionClassCounts {
     /// Packages that came; one to all systems once for each of them.
     pub packages: Count,
-    /// Of these, handed to the next connection; at a client, delivered.
+    /// Packages handed to the next connection; at a client, delivered ones.
     pub passed: Count,
     /// Packages of newest-only data that a newer one replaced while they waited.
     pub replaced: Count,

@@ -51,11 +51,11 @@ pub(super) trait Fates {
 #[derive(Debug)]
 pub(super) struct Outgoing {
     ready: Vec<u8>,
-    /// Of `ready`, bytes that the stream has taken.
+    /// Bytes of `ready` that the stream has taken.
     taken: usize,
-    /// Of `ready`, bytes of a frame that was taken in part before.
+    /// Bytes of `ready` that belong to a frame that was taken in part before.
     begun: usize,
-    /// Of `ready`, bytes up to the end of the last frame that was put before packages.
+    /// Bytes of `ready` up to the end of the last frame that was put before packages.
     hurried: usize,
     /// Bytes that the stream has taken since the connection began.
     sent: u64,

@@ -208,7 +208,7 @@ struct Analysis<'a> {
     supply: &'a Supply,
     own: &'a Stream,
     others: &'a [(Stream, Ahead)],
-    /// Of all datagrams.
+    /// Time on the wire of the largest datagram, ns.
     largest_ns: u64,
     longest_ns: u64,
 }

@@ -77,7 +77,7 @@ impl SessionFrameKind {
 pub struct SessionFrameHead {
     /// What it is.
     pub kind: SessionFrameKind,
-    /// Of a package: how often it was handed on before.
+    /// How often the package was handed on before.
     pub hops: u8,
     /// Bytes that follow.
     pub length: usize,

@@ -123,7 +123,7 @@ pub struct RegistrationVerdict<'a> {
     pub number: u32,
     /// What speaks against it; none: it holds.
     pub objection: Option<Objection>,
-    /// Of which range.
+    /// The range that it is about.
     pub range: Range,
     /// The host of the range in conflict.
     pub holder: &'a str,

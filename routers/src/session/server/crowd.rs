@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Connections by owner.
 #[derive(Debug)]
 pub(super) struct Crowd<K> {
-    /// Of each, from the oldest on.
+    /// Connections of each owner, the oldest first.
     of: BTreeMap<K, BTreeSet<(u64, ClientIndex)>>,
     /// Each with how many it has.
     sizes: BTreeSet<(usize, K)>,

@@ -29,7 +29,7 @@ pub(super) struct TimeSocket {
     socket: UdpSocket,
     peers: Vec<SockaddrStorage>,
     control: Box<[u8]>,
-    /// Of a datagram of time.
+    /// Length of a datagram of time.
     datagram_bytes: usize,
 }
 

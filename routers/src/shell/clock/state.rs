@@ -30,7 +30,7 @@ pub struct ClockSnapshot {
     pub exchanges: u64,
     /// See [`Clock::contradictions`].
     pub contradictions: u64,
-    /// Of the last exchange: whether all its stamps were the kernel's.
+    /// Whether all stamps of the last exchange were the kernel's.
     pub by_kernel: bool,
     /// Datagrams that were not taken.
     pub ignored: u64,
