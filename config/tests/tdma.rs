@@ -150,7 +150,7 @@ fn without_slots_there_are_no_bounds() {
 
 /// Useless tables: each is refused with a message, or has bounds, but nothing overflows or loops forever.
 #[test]
-fn absurd_flows_are_judged_in_time() {
+fn absurd_flows_are_checked_in_time() {
     let flow = SLOTS
         .split_once("[[flow]]")
         .unwrap()

@@ -14,6 +14,7 @@ const WORDS: &[(&[&str], &str)] = &[
     (&["acquaintance", "acquaintances", "acquainted"], "peer session"),
     (&["greets", "greeter", "greeting"], "handshake"),
     (&["reign", "reigns"], "term of a master"),
+    (&["judge", "judges", "judged", "judging"], "validate, check"),
 ];
 
 /// Files that quote such words: the table above itself.

@@ -21,7 +21,7 @@ pub(super) fn wake_up(priority: u8) -> Finding {
     }
 }
 
-/// Judges sorted latenesses, measured with a real-time priority or under the normal scheduler.
+/// Validates sorted latenesses, measured with a real-time priority or under the normal scheduler.
 pub(super) fn validate(latenesses: &[Duration], fifo: Option<u8>) -> Finding {
     let at = |part: f64| time(latenesses[((latenesses.len() - 1) as f64 * part) as usize]);
     let how = fifo.map_or_else(|| "the normal scheduler".into(), |priority| format!("SCHED_FIFO {priority}"));

@@ -191,9 +191,9 @@ impl World {
                 Event::Start => self.start(),
                 Event::Answered { call, incarnation, answer } => self.answered(call, incarnation, answer),
             }
-            self.judge_places();
+            self.check_places();
         }
-        self.judge_all();
+        self.check_all();
         self
     }
 
@@ -329,7 +329,7 @@ impl World {
         };
         *self.seen.entry(said).or_default() += 1;
         if said == "busy" {
-            self.judge_refusal(package.caller, knows);
+            self.check_refusal(package.caller, knows);
         }
         if said == "run" {
             self.execute(package);
@@ -403,7 +403,7 @@ impl World {
         }
     }
 
-    fn judge_all(&mut self) {
+    fn check_all(&mut self) {
         for (index, call) in self.calls.iter().enumerate().filter(|(_, call)| !call.idempotent && !call.unknowable) {
             let runs = call.runs.len();
             match call.outcome {

@@ -33,7 +33,7 @@ impl World {
 
     /// However many call, and however long they say that it is valid: no principal has more than half of the open
     /// places, and none for longer than it may.
-    pub(super) fn judge_places(&mut self) {
+    pub(super) fn check_places(&mut self) {
         if self.deduplicator.callers.len() > CALLERS_MAX + NAMED {
             self.problems.push("remembers more callers than it may".into());
         }
@@ -52,7 +52,7 @@ impl World {
 
     /// A caller of its own place is never refused for want of one, and a principal that has none only where none is
     /// left.
-    pub(super) fn judge_refusal(&mut self, caller: usize, knows: bool) {
+    pub(super) fn check_refusal(&mut self, caller: usize, knows: bool) {
         let principal = self.principal(caller);
         let has_one = self.held().any(|other| self.principal(other) == principal);
         let open = self.held().filter(|other| *other >= NAMED).count();

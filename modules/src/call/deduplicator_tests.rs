@@ -21,7 +21,7 @@ fn request(sequence: u32) -> Request {
     }
 }
 
-/// Judges, and runs if it may.
+/// Validates, and runs if it may.
 fn serve(once: &mut Deduplicator, request: &Request, now_ns: u64) -> &'static str {
     let said = match once.validate(request, now_ns) {
         Verdict::Run => "run",

@@ -151,7 +151,7 @@ proptest! {
     }
 
     #[test]
-    fn whole_numbers_are_judged_by_their_value(n: i16) {
+    fn whole_numbers_are_validated_by_their_value(n: i16) {
         let (index, parameter) = parameter("offset");
         let bytes = encode(&parameter.field.ty, &Value::I(n.into())).unwrap();
         prop_assert_eq!(settings().accept(index, &bytes).is_ok(), n >= -3);

@@ -22,7 +22,7 @@ fn lan(node: NodeIndex) -> ArrivalPath {
 
 const BEYOND: ArrivalPath = ArrivalPath::Beyond { is_our_name: false };
 
-fn judged(way: ArrivalPath, kind: Type, from: Name, to: Name) -> Result<(), NotAdmitted> {
+fn validated(way: ArrivalPath, kind: Type, from: Name, to: Name) -> Result<(), NotAdmitted> {
     admission().validate(way, &Head { to, from, kind, ..Head::default() }, &[])
 }
 
@@ -40,7 +40,7 @@ fn a_sender_under_a_name_of_another_is_refused() {
         (BEYOND, name(2, 0, 1, 1), false, "no class"),
     ] {
         let expected = if is_admitted { Ok(()) } else { Err(NotAdmitted::ForeignName) };
-        assert_eq!(judged(way, Type::data(1), from, yours), expected, "{why}");
+        assert_eq!(validated(way, Type::data(1), from, yours), expected, "{why}");
     }
 }
 
@@ -53,15 +53,15 @@ fn the_mailboxes_of_routers_take_nothing_and_their_modules_are_as_any() {
             for way in [lan(1), BEYOND] {
                 let (to, kinds) = (name(1, class, 0, local), [Type::command(16), Type::reply(16), Type::data(1)]);
                 for kind in kinds {
-                    assert_eq!(judged(way, kind, tool, to), expected, "{way:?} to {to}");
+                    assert_eq!(validated(way, kind, tool, to), expected, "{way:?} to {to}");
                     let expected = if kind == Type::reply(16) { Ok(()) } else { expected };
-                    assert_eq!(judged(way, kind, name(1, class, 1, local), tool), expected, "{way:?} from {to}");
+                    assert_eq!(validated(way, kind, name(1, class, 1, local), tool), expected, "{way:?} from {to}");
                 }
             }
         }
     }
     let module = name(1, 90, 0, local::TRANSIT);
-    assert_eq!(judged(lan(1), Type::data(1), tool, module), Ok(()), "the same local id of a module is its own");
+    assert_eq!(validated(lan(1), Type::data(1), tool, module), Ok(()), "the same local id of a module is its own");
 }
 
 #[test]
@@ -75,9 +75,9 @@ fn of_another_systems_routers_the_tcp_router_alone_is_for_all() {
         (2, name(1, 90, 0, 0), true, "a module"),
     ] {
         let expected = if is_admitted { Ok(()) } else { Err(NotAdmitted::RoutersOwn) };
-        assert_eq!(judged(BEYOND, Type::command(4), name(from, 32, 40, 1), to), expected, "{why}");
+        assert_eq!(validated(BEYOND, Type::command(4), name(from, 32, 40, 1), to), expected, "{why}");
     }
-    let answer = judged(BEYOND, Type::reply(4), name(2, TCP.0, TCP_SERVER, 0), name(1, 32, 40, 1));
+    let answer = validated(BEYOND, Type::reply(4), name(2, TCP.0, TCP_SERVER, 0), name(1, 32, 40, 1));
     assert_eq!(answer, Ok(()), "and what it answers");
 }
 
@@ -93,8 +93,8 @@ fn only_classes_that_are_listed_may_command_by_whichever_way() {
         (Type::reply(16), 90, 1, true),
     ] {
         let (expected, to) = (if is_admitted { Ok(()) } else { Err(NotAdmitted::NotAllowed) }, name(1, 200, 0, local));
-        assert_eq!(judged(lan(1), kind, name(1, from, 1, 1), to), expected, "{kind:?} to {to}, by the LAN");
-        assert_eq!(judged(BEYOND, kind, name(2, from, 1, 1), to), expected, "{kind:?} to {to}, by the TCP router");
+        assert_eq!(validated(lan(1), kind, name(1, from, 1, 1), to), expected, "{kind:?} to {to}, by the LAN");
+        assert_eq!(validated(BEYOND, kind, name(2, from, 1, 1), to), expected, "{kind:?} to {to}, by the TCP router");
     }
 }
 

@@ -73,7 +73,7 @@ pub trait TimePlatform {
     fn happened(&mut self, clock: &Clock, event: TimeEvent<'_>);
 }
 
-/// How a frame of time is judged.
+/// How a frame of time is validated.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TimeSource {
     /// From an incarnation that is known to live.
@@ -109,7 +109,7 @@ pub enum TimeEvent<'a> {
     Hears,
     /// A frame was handled.
     Heard {
-        /// How it is judged.
+        /// How it is validated.
         source: TimeSource,
         /// Its head.
         head: &'a FrameHead,

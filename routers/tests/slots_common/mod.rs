@@ -380,7 +380,7 @@ pub(crate) struct Outside {
 
 /// The nodes with these frames' slots, by the time of a master.
 #[derive(Default, Debug)]
-pub(crate) struct Judged {
+pub(crate) struct SlotReport {
     pub(crate) frames: usize,
     /// Of these, in a window of another, or in nobody's.
     pub(crate) outside: Vec<Outside>,
@@ -390,9 +390,9 @@ pub(crate) struct Judged {
 
 /// A frame is its sender's if it starts in a window of it or in the guard behind, or so little before that the guard of
 /// the slot before still holds: half of it, which is what a node's clock may be off.
-pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
+pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> SlotReport {
     let table = SlotTable::new(&table(), &MASTERS, 0, NODES, 28);
-    let mut kept = Judged { frames: crossed.len(), ..Judged::default() };
+    let mut kept = SlotReport { frames: crossed.len(), ..SlotReport::default() };
     let mut last = None;
     for frame in crossed {
         let at_ns = time.at(frame.at_ns).ns;
@@ -417,7 +417,7 @@ pub(crate) fn validate(crossed: &[Crossed], time: &TimeRecord) -> Judged {
 /// that late on a computer that works.
 const OUTSIDE_PER_THOUSAND: usize = 3;
 
-fn tell(what: &str, kept: &Judged) {
+fn tell(what: &str, kept: &SlotReport) {
     let at = |per_thousand: usize| {
         kept.starts_ns
             .get(kept.starts_ns.len().saturating_sub(1) * per_thousand / 1000)
@@ -444,7 +444,7 @@ pub(crate) fn assert_kept(what: &str, crossed: &[Crossed], time: &TimeRecord) {
 }
 
 /// All but a few were where they belong.
-pub(crate) fn assert_inside(what: &str, kept: &Judged) {
+pub(crate) fn assert_inside(what: &str, kept: &SlotReport) {
     let most = 1 + kept.frames * OUTSIDE_PER_THOUSAND / 1000;
     assert!(kept.outside.len() <= most, "{what}: {kept:?}");
 }

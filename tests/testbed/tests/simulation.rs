@@ -63,14 +63,14 @@ fn keep_promises(test: &str, seeds: u64, plan: fn(u64) -> Plan) -> BTreeMap<&'st
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     let mut broken = Vec::new();
     let first = number("ROHRPOST_SIM_FIRST").unwrap_or(0);
-    let judged = |seed| {
+    let validated = |seed| {
         let outcome = run(plan(seed), guard, false);
         let told = outcome.problems.first().map(|problem| told(test, seed, problem));
         // At once: thousands of networks take their time.
         told.iter().for_each(|told| eprintln!("{told}"));
         (told, outcome)
     };
-    for (told, outcome) in for_all(seeds, |seed| judged(first + seed)) {
+    for (told, outcome) in for_all(seeds, |seed| validated(first + seed)) {
         broken.extend(told);
         outcome.seen.iter().for_each(|(what, count)| *seen.entry(what).or_default() += count);
     }
@@ -162,7 +162,7 @@ fn networks_of_unsteady_clocks_keep_their_promises() {
     saw_enough(&seen, seeds, &SEEN_IN_A_HUNDRED_UNSTEADY);
 }
 
-/// Have shown bugs, of the core or of what judges it, that thousands of such networks seldom show.
+/// Have shown bugs, of the core or of what checks it, that thousands of such networks seldom show.
 #[test]
 fn slotted_networks_of_unsteady_clocks_that_broke_a_promise_once_keep_it() {
     for seed in [3804, 4630, 4666] {

@@ -18,10 +18,10 @@ const PACE: Duration = Duration::from_micros(500);
 
 /// All cases of this file.
 pub(super) fn cases() -> Vec<Box<dyn Case>> {
-    let whole = |bytes| LanHop { name: "hop", bytes, mtu: WHOLE, pace: None, judged: true };
+    let whole = |bytes| LanHop { name: "hop", bytes, mtu: WHOLE, pace: None, has_target: true };
     let mut cases = [64, 1024, 16_384, 62_000].map(whole).to_vec();
-    cases.push(LanHop { name: "hop, paced", pace: Some(PACE), judged: false, ..whole(64) });
-    cases.push(LanHop { name: "hop, in fragments", mtu: ETHERNET, judged: false, ..whole(16_384) });
+    cases.push(LanHop { name: "hop, paced", pace: Some(PACE), has_target: false, ..whole(64) });
+    cases.push(LanHop { name: "hop, in fragments", mtu: ETHERNET, has_target: false, ..whole(16_384) });
     cases.into_iter().map(|case| Box::new(case) as Box<dyn Case>).collect()
 }
 
@@ -32,7 +32,7 @@ struct LanHop {
     mtu: u16,
     pace: Option<Duration>,
     /// Whether the targets apply.
-    judged: bool,
+    has_target: bool,
 }
 
 impl Case for LanHop {
@@ -54,7 +54,7 @@ impl Case for LanHop {
             Contender::sampled("chain of mailboxes", || time_mailbox_chain(ground.wire()?, &cell)),
             Contender::sampled("udp", || time_two_processes(&cell, |end, _| Datagrams::open(ground.wire()?, end))),
         ];
-        let target = |bound| self.judged.then_some(Target::AtMost(bound));
+        let target = |bound| self.has_target.then_some(Target::AtMost(bound));
         let versus = [
             Versus { name: "chain", p50: target(1.15), p99: target(1.3) },
             Versus { name: "chain of mailboxes", p50: None, p99: None },

@@ -84,9 +84,9 @@ impl Case for LanJunk {
             Contender::sampled("udp, junk on unread ports", || under_junk(&UNREAD, &udp)),
             Contender::sampled("udp", udp),
         ];
-        let judged = (self.from == JunkSource::Stranger).then_some(Target::AtMost(1.2));
+        let target = (self.from == JunkSource::Stranger).then_some(Target::AtMost(1.2));
         let versus = [
-            Versus { name: "no junk", p50: None, p99: judged },
+            Versus { name: "no junk", p50: None, p99: target },
             Versus { name: "udp, junk on unread ports", p50: None, p99: None },
             Versus { name: "udp", p50: None, p99: None },
         ];

@@ -37,7 +37,7 @@ impl Case for Brisk {
         let contest = Contest {
             case: "cycle-1ms",
             watched: vec![watched("loaded", true), watched(UNLOADED, false)],
-            judged: 1,
+            with_goals: 1,
             bounds: vec![HOPED],
             versus: vec![
                 Versus { name: HOPED.0, p50: None, p99: Some(Target::AtMost(1.0)) },

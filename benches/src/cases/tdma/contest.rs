@@ -79,7 +79,7 @@ pub(super) struct Contest {
     /// Those watched.
     pub watched: Vec<WatchedContender>,
     /// Goals apply to the first so many.
-    pub judged: usize,
+    pub with_goals: usize,
     /// The goals of slots: a name and figures.
     pub bounds: Vec<(&'static str, Summary)>,
     /// Compared with the first one.
@@ -146,7 +146,7 @@ impl Contest {
         let subject = self.subject(told.unit, Some(told.what));
         let rows = self.watched.iter().zip(seen).enumerate().map(|(at, (watched, seen))| {
             let rounds: Vec<f64> = seen.iter().map(told.of).collect();
-            figure(&subject, watched.contender, &rounds, if at < self.judged { told.goals } else { &[] })
+            figure(&subject, watched.contender, &rounds, if at < self.with_goals { told.goals } else { &[] })
         });
         rows.flatten().collect()
     }

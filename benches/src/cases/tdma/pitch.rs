@@ -46,7 +46,7 @@ impl Case for Pitch {
         let contest = Contest {
             case: "pitch",
             watched: tables.map(|(contender, plan)| watched(contender, plan)).into(),
-            judged: tables.len(),
+            with_goals: tables.len(),
             bounds: Vec::new(),
             versus: Vec::new(),
             figures: [&[INTO_GUARD, OMITTED][..], &ALWAYS[..]].concat(),

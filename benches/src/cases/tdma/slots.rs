@@ -92,7 +92,7 @@ impl Case for Slots {
                 watched(UNLOADED, Rights::RealTime, false),
                 watched(ORDINARY, Rights::Ordinary, true),
             ],
-            judged: 1,
+            with_goals: 1,
             bounds: vec![MUST, HOPED],
             versus: versus.map(|(name, (p50, p99))| Versus { name, p50, p99 }).into(),
             figures: [&FIGURES[..], &ALWAYS[..]].concat(),

@@ -46,7 +46,7 @@ fn scaled(usual: u64) -> u64 {
     (usual * percent.unwrap_or(usually) / 100).max(1)
 }
 
-/// With names of a variant and a run, does it; without, does all, each in a process of its own, and judges.
+/// With names of a variant and a run, does it; without, does all, each in a process of its own, and checks.
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match &arguments[..] {

@@ -1,6 +1,6 @@
 //! What the runs are made of: a small mailbox around the real slot core, its senders and its receiver, as threads.
 //!
-//! Bodies are plain memory, so that ThreadSanitizer judges every access to them. All else is atomics. ThreadSanitizer
+//! Bodies are plain memory, so that ThreadSanitizer checks every access to them. All else is atomics. ThreadSanitizer
 //! knows no fences: what a body's hand-over rested on a fence for would be reported here, though it were right. None
 //! does.
 

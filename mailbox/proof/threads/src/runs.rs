@@ -1,4 +1,4 @@
-//! The runs: each lets threads do one thing many times, and judges the accounts at the end.
+//! The runs: each lets threads do one thing many times, and checks the accounts at the end.
 
 use super::cell::{SeqCount, SeqLatch};
 use super::full::OverflowPolicy;

@@ -65,7 +65,7 @@ impl Admission {
         )
     }
 
-    /// Judges a line, and bounds what it claims. Says which principal's share it used.
+    /// Validates a line, and bounds what it claims. Says which principal's share it used.
     pub(super) fn validate(
         &mut self,
         installation: &Installation,
@@ -231,31 +231,31 @@ mod tests {
     fn a_time_in_the_future_and_losses_that_cannot_be_are_bounded_and_marked() {
         let installation = installation();
         let mut admission = Admission::new(100, 200);
-        let mut judged = |mono_ns: u64, change: fn(&mut OutputLine)| {
+        let mut validated = |mono_ns: u64, change: fn(&mut OutputLine)| {
             let mut said = line(MOTOR);
             change(&mut said);
             admission.validate(&installation, MOTOR, &mut said, Came { mono_ns, ..NOW }).unwrap();
             said
         };
-        assert_eq!(judged(SECOND_NS, |line| line.time_ns += AHEAD_MAX_NS), {
+        assert_eq!(validated(SECOND_NS, |line| line.time_ns += AHEAD_MAX_NS), {
             OutputLine { time_ns: NOW.time_ns + AHEAD_MAX_NS, ..line(MOTOR) }
         });
-        let future = judged(2 * SECOND_NS, |line| line.time_ns = u64::MAX);
+        let future = validated(2 * SECOND_NS, |line| line.time_ns = u64::MAX);
         assert_eq!(future.time_ns, NOW.time_ns);
         assert!(
             future.text.starts_with("(says that it is of 2554-07-21T") && future.text.ends_with(") is on"),
             "{future:?}"
         );
-        let lost = judged(3 * SECOND_NS, |line| line.lost = 4_000_000_000);
+        let lost = validated(3 * SECOND_NS, |line| line.lost = 4_000_000_000);
         assert_eq!(u64::from(lost.lost), 2 * 100 * LANES + 200 * LANES + WAITING_LINES);
         assert_eq!(lost.text, "(says that 4000000000 lines were lost) is on");
-        let suppressed = judged(4 * SECOND_NS, |line| line.suppressed = u32::MAX);
+        let suppressed = validated(4 * SECOND_NS, |line| line.suppressed = u32::MAX);
         assert_eq!(suppressed.suppressed, 100_065_535);
         // After a day of silence much may have been lost.
-        let day = judged(86_400 * SECOND_NS, |line| line.lost = 20_000_000);
+        let day = validated(86_400 * SECOND_NS, |line| line.lost = 20_000_000);
         assert_eq!((day.lost, day.text.as_str()), (20_000_000, "is on"));
         // A mark leaves no room for all of a long text.
-        let long = judged(86_401 * SECOND_NS, |line| (line.lost, line.text) = (u32::MAX, "€".repeat(300)));
+        let long = validated(86_401 * SECOND_NS, |line| (line.lost, line.text) = (u32::MAX, "€".repeat(300)));
         assert!(long.text.len() <= crate::output::TEXT_MAX && long.text.ends_with('…'));
         let counts = RefusedLines { ahead: 1, losses: 3, ..RefusedLines::default() };
         assert_eq!(admission.counts, counts);

@@ -161,7 +161,7 @@ impl Context {
         if self.open.contains(&mailbox) {
             return true;
         }
-        let judged = self.followings.admit((mailbox, latest), head, number, data);
-        judged.map_err(|cause| self.refusals.note(cause, head.from)).is_ok()
+        let validated = self.followings.admit((mailbox, latest), head, number, data);
+        validated.map_err(|cause| self.refusals.note(cause, head.from)).is_ok()
     }
 }

@@ -116,10 +116,10 @@ impl Server {
             }
             member.outgoing.hurry(&if asked.by_hello { welcome } else { SessionMessage::Answer(time) });
         }
-        if let Some(judged) = member.judged.take() {
+        if let Some(pending) = member.verdict.take() {
             member
                 .outgoing
-                .hurry(&SessionMessage::Registered(RegistrationVerdict { holder: &judged.holder, ..judged.verdict }));
+                .hurry(&SessionMessage::Registered(RegistrationVerdict { holder: &pending.holder, ..pending.verdict }));
         }
         if let Some(refused) = member.refused.take() {
             let ((yours, ours), text) = (refused.digests, refused.text.as_str());

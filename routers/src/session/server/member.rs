@@ -87,7 +87,7 @@ pub(super) struct Member {
     pub(super) outgoing: Outgoing,
     pub(super) asked: Option<TimeRequest>,
     pub(super) registrations: Registrations,
-    pub(super) judged: Option<PendingVerdict>,
+    pub(super) verdict: Option<PendingVerdict>,
     pub(super) refused: Option<PendingRefusal>,
     pub(super) round_trip: RoundTrip,
     /// When the connection began, ns.
@@ -123,7 +123,7 @@ impl Member {
             outgoing: Outgoing::new(quota_bytes),
             asked: None,
             registrations: Registrations::default(),
-            judged: None,
+            verdict: None,
             refused: None,
             round_trip: RoundTrip::default(),
             began_ns: now_ns,
@@ -160,7 +160,7 @@ impl Member {
     /// Whether there is more to be written than what is ready.
     pub(super) fn has_more(&self) -> bool {
         let is_leaving = matches!(self.state, MemberState::Leaving { .. });
-        let says = self.asked.is_some() || self.judged.is_some() || self.refused.is_some();
+        let says = self.asked.is_some() || self.verdict.is_some() || self.refused.is_some();
         is_leaving || says || self.outgoing.has_waiting()
     }
 

@@ -138,7 +138,7 @@ impl Server {
                     verdict: &RegistrationVerdict { holder: &holder, ..verdict },
                 });
             }
-            member.judged = Some(PendingVerdict { verdict, holder });
+            member.verdict = Some(PendingVerdict { verdict, holder });
         }
         self.is_due(client);
     }

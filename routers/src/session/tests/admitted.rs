@@ -1,4 +1,4 @@
-//! What the server brings is judged where it arrives, by the same rules as on the LAN.
+//! What the server brings is validated where it arrives, by the same rules as on the LAN.
 
 use super::ground::Ground;
 use super::plan::{client_settings, module, ranges};

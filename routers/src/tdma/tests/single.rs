@@ -60,7 +60,7 @@ impl Lonely {
     }
 
     /// Its next window, validated at this moment after its call.
-    fn judged(&mut self, after_ns: i64) -> (Planned, WindowVerdict) {
+    fn validated(&mut self, after_ns: i64) -> (Planned, WindowVerdict) {
         let Next::Window(planned) = self.scheduler.next(self.now_ns, &self.clock) else { panic!("silent") };
         self.now_ns = planned.call_ns.saturating_add_signed(after_ns);
         let verdict = self.scheduler.validate(&planned, self.now_ns, &self.clock);
@@ -69,7 +69,7 @@ impl Lonely {
 
     /// Asks in its slot, and is answered. Each direction takes 10 µs.
     fn asks(&mut self) {
-        let (_, verdict) = self.judged(0);
+        let (_, verdict) = self.validated(0);
         let WindowVerdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
         let mut datagram = [0; TIME_BYTES];
         let mut kinds = Vec::new();
@@ -119,14 +119,14 @@ fn a_node_listens_then_asks_then_sends() {
         assert_eq!(silent(&mut one), Some(Silent::Joining { heard }));
     }
     one.hears_sync();
-    let (planned, verdict) = one.judged(0);
+    let (planned, verdict) = one.validated(0);
     let WindowVerdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
     assert_eq!((tx_window.carries, one.scheduler.silent()), (Carries::Time, Some(Silent::Joining { heard: 8 })));
     // For coarse time a Sync takes half of its longest delay.
     let delay_max_ns = one.scheduler.table().for_clock().delay_max_ns;
     assert_eq!(planned.begin_ns, planned.window.begin_ns - OFFSET + 10 * US - delay_max_ns / 2);
     let mut one = Lonely::joined();
-    let (planned, verdict) = one.judged(0);
+    let (planned, verdict) = one.validated(0);
     let WindowVerdict::Send(tx_window) = verdict else { panic!("{verdict:?}") };
     assert_eq!((tx_window.carries, one.scheduler.silent()), (Carries::All, None));
     assert!(planned.begin_ns.abs_diff(planned.window.begin_ns - OFFSET) < 2 * US, "{planned:?}");
@@ -139,7 +139,7 @@ fn what_is_late_is_not_sent() {
         [(-1, None), (0, Some(true)), (GATE_NS as i64, Some(true)), (GATE_NS as i64 + 1, Some(false))]
     {
         let mut one = Lonely::joined();
-        let (_, verdict) = one.judged(after_ns);
+        let (_, verdict) = one.validated(after_ns);
         match sends {
             None => assert!(matches!(verdict, WindowVerdict::Early), "{after_ns}: {verdict:?}"),
             Some(true) => assert!(matches!(verdict, WindowVerdict::Send(_)), "{after_ns}: {verdict:?}"),
@@ -188,7 +188,7 @@ fn no_frame_starts_before_its_slot() {
         let left = Stamp { ns: one.now_ns + 12 * US + sample % 10 * US, doubt_ns: 0, by_kernel: true };
         one.scheduler.left(one.now_ns, left);
     }
-    let (planned, verdict) = one.judged(0);
+    let (planned, verdict) = one.validated(0);
     assert!(matches!(verdict, WindowVerdict::Send(_)), "{verdict:?}");
     assert_eq!(planned.begin_ns - planned.call_ns, 12 * US, "as much as can be compensated");
     assert_eq!(one.scheduler.lead_ns().0, 17 * US, "the median");
@@ -203,7 +203,7 @@ fn no_frame_starts_before_its_slot() {
 #[test]
 fn what_was_handed_over_counts() {
     let mut one = Lonely::joined();
-    let (planned, verdict) = one.judged(0);
+    let (planned, verdict) = one.validated(0);
     let WindowVerdict::Send(mut tx_window) = verdict else { panic!("{verdict:?}") };
     // 350 µs: 4375 bytes. All are handed over at once, and the wire takes its time.
     assert!((349 * US..=350 * US).contains(&(planned.end_ns - planned.begin_ns)), "{planned:?}");
@@ -230,7 +230,7 @@ fn what_was_handed_over_counts() {
 #[test]
 fn what_leaves_later_than_bounds_reckon_with_is_late() {
     let mut one = Lonely::joined();
-    let (_, WindowVerdict::Send(mut tx_window)) = one.judged(0) else { panic!() };
+    let (_, WindowVerdict::Send(mut tx_window)) = one.validated(0) else { panic!() };
     let (hand_over_ns, wire_ns, small_wire_ns) = (20 * US, 85_280, 6_720);
     let called_ns = tx_window.begin_ns - one.scheduler.lead_ns().1;
     let turns_at = |after_ns: u64, is_so: &dyn Fn(u64) -> bool| {
@@ -250,7 +250,7 @@ fn what_leaves_later_than_bounds_reckon_with_is_late() {
 #[test]
 fn slots_that_went_by_are_counted() {
     let mut one = Lonely::joined();
-    one.judged(0);
+    one.validated(0);
     let before = one.scheduler.counts(&one.clock);
     one.now_ns += 3 * CYCLE + 2 * GATE_NS;
     one.scheduler.next(one.now_ns, &one.clock);

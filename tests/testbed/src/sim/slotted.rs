@@ -119,7 +119,7 @@ impl Platform for Ground<'_, '_> {
                 self.io.oracle.broken(self.io.now, Promise::Exclusive, "a clock sends outside of its windows".into());
             }
             SlotEvent::Idle(Step::Wait { .. }) => {}
-            SlotEvent::Decided(planned, verdict) => self.judged(planned, verdict),
+            SlotEvent::Decided(planned, verdict) => self.validated(planned, verdict),
             SlotEvent::AnsweredOverheard(tx_window) => self.answered_overheard(tx_window),
             SlotEvent::Made => self.made(),
             SlotEvent::Missed { datagram, held: true } => {
@@ -157,7 +157,7 @@ impl Ground<'_, '_> {
         }
     }
 
-    fn judged(&mut self, planned: &Planned, verdict: &WindowVerdict) {
+    fn validated(&mut self, planned: &Planned, verdict: &WindowVerdict) {
         let io = &mut *self.io;
         io.line(|| format!("{:?}: {verdict:?}", planned.window));
         match verdict {
