@@ -49,10 +49,10 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ("routers/src/queue/mod.rs", "routers/src/queue/shares.rs", "a part of the queue's memory, by its places"),
     (
         "routers/src/shell/clock/mod.rs",
-        "routers/src/shell/clock/works.rs",
+        "routers/src/shell/clock/runtime.rs",
         "what the thread of the clock does, and why it could not",
     ),
-    ("routers/src/tcp/server/door.rs", "routers/src/tcp/server/mod.rs", "lets connections in"),
+    ("routers/src/tcp/server/accept.rs", "routers/src/tcp/server/mod.rs", "lets connections in"),
     (
         "routers/src/session/server/mod.rs",
         "routers/src/session/server/places.rs",

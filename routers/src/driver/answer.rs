@@ -1,6 +1,6 @@
 //! Refusals and hellos between the thread that receives and the one that sends in time slots.
 
-use crate::security::{HELLO_DATAGRAM_BYTES, Said};
+use crate::security::{HELLO_DATAGRAM_BYTES, OutgoingHello};
 use crate::settings::Settings;
 use std::net::IpAddr;
 
@@ -26,7 +26,7 @@ pub enum Answer {
     /// Where all is sealed.
     Hello {
         /// Its receiver, and what it says.
-        said: Said,
+        said: OutgoingHello,
         /// Begins with the hello.
         datagram: [u8; ANSWER_BYTES],
     },

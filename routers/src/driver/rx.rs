@@ -3,7 +3,7 @@
 use super::answer::{ANSWER_BYTES, Answer};
 use crate::inbound::{Datagram, Envelope, Inbound, InboundStep, SOCKET_MAX_NS};
 use crate::report::Deliver;
-use crate::security::{Gate, Said};
+use crate::security::{Gate, OutgoingHello};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use std::sync::Arc;
@@ -108,7 +108,7 @@ impl RxDriver {
 
     /// Sends a hello. In time slots it waits for one, and packages sealed to an incarnation that begins by it wait for
     /// the hello.
-    fn say(&self, on: &mut impl RxPlatform, said: Said, datagram: [u8; ANSWER_BYTES]) {
+    fn say(&self, on: &mut impl RxPlatform, said: OutgoingHello, datagram: [u8; ANSWER_BYTES]) {
         let answer = Answer::Hello { said, datagram };
         match &self.gate {
             // Without room for it, it is lost: a peer without a session is asked again.

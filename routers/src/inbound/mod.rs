@@ -5,7 +5,7 @@
 //!              foreign  refused, told so   old               duplicate      └ fragment ▶ whole ┘   late
 //! ```
 
-mod doubt;
+mod confirmation;
 mod order;
 mod peer;
 mod refusing;

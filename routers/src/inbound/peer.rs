@@ -1,6 +1,6 @@
 //! Receiving side of one peer: its incarnation, its datagrams, and the results for their packages.
 
-use super::doubt::Doubt;
+use super::confirmation::Confirmation;
 use super::order::{Order, sequence_of};
 use super::window::{Arrival, SequenceWindow, WINDOW};
 use crate::counts::Cause;
@@ -27,7 +27,7 @@ pub(super) struct PeerReceiver {
     began_ns: u64,
     /// More than one of its datagrams came.
     is_sure: bool,
-    doubt: Doubt,
+    doubt: Confirmation,
     /// Bounds the reports that an incarnation began.
     restarts_told: Throttle,
     old: [PastIncarnation; OLD_KEPT],

@@ -27,7 +27,7 @@ const LOOK_EVERY_NS: u64 = 10_000_000;
 
 /// A hello in the buffer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Said {
+pub struct OutgoingHello {
     /// The receiver.
     pub to: NodeIndex,
     /// How long it is.
@@ -93,7 +93,7 @@ impl Gate {
         inbound: &mut Inbound,
         deliver: &mut impl Deliver,
         reply: &mut [u8],
-    ) -> Option<Said> {
+    ) -> Option<OutgoingHello> {
         if datagram.len() > inbound.sealed_bytes_max() {
             let why = Rejection::NotOurs;
             self.reject(now_ns, came, why, why.into(), inbound, deliver);
@@ -108,7 +108,7 @@ impl Gate {
                     && inbound.may_handshake(now_ns, came.source, &head, deliver)
                 {
                     let outcome = handshake.receive(now_ns, &head, &opened, reply);
-                    let said = |bytes| Said { to: head.from, bytes, is_reply: true, begins: outcome.begins };
+                    let said = |bytes| OutgoingHello { to: head.from, bytes, is_reply: true, begins: outcome.begins };
                     return outcome.reply_bytes.map(said);
                 }
                 if inbound.is_of_other(came.source, &head) {
@@ -135,12 +135,12 @@ impl Gate {
         opened: &OpenedHello,
         inbound: &Inbound,
         reply: &mut [u8],
-    ) -> Option<Said> {
+    ) -> Option<OutgoingHello> {
         let outcome = self.handshake.as_mut()?.receive_other(now_ns, head, opened, reply);
         if outcome.proves && opened.hello.next[Port::Time as usize] > 0 {
             inbound.tells_other(now_ns, head);
         }
-        outcome.reply_bytes.map(|bytes| Said { to: head.from, bytes, is_reply: true, begins: false })
+        outcome.reply_bytes.map(|bytes| OutgoingHello { to: head.from, bytes, is_reply: true, begins: false })
     }
 
     /// First sequence of a peer's present incarnation that counts; what is missing from there on is lost.
@@ -150,7 +150,7 @@ impl Gate {
 
     /// Has a hello wait for a slot: `put` says whether there was room. Nothing is sealed to an incarnation that begins
     /// by it before it has left; but if it is lost, nothing waits for it.
-    pub fn waits(&self, said: Said, put: impl FnOnce() -> bool) {
+    pub fn waits(&self, said: OutgoingHello, put: impl FnOnce() -> bool) {
         let waits = said.begins && self.all.reply_waits(said.to);
         if !put() && waits {
             self.all.reply_left(said.to);
@@ -168,7 +168,7 @@ impl Gate {
     }
 
     /// The next challenge that is due. Each peer is asked until it is heard, and again when nothing is heard of it.
-    pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<Said> {
+    pub fn ask(&mut self, now_ns: u64, stats: &Stats, datagram: &mut [u8]) -> Option<OutgoingHello> {
         if now_ns < self.look_ns || self.handshake.is_none() {
             return None;
         }
@@ -180,7 +180,7 @@ impl Gate {
         self.peers[usize::from(to)].at_ns = Some(now_ns);
         self.all.doubted(to);
         self.handshake.as_mut()?.refresh(now_ns, to);
-        self.all.ask(to, datagram).map(|bytes| Said { to, bytes, is_reply: false, begins: false })
+        self.all.ask(to, datagram).map(|bytes| OutgoingHello { to, bytes, is_reply: false, begins: false })
     }
 
     fn is_to_be_asked(&mut self, peer: NodeIndex, now_ns: u64, stats: &Stats) -> bool {

@@ -1,6 +1,6 @@
 //! Hellos that wait for a time slot: for each peer the newest challenge and the newest reply.
 
-use super::gate::Said;
+use super::gate::OutgoingHello;
 use super::peer_sessions::PeerSessions;
 use super::{CHALLENGE_MAX_NS, HELLO_DATAGRAM_BYTES, TAG_BYTES};
 use crate::frame::NodeIndex;
@@ -44,7 +44,7 @@ impl HelloQueue {
     ///
     /// # Panics
     /// If the datagram is shorter than a hello.
-    pub fn put(&mut self, now_ns: u64, said: Said, datagram: &[u8]) {
+    pub fn put(&mut self, now_ns: u64, said: OutgoingHello, datagram: &[u8]) {
         let mut word = Word { at_ns: now_ns, begins: said.begins, datagram: [0; HELLO_DATAGRAM_BYTES] };
         word.datagram.copy_from_slice(&datagram[..HELLO_DATAGRAM_BYTES]);
         let Some(peer) = self.peers.get_mut(usize::from(said.to)) else { return };
@@ -57,7 +57,11 @@ impl HelloQueue {
 
     /// The next that is to leave: replies first, and those to one peer before others; then all in turn. What is too old
     /// to be answered is dropped. When it has left, [`Self::left`].
-    pub fn take(&mut self, now_ns: u64, first: Option<NodeIndex>) -> Option<(Said, [u8; HELLO_DATAGRAM_BYTES])> {
+    pub fn take(
+        &mut self,
+        now_ns: u64,
+        first: Option<NodeIndex>,
+    ) -> Option<(OutgoingHello, [u8; HELLO_DATAGRAM_BYTES])> {
         let (next, peers) = (self.next, self.peers.len());
         let first = first.map(usize::from).filter(|first| *first < peers);
         for is_reply in [true, false] {
@@ -72,7 +76,12 @@ impl HelloQueue {
                     }
                 } else {
                     self.next = (to + 1) % peers;
-                    let said = Said { to: to as NodeIndex, bytes: HELLO_DATAGRAM_BYTES, is_reply, begins: word.begins };
+                    let said = OutgoingHello {
+                        to: to as NodeIndex,
+                        bytes: HELLO_DATAGRAM_BYTES,
+                        is_reply,
+                        begins: word.begins,
+                    };
                     return Some((said, word.datagram));
                 }
             }
@@ -81,7 +90,7 @@ impl HelloQueue {
     }
 
     /// It was handed to the network: if it was a reply, its peer can open what is sealed to it from now on.
-    pub fn left(&self, said: Said) {
+    pub fn left(&self, said: OutgoingHello) {
         if said.is_reply {
             self.all.reply_left(said.to);
         }

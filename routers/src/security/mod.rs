@@ -39,7 +39,7 @@ mod sealing;
 mod tally;
 mod unverified;
 
-pub use gate::{ASK_EVERY_NS, Gate, Said};
+pub use gate::{ASK_EVERY_NS, Gate, OutgoingHello};
 pub use handshake::{ANSWERS_MAX, CHALLENGE_MAX_NS, Handshake, HelloOutcome, PER_NS};
 pub use hello::{HELLO_BYTES, Hello};
 pub use hello_queue::{HELLO_SLOT_BYTES, HelloQueue};

@@ -37,7 +37,7 @@ struct Room {
 }
 
 /// The end that reads the mailbox.
-pub(super) struct Giver {
+pub(super) struct BatchSender {
     full: SyncSender<Batch>,
     empty: Receiver<Batch>,
     filling: Option<Batch>,
@@ -45,7 +45,7 @@ pub(super) struct Giver {
 }
 
 /// The end that sends.
-pub(super) struct Taker {
+pub(super) struct BatchReceiver {
     full: Receiver<Batch>,
     empty: SyncSender<Batch>,
     /// The batch in use, and the offset in it.
@@ -55,18 +55,18 @@ pub(super) struct Taker {
 }
 
 /// Both ends.
-pub(super) fn handover(shared: &Arc<Shared>) -> (Giver, Taker) {
+pub(super) fn handover(shared: &Arc<Shared>) -> (BatchSender, BatchReceiver) {
     let ((full, filled), (empty, emptied)) = (sync_channel(BATCHES), sync_channel(BATCHES));
     let room = Arc::new(Room { empty: AtomicUsize::new(BATCHES), wanted: AtomicBool::new(false) });
     for _ in 0..BATCHES {
         // There is room for all.
         let _ = empty.try_send(Batch::with_capacity(BATCH_BYTES + RECORD_HEAD_BYTES + BODY_BYTES_MAX));
     }
-    let giver = Giver { full, empty: emptied, filling: None, room: room.clone() };
-    (giver, Taker { full: filled, empty, reading: None, room, shared: shared.clone() })
+    let giver = BatchSender { full, empty: emptied, filling: None, room: room.clone() };
+    (giver, BatchReceiver { full: filled, empty, reading: None, room, shared: shared.clone() })
 }
 
-impl Handover for Giver {
+impl Handover for BatchSender {
     fn takes(&mut self) -> bool {
         if self.filling.is_none()
             && let Ok(batch) = self.empty.try_recv()
@@ -114,7 +114,7 @@ pub(super) enum Waited {
     Ended,
 }
 
-impl Taker {
+impl BatchReceiver {
     /// The next package: its head, when it was published, its body; and whether it is the last for now.
     pub(super) fn next(&mut self) -> Option<(Head, u64, &[u8], bool)> {
         if self.reading.as_ref().is_some_and(|(batch, at)| *at >= batch.len()) {
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
     use rohrpost_mailbox::{Name, Node, Participant, Priority, Type};
 
-    fn ends() -> (tempfile::TempDir, Giver, Taker) {
+    fn ends() -> (tempfile::TempDir, BatchSender, BatchReceiver) {
         let folder = tempfile::tempdir().unwrap();
         let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
         let shared = Arc::new(Shared::new(&Participant::join(&node, Name::NONE).unwrap()));

@@ -24,7 +24,7 @@ mod failure;
 mod filter;
 mod handover;
 mod hosted;
-mod news;
+mod peer_events;
 mod rest;
 mod rx_thread;
 pub(crate) mod sender_cache;
@@ -40,7 +40,7 @@ mod wire;
 pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
-pub use news::difference;
+pub use peer_events::difference;
 pub use socket::{SocketError, listen};
 
 use crate::driver::{ANSWERS, Answer, FreeDriver, RxDriver, spin_ns};
@@ -51,8 +51,8 @@ use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::{SlotScheduler, SlotTable};
 use answers::ErrorReplier;
-use clock::{ClockError, ClockParts, ClockService, ClockState, Works};
-use news::News;
+use clock::{ClockError, ClockParts, ClockRuntime, ClockService, ClockState};
+use peer_events::News;
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotonic_ns};
 use rx_thread::{PackageDelivery, RxSystem, RxThread};
 use sender_cache::SenderCache;
@@ -242,8 +242,10 @@ impl Shell {
             system.answers = Some(shell.send_in_slots(name, inlet, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
-            let works =
-                clock.map(Works::new).transpose()?.map(|works| works.sealed(shell.peer_sessions.as_ref(), false));
+            let works = clock
+                .map(ClockRuntime::new)
+                .transpose()?
+                .map(|works| works.sealed(shell.peer_sessions.as_ref(), false));
             shell.service = works.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
             inlet.sending.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
@@ -279,7 +281,7 @@ impl Shell {
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = SlotTable::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
-        let works = Works::new(clock)?.sealed(self.peer_sessions.as_ref(), true).in_slots(table.for_clock());
+        let works = ClockRuntime::new(clock)?.sealed(self.peer_sessions.as_ref(), true).in_slots(table.for_clock());
         let spin_ns = spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(ANSWERS);
         let scheduler = SlotScheduler::new(table, spin_ns);

@@ -5,7 +5,7 @@
 //! both kinds before any thread runs, and a flood of one takes no room or time from the other.
 
 use super::answers::{ErrorReplier, Faults};
-use super::handover::{Giver, Taker, Waited, handover};
+use super::handover::{BatchReceiver, BatchSender, Waited, handover};
 use super::rx_thread::{PackageDelivery, RxSystem, RxThread};
 use super::sender_cache::SenderCache;
 use super::sending::Sending;
@@ -32,7 +32,7 @@ pub(super) struct Rest {
 
 /// What the driver has of the system.
 pub(super) struct HandoverInlet {
-    pub(super) taker: Taker,
+    pub(super) taker: BatchReceiver,
     pub(super) sending: Sending,
 }
 
@@ -75,7 +75,7 @@ impl Shell {
         (node, name): (&Arc<Node>, Name),
         faults: &Arc<dyn Faults>,
         (socket, impair): (Option<OwnedFd>, Option<impair::ImpairmentSettings>),
-    ) -> Result<Option<Giver>, ShellError> {
+    ) -> Result<Option<BatchSender>, ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
         if !settings.parts_rest() {
             return Ok(None);

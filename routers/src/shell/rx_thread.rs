@@ -3,7 +3,7 @@
 
 use super::ages::Ages;
 use super::answers::ErrorReplier;
-use super::news::News;
+use super::peer_events::News;
 use super::sender_cache::SenderCache;
 use super::socket::{InSocket, Received};
 use super::threads::{Awake, Shared};

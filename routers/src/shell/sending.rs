@@ -2,7 +2,7 @@
 
 use super::answers::ErrorReplier;
 use super::failure::Failure;
-use super::handover::Giver;
+use super::handover::BatchSender;
 use super::wire::PeerSockets;
 use crate::counts::Cause;
 use crate::driver::{Handover, NotSent, Outlet, RealTimeOutlet};
@@ -18,7 +18,7 @@ pub(super) struct Sending {
     pub(super) answers: ErrorReplier,
     pub(super) wire: PeerSockets,
     /// To the thread that sends what is not real time; none where there is none.
-    pub(super) rest: Option<Giver>,
+    pub(super) rest: Option<BatchSender>,
 }
 
 impl Report for ErrorReplier {

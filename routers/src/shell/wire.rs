@@ -8,7 +8,7 @@
 //! No thread ever waits in a socket: a stalled device delays only its own peers.
 
 use super::failure::{Failure, Failures};
-use super::news::News;
+use super::peer_events::News;
 use super::socket::OutSocket;
 use crate::frame::NodeIndex;
 use crate::impair::{self, Impairment};

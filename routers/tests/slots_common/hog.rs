@@ -6,7 +6,7 @@ use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_nanosleep};
 use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::sys::{Reservation, Scheduling, reserve, schedule};
-use rohrpost_routers::shell::slots::Granted;
+use rohrpost_routers::shell::slots::ActualScheduling;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
@@ -29,7 +29,7 @@ pub(crate) struct Hog {
 impl Hog {
     /// Starts it, and waits until it is at work. `test` is the test of this program that calls [`be_a_hog`], `routers`
     /// what routers were granted. None where it may not go before them.
-    pub(crate) fn start(test: &str, routers: Granted) -> Option<Self> {
+    pub(crate) fn start(test: &str, routers: ActualScheduling) -> Option<Self> {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command
             .args(["--exact", test, "--nocapture"])
@@ -52,7 +52,7 @@ impl Drop for Hog {
 }
 
 fn goes_first(how: &str) -> bool {
-    if how != Granted::Reserved.word() {
+    if how != ActualScheduling::Reserved.word() {
         return schedule(Scheduling::Fifo(FIFO)).is_ok();
     }
     let wanted = Reservation { runtime_ns: DEADLINE_NS / 2, deadline_ns: DEADLINE_NS, period_ns: DEADLINE_NS };

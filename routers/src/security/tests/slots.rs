@@ -84,8 +84,8 @@ fn while_keys_are_changed_a_peer_with_either_hears_enough() {
     }
 }
 
-fn said(to: NodeIndex, is_reply: bool, begins: bool) -> Said {
-    Said { to, bytes: HELLO_DATAGRAM_BYTES, is_reply, begins }
+fn said(to: NodeIndex, is_reply: bool, begins: bool) -> OutgoingHello {
+    OutgoingHello { to, bytes: HELLO_DATAGRAM_BYTES, is_reply, begins }
 }
 
 /// What leaves next: its receiver, whether it is a reply, and its first byte.

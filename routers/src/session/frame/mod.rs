@@ -15,12 +15,12 @@
 mod bad;
 mod carried;
 mod fields;
-mod meeting;
+mod handshake;
 mod ranges;
 
 pub use bad::{BadSessionFrame, VERSION};
 pub use carried::{Carried, TimeAnswer};
-pub use meeting::{NAME_BYTES_MAX, SessionHello, SessionRefusal, SessionRefusalReason, Welcome};
+pub use handshake::{NAME_BYTES_MAX, SessionHello, SessionRefusal, SessionRefusalReason, Welcome};
 pub use ranges::{Objection, RANGES_MAX, Range, Ranges, RegistrationVerdict};
 
 use fields::FieldReader;

@@ -7,7 +7,7 @@
 //! ```
 
 mod carry;
-mod crowd;
+mod connections;
 mod intake;
 mod look;
 mod member;

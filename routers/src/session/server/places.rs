@@ -6,7 +6,7 @@
 //!  hello  ─▶ member:    of too many the newest of the principal that has most, if the new one's has fewer by two
 //! ```
 
-use super::crowd::Crowd;
+use super::connections::ConnectionsByOwner;
 use super::member::{Member, MemberState};
 use super::principal::{Principal, Principals};
 use super::work::WORK_SHARE;
@@ -36,7 +36,7 @@ pub(super) struct Places {
     /// Places that were left.
     free: BTreeSet<u16>,
     /// Clients without a hello yet, by address.
-    handshakes: Crowd<Principal>,
+    handshakes: ConnectionsByOwner<Principal>,
     /// Admitted clients.
     pub(super) principals: Principals,
     /// Admitted clients, by incarnation.

@@ -1,7 +1,7 @@
 //! The party that a connection counts to. Limits hold for each principal, so that more connections give no larger
 //! share.
 
-use super::crowd::Crowd;
+use super::connections::ConnectionsByOwner;
 use crate::session::{ClientIndex, WAIT_MAX_NS};
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
@@ -53,7 +53,7 @@ pub(in crate::session) struct Principals {
     ids: BTreeMap<Principal, PrincipalId>,
     uses: BTreeMap<PrincipalId, Uses>,
     /// Their connections.
-    pub(super) members: Crowd<PrincipalId>,
+    pub(super) members: ConnectionsByOwner<PrincipalId>,
     /// Principals without a connection, and since when, ns.
     gone: VecDeque<(u64, PrincipalId)>,
     next: PrincipalId,

@@ -11,16 +11,16 @@
 //! of the time at most. What it does, and when, says the [driver](crate::driver).
 
 mod local;
+mod runtime;
 mod socket;
 mod state;
 #[cfg(test)]
 mod tests;
-mod works;
 
 pub use local::Skew;
 pub(crate) use local::looked;
+pub(super) use runtime::ClockRuntime;
 pub use state::{ClockSnapshot, ClockState};
-pub(super) use works::Works;
 
 use crate::driver::ClockStep;
 use crate::impair;
@@ -110,11 +110,11 @@ impl ClockService {
     /// # Errors
     /// [`ClockError`]
     pub fn start(parts: ClockParts) -> Result<Self, ClockError> {
-        Self::of(Works::new(parts)?)
+        Self::of(ClockRuntime::new(parts)?)
     }
 
     /// A service of parts that were made already.
-    pub(super) fn of(works: Works) -> Result<Self, ClockError> {
+    pub(super) fn of(works: ClockRuntime) -> Result<Self, ClockError> {
         let state = works.state().clone();
         let (ended, ends) = io::pipe().map_err(ClockError::Thread)?;
         let mut worker = Worker { works, ended };
@@ -146,7 +146,7 @@ impl Drop for ClockService {
 
 /// The thread.
 struct Worker {
-    works: Works,
+    works: ClockRuntime,
     ended: PipeReader,
 }
 

@@ -6,7 +6,7 @@ use crate::report::Report;
 use rohrpost_mailbox::{Head, Priority, Receiver, monotonic_ns};
 
 /// What a package goes through when it is taken.
-pub(super) struct Hands<'a, R, N> {
+pub(super) struct TransitAdapter<'a, R, N> {
     pub(super) transit: &'a mut Receiver,
     pub(super) outbound: &'a mut Outbound,
     pub(super) report: &'a mut R,
@@ -14,7 +14,7 @@ pub(super) struct Hands<'a, R, N> {
     pub(super) local_ns: N,
 }
 
-impl<R: Report, N: Fn() -> u64> Transit for Hands<'_, R, N> {
+impl<R: Report, N: Fn() -> u64> Transit for TransitAdapter<'_, R, N> {
     fn waits(&mut self) -> (usize, Option<Priority>) {
         self.transit.waits()
     }
@@ -102,7 +102,7 @@ mod tests {
 
         fn hands(&mut self) -> (&mut Intake, impl Transit) {
             let Self { intake, transit, end, .. } = self;
-            (intake, Hands { transit, outbound: &mut end.outbound, report: &mut end.log, local_ns: || 0 })
+            (intake, TransitAdapter { transit, outbound: &mut end.outbound, report: &mut end.log, local_ns: || 0 })
         }
 
         /// Looks this often shortly before the call.

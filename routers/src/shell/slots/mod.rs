@@ -4,16 +4,16 @@
 //! Its bell is never rung: publishing a package makes no system call, since the package waits for a slot anyway. The
 //! thread takes nothing from the heap.
 
-mod alarm;
-mod granted;
 mod intake;
-mod speech;
+mod messages;
+mod scheduling;
+mod sleep;
 mod state;
 
-pub use granted::Granted;
+pub use scheduling::ActualScheduling;
 pub use state::{SlotSnapshot, SlotStatus};
 
-use super::clock::{ClockState, Works};
+use super::clock::{ClockRuntime, ClockState};
 use super::sending::Sending;
 use super::socket::InSocket;
 use super::threads::Shared;
@@ -28,7 +28,7 @@ use crate::settings::Settings;
 use crate::stats::Stats;
 use crate::tdma::SlotScheduler;
 use crate::time::{Clock, SentId, Stamp, TIME_BYTES};
-use intake::Hands;
+use intake::TransitAdapter;
 use rohrpost_mailbox::{Name, Receiver, monotonic_ns};
 use std::net::IpAddr;
 use std::sync::atomic::Ordering;
@@ -55,7 +55,7 @@ struct System {
     shared: Arc<Shared>,
     /// In which the thread that receives counts.
     stats: Arc<Stats>,
-    works: Works,
+    works: ClockRuntime,
     transit: Receiver,
     sending: Sending,
     answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
@@ -71,7 +71,7 @@ impl SlotThread {
         own: Own,
         (shared, stats): (Arc<Shared>, Arc<Stats>),
         inlet: TransitInlet,
-        works: Works,
+        works: ClockRuntime,
         scheduler: SlotScheduler,
     ) -> Self {
         let TransitInlet { transit, sending } = inlet;
@@ -96,12 +96,12 @@ impl SlotThread {
     /// Runs until the router ends.
     pub(super) fn run(self) {
         let Self { mut driver, mut system } = self;
-        alarm::be_punctual();
-        system.snapshot.granted = Granted::ask(driver.scheduler().table());
-        system.works.runs_in_real_time(system.snapshot.granted != Granted::Ordinary);
+        sleep::be_punctual();
+        system.snapshot.granted = ActualScheduling::ask(driver.scheduler().table());
+        system.works.runs_in_real_time(system.snapshot.granted != ActualScheduling::Ordinary);
         while !system.shared.ends() {
             match driver.poll(&mut system) {
-                SlotStep::Sleep { for_ns } => alarm::sleep(for_ns),
+                SlotStep::Sleep { for_ns } => sleep::sleep(for_ns),
                 SlotStep::Spin { .. } => std::hint::spin_loop(),
             }
         }
@@ -127,7 +127,7 @@ impl Platform for System {
 
     fn transit(&mut self) -> impl Transit {
         let Self { transit, sending: Sending { outbound, answers: report, .. }, works, .. } = self;
-        Hands { transit, outbound, report, local_ns: || works.now_ns() }
+        TransitAdapter { transit, outbound, report, local_ns: || works.now_ns() }
     }
 
     fn queue(&mut self) -> (&mut Outbound, impl Report) {
@@ -166,7 +166,7 @@ impl Platform for System {
         self.works.publish();
         let Self { works, settings, snapshot, state, .. } = self;
         let (before, silent) = (snapshot.silent, scheduler.silent());
-        speech::tell_change(before, silent, || speech::parted(settings, works.clock().parted_by(works.now_ns())));
+        messages::tell_change(before, silent, || messages::parted(settings, works.clock().parted_by(works.now_ns())));
         let (counts, lead_ns) = (scheduler.counts(works.clock()), scheduler.lead_ns());
         let WindowLog { held, windows } = *log;
         *snapshot = SlotSnapshot { counts, silent, lead_ns, held, windows, ..*snapshot };

@@ -1,6 +1,6 @@
 //! What the thread of the time slots lets others see.
 
-use super::granted::Granted;
+use super::scheduling::ActualScheduling;
 use crate::driver::{Used, WINDOWS};
 use crate::tdma::{Silent, SlotCounts};
 use std::sync::{Mutex, PoisonError};
@@ -15,7 +15,7 @@ pub struct SlotSnapshot {
     /// From the call to the wire, ns: the median, and by how much calls are made earlier.
     pub lead_ns: (u64, u64),
     /// How the thread is scheduled.
-    pub granted: Granted,
+    pub granted: ActualScheduling,
     /// Datagrams that waited for the next slot, since the thread stood still between their making and their leaving.
     pub held: u64,
     /// The last windows that were used, the oldest first, as far as there were so many.
@@ -29,7 +29,7 @@ impl SlotSnapshot {
             counts: SlotCounts::default(),
             silent,
             lead_ns: (0, 0),
-            granted: Granted::Ordinary,
+            granted: ActualScheduling::Ordinary,
             held: 0,
             windows: [None; WINDOWS],
         }

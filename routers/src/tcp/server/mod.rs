@@ -3,7 +3,7 @@
 //! No client can make it wait: each socket is read a bounded piece at a time, and what it does not take waits in the
 //! client's own queue.
 
-mod door;
+mod accept;
 mod reporter;
 
 use super::fault_writer::FaultWriter;
@@ -13,7 +13,7 @@ use super::stream::{Moved, Stream};
 use crate::session::server::{Names, Rights, Server, ServerSettings, ServerStep, View};
 use crate::session::{Cause, ClientIndex};
 use crate::shell::Faults;
-use door::{listen, raise_descriptors};
+use accept::{listen, raise_descriptors};
 use nix::sys::epoll::{Epoll, EpollCreateFlags, EpollEvent, EpollFlags, EpollTimeout};
 use nix::sys::eventfd::{EfdFlags, EventFd};
 use reporter::ServerReporter;

@@ -2,12 +2,12 @@
 //! thread, on a simulated platform, and watched.
 
 use super::clock::Now;
-use super::packages::{Hands, Packages};
+use super::packages::{Packages, TransitAdapter};
 use super::promise::Promise;
 use super::spans::RECOVERY_NS;
 use super::station::{Arrived, Io, Layer, Port, Sent};
 use super::ticking::{self, Ticking};
-use super::transmission::{Basis, Says};
+use super::transmission::{Basis, SendBasis};
 use rohrpost_routers::driver::{Answer, NotSent, Platform, SlotDriver, SlotEvent, SlotStep, WindowLog, spin_ns};
 use rohrpost_routers::frame::{FrameHead, FrameKind, NodeIndex};
 use rohrpost_routers::intake::{MAKING_NS, Transit};
@@ -40,7 +40,7 @@ struct WindowWatch {
     allowance_ns: u64,
     cycle_ns: u64,
     /// The time basis on which this node sends in the window, and the number of datagrams sent before it.
-    window: (Says, usize),
+    window: (SendBasis, usize),
     /// When the window began in which it last said a hello by what it had overheard, local ns.
     asked_ns: Option<u64>,
     /// When it began, true ns; none as soon as it has joined.
@@ -75,7 +75,7 @@ impl Platform for Ground<'_, '_> {
     }
 
     fn transit(&mut self) -> impl Transit {
-        Hands { packages: self.packages, io: self.io }
+        TransitAdapter { packages: self.packages, io: self.io }
     }
 
     fn queue(&mut self) -> (&mut Outbound, impl Report) {
@@ -205,34 +205,34 @@ impl Ground<'_, '_> {
 
     /// The time basis for sending now: the node's own time if its stated bound is at most half of the guard, else what
     /// it heard.
-    fn says(&self, carries: Carries) -> Says {
+    fn says(&self, carries: Carries) -> SendBasis {
         let (io, now_ns, allowed_ns) = (&*self.io, self.io.now.monotonic_ns, self.watch.allowance_ns);
         let clock = self.time.core();
         let own = clock.estimate().filter(|own| own.bound_ns(now_ns) <= allowed_ns);
         let digest = clock.digest();
         match own {
-            Some(own) if clock.is_beginning() => Says {
+            Some(own) if clock.is_beginning() => SendBasis {
                 basis: Basis::Begins { since_ns: io.now.true_ns },
                 digest,
                 term: clock.term(),
                 estimate: Some(own),
             },
-            Some(own) => Says { basis: Basis::Own, digest, term: clock.reading(now_ns).term, estimate: Some(own) },
+            Some(own) => SendBasis { basis: Basis::Own, digest, term: clock.reading(now_ns).term, estimate: Some(own) },
             None if carries == Carries::Hello => {
-                let Some(voice) = self.time.overheard(io.now, allowed_ns) else { return Says::default() };
+                let Some(voice) = self.time.overheard(io.now, allowed_ns) else { return SendBasis::default() };
                 let basis = Basis::Overheard { is_misled: voice.is_misled };
-                Says { basis, digest, term: voice.term, estimate: Some(voice.estimate) }
+                SendBasis { basis, digest, term: voice.term, estimate: Some(voice.estimate) }
             }
             None => {
                 let estimate = clock.coarse(now_ns);
                 let is_misled = self.time.is_misled(io.now, allowed_ns);
-                Says { basis: Basis::Heard { is_misled }, digest, term: self.time.told_term(), estimate }
+                SendBasis { basis: Basis::Heard { is_misled }, digest, term: self.time.told_term(), estimate }
             }
         }
     }
 
     /// A sender is off the time of its master by half of the guard at most, whatever it states itself.
-    fn off_the_master(&mut self, says: &Says) {
+    fn off_the_master(&mut self, says: &SendBasis) {
         let io = &mut *self.io;
         let Some(estimate) = says.estimate else { return };
         let Some(masters_ns) = io.oracle.times.of_term_ns(io.now, (says.digest, says.term)) else { return };
@@ -251,7 +251,7 @@ impl Slotted {
         let watch = WindowWatch {
             allowance_ns: table.allowance_ns(),
             cycle_ns: table.cycle_ns(),
-            window: (Says::default(), 0),
+            window: (SendBasis::default(), 0),
             asked_ns: None,
             joins_since_ns: Some(now.true_ns),
             stood_still: false,

@@ -34,7 +34,7 @@ impl Basis {
 
 /// The time basis of a transmission, and the term that it follows.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct Says {
+pub struct SendBasis {
     /// By what it finds its windows.
     pub basis: Basis,
     /// Of its configuration.

@@ -4,7 +4,7 @@ use super::clock::Now;
 use super::promise::{Problem, Promise};
 use super::slots::Slots;
 use super::spans::US;
-use super::transmission::{Basis, Says, Transmission};
+use super::transmission::{Basis, SendBasis, Transmission};
 use rohrpost_routers::time::Term;
 use std::collections::{BTreeMap, VecDeque};
 
@@ -21,7 +21,7 @@ pub struct Wire {
     /// When each node's interface is free again, true ns.
     free_ns: Vec<u64>,
     /// By what each sends.
-    says: Vec<Says>,
+    says: Vec<SendBasis>,
     /// When each began the window in which it sends, on its clock, ns.
     called_ns: Vec<u64>,
     /// When somebody first sent by a term, true ns.
@@ -34,7 +34,7 @@ impl Wire {
     pub fn new(nodes: usize) -> Self {
         Self {
             free_ns: vec![0; nodes],
-            says: vec![Says::default(); nodes],
+            says: vec![SendBasis::default(); nodes],
             called_ns: vec![0; nodes],
             first_ns: BTreeMap::new(),
             recent: VecDeque::with_capacity(RECENT_MAX),
@@ -42,12 +42,12 @@ impl Wire {
     }
 
     /// From now on a node sends by this. It may have begun a time before.
-    pub fn goes_by(&mut self, now: Now, node: usize, says: Says) {
+    pub fn goes_by(&mut self, now: Now, node: usize, says: SendBasis) {
         self.first_ns.entry((says.digest, says.term)).or_insert(now.true_ns);
         self.called_ns[node] = now.monotonic_ns;
         let before = self.says[node].basis;
         let goes_on = matches!((before, says.basis), (Basis::Begins { .. }, Basis::Begins { .. }));
-        self.says[node] = Says { basis: if goes_on { before } else { says.basis }, ..says };
+        self.says[node] = SendBasis { basis: if goes_on { before } else { says.basis }, ..says };
     }
 
     /// What is wrong with a datagram that was handed over, and was on the wire from then to then, on the clock of its
@@ -82,7 +82,7 @@ impl Wire {
         let begin_ns = at_ns.max(self.free_ns[node]);
         let end_ns = begin_ns + slots.takes_ns(bytes);
         self.free_ns[node] = end_ns;
-        let Says { basis, digest, term, .. } = self.says[node];
+        let SendBasis { basis, digest, term, .. } = self.says[node];
         let master = slots.master(term);
         let own = Transmission { node, basis, digest, term, master, begin_ns, end_ns };
         let mut meets = self.recent.iter().filter(|other| other.node != node && own.meets(other));

@@ -14,7 +14,7 @@ pub use free::Free;
 use receiving::RxSystem;
 pub(super) use settings::{ROUTER_CLASS, digest};
 pub use settings::{address, settings};
-pub(super) use slotted::Hands;
+pub(super) use slotted::TransitAdapter;
 use watch::still_fresh;
 
 use super::clock::Now;

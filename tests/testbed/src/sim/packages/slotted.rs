@@ -15,12 +15,12 @@ use std::net::IpAddr;
 use std::rc::Rc;
 
 /// What a package goes through when it is taken from the transit mailbox.
-pub(in crate::sim) struct Hands<'a, 'b> {
+pub(in crate::sim) struct TransitAdapter<'a, 'b> {
     pub(in crate::sim) packages: &'a mut Packages,
     pub(in crate::sim) io: &'a mut Io<'b>,
 }
 
-impl Transit for Hands<'_, '_> {
+impl Transit for TransitAdapter<'_, '_> {
     fn waits(&mut self) -> (usize, Option<Priority>) {
         self.io.host.transit.waits()
     }

@@ -27,7 +27,7 @@ struct DelayedArrival {
 }
 
 /// All of a clock but its thread.
-pub(in crate::shell) struct Works {
+pub(in crate::shell) struct ClockRuntime {
     driver: ClockDriver,
     system: TimeSystem,
 }
@@ -45,7 +45,7 @@ struct TimeSystem {
     real_time: bool,
 }
 
-impl Works {
+impl ClockRuntime {
     /// Binds the socket. What an earlier incarnation of this router wrote in the node's page goes on.
     pub(in crate::shell) fn new(parts: ClockParts) -> Result<Self, ClockError> {
         let ClockParts { settings, nodes, node, impair, kernel_stamps, skew, observer } = parts;
@@ -251,7 +251,7 @@ fn warn_unsteady(why: Unsteady) {
     tracing::warn!("nothing is known of the time until it has been measured anew: {why}");
 }
 
-impl AsFd for Works {
+impl AsFd for ClockRuntime {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.system.socket.as_fd()
     }

@@ -15,7 +15,7 @@ const WITHIN_NS: u64 = 2_000_000_000;
 
 /// Doubted claims of one peer.
 #[derive(Debug, Default)]
-pub(super) struct Doubt {
+pub(super) struct Confirmation {
     claims: [DoubtedClaim; KEPT],
     next: usize,
 }
@@ -28,7 +28,7 @@ struct DoubtedClaim {
     at_ns: u64,
 }
 
-impl Doubt {
+impl Confirmation {
     /// Whether another datagram has confirmed this claim: of the same incarnation, and sent shortly before or
     /// reordered. If none has, this one is remembered.
     pub(super) fn is_confirmed(&mut self, now_ns: u64, head: &FrameHead) -> bool {

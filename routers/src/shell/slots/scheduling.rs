@@ -20,7 +20,7 @@ const CYCLES: u64 = 64;
 
 /// What the system has granted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Granted {
+pub enum ActualScheduling {
     /// SCHED_DEADLINE: it goes before all others.
     Reserved,
     /// SCHED_FIFO above all modules; where there is too much to do the kernel stops it for 50 ms a second.
@@ -29,7 +29,7 @@ pub enum Granted {
     Ordinary,
 }
 
-impl Granted {
+impl ActualScheduling {
     /// Asks for the calling thread; what is refused is told once. Never bound to a processor: where another thread
     /// stands in the way it goes to the next.
     pub(super) fn ask(table: &SlotTable) -> Self {

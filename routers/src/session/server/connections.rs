@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Connections by owner.
 #[derive(Debug)]
-pub(super) struct Crowd<K> {
+pub(super) struct ConnectionsByOwner<K> {
     /// Connections of each owner, the oldest first.
     of: BTreeMap<K, BTreeSet<(u64, ClientIndex)>>,
     /// Each with how many it has.
@@ -13,13 +13,13 @@ pub(super) struct Crowd<K> {
     len: usize,
 }
 
-impl<K> Default for Crowd<K> {
+impl<K> Default for ConnectionsByOwner<K> {
     fn default() -> Self {
         Self { of: BTreeMap::new(), sizes: BTreeSet::new(), len: 0 }
     }
 }
 
-impl<K: Ord + Clone> Crowd<K> {
+impl<K: Ord + Clone> ConnectionsByOwner<K> {
     /// Adds a connection that began at this time, ns.
     pub(super) fn add(&mut self, owner: &K, began_ns: u64, client: ClientIndex) {
         let of = self.of.entry(owner.clone()).or_default();
@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn it_knows_the_owner_with_most_and_since_when() {
-        let mut crowd = Crowd::default();
+        let mut crowd = ConnectionsByOwner::default();
         for (owner, began_ns, client) in [("a", 5, 0), ("b", 9, 1), ("b", 7, 2), ("a", 6, 3), ("b", 8, 4)] {
             crowd.add(&owner, began_ns, ClientIndex(client));
         }
