@@ -89,8 +89,8 @@ impl CommandServer {
     }
 }
 
-/// Validates the sender of a command by `[access]`, and says which principal's share of places it uses. The routers have
-/// validated by the same rules what comes from other nodes; here it holds for what comes from the same one, too.
+/// Validates the sender of a command by `[access]`, and says which principal's share of places it uses. The routers
+/// have validated by the same rules what comes from other nodes; here it holds for what comes from the same one, too.
 pub(crate) fn admit(installation: &Installation, head: &Head) -> Result<Principal, Fault> {
     let Some(rule) = installation.access_against(head.from, head.to) else {
         return Ok(installation.principal(head.from));

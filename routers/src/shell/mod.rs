@@ -242,11 +242,11 @@ impl Shell {
             system.answers = Some(shell.send_in_slots(name, inlet, clock.ok_or(ShellError::NoTime)?)?);
             shell.open_tunnel(node, name)?;
         } else {
-            let works = clock
+            let runtime = clock
                 .map(ClockRuntime::new)
                 .transpose()?
-                .map(|works| works.sealed(shell.peer_sessions.as_ref(), false));
-            shell.service = works.map(ClockService::of).transpose()?;
+                .map(|runtime| runtime.sealed(shell.peer_sessions.as_ref(), false));
+            shell.service = runtime.map(ClockService::of).transpose()?;
             shell.clock = shell.service.as_ref().map(|service| service.state().clone());
             inlet.sending.rest = shell.begin_rest((node, name), &faults, (sockets.next(), impair))?;
             let tx_thread = TxThread { shared: shell.shared.clone(), driver: FreeDriver::new(&shell.settings), inlet };
@@ -281,7 +281,7 @@ impl Shell {
         let tdma = settings.tdma.as_ref().ok_or(ShellError::NoTime)?;
         let (nodes, heads_bytes) = (settings.nodes.len() as u8, settings.overhead_bytes());
         let table = SlotTable::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
-        let works = ClockRuntime::new(clock)?.sealed(self.peer_sessions.as_ref(), true).in_slots(table.for_clock());
+        let runtime = ClockRuntime::new(clock)?.sealed(self.peer_sessions.as_ref(), true).in_slots(table.for_clock());
         let spin_ns = spin_ns(table.cycle_ns());
         let (answers, waiting) = sync_channel(ANSWERS);
         let scheduler = SlotScheduler::new(table, spin_ns);
@@ -292,7 +292,7 @@ impl Shell {
             answers: (waiting, self.sockets[0].clone()),
         };
         let counted = (self.shared.clone(), self.stats.clone());
-        let slots = SlotThread::new(own, counted, inlet, works, scheduler);
+        let slots = SlotThread::new(own, counted, inlet, runtime, scheduler);
         (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
         self.begin("slots", move || slots.run())?;
         Ok(answers)

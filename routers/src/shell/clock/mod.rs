@@ -7,8 +7,8 @@
 //! ```
 //!
 //! The thread sleeps in one system call until a datagram, a stamp or its time comes. It takes nothing from the heap for
-//! a datagram. What strangers send is dropped in the kernel; whatever comes with a node's address, it works for a share
-//! of the time at most. What it does, and when, says the [driver](crate::driver).
+//! a datagram. What strangers send is dropped in the kernel; for datagrams with the address of a node it works for a
+//! share of the time at most. The [driver](crate::driver) decides what it does, and when.
 
 mod local;
 mod runtime;
@@ -114,10 +114,10 @@ impl ClockService {
     }
 
     /// A service of parts that were made already.
-    pub(super) fn of(works: ClockRuntime) -> Result<Self, ClockError> {
-        let state = works.state().clone();
+    pub(super) fn of(runtime: ClockRuntime) -> Result<Self, ClockError> {
+        let state = runtime.state().clone();
         let (ended, ends) = io::pipe().map_err(ClockError::Thread)?;
-        let mut worker = Worker { works, ended };
+        let mut worker = Worker { runtime, ended };
         let thread =
             std::thread::Builder::new().name("clock".into()).spawn(move || worker.run()).map_err(ClockError::Thread)?;
         Ok(Self { state, ends: Some(ends), thread: Some(thread) })
@@ -146,16 +146,16 @@ impl Drop for ClockService {
 
 /// The thread.
 struct Worker {
-    works: ClockRuntime,
+    runtime: ClockRuntime,
     ended: PipeReader,
 }
 
 impl Worker {
     fn run(&mut self) {
         // The router's other threads tell when it is refused.
-        self.works.runs_in_real_time(schedule(Scheduling::Fifo(FIFO)).is_ok());
+        self.runtime.runs_in_real_time(schedule(Scheduling::Fifo(FIFO)).is_ok());
         loop {
-            let ClockStep { for_ns, reads } = self.works.poll();
+            let ClockStep { for_ns, reads } = self.runtime.poll();
             if self.sleep(Duration::from_nanos(for_ns), reads) {
                 return;
             }
@@ -165,7 +165,7 @@ impl Worker {
     /// Sleeps for so long; if it `reads`, only until there is something to take. True when the clock is to end.
     fn sleep(&mut self, time: Duration, reads: bool) -> bool {
         let mut fds =
-            [PollFd::new(self.ended.as_fd(), PollFlags::POLLIN), PollFd::new(self.works.as_fd(), PollFlags::POLLIN)];
+            [PollFd::new(self.ended.as_fd(), PollFlags::POLLIN), PollFd::new(self.runtime.as_fd(), PollFlags::POLLIN)];
         let watched = if reads { &mut fds[..] } else { &mut fds[..1] };
         // Interrupted or not: the next round looks for itself.
         let _ = ppoll(watched, Some(TimeSpec::from_duration(time)), None);

@@ -55,7 +55,7 @@ struct System {
     shared: Arc<Shared>,
     /// In which the thread that receives counts.
     stats: Arc<Stats>,
-    works: ClockRuntime,
+    clock: ClockRuntime,
     transit: Receiver,
     sending: Sending,
     answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
@@ -71,7 +71,7 @@ impl SlotThread {
         own: Own,
         (shared, stats): (Arc<Shared>, Arc<Stats>),
         inlet: TransitInlet,
-        works: ClockRuntime,
+        clock: ClockRuntime,
         scheduler: SlotScheduler,
     ) -> Self {
         let TransitInlet { transit, sending } = inlet;
@@ -79,7 +79,7 @@ impl SlotThread {
         let state = Arc::new(SlotStatus::new(snapshot));
         let Own { router, settings, peer_sessions, answers } = own;
         let driver = SlotDriver::new(&settings, peer_sessions.as_ref(), scheduler, monotonic_ns());
-        let system = System { shared, stats, works, transit, sending, answers, settings, router, snapshot, state };
+        let system = System { shared, stats, clock, transit, sending, answers, settings, router, snapshot, state };
         Self { driver, system }
     }
 
@@ -90,7 +90,7 @@ impl SlotThread {
 
     /// And of the clock.
     pub(super) fn clock_state(&self) -> Arc<ClockState> {
-        self.system.works.state().clone()
+        self.system.clock.state().clone()
     }
 
     /// Runs until the router ends.
@@ -98,7 +98,7 @@ impl SlotThread {
         let Self { mut driver, mut system } = self;
         sleep::be_punctual();
         system.snapshot.granted = ActualScheduling::ask(driver.scheduler().table());
-        system.works.runs_in_real_time(system.snapshot.granted != ActualScheduling::Ordinary);
+        system.clock.runs_in_real_time(system.snapshot.granted != ActualScheduling::Ordinary);
         while !system.shared.ends() {
             match driver.poll(&mut system) {
                 SlotStep::Sleep { for_ns } => sleep::sleep(for_ns),
@@ -110,7 +110,7 @@ impl SlotThread {
 
 impl Platform for System {
     fn local_ns(&self) -> u64 {
-        self.works.now_ns()
+        self.clock.now_ns()
     }
 
     fn monotonic_ns(&self) -> u64 {
@@ -118,16 +118,16 @@ impl Platform for System {
     }
 
     fn clock(&self) -> &Clock {
-        self.works.clock()
+        self.clock.clock()
     }
 
     fn time(&mut self) -> (&mut Clock, &Stats) {
-        (self.works.clock_mut(), &self.stats)
+        (self.clock.clock_mut(), &self.stats)
     }
 
     fn transit(&mut self) -> impl Transit {
-        let Self { transit, sending: Sending { outbound, answers: report, .. }, works, .. } = self;
-        TransitAdapter { transit, outbound, report, local_ns: || works.now_ns() }
+        let Self { transit, sending: Sending { outbound, answers: report, .. }, clock, .. } = self;
+        TransitAdapter { transit, outbound, report, local_ns: || clock.now_ns() }
     }
 
     fn queue(&mut self) -> (&mut Outbound, impl Report) {
@@ -139,7 +139,7 @@ impl Platform for System {
     }
 
     fn send_time(&mut self, to: NodeIndex, datagram: &[u8; TIME_BYTES]) {
-        self.works.send(to, datagram);
+        self.clock.send(to, datagram);
     }
 
     fn next_answer(&mut self) -> Option<Answer> {
@@ -151,11 +151,11 @@ impl Platform for System {
     }
 
     fn take_time(&mut self, most: usize, left: impl FnMut(SentId, Stamp)) {
-        self.works.take(most, left);
+        self.clock.take(most, left);
     }
 
     fn take_stranger(&mut self) -> Option<IpAddr> {
-        self.works.take_stranger()
+        self.clock.take_stranger()
     }
 
     fn tidy(&mut self, now_ns: u64) {
@@ -163,11 +163,11 @@ impl Platform for System {
     }
 
     fn publish(&mut self, scheduler: &SlotScheduler, log: &WindowLog) {
-        self.works.publish();
-        let Self { works, settings, snapshot, state, .. } = self;
+        self.clock.publish();
+        let Self { clock, settings, snapshot, state, .. } = self;
         let (before, silent) = (snapshot.silent, scheduler.silent());
-        messages::tell_change(before, silent, || messages::parted(settings, works.clock().parted_by(works.now_ns())));
-        let (counts, lead_ns) = (scheduler.counts(works.clock()), scheduler.lead_ns());
+        messages::tell_change(before, silent, || messages::parted(settings, clock.clock().parted_by(clock.now_ns())));
+        let (counts, lead_ns) = (scheduler.counts(clock.clock()), scheduler.lead_ns());
         let WindowLog { held, windows } = *log;
         *snapshot = SlotSnapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
         state.show(snapshot);
