@@ -93,7 +93,7 @@ const LONG: &[(&str, usize)] = &[
     ("mailbox/src/sender.rs", 420),
     ("mailbox/src/slots.rs", 430),
     ("mailbox/src/system_time.rs", 422),
-    ("modules/src/call/deduplicator_simulation.rs", 424),
+    ("modules/src/call/deduplicator_simulation.rs", 403),
     ("modules/src/output/way.rs", 438),
     ("modules/tests/launch.rs", 404),
     ("routers/src/frame/mod.rs", 429),

@@ -2,8 +2,9 @@
 //! chance comes from a seed.
 
 use super::{CALLERS_MAX, Deduplicator, Fault, Principal, Request, TRANSIT_MAX_NS, VALIDITY_MAX_NS, Verdict, WINDOW};
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap, VecDeque};
+use rohrpost_testbed::sim::chance::Chance;
+use rohrpost_testbed::sim::events::Events;
+use std::collections::{BTreeMap, VecDeque};
 
 const MS: u64 = 1_000_000;
 
@@ -30,25 +31,6 @@ pub(super) enum Broken {
 pub(super) const NAMED: usize = 2;
 /// As long as an envelope can tell.
 const VALID_LONG_NS: u64 = u32::MAX as u64 * 1000;
-
-struct Rng(u64);
-
-impl Rng {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    fn below(&mut self, bound: u64) -> u64 {
-        self.next() % bound.max(1)
-    }
-
-    fn percent(&mut self, percent: u64) -> bool {
-        self.below(100) < percent
-    }
-}
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Package {
@@ -99,11 +81,10 @@ pub(super) struct Call {
 
 /// One run of the simulation.
 pub(super) struct World {
-    rng: Rng,
+    chance: Chance,
     broken: Broken,
     pub(super) now_ns: u64,
-    events: BinaryHeap<Reverse<(u64, u64, Event)>>,
-    ticket: u64,
+    events: Events<Event>,
     pub(super) delay_max_ns: u64,
     pub(super) loss_percent: u64,
     copy_percent: u64,
@@ -129,23 +110,22 @@ const CALLS: usize = 120;
 
 impl World {
     pub(super) fn new(seed: u64, broken: Broken) -> Self {
-        let mut rng = Rng(seed);
-        let local = rng.percent(30);
+        let mut chance = Chance::new(seed);
+        let local = chance.percent(30);
         let (delay_max_ns, loss_percent, copy_percent) =
-            if local { (0, 0, 0) } else { (rng.below(TRANSIT_MAX_NS * 9 / 10), rng.below(40), rng.below(30)) };
-        let death_percent = if rng.percent(30) { 0 } else { rng.below(12) };
-        let callers = if rng.percent(20) { CALLS } else { 1 + rng.below(4) as usize };
+            if local { (0, 0, 0) } else { (chance.below(TRANSIT_MAX_NS * 9 / 10), chance.below(40), chance.below(30)) };
+        let death_percent = if chance.percent(30) { 0 } else { chance.below(12) };
+        let callers = if chance.percent(20) { CALLS } else { 1 + chance.below(4) as usize };
         // Incarnations and numbers wrap early.
-        let callers = (0..callers).map(|n| (u32::MAX - n as u32 % 3, u32::MAX - rng.below(20) as u32)).collect();
+        let callers = (0..callers).map(|n| (u32::MAX - n as u32 % 3, u32::MAX - chance.below(20) as u32)).collect();
         // A few that may hold much, or so many that each holds one place and none is left.
-        let principals = if rng.percent(30) { CALLS } else { 1 + rng.below(6) as usize };
-        let greedy = rng.percent(50);
+        let principals = if chance.percent(30) { CALLS } else { 1 + chance.below(6) as usize };
+        let greedy = chance.percent(50);
         let started_ns = 5000 * MS;
         let mut world = Self {
             broken,
             now_ns: started_ns,
-            events: BinaryHeap::new(),
-            ticket: 0,
+            events: Events::default(),
             delay_max_ns,
             loss_percent,
             copy_percent,
@@ -162,26 +142,25 @@ impl World {
             mailbox: VecDeque::new(),
             problems: Vec::new(),
             seen: BTreeMap::new(),
-            rng,
+            chance,
         };
         // Many callers at once, so that memory is full at times.
         let crowded = world.callers.len() > CALLERS_MAX;
         let (calls, span_ms) = if crowded { (3 * CALLS, 10_000) } else { (CALLS, 20_000) };
         for _ in 0..calls {
-            let caller = world.rng.below(world.callers.len() as u64) as usize;
-            let after_ns = world.rng.below(span_ms * MS);
+            let caller = world.chance.below(world.callers.len() as u64) as usize;
+            let after_ns = world.chance.below(span_ms * MS);
             world.at(after_ns, Event::Begin(caller));
         }
         world
     }
 
     fn at(&mut self, after_ns: u64, event: Event) {
-        self.ticket += 1;
-        self.events.push(Reverse((self.now_ns + after_ns, self.ticket, event)));
+        self.events.push(self.now_ns + after_ns, event);
     }
 
     pub(super) fn run(mut self) -> Self {
-        while let Some(Reverse((now_ns, _, event))) = self.events.pop() {
+        while let Some((now_ns, event)) = self.events.pop() {
             self.now_ns = now_ns;
             match event {
                 Event::Begin(caller) => self.begin(caller),
@@ -198,18 +177,18 @@ impl World {
     }
 
     fn begin(&mut self, caller: usize) {
-        if self.rng.percent(5) {
+        if self.chance.percent(5) {
             // It was restarted: its calls under way are nobody's now.
             self.callers[caller].0 = self.callers[caller].0.wrapping_add(1);
             self.callers[caller].1 = 1;
         }
         let (incarnation, sequence) = self.callers[caller];
         // Calls to others come in between.
-        let step = if self.rng.percent(10) { 1 + self.rng.below(2 * u64::from(WINDOW)) as u32 } else { 1 };
+        let step = if self.chance.percent(10) { 1 + self.chance.below(2 * u64::from(WINDOW)) as u32 } else { 1 };
         self.callers[caller].1 = sequence.wrapping_add(step);
         let is_greedy = self.greedy && caller >= NAMED && caller.is_multiple_of(3);
-        let valid_for_ns = if is_greedy { VALID_LONG_NS } else { (10 + self.rng.below(3000)) * MS };
-        let idempotent = self.rng.percent(20);
+        let valid_for_ns = if is_greedy { VALID_LONG_NS } else { (10 + self.chance.below(3000)) * MS };
+        let idempotent = self.chance.percent(20);
         self.calls.push(Call {
             caller,
             incarnation,
@@ -257,10 +236,10 @@ impl World {
     }
 
     fn carry(&mut self, event: Event) {
-        let copies = 1 + usize::from(self.rng.percent(self.copy_percent));
+        let copies = 1 + usize::from(self.chance.percent(self.copy_percent));
         for _ in 0..copies {
-            if !self.rng.percent(self.loss_percent) {
-                let delay_ns = if self.delay_max_ns == 0 { 0 } else { self.rng.below(self.delay_max_ns) };
+            if !self.chance.percent(self.loss_percent) {
+                let delay_ns = if self.delay_max_ns == 0 { 0 } else { self.chance.below(self.delay_max_ns) };
                 self.at(delay_ns, event);
             }
         }
@@ -269,7 +248,7 @@ impl World {
     fn arrive(&mut self, package: Package) {
         if self.mailbox.len() < 16 {
             self.mailbox.push_back(Package { published_ns: self.now_ns, ..package });
-            let busy_ns = self.rng.below(20 * MS);
+            let busy_ns = self.chance.below(20 * MS);
             self.at(busy_ns, Event::Serve);
         }
     }
@@ -365,14 +344,14 @@ impl World {
 
     /// Whether the server dies now; then the package in its hand waits for the next, if it was not waiting so already.
     fn dies(&mut self, package: Package) -> bool {
-        if !self.rng.percent(self.death_percent) {
+        if !self.chance.percent(self.death_percent) {
             return false;
         }
         self.alive = false;
         if !package.redelivered {
             self.mailbox.push_front(Package { redelivered: true, ..package });
         }
-        let down_ns = self.rng.below(1500 * MS);
+        let down_ns = self.chance.below(1500 * MS);
         self.at(down_ns, Event::Start);
         true
     }
@@ -383,7 +362,7 @@ impl World {
         self.started_ns = self.now_ns;
         self.deduplicator = Self::once(self.now_ns);
         for _ in 0..self.mailbox.len() {
-            let busy_ns = self.rng.below(20 * MS);
+            let busy_ns = self.chance.below(20 * MS);
             self.at(busy_ns, Event::Serve);
         }
     }
