@@ -169,7 +169,8 @@ fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
         let late = times_ns(&drawing.file(), r"/network/packages/base\ \u{2192}\ brain");
         assert!(late.last() > Some(&ended_ns), "links are told of again");
         drawing.has("/modules/pilot.0", 1..=8);
-        let robot = drawing.said.split("\ngui ").nth(2).and_then(|row| row.lines().next()).unwrap();
+        let beyond = drawing.said.split_once("Through the TCP router, by class").expect("clients have counted").1;
+        let robot = beyond.split_once("\ngui ").and_then(|(_, row)| row.lines().next()).expect("a row of the bridge");
         let counts: Vec<u64> = robot.split_whitespace().map_while(|word| word.parse().ok()).collect();
         let [meant, _left, _replaced, came, ..] = counts[..] else { panic!("{robot}") };
         assert!(meant > 200 && came * 5 > meant * 4, "of some thousand a gap's are missing: {robot}");
