@@ -256,3 +256,47 @@ impl AsFd for ClockRuntime {
         self.system.socket.as_fd()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "these are tests")]
+
+    use super::*;
+    use crate::time::TimeSettings;
+    use std::net::UdpSocket;
+    use std::time::Duration;
+
+    /// A datagram that an impairment keeps counts as well: a flood would hold the thread otherwise.
+    #[test]
+    fn a_look_reads_a_bounded_number_of_datagrams_also_behind_an_impairment() {
+        for impair in [None, Some("loss=100%"), Some("delay=5s")] {
+            let peer = UdpSocket::bind(("127.9.3.2", 0)).unwrap();
+            let port = peer.local_addr().unwrap().port();
+            let nodes = [1, 2].map(|host| SocketAddr::from(([127, 9, 3, host], port)));
+            let settings = TimeSettings {
+                system: 1,
+                own: 0,
+                nodes: 2,
+                masters: vec![0],
+                interval: Duration::from_millis(100),
+                digest: 7,
+                incarnation: 1,
+            };
+            let parts = ClockParts {
+                settings,
+                nodes: nodes.to_vec(),
+                node: None,
+                impair: impair.map(|text| text.parse().unwrap()),
+                kernel_stamps: false,
+                skew: None,
+                observer: None,
+            };
+            let mut runtime = ClockRuntime::new(parts).unwrap();
+            (0..40).for_each(|_| assert_eq!(peer.send_to(&[0; 10], nodes[0]).unwrap(), 10));
+            runtime.take(16, |_, _| {});
+            let socket = &mut runtime.system.socket;
+            let left = std::iter::from_fn(|| socket.receive(&mut [0; TIME_DATAGRAM_BYTES])).count();
+            assert_eq!(left, 24, "{impair:?}");
+        }
+    }
+}
