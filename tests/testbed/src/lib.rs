@@ -4,3 +4,6 @@
 
 pub mod sim;
 pub mod stall_detector;
+pub mod stalls;
+
+pub use rohrpost_test_report as report;
