@@ -59,7 +59,7 @@ fn module() {
 fn a_view_of_ones_own_draws_a_type_of_ones_own() {
     let folder = tempfile::tempdir().unwrap();
     let (me, example) = (std::env::current_exe().unwrap(), bridge().parent().unwrap().join("examples/own_view"));
-    assert!(example.is_file(), "`cargo xtask test` builds {}", example.display());
+    assert!(example.is_file(), "`cargo xtask test --all` builds {}", example.display());
     let config = format!(
         r#"
 installation = "fires"

@@ -1,4 +1,4 @@
-//! Rerun's command line and the GUI bridge, which `cargo xtask test` brings.
+//! Rerun's command line and the GUI bridge, which `cargo xtask test --all` brings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -20,7 +20,7 @@ pub(crate) fn bridge() -> PathBuf {
 fn program(variable: &str) -> PathBuf {
     let path = std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_file());
     path.unwrap_or_else(|| {
-        panic!("{variable} names no program; run them by \"cargo xtask test\", which installs Rerun's command line")
+        panic!("{variable} names no program; run them by \"cargo xtask test --all\", which installs Rerun")
     })
 }
 

@@ -9,8 +9,8 @@
 //! they say: only when peace itself is noisy is their number doubled, once, and all count.
 //!
 //! A few rounds on a shared computer distinguish a robot that waits for its viewer from one that does not, but show no
-//! difference of 10 %: they have a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test` repeats each fault that
-//! often, and applies the narrow one.
+//! difference of 10 %: they have a wide limit. `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test --all` repeats each fault
+//! that often, and applies the narrow one.
 
 use super::load::{Load, on_one_processor};
 use super::modules::Mark;

@@ -3,64 +3,107 @@
 //! Rerun's tests are in two builds: the bridge's own ones run in its profile, so that Rerun is compiled once only, and
 //! those that look at whole drawings with Rerun's command line belong to the feature `rerun-tests`. They
 //! find that command line by the environment variable `ROHRPOST_RERUN`, and have to fail without it, saying
-//! `run them by "cargo xtask test", which installs Rerun's command line`.
+//! `run them by "cargo xtask test --all", which installs Rerun`.
 
 use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE, cargo};
 use crate::failure::Failure;
-use crate::stages::{self, Stage};
+use crate::parts;
+use crate::report;
+use crate::stages::{self, Done, Stage};
 use crate::venv;
 use crate::{fuzz, tsan};
 use std::process::{Command, ExitCode};
 
-/// All tests.
-pub(crate) fn test() -> ExitCode {
-    stages::run_all(TESTS)
+/// The bench, with its peers: some 70 crates.
+const BENCH: &str = "rohrpost-bench";
+
+/// `cargo xtask test [--all]`: what a change to the product may break, or all tests.
+pub(crate) fn test(args: &[String]) -> Result<ExitCode, Failure> {
+    match args {
+        [] => Ok(stages::run_all([PRODUCT])),
+        [all] if all == "--all" => Ok(stages::run_all(ALL)),
+        _ => Err("cargo xtask test [--all]: no other arguments".into()),
+    }
 }
 
 /// Checks that must pass before anything lands.
 pub(crate) fn ci() -> ExitCode {
-    stages::run_all(LINTS.into_iter().chain(TESTS))
+    stages::run_all(LINTS.into_iter().chain(ALL))
 }
 
 const LINTS: [Stage; 4] = [
-    Stage { name: "format", run: || cargo::run("looking at the format", &mut cargo(&["fmt", "--all", "--check"])) },
+    Stage {
+        name: "format",
+        budget: 1,
+        run: || whole(cargo::run("looking at the format", &mut cargo(&["fmt", "--all", "--check"]))),
+    },
     Stage {
         name: "clippy for all but the GUI bridge",
+        budget: 6,
         run: || {
             let all = ["clippy", "--workspace", "--exclude", BRIDGE, "--all-targets", "--", "--deny", "warnings"];
-            cargo::run("clippy for all but the GUI bridge", &mut cargo(&all))
+            whole(cargo::run("clippy for all but the GUI bridge", &mut cargo(&all)))
         },
     },
-    Stage { name: "clippy for the GUI bridge", run: || cargo::run("clippy for the GUI bridge", &mut bridge_clippy()) },
+    Stage {
+        name: "clippy for the GUI bridge",
+        budget: 6,
+        run: || whole(cargo::run("clippy for the GUI bridge", &mut bridge_clippy())),
+    },
     Stage {
         name: "clippy for what the author of a module compiles",
+        budget: 1,
         run: || {
             let bare = ["clippy", "--package", "rohrpost", "--package", "rohrpost-modules", "--lib"];
             let why = "clippy for what the author of a module compiles";
-            cargo::run(why, cargo(&bare).args(["--", "--deny", "warnings"]))
+            whole(cargo::run(why, cargo(&bare).args(["--", "--deny", "warnings"])))
         },
     },
 ];
 
-const TESTS: [Stage; 5] = [
+/// What a change to the product may break.
+const PRODUCT: Stage = Stage {
+    name: "tests of the product",
+    budget: 25,
+    run: || {
+        let most = ["test", "--workspace", "--exclude", BRIDGE, "--exclude", BENCH, "--no-fail-fast"];
+        parts::run("testing all but the GUI bridge and the bench", tests(&most))
+    },
+};
+
+const ALL: [Stage; 5] = [
     Stage {
         name: "tests of all but the GUI bridge",
+        budget: 25,
         run: || {
             let all = ["test", "--workspace", "--exclude", BRIDGE, "--no-fail-fast"];
-            cargo::run("testing all but the GUI bridge", &mut cargo(&all))
+            parts::run("testing all but the GUI bridge", tests(&all))
         },
     },
-    Stage { name: "ThreadSanitizer", run: || tsan::run().map(drop) },
-    Stage { name: "fuzzing, short", run: fuzz::short },
+    Stage { name: "ThreadSanitizer", budget: 1, run: || whole(tsan::run().map(drop)) },
+    Stage { name: "fuzzing, short", budget: 3, run: || whole(fuzz::short()) },
     Stage {
         name: "tests of the GUI bridge",
+        budget: 5,
         run: || {
             let bridge = ["test", "--profile", BRIDGE_PROFILE, "--package", BRIDGE];
-            cargo::run("testing the GUI bridge", &mut cargo(&bridge))
+            parts::run("testing the GUI bridge", tests(&bridge))
         },
     },
-    Stage { name: "drawings, with Rerun's command line", run: drawings },
+    Stage { name: "drawings, with Rerun's command line", budget: 5, run: || whole(drawings()) },
 ];
+
+/// A stage without parts.
+fn whole(result: Result<(), Failure>) -> Done {
+    (Vec::new(), result)
+}
+
+/// A call of Cargo that runs tests, which report to the file of this run.
+fn tests(args: &[&str]) -> Command {
+    let mut command = cargo(args);
+    command.env(rohrpost_test_report::FILE, report::path());
+    command
+}
 
 fn drawings() -> Result<(), Failure> {
     // The example is a bridge with a user's own view, which a test starts.
@@ -70,7 +113,7 @@ fn drawings() -> Result<(), Failure> {
     let test = ["test", "--package", "rohrpost-cli", "--features", "rerun-tests", "--test", "rerun"];
     cargo::run(
         "testing drawings, and a viewer that misbehaves, with Rerun's command line",
-        cargo(&test)
+        tests(&test)
             .args(["--", "--test-threads", "1"])
             .env("ROHRPOST_RERUN", rerun)
             .env("ROHRPOST_BRIDGE", cargo::target().join(BRIDGE_PROFILE).join(BRIDGE)),

@@ -121,7 +121,8 @@ impl Stalls {
         Self { processors: (0..count).filter_map(begin).collect(), end, began }
     }
 
-    /// For how long a processor stood still between these moments, all stalls together; of the one that did for longest.
+    /// For how long a processor stood still between these moments, all stalls together. The longest
+    /// of all processors.
     pub fn stalled(&self, since: Instant, until: Instant) -> Duration {
         let [since_ns, until_ns] = [since, until].map(|at| ns(at.saturating_duration_since(self.began)));
         let of = |processor: &Arc<Processor>| processor.stalled_ns(since_ns, until_ns);

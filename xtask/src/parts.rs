@@ -1,0 +1,118 @@
+//! How long each test program of a `cargo test` takes, from what Cargo says on the way.
+
+use crate::cargo;
+use crate::failure::Failure;
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, ExitStatus};
+use std::time::{Duration, Instant};
+
+/// A part of a stage takes this long to have a row of its own.
+const OWN_ROW: Duration = Duration::from_secs(5);
+
+/// A part of a stage: what Cargo builds, a test program, or a crate's doc tests.
+pub(crate) struct Part {
+    pub(crate) name: String,
+    pub(crate) took: Duration,
+}
+
+/// Runs `cargo test`, shows what it prints, and takes the time of its parts.
+pub(crate) fn run(why: &str, mut command: Command) -> (Vec<Part>, Result<(), Failure>) {
+    let shown = cargo::shown(&command);
+    eprintln!("==> {why}\n    {shown}");
+    let mut clock = PartClock::new(Instant::now());
+    let result = match follow(&mut command, |line| clock.line(line, Instant::now())) {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("{why}: `{shown}` ended with {status}")),
+        Err(error) => Err(format!("cannot run `{shown}`: {error}")),
+    };
+    (clock.end(Instant::now()), result)
+}
+
+/// Both outputs are one, so that what Cargo says of a program comes before what that prints.
+fn follow(command: &mut Command, mut see: impl FnMut(&str)) -> std::io::Result<ExitStatus> {
+    let (reader, writer) = std::io::pipe()?;
+    let mut child = command.stdout(writer.try_clone()?).stderr(writer).spawn()?;
+    // The command holds the writing ends; the pipe ends with the last of them.
+    command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null());
+    let (mut reader, mut line, mut out) = (BufReader::new(reader), Vec::new(), std::io::stdout());
+    while reader.read_until(b'\n', &mut line)? > 0 {
+        see(&String::from_utf8_lossy(&line));
+        out.write_all(&line)?;
+        line.clear();
+    }
+    child.wait()
+}
+
+/// Ends a part where the next begins.
+struct PartClock {
+    parts: Vec<Part>,
+    name: String,
+    began: Instant,
+}
+
+impl PartClock {
+    fn new(began: Instant) -> Self {
+        Self { parts: Vec::new(), name: "build".to_owned(), began }
+    }
+
+    fn line(&mut self, line: &str, now: Instant) {
+        let Some(next) = program(line) else { return };
+        let name = std::mem::replace(&mut self.name, next);
+        self.parts.push(Part { name, took: now - self.began });
+        self.began = now;
+    }
+
+    /// The longest first; short ones in one row.
+    fn end(mut self, now: Instant) -> Vec<Part> {
+        self.parts.push(Part { name: self.name, took: now - self.began });
+        let (mut long, short): (Vec<_>, Vec<_>) = self.parts.into_iter().partition(|part| part.took >= OWN_ROW);
+        long.sort_by_key(|part| std::cmp::Reverse(part.took));
+        if !short.is_empty() {
+            let name = format!("{} more, each below {} s", short.len(), OWN_ROW.as_secs());
+            long.push(Part { name, took: short.iter().map(|part| part.took).sum() });
+        }
+        long
+    }
+}
+
+/// What a line begins: `Running tests/tidy.rs (target/debug/deps/tidy-0123456789abcdef)`, `Doc-tests rohrpost`.
+fn program(line: &str) -> Option<String> {
+    let line = line.trim();
+    if let Some(of) = line.strip_prefix("Doc-tests ") {
+        return Some(format!("examples in the docs of {of}"));
+    }
+    let (_, path) = line.strip_prefix("Running ")?.split_once('(')?;
+    let (_, file) = path.strip_suffix(')')?.rsplit_once("deps/")?;
+    Some(file.rsplit_once('-')?.0.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_lasts_from_its_line_to_the_next() {
+        let began = Instant::now();
+        let mut clock = PartClock::new(began);
+        let lines = [
+            (1, "   Compiling rohrpost v0.1.0"),
+            (60, "     Running tests/e2e/main.rs (target/debug/deps/e2e-0123456789abcdef)"),
+            (330, "     Running unittests src/lib.rs (target/debug/deps/rohrpost_mailbox-0123456789abcdef)"),
+            (331, "test Running late (deps/a-b) ... ok"),
+            (332, "   Doc-tests rohrpost"),
+        ];
+        lines.iter().for_each(|(at, line)| clock.line(line, began + Duration::from_secs(*at)));
+        let parts = clock.end(began + Duration::from_secs(335));
+        let seen: Vec<_> = parts.iter().map(|part| (part.name.as_str(), part.took.as_secs())).collect();
+        assert_eq!(seen, [("e2e", 270), ("build", 60), ("2 more, each below 5 s", 5)]);
+    }
+
+    #[test]
+    fn what_a_program_prints_is_followed_to_its_end() {
+        let mut lines = Vec::new();
+        let mut command = Command::new("sh");
+        command.args(["-c", "echo one; echo two >&2; printf three; exit 3"]);
+        let status = follow(&mut command, |line| lines.push(line.trim().to_owned())).expect("sh runs");
+        assert_eq!((lines.join(" "), status.code()), ("one two three".to_owned(), Some(3)));
+    }
+}
