@@ -9,7 +9,7 @@ use crate::cargo::{self, BRIDGE, BRIDGE_PROFILE, cargo};
 use crate::failure::Failure;
 use crate::stages::{self, Stage};
 use crate::venv;
-use crate::{fuzz, tsan};
+use crate::{fuzz, instructions, tsan};
 use std::process::{Command, ExitCode};
 
 /// All tests.
@@ -42,7 +42,7 @@ const LINTS: [Stage; 4] = [
     },
 ];
 
-const TESTS: [Stage; 5] = [
+const TESTS: [Stage; 6] = [
     Stage {
         name: "tests of all but the GUI bridge",
         run: || {
@@ -51,6 +51,7 @@ const TESTS: [Stage; 5] = [
         },
     },
     Stage { name: "ThreadSanitizer", run: || tsan::run().map(drop) },
+    Stage { name: "instructions of the hot paths", run: instructions::check },
     Stage { name: "fuzzing, short", run: fuzz::short },
     Stage {
         name: "tests of the GUI bridge",
