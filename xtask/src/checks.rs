@@ -11,7 +11,7 @@ use crate::parts;
 use crate::report;
 use crate::stages::{self, Done, Stage};
 use crate::venv;
-use crate::{fuzz, tsan};
+use crate::{fuzz, instructions, tsan};
 use std::process::{Command, ExitCode};
 
 /// The bench, with its peers: some 70 crates.
@@ -71,7 +71,7 @@ const PRODUCT: Stage = Stage {
     },
 };
 
-const ALL: [Stage; 5] = [
+const ALL: [Stage; 6] = [
     Stage {
         name: "tests of all but the GUI bridge",
         budget: 25,
@@ -81,6 +81,7 @@ const ALL: [Stage; 5] = [
         },
     },
     Stage { name: "ThreadSanitizer", budget: 1, run: || whole(tsan::run().map(drop)) },
+    Stage { name: "instructions of the hot paths", budget: 4, run: || whole(instructions::check()) },
     Stage { name: "fuzzing, short", budget: 3, run: || whole(fuzz::short()) },
     Stage {
         name: "tests of the GUI bridge",

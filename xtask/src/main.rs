@@ -9,6 +9,7 @@ mod checks;
 mod demo;
 mod failure;
 mod fuzz;
+mod instructions;
 mod parts;
 mod picture;
 mod report;
@@ -30,6 +31,8 @@ cargo xtask ci
     Format, clippy for both builds, then all tests.
 cargo xtask fuzz [TARGET...] [--seconds N] | --short
     Fuzzes each target, or those named, for so long (60 s), from where the last run ended; or as the tests do, a little.
+cargo xtask instructions [--record]
+    Counts instructions of the hot paths with callgrind and compares them with recorded ceilings, or records these.
 cargo xtask tsan
     Runs the mailbox's slot core, and broken variants of it, under ThreadSanitizer.
 cargo xtask picture FILE.rrd OUT.png [--size WIDTHxHEIGHT] [--wait SECONDS]
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
         "test" => checks::test(rest),
         "ci" => Ok(checks::ci()),
         "fuzz" => fuzz::run(rest),
+        "instructions" => instructions::command(rest),
         "tsan" => tsan::run(),
         "picture" => picture::run(rest),
         "help" | "--help" | "-h" => {

@@ -1,0 +1,236 @@
+//! `cargo xtask instructions`: instructions of the hot paths, counted by callgrind, against recorded ceilings.
+//!
+//! Counts need no quiet machine: the same compiler makes the same instructions. So a commit that makes a path slower
+//! fails without a clock. What they do not see: cache lines that move between processors, and the kernel.
+
+use crate::cargo::{self, cargo, host};
+use crate::failure::Failure;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+const PROFILE: &str = "counted";
+/// The folder of the program that is counted, from the root.
+const FOLDER: &str = "benches/instructions";
+/// The program counts what happens inside a function of this name.
+const FUNCTION: &str = "--toggle-collect=*counted*";
+/// Operations that are counted, of each path.
+const OPERATIONS: u64 = 5_000;
+/// A ceiling is this much above what was counted, percent.
+const ROOM_PERCENT: u64 = 3;
+/// A path that needs so much less than its ceiling has become faster: the ceiling is to be lowered, percent.
+const SLACK_PERCENT: u64 = 7;
+/// A path that is slower than one with a ceiling, by that one's name; it must be above that ceiling.
+const PLANTED: (&str, &str) = ("send-slower-by-a-third", "send");
+
+/// Counts and compares; with `--record`, writes the ceilings anew.
+pub(crate) fn command(args: &[String]) -> Result<ExitCode, Failure> {
+    match args {
+        [] => check()?,
+        [record] if record == "--record" => {
+            let (compiler, counts) = (compiler()?, count_all(&build()?)?);
+            let path = ceilings_path();
+            fs::write(&path, Ceilings::of(&compiler, &counts).to_text())
+                .map_err(|error| format!("{}: {error}", path.display()))?;
+        }
+        _ => return Err("cargo xtask instructions [--record]".into()),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The stage of `cargo xtask test --all`.
+pub(crate) fn check() -> Result<(), Failure> {
+    let (path, compiler) = (ceilings_path(), compiler()?);
+    let text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let ceilings = Ceilings::from_text(&text)?;
+    let counts = count_all(&build()?)?;
+    compare(&ceilings, &compiler, &counts)
+}
+
+/// A path and the instructions of one operation.
+type Count = (String, u64);
+
+/// The recorded file.
+#[derive(Debug, PartialEq, Eq)]
+struct Ceilings {
+    /// The compiler's version and target.
+    compiler: String,
+    paths: Vec<Count>,
+}
+
+impl Ceilings {
+    fn of(compiler: &str, counts: &[Count]) -> Self {
+        let planted = |count: &&Count| count.0 != PLANTED.0;
+        let ceiling = |(path, count): &Count| (path.clone(), count + (count * ROOM_PERCENT).div_ceil(100));
+        Self { compiler: compiler.into(), paths: counts.iter().filter(planted).map(ceiling).collect() }
+    }
+
+    fn to_text(&self) -> String {
+        let head = format!(
+            "# Most instructions of one operation of each hot path, {ROOM_PERCENT} % above what was counted.\n\
+             # Written by `cargo xtask instructions --record`.\n\
+             compiler {}\n",
+            self.compiler
+        );
+        self.paths.iter().fold(head, |text, (path, ceiling)| text + &format!("{path} {ceiling}\n"))
+    }
+
+    fn from_text(text: &str) -> Result<Self, Failure> {
+        let mut ceilings = Self { compiler: String::new(), paths: Vec::new() };
+        for line in text.lines().filter(|line| !line.starts_with('#')) {
+            let bad = || format!("{FOLDER}/ceilings.txt: `{line}` is no ceiling");
+            match line.split_once(' ').ok_or_else(bad)? {
+                ("compiler", compiler) => ceilings.compiler = compiler.into(),
+                (path, ceiling) => ceilings.paths.push((path.into(), ceiling.parse().map_err(|_| bad())?)),
+            }
+        }
+        Ok(ceilings)
+    }
+}
+
+/// Fails with a line for each path that is above its ceiling, far below it, or without one.
+fn compare(ceilings: &Ceilings, compiler: &str, counts: &[Count]) -> Result<(), Failure> {
+    let mut wrong = Vec::new();
+    let ceiling_of = |path: &str| ceilings.paths.iter().find(|(name, _)| name == path).map(|(_, ceiling)| *ceiling);
+    for (path, count) in counts.iter().filter(|(path, _)| path != PLANTED.0) {
+        match ceiling_of(path) {
+            None => wrong.push(format!("{path}: {count} instructions, and no ceiling; record it")),
+            Some(ceiling) if *count > ceiling => wrong.push(format!(
+                "{path}: {count} instructions, its ceiling is {ceiling}; make it faster, or record anew and say in \
+                 the commit what the instructions are for"
+            )),
+            Some(ceiling) if count * 100 < ceiling * (100 - SLACK_PERCENT) => wrong.push(format!(
+                "{path}: {count} instructions, its ceiling is {ceiling}; it has become faster, lower the ceiling"
+            )),
+            Some(_) => {}
+        }
+    }
+    let counted = |path: &str| counts.iter().find(|(name, _)| name == path).map(|(_, count)| *count);
+    for (path, _) in ceilings.paths.iter().filter(|(path, _)| counted(path).is_none()) {
+        wrong.push(format!("{path}: has a ceiling, and is not counted; remove it"));
+    }
+    if counted(PLANTED.0) <= ceiling_of(PLANTED.1) {
+        wrong.push(format!("{}: is not above the ceiling of {}; the count sees nothing", PLANTED.0, PLANTED.1));
+    }
+    if wrong.is_empty() {
+        return Ok(());
+    }
+    if compiler != ceilings.compiler {
+        wrong.push(format!("recorded with {}, this is {compiler}", ceilings.compiler));
+    }
+    wrong.push(format!("record: `cargo xtask instructions --record`, which writes {FOLDER}/ceilings.txt"));
+    Err(format!("instructions of the hot paths:\n    {}", wrong.join("\n    ")))
+}
+
+fn ceilings_path() -> PathBuf {
+    cargo::root().join(FOLDER).join("ceilings.txt")
+}
+
+/// Version and target: instructions of another compiler are others.
+fn compiler() -> Result<String, Failure> {
+    let output = Command::new("rustc").arg("--version").output().map_err(|error| format!("rustc: {error}"))?;
+    let version = String::from_utf8_lossy(&output.stdout);
+    Ok(format!("{} {}", version.split_whitespace().nth(1).unwrap_or("?"), host()?))
+}
+
+/// The program, built.
+fn build() -> Result<PathBuf, Failure> {
+    let valgrind = Command::new("valgrind").arg("--version").output();
+    if !valgrind.is_ok_and(|output| output.status.success()) {
+        return Err("no valgrind, which counts instructions; install it: `apt-get install valgrind`".into());
+    }
+    let package = ["--package", "rohrpost-bench", "--no-default-features", "--features", "lan"];
+    let mut build = cargo(&["build", "--profile", PROFILE, "--bench", "instructions"]);
+    build.args(package);
+    cargo::run("building the hot paths", &mut build)?;
+    // Cargo says which file it made; the name has a hash.
+    let output = build.arg("--message-format=json").output().map_err(|error| format!("cargo: {error}"))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let made = text.split("\"executable\":\"").skip(1).filter_map(|rest| rest.split('"').next());
+    made.last().map(PathBuf::from).ok_or_else(|| "cargo names no program of the hot paths".into())
+}
+
+fn count_all(program: &Path) -> Result<Vec<Count>, Failure> {
+    let list = Command::new(program).output().map_err(|error| format!("{}: {error}", program.display()))?;
+    let list = String::from_utf8_lossy(&list.stdout);
+    let counts = list.lines().map(|path| Ok((path.to_owned(), count(program, path)?)));
+    let counts = counts.collect::<Result<Vec<Count>, Failure>>()?;
+    eprintln!("==> instructions of one operation");
+    counts.iter().for_each(|(path, count)| eprintln!("    {path:<24} {count:>6}"));
+    Ok(counts)
+}
+
+/// Instructions of one operation.
+fn count(program: &Path, path: &str) -> Result<u64, Failure> {
+    let mut valgrind = Command::new("valgrind");
+    valgrind
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", FUNCTION])
+        .arg(program)
+        .args([path, &OPERATIONS.to_string()]);
+    let output = valgrind.output().map_err(|error| format!("valgrind: {error}"))?;
+    let told = String::from_utf8_lossy(&output.stderr);
+    match collected(&told).filter(|collected| output.status.success() && *collected > 0) {
+        Some(collected) => Ok(collected / OPERATIONS),
+        None => Err(format!("counting the instructions of {path}:\n{told}")),
+    }
+}
+
+/// What callgrind counted in all.
+fn collected(told: &str) -> Option<u64> {
+    told.split("Collected : ").nth(1)?.split_whitespace().next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COMPILER: &str = "1.95.0 x86_64-unknown-linux-gnu";
+
+    fn counts(send: u64) -> Vec<Count> {
+        [("send", send), ("receive", 600), (PLANTED.0, 1067)].map(|(path, count)| (path.into(), count)).into()
+    }
+
+    fn compared(counts: &[Count], compiler: &str) -> Result<(), Failure> {
+        compare(&Ceilings::of(COMPILER, &self::counts(800)), compiler, counts)
+    }
+
+    #[test]
+    fn what_is_recorded_is_read_again_and_holds() {
+        let ceilings = Ceilings::of(COMPILER, &counts(800));
+        assert_eq!(ceilings.paths, [("send".into(), 824), ("receive".into(), 618)]);
+        assert_eq!(Ceilings::from_text(&ceilings.to_text()), Ok(ceilings));
+        assert!(Ceilings::from_text("send many").unwrap_err().contains("`send many` is no ceiling"));
+        assert_eq!(compared(&counts(800), COMPILER), Ok(()));
+        assert_eq!(compared(&counts(824), COMPILER), Ok(()));
+    }
+
+    #[test]
+    fn a_path_above_its_ceiling_or_far_below_it_fails() {
+        let slower = compared(&counts(825), COMPILER).unwrap_err();
+        assert!(slower.contains("send: 825 instructions, its ceiling is 824; make it faster"), "{slower}");
+        assert!(!slower.contains("receive") && !slower.contains("recorded with"), "{slower}");
+        let faster = compared(&counts(760), "1.96.0 x86_64-unknown-linux-gnu").unwrap_err();
+        assert!(faster.contains("lower the ceiling") && faster.contains("recorded with 1.95.0"), "{faster}");
+    }
+
+    #[test]
+    fn a_path_without_a_ceiling_and_a_ceiling_without_a_path_fail() {
+        let mut more = counts(800);
+        more.push(("seal".into(), 5));
+        assert!(compared(&more, COMPILER).unwrap_err().contains("seal: 5 instructions, and no ceiling"));
+        assert!(compared(&[], COMPILER).unwrap_err().contains("receive: has a ceiling, and is not counted"));
+    }
+
+    #[test]
+    fn a_count_that_does_not_see_the_planted_path_fails() {
+        let mut blind = counts(800);
+        blind.last_mut().unwrap().1 = 824;
+        assert!(compared(&blind, COMPILER).unwrap_err().contains("the count sees nothing"));
+    }
+
+    #[test]
+    fn the_sum_is_found_in_what_callgrind_tells() {
+        assert_eq!(collected("==7== Events    : Ir\n==7== Collected : 4030000\n==7==\n"), Some(4_030_000));
+        assert_eq!(collected("==7== Events    : Ir\n"), None);
+    }
+}
