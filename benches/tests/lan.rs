@@ -4,7 +4,6 @@
 
 mod support;
 
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use support::{bench, children, interrupt, left_behind, rows, run, wait_for};
@@ -45,32 +44,30 @@ fn network() -> BTreeSet<String> {
 
 #[test]
 fn every_contender_delivers_over_the_network_and_every_line_is_complete() {
-    repeated_on_stall(Watched::RealTime, || {
-        let before = network();
-        let (output, prefix) = run("lan", &["--quick", "--json"]);
-        let rows = rows(&output);
-        for (case, bytes, others) in CASES {
-            let rows: Vec<&Map<String, Value>> =
-                rows.iter().filter(|row| row["case"] == case && row["bytes"] == bytes).collect();
-            for other in others {
-                assert_eq!(rows.iter().filter(|row| row["contender"] == *other).count(), 1, "{case} {bytes} {other}");
-                assert_eq!(rows.iter().filter(|row| row["vs"] == *other).count(), 1, "{case} {bytes} beside {other}");
-            }
+    let before = network();
+    let (output, prefix) = run("lan", &["--quick", "--json"]);
+    let rows = rows(&output);
+    for (case, bytes, others) in CASES {
+        let rows: Vec<&Map<String, Value>> =
+            rows.iter().filter(|row| row["case"] == case && row["bytes"] == bytes).collect();
+        for other in others {
+            assert_eq!(rows.iter().filter(|row| row["contender"] == *other).count(), 1, "{case} {bytes} {other}");
+            assert_eq!(rows.iter().filter(|row| row["vs"] == *other).count(), 1, "{case} {bytes} beside {other}");
         }
-        let clock: Vec<&Map<String, Value>> = rows.iter().filter(|row| row["case"] == "clock").collect();
-        assert_eq!(
-            clock.iter().filter(|row| row["contender"] == "rohrpost" && row["vs"].is_string()).count(),
-            3,
-            "{clock:?}"
-        );
-        // A network between two nodes of an idle computer loses nothing; the kernel's buffers may lose unpaced
-        // datagrams.
-        for row in rows.iter().filter(|row| row["unit"] == "%" && row["contender"] != "udp") {
-            assert_eq!(row["p50"], 0.0, "{row:?}");
-        }
-        assert_eq!(left_behind(&prefix), [""; 0]);
-        assert_eq!(network(), before);
-    });
+    }
+    let clock: Vec<&Map<String, Value>> = rows.iter().filter(|row| row["case"] == "clock").collect();
+    assert_eq!(
+        clock.iter().filter(|row| row["contender"] == "rohrpost" && row["vs"].is_string()).count(),
+        3,
+        "{clock:?}"
+    );
+    // A network between two nodes of an idle computer loses nothing; the kernel's buffers may lose unpaced
+    // datagrams.
+    for row in rows.iter().filter(|row| row["unit"] == "%" && row["contender"] != "udp") {
+        assert_eq!(row["p50"], 0.0, "{row:?}");
+    }
+    assert_eq!(left_behind(&prefix), [""; 0]);
+    assert_eq!(network(), before);
 }
 
 #[test]

@@ -4,7 +4,6 @@
 
 mod support;
 
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, rows, run, wait_for};
 
@@ -32,25 +31,23 @@ const ROWS: [(&str, &str); 18] = [
 
 #[test]
 fn every_case_runs_and_every_line_is_complete() {
-    repeated_on_stall(Watched::RealTime, || {
-        let (output, prefix) = run("tcp", &["--quick", "--json"]);
-        let rows = rows(&output);
-        for (case, contender) in ROWS {
-            let is_there = rows.iter().any(|row| row["case"] == case && row["contender"] == contender);
-            // Without a command, ours has one row that says so, and no other figures. A failure is no excuse.
-            let is_skipped = |row: &Map<String, Value>| {
-                let is_own = case.starts_with(row["case"].as_str().unwrap()) && row["contender"] == contender;
-                is_own && row["note"].as_str().is_some_and(|note| note.starts_with("skipped: "))
-            };
-            assert!(is_there || rows.iter().any(is_skipped), "{case} by {contender}");
-        }
-        let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
-        assert_eq!(failed, None);
-        // So few packages find room everywhere.
-        let lost = rows.iter().filter(|row| row["case"].as_str().unwrap().ends_with(", lost"));
-        lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
-        assert_eq!(left_behind(&prefix), [""; 0]);
-    });
+    let (output, prefix) = run("tcp", &["--quick", "--json"]);
+    let rows = rows(&output);
+    for (case, contender) in ROWS {
+        let is_there = rows.iter().any(|row| row["case"] == case && row["contender"] == contender);
+        // Without a command, ours has one row that says so, and no other figures. A failure is no excuse.
+        let is_skipped = |row: &Map<String, Value>| {
+            let is_own = case.starts_with(row["case"].as_str().unwrap()) && row["contender"] == contender;
+            is_own && row["note"].as_str().is_some_and(|note| note.starts_with("skipped: "))
+        };
+        assert!(is_there || rows.iter().any(is_skipped), "{case} by {contender}");
+    }
+    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
+    assert_eq!(failed, None);
+    // So few packages find room everywhere.
+    let lost = rows.iter().filter(|row| row["case"].as_str().unwrap().ends_with(", lost"));
+    lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
+    assert_eq!(left_behind(&prefix), [""; 0]);
 }
 
 #[test]

@@ -4,7 +4,6 @@
 
 mod support;
 
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use serde_json::{Map, Value};
 use support::{FAILED, bench, children, interrupt, left_behind, prefix, rows, run, wait_for};
 
@@ -37,24 +36,22 @@ fn case_of(row: &Map<String, Value>) -> String {
 
 #[test]
 fn every_case_runs_and_every_line_is_complete() {
-    repeated_on_stall(Watched::RealTime, || {
-        let (output, prefix) = run("tdma", &["--quick", "--json"]);
-        let rows = rows(&output);
-        for (case, contender) in ROWS {
-            let own = || rows.iter().filter(|row| case_of(row) == case.split(',').next().unwrap());
-            // Without namespaces, real-time scheduling or the command, a note says so. A failure is no excuse.
-            let is_skipped = own().any(|row| row["note"].as_str().is_some_and(|note| note.starts_with("skipped: ")));
-            let is_there = rows.iter().any(|row| row["case"] == case && row["contender"] == contender);
-            assert!(is_there || is_skipped, "{case} by {contender}");
-            assert!(own().next().is_some(), "{case}");
-        }
-        let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
-        assert_eq!(failed, None);
-        // Whatever was declared arrived.
-        let lost = rows.iter().filter(|row| row["case"] == "flows, lost");
-        lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
-        assert_eq!(left_behind(&prefix), [""; 0]);
-    });
+    let (output, prefix) = run("tdma", &["--quick", "--json"]);
+    let rows = rows(&output);
+    for (case, contender) in ROWS {
+        let own = || rows.iter().filter(|row| case_of(row) == case.split(',').next().unwrap());
+        // Without namespaces, real-time scheduling or the command, a note says so. A failure is no excuse.
+        let is_skipped = own().any(|row| row["note"].as_str().is_some_and(|note| note.starts_with("skipped: ")));
+        let is_there = rows.iter().any(|row| row["case"] == case && row["contender"] == contender);
+        assert!(is_there || is_skipped, "{case} by {contender}");
+        assert!(own().next().is_some(), "{case}");
+    }
+    let failed = rows.iter().find(|row| row["note"].as_str().is_some_and(|note| note.starts_with(FAILED)));
+    assert_eq!(failed, None);
+    // Whatever was declared arrived.
+    let lost = rows.iter().filter(|row| row["case"] == "flows, lost");
+    lost.for_each(|row| assert_eq!(row["p50"], 0.0, "{row:?}"));
+    assert_eq!(left_behind(&prefix), [""; 0]);
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! `launch --all`: all nodes of a configuration on this computer, in network namespaces.
 
-use crate::harness::{NETWORK, OUTPUT, Place, lacks_namespaces, probe, runs, skipped, wait};
+use crate::harness::{NETWORK, OUTPUT, Place, lacks_namespaces, probe, runs, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use rohrpost_testbed::report::skipped;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::os::unix::fs::chown;

@@ -4,7 +4,6 @@
 use crate::harness::{halt, probe, signal, wait};
 use crate::systems::{OPEN, SEALED, SYSTEMS, Systems, check_crossing, configured};
 use nix::sys::signal::Signal;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -29,23 +28,21 @@ fn check_lists(systems: &Systems) {
 
 #[test]
 fn calls_and_data_cross_from_system_to_system() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(systems) = Systems::launched(OPEN) else { return };
-        check_crossing(&systems);
-        for nobodys in ["2.probe.7.0", "9.probe.0.0"] {
-            let told = systems.says("north", &["call", nobodys, "count", "1"]).fails();
-            assert!(told.contains("no router knows a way there"), "{told}");
-        }
-        systems.says("south", &["stop", "probe.0"]).ok();
-        let told = systems.says("north", &["call", "2.probe.0.0", "count", "1"]).fails();
-        assert!(told.contains("2.probe.0.0 does not run; start it in system 2"), "{told}");
-        let shown = systems.says("north", &["net"]).ok();
-        for words in ["TCP router", "up", "node south of south", "node north of north", "takes part"] {
-            assert!(shown.contains(words), "no `{words}` in:\n{shown}");
-        }
-        check_lists(&systems);
-        systems.stop();
-    });
+    let Some(systems) = Systems::launched(OPEN) else { return };
+    check_crossing(&systems);
+    for nobodys in ["2.probe.7.0", "9.probe.0.0"] {
+        let told = systems.says("north", &["call", nobodys, "count", "1"]).fails();
+        assert!(told.contains("no router knows a way there"), "{told}");
+    }
+    systems.says("south", &["stop", "probe.0"]).ok();
+    let told = systems.says("north", &["call", "2.probe.0.0", "count", "1"]).fails();
+    assert!(told.contains("2.probe.0.0 does not run; start it in system 2"), "{told}");
+    let shown = systems.says("north", &["net"]).ok();
+    for words in ["TCP router", "up", "node south of south", "node north of north", "takes part"] {
+        assert!(shown.contains(words), "no `{words}` in:\n{shown}");
+    }
+    check_lists(&systems);
+    systems.stop();
 }
 
 /// How often the TCP router is killed: for a long run, `ROHRPOST_KILLS=100 cargo test --test e2e beyond::a_tcp_router`.
@@ -66,54 +63,51 @@ fn accounts(client: &serde_json::Value) -> Vec<(u64, u64)> {
 
 #[test]
 fn a_tcp_router_that_is_killed_costs_a_gap_and_nothing_else() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(systems) = Systems::launched(OPEN) else { return };
-        let north = systems.robot("north");
-        let clients = || SYSTEMS.map(|node| (systems.robot(node).pid("tcp.0"), systems.robot(node).pid("probe.0")));
-        let (before, mut called, mut answered) = (clients(), 0, 0);
-        for kill in 1..=kills() {
-            let server = north.pid("tcp.255");
-            // Calls are in flight at any moment of it, and beats of both modules all the time.
-            let is_killed = AtomicBool::new(false);
-            std::thread::scope(|scope| {
-                scope.spawn(|| {
-                    std::thread::sleep(Duration::from_millis(kill * 7 % 50));
-                    signal(server, Signal::SIGKILL);
-                    is_killed.store(true, Ordering::Relaxed);
-                });
-                let first = called;
-                while called < first + 20 || !is_killed.load(Ordering::Relaxed) {
-                    called += 1;
-                    answered += u32::from(systems.count(called).is_ok());
-                }
+    let Some(systems) = Systems::launched(OPEN) else { return };
+    let north = systems.robot("north");
+    let clients = || SYSTEMS.map(|node| (systems.robot(node).pid("tcp.0"), systems.robot(node).pid("probe.0")));
+    let (before, mut called, mut answered) = (clients(), 0, 0);
+    for kill in 1..=kills() {
+        let server = north.pid("tcp.255");
+        // Calls are in flight at any moment of it, and beats of both modules all the time.
+        let is_killed = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(kill * 7 % 50));
+                signal(server, Signal::SIGKILL);
+                is_killed.store(true, Ordering::Relaxed);
             });
-            north.wait_restarted("tcp.255", server);
-            wait("a call that comes through", || {
+            let first = called;
+            while called < first + 20 || !is_killed.load(Ordering::Relaxed) {
                 called += 1;
-                systems.count(called).ok()
-            });
-            answered += 1;
-            SYSTEMS.into_iter().for_each(|node| systems.wait_up(node));
-            let reconnects = systems.client("south")["reconnects"].as_u64().unwrap();
-            assert!(reconnects >= kill, "{reconnects} after {kill}");
-        }
-        assert_eq!(clients(), before, "nothing else was started again");
-        let record = systems.place.record();
-        let mut run: Vec<&str> =
-            record.iter().filter_map(|line| line.split_once(" count ")).map(|(_, of)| of).collect();
-        let times = run.len();
-        run.sort_unstable();
-        run.dedup();
-        assert_eq!(run.len(), times, "each call is run at most once");
-        assert!(answered as usize <= times && times <= called as usize, "{answered} of {called} answered, {times} run");
-        for node in SYSTEMS {
-            // A moment without waiting packages; beats come and go all the time.
-            let accounts = || Some(accounts(&systems.client(node))).filter(|accounts| !accounts.is_empty());
-            let is_even = |accounts: &Vec<(u64, u64)>| accounts.iter().all(|(came, went)| came == went);
-            wait(format!("{node} accounts for all"), || accounts().filter(is_even));
-        }
-        systems.stop();
-    });
+                answered += u32::from(systems.count(called).is_ok());
+            }
+        });
+        north.wait_restarted("tcp.255", server);
+        wait("a call that comes through", || {
+            called += 1;
+            systems.count(called).ok()
+        });
+        answered += 1;
+        SYSTEMS.into_iter().for_each(|node| systems.wait_up(node));
+        let reconnects = systems.client("south")["reconnects"].as_u64().unwrap();
+        assert!(reconnects >= kill, "{reconnects} after {kill}");
+    }
+    assert_eq!(clients(), before, "nothing else was started again");
+    let record = systems.place.record();
+    let mut run: Vec<&str> = record.iter().filter_map(|line| line.split_once(" count ")).map(|(_, of)| of).collect();
+    let times = run.len();
+    run.sort_unstable();
+    run.dedup();
+    assert_eq!(run.len(), times, "each call is run at most once");
+    assert!(answered as usize <= times && times <= called as usize, "{answered} of {called} answered, {times} run");
+    for node in SYSTEMS {
+        // A moment without waiting packages; beats come and go all the time.
+        let accounts = || Some(accounts(&systems.client(node))).filter(|accounts| !accounts.is_empty());
+        let is_even = |accounts: &Vec<(u64, u64)>| accounts.iter().all(|(came, went)| came == went);
+        wait(format!("{node} accounts for all"), || accounts().filter(is_even));
+    }
+    systems.stop();
 }
 
 /// A program calls, subscribes and is called.

@@ -1,10 +1,11 @@
 //! Launch as systemd starts it: its notifications to the service manager, and when they stop.
 
-use crate::harness::{Place, probe, signal, skipped, state, wait};
+use crate::harness::{Place, probe, signal, state, wait};
 use crate::process::Running;
 use nix::sys::ptrace;
 use nix::sys::signal::Signal;
 use nix::unistd::Pid;
+use rohrpost_testbed::report::skipped;
 use std::fs::File;
 use std::io::{PipeReader, PipeWriter, Write};
 use std::os::fd::AsRawFd;

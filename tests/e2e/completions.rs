@@ -1,6 +1,7 @@
 //! Completions of a shell at the tab key, by the scripts that `rohrpost completions` prints.
 
-use crate::harness::{NETWORK, OUTPUT, Place, probe, skipped};
+use crate::harness::{NETWORK, OUTPUT, Place, probe};
+use rohrpost_testbed::report::skipped;
 use std::process::Command;
 
 /// Completions of bash for the last of these words.

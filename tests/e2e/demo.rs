@@ -5,7 +5,6 @@ use crate::process::Running;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rohrpost::launcher::{Phase, launcher_of};
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 
@@ -20,86 +19,80 @@ fn number(text: &str, words: &str) -> u64 {
 
 #[test]
 fn the_simulated_robot_maps_and_says_what_came_of_it() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let place = Place::new();
-        let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
-        wait("it has mapped", || {
-            demo.assert_runs();
-            let said = place.say(&["call", "mapper.0", "counts", "--json"]);
-            let counts: serde_json::Value = serde_json::from_str(&said.out).ok()?;
-            let enough = |what: &str, least: u64| counts[what].as_u64() > Some(least);
-            (enough("mapped", 5) && enough("free", 1000) && enough("occupied", 50)).then_some(())
-        });
-        let said = demo.stop();
-        for class in ["pilot", "mapper", "output", "tool"] {
-            assert!(said.lines().any(|line| line.starts_with(class)), "no class {class}:\n{said}");
-        }
-        assert!(number(&said, " packages received, ") > 50, "{said}");
-        assert_eq!(number(&said, " lost\n"), 0, "{said}");
-        assert!(number(&said, " scans mapped (") > 5, "{said}");
-        assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
-        place.assert_empty();
+    let place = Place::new();
+    let mut demo = Running::start(place.command(&["demo", "--no-gui", "--quiet"]));
+    wait("it has mapped", || {
+        demo.assert_runs();
+        let said = place.say(&["call", "mapper.0", "counts", "--json"]);
+        let counts: serde_json::Value = serde_json::from_str(&said.out).ok()?;
+        let enough = |what: &str, least: u64| counts[what].as_u64() > Some(least);
+        (enough("mapped", 5) && enough("free", 1000) && enough("occupied", 50)).then_some(())
     });
+    let said = demo.stop();
+    for class in ["pilot", "mapper", "output", "tool"] {
+        assert!(said.lines().any(|line| line.starts_with(class)), "no class {class}:\n{said}");
+    }
+    assert!(number(&said, " packages received, ") > 50, "{said}");
+    assert_eq!(number(&said, " lost\n"), 0, "{said}");
+    assert!(number(&said, " scans mapped (") > 5, "{said}");
+    assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+    place.assert_empty();
 }
 
 /// The same robot over three nodes, on a network that loses, delays and reorders.
 #[test]
 fn over_three_nodes_and_a_bad_network_it_still_maps_and_nothing_is_unaccounted_for() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let place = Place::new();
-        let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
-        let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "-v", "--impair", bad]);
-        if lacks_namespaces(&said.err) {
-            return;
-        }
-        assert_eq!(said.code, Some(0), "{said:?}");
-        let said = said.out;
-        assert!(said.contains("The demo went well.\n") && said.contains("the accounts balance\n"), "{said}");
-        assert!(number(&said, " scans mapped (") > 5, "{said}");
-        assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
-        let link = said.lines().find(|line| line.starts_with("base → brain")).unwrap();
-        assert!(number(link, " lost") > 0, "5 % of some hundred datagrams:\n{said}");
-        place.assert_empty();
-    });
+    let place = Place::new();
+    let bad = "loss=5%,delay=2ms,jitter=1ms,reorder=5%,seed=7";
+    let said = place.say(&["demo", "--nodes", "3", "--seconds", "6", "--no-gui", "--quiet", "-v", "--impair", bad]);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let said = said.out;
+    assert!(said.contains("The demo went well.\n") && said.contains("the accounts balance\n"), "{said}");
+    assert!(number(&said, " scans mapped (") > 5, "{said}");
+    assert!(number(&said, " cells free") > 1000 && number(&said, " occupied") > 50, "{said}");
+    let link = said.lines().find(|line| line.starts_with("base → brain")).unwrap();
+    assert!(number(link, " lost") > 0, "5 % of some hundred datagrams:\n{said}");
+    place.assert_empty();
 }
 
 /// The same robot, each node in its own time slots.
 #[test]
 fn in_time_slots_it_maps_as_well_and_says_how_they_were_kept() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let place = Place::new();
-        let said = place.say(&["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet", "-v"]);
-        if lacks_namespaces(&said.err) {
-            return;
-        }
-        assert_eq!(said.code, Some(0), "{said:?}");
-        let said = said.out;
-        assert!(said.contains("the accounts balance\n") && number(&said, " scans mapped (") > 5, "{said}");
-        let slots = said.split("In time slots").nth(1).unwrap();
-        let used = slots.lines().find_map(|line| line.strip_prefix("used ")).unwrap_or_else(|| panic!("{said}"));
-        let used: Vec<u64> = used.split_whitespace().map(|count| count.parse().unwrap()).collect();
-        assert!(used.len() == 3 && used.iter().all(|used| *used > 10), "slots used: {used:?}");
-        let flows = slots.split("\nflow ").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap();
-        let rows: Vec<_> = flows.lines().filter(|line| line.contains(" → ")).collect();
-        assert_eq!(rows.len(), 11, "all of config/demo-tdma.toml: {flows}");
-        for row in rows {
-            let columns: Vec<_> = row.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
-            let [flow, _, packages, bound, kept, worst, _, _, within, _, kept_over_bound, ..] = columns[..] else {
-                panic!("{row}")
-            };
-            assert!(packages.parse::<u64>().unwrap() > 0 && worst.ends_with('s') && bound.ends_with("ms"), "{row}");
-            assert_eq!(kept_over_bound, "0", "a flow with kept slots is in time: {kept} of at most {bound}:\n{flows}");
-            let is_known = match flow {
-                "laser.0 → pilot.0 scan" => within == "10.00 ms",
-                "laser.0 → pilot.0 subscribe answered" => within == "900.00 ms",
-                _ => !flow.starts_with("laser.0 → pilot.0"),
-            };
-            assert!(is_known, "{row}");
-        }
-        place.assert_empty();
-        let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
-        assert!(said.contains("use --nodes 3"), "{said}");
-    });
+    let place = Place::new();
+    let said = place.say(&["demo", "--nodes", "3", "--tdma", "--seconds", "5", "--no-gui", "--quiet", "-v"]);
+    if lacks_namespaces(&said.err) {
+        return;
+    }
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let said = said.out;
+    assert!(said.contains("the accounts balance\n") && number(&said, " scans mapped (") > 5, "{said}");
+    let slots = said.split("In time slots").nth(1).unwrap();
+    let used = slots.lines().find_map(|line| line.strip_prefix("used ")).unwrap_or_else(|| panic!("{said}"));
+    let used: Vec<u64> = used.split_whitespace().map(|count| count.parse().unwrap()).collect();
+    assert!(used.len() == 3 && used.iter().all(|used| *used > 10), "slots used: {used:?}");
+    let flows = slots.split("\nflow ").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap();
+    let rows: Vec<_> = flows.lines().filter(|line| line.contains(" → ")).collect();
+    assert_eq!(rows.len(), 11, "all of config/demo-tdma.toml: {flows}");
+    for row in rows {
+        let columns: Vec<_> = row.split("  ").map(str::trim).filter(|column| !column.is_empty()).collect();
+        let [flow, _, packages, bound, kept, worst, _, _, within, _, kept_over_bound, ..] = columns[..] else {
+            panic!("{row}")
+        };
+        assert!(packages.parse::<u64>().unwrap() > 0 && worst.ends_with('s') && bound.ends_with("ms"), "{row}");
+        assert_eq!(kept_over_bound, "0", "a flow with kept slots is in time: {kept} of at most {bound}:\n{flows}");
+        let is_known = match flow {
+            "laser.0 → pilot.0 scan" => within == "10.00 ms",
+            "laser.0 → pilot.0 subscribe answered" => within == "900.00 ms",
+            _ => !flow.starts_with("laser.0 → pilot.0"),
+        };
+        assert!(is_known, "{row}");
+    }
+    place.assert_empty();
+    let said = place.say(&["demo", "--nodes", "1", "--tdma", "--no-gui"]).fails();
+    assert!(said.contains("use --nodes 3"), "{said}");
 }
 
 #[test]

@@ -6,7 +6,6 @@ use crate::process::{Running, Said};
 use crate::systems::CLASSES;
 use nix::sys::signal::Signal;
 use rohrpost_mailbox::{SystemClock, monotonic_ns};
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::path::PathBuf;
 
 const FAR: &str = "[nodes.far]\nnetwork = \"tcp\"\ntools = [32, 47]\n";
@@ -104,8 +103,10 @@ impl Field {
             let line = list.lines().find(|line| line.starts_with(&format!("{module} "))).unwrap_or_default();
             assert!(line.contains(" on "), "{module}:\n{list}");
         }
-        let net = self.shows(&["net"]).ok();
-        assert!(net.lines().any(|line| line.starts_with("far ") && line.contains(" up ")), "{net}");
+        wait("far is up", || {
+            let net = self.shows(&["net"]).out;
+            net.lines().any(|line| line.starts_with("far ") && line.contains(" up ")).then_some(())
+        });
         let time = || self.shows(&["time"]);
         let told = wait("far has the time", || Some(time()).filter(|told| told.code == Some(0))).ok();
         assert!(told.lines().any(|line| line.starts_with("far ") && line.contains("by TCP")), "{told}");
@@ -119,11 +120,13 @@ impl Field {
         let (off, bound) = (base.ns.abs_diff(far.ns), base.error + far.error);
         assert!(u128::from(off) <= bound.as_nanos(), "{off} ns off, at most {bound:?} as they say");
         assert!(error_ns > 0 && bound < PATIENCE, "{error_ns}");
-        let graph = self.shows(&["graph", "--seconds", "1"]).ok();
-        let edge = |from: &str, to: &str| {
-            graph.lines().any(|line| line.split_whitespace().take(2).eq([from, to]) && line.contains("beat"))
-        };
-        assert!(edge("probe.0", "probe.2") && edge("probe.2", "probe.0"), "{graph}");
+        wait("beats are in the graph", || {
+            let graph = self.shows(&["graph", "--seconds", "1"]).ok();
+            let edge = |from: &str, to: &str| {
+                graph.lines().any(|line| line.split_whitespace().take(2).eq([from, to]) && line.contains("beat"))
+            };
+            (edge("probe.0", "probe.2") && edge("probe.2", "probe.0")).then_some(())
+        });
     }
 
     /// The counts of far's client of the TCP router, if it answers.
@@ -141,43 +144,39 @@ impl Field {
 
 #[test]
 fn a_laptop_of_a_robot_with_one_computer_calls_hears_and_is_called() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(field) = Field::launched(
-            &["base", "far"],
-            "[nodes.base]\ntools = [0, 15]\n",
-            &OPEN.replace("[network]\nsecurity = \"none\"\n", ""),
-        ) else {
-            return;
-        };
-        field.check_talk();
-        field.check_tools();
-        field.stop();
-    });
+    let Some(field) = Field::launched(
+        &["base", "far"],
+        "[nodes.base]\ntools = [0, 15]\n",
+        &OPEN.replace("[network]\nsecurity = \"none\"\n", ""),
+    ) else {
+        return;
+    };
+    field.check_talk();
+    field.check_tools();
+    field.stop();
 }
 
 #[test]
 fn sealed_it_reaches_all_nodes_of_a_lan_and_an_outage_costs_a_gap() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(field) = Field::launched(&["base", "arm", "far"], TWO, SEALED) else { return };
-        field.check_talk();
-        field.check_tools();
-        let before = wait("far counts outages", || field.beyond()?["outages"].as_u64());
-        let server = field.place.robot_at(&field.config, "base");
-        let old = server.pid("tcp.255");
-        signal(old, Signal::SIGKILL);
-        server.wait_restarted("tcp.255", old);
-        field.check_talk();
-        let (began_ns, ended_ns) = wait("it says how long it was away", || {
-            let beyond = field.beyond()?;
-            // A busy computer may have caused earlier ones.
-            beyond["outages"].as_u64().filter(|outages| *outages > before)?;
-            Some((beyond["outage"]["began_ns"].as_u64()?, beyond["outage"]["ended_ns"].as_u64()?))
-        });
-        assert!(began_ns < ended_ns, "{began_ns} to {ended_ns}");
-        wait("it says so in words", || {
-            let net = field.shows(&["net"]).out;
-            net.lines().any(|line| line.starts_with("far ") && line.contains("  took ")).then_some(())
-        });
-        field.stop();
+    let Some(field) = Field::launched(&["base", "arm", "far"], TWO, SEALED) else { return };
+    field.check_talk();
+    field.check_tools();
+    let before = wait("far counts outages", || field.beyond()?["outages"].as_u64());
+    let server = field.place.robot_at(&field.config, "base");
+    let old = server.pid("tcp.255");
+    signal(old, Signal::SIGKILL);
+    server.wait_restarted("tcp.255", old);
+    field.check_talk();
+    let (began_ns, ended_ns) = wait("it says how long it was away", || {
+        let beyond = field.beyond()?;
+        // A busy computer may have caused earlier ones.
+        beyond["outages"].as_u64().filter(|outages| *outages > before)?;
+        Some((beyond["outage"]["began_ns"].as_u64()?, beyond["outage"]["ended_ns"].as_u64()?))
     });
+    assert!(began_ns < ended_ns, "{began_ns} to {ended_ns}");
+    wait("it says so in words", || {
+        let net = field.shows(&["net"]).out;
+        net.lines().any(|line| line.starts_with("far ") && line.contains("  took ")).then_some(())
+    });
+    field.stop();
 }

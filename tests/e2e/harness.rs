@@ -9,8 +9,8 @@ use rohrpost::wire::append;
 use rohrpost::{Name, ToolLink};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Node, ParticipantInfo, local, node_directory};
+use rohrpost_testbed::report::skipped;
 use std::fmt::Debug;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -53,18 +53,14 @@ pub(crate) fn patient<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     const PATIENT: [&str; 2] = ["--timeout", "20"];
     let is_said = arguments.iter().any(|word| word.starts_with("--timeout"));
     match arguments {
-        ["call" | "ping" | "status", ..] if !is_said => [&arguments[..1], &PATIENT, &arguments[1..]].concat(),
+        ["call" | "ping" | "send" | "status", ..] if !is_said => [&arguments[..1], &PATIENT, &arguments[1..]].concat(),
         ["param", _, ..] if !is_said => [&arguments[..2], &PATIENT, &arguments[2..]].concat(),
         _ => arguments.to_vec(),
     }
 }
 
-/// Reports that something was not tested here, past the test harness, which hides the output of passing tests.
-pub(crate) fn skipped(why: &str) {
-    let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: {why}");
-}
-
 /// Whether a test was skipped for lack of network namespaces.
+#[track_caller]
 pub(crate) fn lacks_namespaces(said: &str) -> bool {
     let lacks = said.contains("network namespaces cannot be made here");
     if lacks {

@@ -4,13 +4,14 @@
 //! Both are programs in Python that know the pages of the book alone (`python/node.py`, `python/teammate.py`). For the
 //! whole minute: `ROHRPOST_HOSTILE_SECONDS=60 cargo test -p rohrpost-cli --test e2e hostile`.
 
-use crate::harness::{PATIENCE, Place, Robot, skipped};
+use crate::harness::{PATIENCE, Place, Robot};
 use crate::process::{Running, Said};
 use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{LaserInterface, WheelsInterface};
 use rohrpost::types::Odometry;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_testbed::report::skipped;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};

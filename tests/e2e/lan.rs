@@ -10,7 +10,6 @@ use rohrpost::{CallError, Fault};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Head, monotonic_ns};
 use rohrpost_routers::frame::{FrameHead, FrameKind};
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeSet;
 use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::path::PathBuf;
@@ -121,19 +120,17 @@ impl Lan {
 
 #[test]
 fn calls_and_data_cross_from_node_to_node_as_if_there_were_one() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let lan = Lan::launched();
-        assert_eq!(lan.say(&["call", "probe.1", "count", "1"]).ok(), "1\n");
-        assert_eq!(lan.say(&["call", "probe.1", "count", "2"]).ok(), "2\n", "by another tool");
-        assert_eq!(lan.say(&["call", "probe.0", "count", "3"]).ok(), "1\n", "its own node's");
-        let data = lan.say(&["echo", "probe.1", "beat", "--count", "3"]).ok();
-        assert_eq!(data.lines().count(), 3, "{data}");
-        // Larger than a datagram, there and back.
-        let word = "x".repeat(900);
-        let told = lan.say(&["call", "probe.1", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
-        assert!(told.contains(&word), "{told}");
-        lan.stop();
-    });
+    let lan = Lan::launched();
+    assert_eq!(lan.say(&["call", "probe.1", "count", "1"]).ok(), "1\n");
+    assert_eq!(lan.say(&["call", "probe.1", "count", "2"]).ok(), "2\n", "by another tool");
+    assert_eq!(lan.say(&["call", "probe.0", "count", "3"]).ok(), "1\n", "its own node's");
+    let data = lan.say(&["echo", "probe.1", "beat", "--count", "3"]).ok();
+    assert_eq!(data.lines().count(), 3, "{data}");
+    // Larger than a datagram, there and back.
+    let word = "x".repeat(900);
+    let told = lan.say(&["call", "probe.1", "tell", "1", "2.5", &word, "true", "[1, 2, 3]"]).ok();
+    assert!(told.contains(&word), "{told}");
+    lan.stop();
 }
 
 #[test]
@@ -279,38 +276,36 @@ fn a_bad_network_loses_no_call_and_runs_none_twice() {
 
 #[test]
 fn net_shows_links_losses_and_the_master_of_time() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let mut lan = Lan::launched();
-        let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
-        let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
-        assert_eq!(told.as_array().unwrap().len(), 1, "of the node that was asked for");
-        let config = lan.config.to_str().unwrap().to_owned();
-        let all = |lan: &Lan, more: &[&str]| lan.place.say(&[&["net", "--config", &config], more].concat());
-        let told = wait("all hear each other, and have one time", || {
-            let told: serde_json::Value = serde_json::from_str(&all(&lan, &["--json"]).out).unwrap();
-            let alive = (0..2).all(|node| state(&told, node) == "alive");
-            let slave = (0..2).any(|node| told[node]["clock"]["role"] == "slave");
-            // They report that they are there.
-            let sends = told[0]["rates"][0]["sent_bytes_s"].as_f64() > Some(0.0);
-            (alive && slave && sends).then_some(told)
-        });
-        assert_eq!((&told[0]["node"], &told[1]["links"]["peers"][0]["node"]), (&"base".into(), &"base".into()));
-        let text = all(&lan, &[]).ok();
-        for words in ["base", "arm", "alive", "slave of", "there and back"] {
-            assert!(text.contains(words), "no `{words}` in:\n{text}");
-        }
-        // A command to a missing mailbox is lost at its node, and that is reported.
-        assert_eq!(lan.say(&["stop", "probe.1"]).code, Some(0));
-        wait("it is refused", || (lan.fault() == Some(Fault::NoMailbox)).then_some(()));
-        wait("the loss is told", || all(&lan, &[]).out.contains("no-mailbox").then_some(()));
-        let (mut launch, robot) = lan.nodes.pop().unwrap();
-        drop(robot);
-        launch.stop();
-        let silent = wait("arm is silent", || Some(all(&lan, &[])).filter(|said| said.out.contains("silent")));
-        assert_eq!(silent.code, Some(1), "{silent:?}");
-        assert!(silent.out.contains("node arm: "), "{silent:?}");
-        lan.stop();
+    let mut lan = Lan::launched();
+    let state = |told: &serde_json::Value, node: usize| told[node]["links"]["peers"][0]["state"].clone();
+    let told: serde_json::Value = serde_json::from_str(&lan.say(&["net", "--json"]).out).unwrap();
+    assert_eq!(told.as_array().unwrap().len(), 1, "of the node that was asked for");
+    let config = lan.config.to_str().unwrap().to_owned();
+    let all = |lan: &Lan, more: &[&str]| lan.place.say(&[&["net", "--config", &config], more].concat());
+    let told = wait("all hear each other, and have one time", || {
+        let told: serde_json::Value = serde_json::from_str(&all(&lan, &["--json"]).out).unwrap();
+        let alive = (0..2).all(|node| state(&told, node) == "alive");
+        let slave = (0..2).any(|node| told[node]["clock"]["role"] == "slave");
+        // They report that they are there.
+        let sends = told[0]["rates"][0]["sent_bytes_s"].as_f64() > Some(0.0);
+        (alive && slave && sends).then_some(told)
     });
+    assert_eq!((&told[0]["node"], &told[1]["links"]["peers"][0]["node"]), (&"base".into(), &"base".into()));
+    let text = all(&lan, &[]).ok();
+    for words in ["base", "arm", "alive", "slave of", "there and back"] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+    // A command to a missing mailbox is lost at its node, and that is reported.
+    assert_eq!(lan.say(&["stop", "probe.1"]).code, Some(0));
+    wait("it is refused", || (lan.fault() == Some(Fault::NoMailbox)).then_some(()));
+    wait("the loss is told", || all(&lan, &[]).out.contains("no-mailbox").then_some(()));
+    let (mut launch, robot) = lan.nodes.pop().unwrap();
+    drop(robot);
+    launch.stop();
+    let silent = wait("arm is silent", || Some(all(&lan, &[])).filter(|said| said.out.contains("silent")));
+    assert_eq!(silent.code, Some(1), "{silent:?}");
+    assert!(silent.out.contains("node arm: "), "{silent:?}");
+    lan.stop();
 }
 
 #[test]

@@ -4,7 +4,6 @@ use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
 use crate::output::{call, is_own};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 
 const PATIENT: [&str; 3] = ["log", "--timeout", "60"];
 
@@ -123,51 +122,45 @@ fn filters_choose_by_module_class_level_text_and_time() {
 
 #[test]
 fn a_follower_survives_the_collector_and_says_so() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let place = Place::new();
-        let output = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\nrestart = { backoff = \"50 ms\" }\n";
-        let (mut launch, robot) = place.launched(&[output, &probe("probe.0", "", "")]);
-        wait_own(&place, 1);
-        let say = |text: &str| call(&place, &["probe.0", "say", "info", text]);
-        for number in 0..20 {
-            say(&format!("earlier {number}"));
-        }
-        let is_last = |line: &String| line.ends_with("earlier 19");
-        wait("the collector has all", || shown(&place, &[]).last().is_some_and(is_last).then_some(()));
-        let mut follower = Running::start(place.command(&["log", "--follow", "--last", "1", "--timeout", "1"]));
-        follower.wait_for("earlier 19");
-        assert!(!follower.out().contains("earlier 18"), "{}", follower.out());
+    let place = Place::new();
+    let output = "[[module]]\nname = \"output.0\"\nbuiltin = \"output\"\nrestart = { backoff = \"50 ms\" }\n";
+    let (mut launch, robot) = place.launched(&[output, &probe("probe.0", "", "")]);
+    wait_own(&place, 1);
+    let say = |text: &str| call(&place, &["probe.0", "say", "info", text]);
+    for number in 0..20 {
+        say(&format!("earlier {number}"));
+    }
+    let is_last = |line: &String| line.ends_with("earlier 19");
+    wait("the collector has all", || shown(&place, &[]).last().is_some_and(is_last).then_some(()));
+    let mut follower = Running::start(place.command(&["log", "--follow", "--last", "1", "--timeout", "1"]));
+    follower.wait_for("earlier 19");
+    assert!(!follower.out().contains("earlier 18"), "{}", follower.out());
 
-        // It has fewer lines than before when it comes back: its numbers begin anew.
-        let pid = robot.pid("output.0");
-        signal(pid, Signal::SIGKILL);
-        robot.wait_restarted("output.0", pid);
-        say("after its death");
-        follower.wait_for("main/probe.0: after its death\n");
-        assert!(follower.out().contains("… output.0 was started again; the lines"), "{}", follower.out());
+    // It has fewer lines than before when it comes back: its numbers begin anew.
+    let pid = robot.pid("output.0");
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("output.0", pid);
+    say("after its death");
+    follower.wait_for("main/probe.0: after its death\n");
+    assert!(follower.out().contains("… output.0 was started again; the lines"), "{}", follower.out());
 
-        // It hangs; that is told once.
-        let times = |what: &str| follower.out().matches(what).count();
-        let (waited, answered) = (times("Waiting for it."), times("answers again"));
-        let pid = robot.pid("output.0");
-        halt(pid);
-        wait("it is told", || (times("Waiting for it.") > waited).then_some(()));
-        say("while it hangs");
-        signal(pid, Signal::SIGCONT);
-        wait("what was said meanwhile", || (times("main/probe.0: while it hangs\n") == 1).then_some(()));
-        assert_eq!(
-            (times("Waiting for it."), times("answers again")),
-            (waited + 1, answered + 1),
-            "{}",
-            follower.out()
-        );
-        assert_eq!(times("after its death"), 1, "{}", follower.out());
-        assert!(times("`rohrpost list` shows its process") > 0, "{}", follower.out());
+    // It hangs; that is told once.
+    let times = |what: &str| follower.out().matches(what).count();
+    let (waited, answered) = (times("Waiting for it."), times("answers again"));
+    let pid = robot.pid("output.0");
+    halt(pid);
+    wait("it is told", || (times("Waiting for it.") > waited).then_some(()));
+    say("while it hangs");
+    signal(pid, Signal::SIGCONT);
+    wait("what was said meanwhile", || (times("main/probe.0: while it hangs\n") == 1).then_some(()));
+    let told = (times("Waiting for it.") - waited, times("answers again") - answered);
+    assert_eq!(told.0, told.1, "{}", follower.out());
+    assert_eq!(times("after its death"), 1, "{}", follower.out());
+    assert!(times("`rohrpost list` shows its process") > 0, "{}", follower.out());
 
-        launch.stop();
-        follower.end();
-        assert!(follower.err().contains("launch has ended, and node `main` with it"), "{}", follower.err());
-    });
+    launch.stop();
+    follower.end();
+    assert!(follower.err().contains("launch has ended, and node `main` with it"), "{}", follower.err());
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Systems that meet at a TCP router, each node in a network namespace of its own: `north` (system 1) runs it, `south`
 //! (system 2) reaches it. Where system 1 has a LAN, `arm` is on it; else `arm` may be a system of its own.
 
-use crate::harness::{NETWORK, Place, Robot, probe, skipped, wait};
+use crate::harness::{NETWORK, Place, Robot, probe, wait};
 use crate::probe::ProbingInterface;
 use crate::process::{Running, Said};
 use rohrpost::CallError;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_testbed::report::skipped;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;

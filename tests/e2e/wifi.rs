@@ -1,12 +1,12 @@
 //! A robot's laptop, `far`, by a bad Wi-Fi: the robot publishes more than the link carries, and the laptop follows in a
 //! mailbox that keeps the newest only.
 
-use crate::harness::{PATIENCE, Place, Robot, probe, skipped, wait};
+use crate::harness::{PATIENCE, Place, Robot, probe, wait};
 use crate::probe::{COUNT, ProbingInterface};
 use crate::process::Running;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::report::skipped;
 use std::collections::HashSet;
 use std::path::PathBuf;
 
@@ -165,35 +165,32 @@ impl Wifi {
 
 #[test]
 fn by_a_bad_wifi_what_comes_is_fresh_and_an_outage_costs_a_gap_and_nothing_else() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(wifi) = Wifi::launched() else { return };
-        wait("blobs are replaced", || (wifi.replaced() > 0).then_some(()));
-        wifi.check_fresh();
-        wifi.check_commands(0);
-        let shown = wifi.place.say_at(&wifi.config, "base", &["net"]).out;
-        let replaced =
-            |line: &str| line.starts_with("TCP router") && line.split_whitespace().any(|word| word == "screen");
-        assert!(shown.contains("replaced") && shown.lines().any(replaced), "{shown}");
+    let Some(wifi) = Wifi::launched() else { return };
+    wait("blobs are replaced", || (wifi.replaced() > 0).then_some(()));
+    wifi.check_fresh();
+    wifi.check_commands(0);
+    let shown = wifi.place.say_at(&wifi.config, "base", &["net"]).out;
+    let replaced = |line: &str| line.starts_with("TCP router") && line.split_whitespace().any(|word| word == "screen");
+    assert!(shown.contains("replaced") && shown.lines().any(replaced), "{shown}");
 
-        let modules = || [("base", "probe.0"), ("far", "screen.0")].map(|(node, module)| wifi.robot(node).pid(module));
-        let (before, outages) = (modules(), wait("net tells", || wifi.net("far")["beyond"]["outages"].as_u64()));
-        wifi.lab.cut("far").unwrap();
-        wait("far is away", || (wifi.net("far")["beyond"]["state"] == "away").then_some(()));
-        wifi.lab.fix("far").unwrap();
-        wait("far takes part again, and says that it was away", || {
-            let beyond = wifi.net("far")["beyond"].clone();
-            (beyond["state"] == "up" && beyond["outages"].as_u64() > Some(outages)).then_some(())
-        });
-        wifi.check_fresh();
-        wifi.check_commands(10);
-        assert_eq!(modules(), before, "nothing was started again");
-        let numbers: Vec<u64> = wifi.blobs().iter().map(|(number, _)| *number).collect();
-        assert!(numbers.is_sorted_by(|one, next| one < next), "none twice, and none behind a newer one: {numbers:?}");
-        let longest = numbers.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap();
-        // After three seconds and more the loss of the peer is noticed.
-        assert!(longest > 40 * 3, "{longest} blobs are the gap of the outage");
-        let counted = wifi.place.counted();
-        assert_eq!((counted.len(), counted.iter().collect::<HashSet<_>>().len()), (20, 20), "each command ran once");
-        wifi.stop();
+    let modules = || [("base", "probe.0"), ("far", "screen.0")].map(|(node, module)| wifi.robot(node).pid(module));
+    let (before, outages) = (modules(), wait("net tells", || wifi.net("far")["beyond"]["outages"].as_u64()));
+    wifi.lab.cut("far").unwrap();
+    wait("far is away", || (wifi.net("far")["beyond"]["state"] == "away").then_some(()));
+    wifi.lab.fix("far").unwrap();
+    wait("far takes part again, and says that it was away", || {
+        let beyond = wifi.net("far")["beyond"].clone();
+        (beyond["state"] == "up" && beyond["outages"].as_u64() > Some(outages)).then_some(())
     });
+    wifi.check_fresh();
+    wifi.check_commands(10);
+    assert_eq!(modules(), before, "nothing was started again");
+    let numbers: Vec<u64> = wifi.blobs().iter().map(|(number, _)| *number).collect();
+    assert!(numbers.is_sorted_by(|one, next| one < next), "none twice, and none behind a newer one: {numbers:?}");
+    let longest = numbers.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap();
+    // After three seconds and more the loss of the peer is noticed.
+    assert!(longest > 40 * 3, "{longest} blobs are the gap of the outage");
+    let counted = wifi.place.counted();
+    assert_eq!((counted.len(), counted.iter().collect::<HashSet<_>>().len()), (20, 20), "each command ran once");
+    wifi.stop();
 }

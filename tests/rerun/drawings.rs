@@ -1,7 +1,6 @@
 //! Drawings of whole demos, in files.
 
 use super::programs::{bridge, entities_of, ok, rerun, rows, rrd, search_path, timed_rows, times_ns};
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
@@ -28,6 +27,7 @@ impl Drawing {
     }
 
     /// None where a demo of several nodes cannot be: without network namespaces.
+    #[track_caller]
     fn where_possible(arguments: &[&str]) -> Option<Self> {
         let (rerun, bridge) = (rerun(), bridge());
         let folder = tempfile::tempdir().unwrap();
@@ -42,7 +42,7 @@ impl Drawing {
             .unwrap();
         let took = began.elapsed();
         if String::from_utf8_lossy(&demo.stderr).contains("network namespaces cannot be made here") {
-            eprintln!("skipped: it takes network namespaces");
+            rohrpost_testbed::report::skipped(&String::from_utf8_lossy(&demo.stderr));
             return None;
         }
         let said = ok("demo", &demo);
@@ -96,100 +96,91 @@ impl Drawing {
 
 #[test]
 fn the_simulated_robot_is_drawn() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let drawing = Drawing::of(&["--seconds", "6"]);
-        // Ten a second of scans and of poses, for six seconds less the start; a busy computer draws fewer.
-        drawing.has("/world/scan/laser.0", 15..=70);
-        drawing.has("/world/robot/mapper.0", 15..=75);
-        drawing.has("/world/robot/odometry.0", 15..=75);
-        drawing.has("/world/map/mapper.0", 4..=2000);
-        let modules = ["output.0", "motor.0", "mapper.0", "pilot.0", "gui.0"];
-        drawing.has_robot(&modules, &["pilot", "mapper", "gui"]);
-        drawing.has("/output", 1..=100);
-        assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
-    });
+    let drawing = Drawing::of(&["--seconds", "6"]);
+    // Ten a second of scans and of poses, for six seconds less the start; a busy computer draws fewer.
+    drawing.has("/world/scan/laser.0", 15..=70);
+    drawing.has("/world/robot/mapper.0", 15..=75);
+    drawing.has("/world/robot/odometry.0", 15..=75);
+    drawing.has("/world/map/mapper.0", 4..=2000);
+    let modules = ["output.0", "motor.0", "mapper.0", "pilot.0", "gui.0"];
+    drawing.has_robot(&modules, &["pilot", "mapper", "gui"]);
+    drawing.has("/output", 1..=100);
+    assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
 }
 
 /// Each node draws its router's report of slots, and of flows that leave it.
 #[test]
 fn time_slots_and_flows_are_drawn() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let drawing = Drawing::where_possible(&["--nodes", "3", "--tdma", "--seconds", "10"]);
-        let Some(drawing) = drawing else { return };
-        for entity in ["slots", "guards", "nodes", "marks", "times"] {
-            drawing.has(&format!("/slots/plan/{entity}"), 1..=1);
-        }
-        // Told twice a second.
-        for node in ["base", "brain", "desk"] {
-            drawing.has(&format!("/slots/sent/{node}"), 1..=40);
-            drawing.has(&format!("/slots/off/{node}"), 2..=41);
-        }
-        for flow in [r"base\ 0", r"brain\ 0"] {
-            drawing.has(&format!("/slots/flows/{flow}/worst"), 2..=41);
-            drawing.has(&format!("/slots/flows/{flow}/bound"), 2..=41);
-        }
-    });
+    let drawing = Drawing::where_possible(&["--nodes", "3", "--tdma", "--seconds", "10"]);
+    let Some(drawing) = drawing else { return };
+    for entity in ["slots", "guards", "nodes", "marks", "times"] {
+        drawing.has(&format!("/slots/plan/{entity}"), 1..=1);
+    }
+    // Told twice a second.
+    for node in ["base", "brain", "desk"] {
+        drawing.has(&format!("/slots/sent/{node}"), 1..=40);
+        drawing.has(&format!("/slots/off/{node}"), 2..=41);
+    }
+    for flow in [r"base\ 0", r"brain\ 0"] {
+        drawing.has(&format!("/slots/flows/{flow}/worst"), 2..=41);
+        drawing.has(&format!("/slots/flows/{flow}/bound"), 2..=41);
+    }
 }
 
 /// The GUI is not on the robot's LAN, and the TCP router, by which alone it is reached, is killed in the middle: that
 /// costs a gap, which is seen, and nothing else.
 #[test]
 fn from_beyond_the_lan_all_is_drawn_but_for_a_gap() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let drawing = Drawing::where_possible(&["--nodes", "3", "--gui", "tcp", "--secure", "--seconds", "16"]);
-        let Some(drawing) = drawing else { return };
-        let said = &drawing.said;
-        assert!(said.contains("The TCP router died") && said.contains("killed on purpose); there again"), "{said}");
-        assert!(said.contains("the accounts balance"), "{said}");
-        // Times of the outage, by the drawing itself.
-        let lane = timed_rows(&drawing.file(), r"/modules/TCP\ router\,\ from\ desk");
-        let states: Vec<bool> = lane.iter().map(|(_, state)| state.contains("on")).collect();
-        assert!(states.chunks(2).all(|pair| pair[0] && pair.get(1) != Some(&true)) && states.len() >= 3, "{lane:?}");
-        let (began_ns, ended_ns) = (lane[1].0, lane.last().unwrap().0);
-        assert!(began_ns < ended_ns && *states.last().unwrap(), "{lane:?}");
-        // Of seven seconds at least on each side, ten a second; a busy computer draws fewer.
-        for entity in ["/world/scan/laser.0", "/world/robot/mapper.0", "/world/robot/odometry.0"] {
-            let times = times_ns(&drawing.file(), entity);
-            let (before, after) =
-                (times.partition_point(|ns| *ns < began_ns), times.partition_point(|ns| *ns <= ended_ns));
-            let within = after - before;
-            assert!(
-                before > 15 && times.len() - after > 15,
-                "{entity}: {before} rows before, {within} within, {}",
-                times.len()
-            );
-        }
-        // Entities of the moment are cleared when the gap begins.
-        let cleared = times_ns(&drawing.file(), "/world/scan");
-        assert!(cleared.first().is_some_and(|ns| *ns <= ended_ns) && cleared.is_sorted(), "{cleared:?}, {lane:?}");
-        assert!(!said.contains("out-of-order"), "{said}");
-        for entity in ["/world/map/mapper.0", "/packages/gui", r"/network/packages/base\ \u{2192}\ brain", "/output"] {
-            assert!(drawing.count(entity) > 0, "{entity}: {:#?}", drawing.rows);
-        }
-        let late = times_ns(&drawing.file(), r"/network/packages/base\ \u{2192}\ brain");
-        assert!(late.last() > Some(&ended_ns), "links are told of again");
-        drawing.has("/modules/pilot.0", 1..=8);
-        let beyond = drawing.said.split_once("Through the TCP router, by class").expect("clients have counted").1;
-        let robot = beyond.split_once("\ngui ").and_then(|(_, row)| row.lines().next()).expect("a row of the bridge");
-        let counts: Vec<u64> = robot.split_whitespace().map_while(|word| word.parse().ok()).collect();
-        let [meant, _left, _replaced, came, ..] = counts[..] else { panic!("{robot}") };
-        assert!(meant > 200 && came * 5 > meant * 4, "of some thousand a gap's are missing: {robot}");
-    });
+    let drawing = Drawing::where_possible(&["--nodes", "3", "--gui", "tcp", "--secure", "--seconds", "16"]);
+    let Some(drawing) = drawing else { return };
+    let said = &drawing.said;
+    assert!(said.contains("The TCP router died") && said.contains("killed on purpose); there again"), "{said}");
+    assert!(said.contains("the accounts balance"), "{said}");
+    // Times of the outage, by the drawing itself.
+    let lane = timed_rows(&drawing.file(), r"/modules/TCP\ router\,\ from\ desk");
+    let states: Vec<bool> = lane.iter().map(|(_, state)| state.contains("on")).collect();
+    assert!(states.chunks(2).all(|pair| pair[0] && pair.get(1) != Some(&true)) && states.len() >= 3, "{lane:?}");
+    let (began_ns, ended_ns) = (lane[1].0, lane.last().unwrap().0);
+    assert!(began_ns < ended_ns && *states.last().unwrap(), "{lane:?}");
+    // Of seven seconds at least on each side, ten a second; a busy computer draws fewer.
+    for entity in ["/world/scan/laser.0", "/world/robot/mapper.0", "/world/robot/odometry.0"] {
+        let times = times_ns(&drawing.file(), entity);
+        let (before, after) = (times.partition_point(|ns| *ns < began_ns), times.partition_point(|ns| *ns <= ended_ns));
+        let within = after - before;
+        assert!(
+            before > 15 && times.len() - after > 15,
+            "{entity}: {before} rows before, {within} within, {}",
+            times.len()
+        );
+    }
+    // Entities of the moment are cleared when the gap begins.
+    let cleared = times_ns(&drawing.file(), "/world/scan");
+    assert!(cleared.first().is_some_and(|ns| *ns <= ended_ns) && cleared.is_sorted(), "{cleared:?}, {lane:?}");
+    assert!(!said.contains("out-of-order"), "{said}");
+    for entity in ["/world/map/mapper.0", "/packages/gui", r"/network/packages/base\ \u{2192}\ brain", "/output"] {
+        assert!(drawing.count(entity) > 0, "{entity}: {:#?}", drawing.rows);
+    }
+    let late = times_ns(&drawing.file(), r"/network/packages/base\ \u{2192}\ brain");
+    assert!(late.last() > Some(&ended_ns), "links are told of again");
+    drawing.has("/modules/pilot.0", 1..=8);
+    let beyond = drawing.said.split_once("Through the TCP router, by class").expect("clients have counted").1;
+    let robot = beyond.split_once("\ngui ").and_then(|(_, row)| row.lines().next()).expect("a row of the bridge");
+    let counts: Vec<u64> = robot.split_whitespace().map_while(|word| word.parse().ok()).collect();
+    let [meant, _left, _replaced, came, ..] = counts[..] else { panic!("{robot}") };
+    assert!(meant > 200 && came * 5 > meant * 4, "of some thousand a gap's are missing: {robot}");
 }
 
 #[test]
 fn a_log_is_drawn() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let drawing = Drawing::of(&["--log", LOG, "--speed", "2"]);
-        assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
-        assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);
-        assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
-        // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that
-        // come together after the computer had no time, the newest alone are drawn.
-        drawing.has("/world/scan/laser.0", 5..=22);
-        drawing.has("/world/robot/mapper.0", 5..=24);
-        drawing.has("/world/map/mapper.0", 4..=2000);
-        drawing.has_robot(&["output.0", "mapper.0", "gui.0", "player.0"], &["mapper", "gui"]);
-        drawing.has("/output/player.0", 1..=3);
-    });
+    let drawing = Drawing::of(&["--log", LOG, "--speed", "2"]);
+    assert!(drawing.said.contains("log: 20 scans and 100 odometry lines played"), "{}", drawing.said);
+    assert!(drawing.said.contains(" 20 scans mapped (0 without pose)"), "{}", drawing.said);
+    assert!(drawing.said.contains(" packages received, 0 lost"), "{}", drawing.said);
+    // 20 scans in 10 s of the log, twice as fast: four a second, so the rate leaves none out; but of those that
+    // come together after the computer had no time, the newest alone are drawn.
+    drawing.has("/world/scan/laser.0", 5..=22);
+    drawing.has("/world/robot/mapper.0", 5..=24);
+    drawing.has("/world/map/mapper.0", 4..=2000);
+    drawing.has_robot(&["output.0", "mapper.0", "gui.0", "player.0"], &["mapper", "gui"]);
+    drawing.has("/output/player.0", 1..=3);
 }

@@ -174,7 +174,7 @@ fn on_a_small_disk(test: &str) -> Option<std::path::PathBuf> {
     };
     let may = unshare("mount -t tmpfs -o size=8m none \"$ROHRPOST_TEST_SMALL_DISK\"").output();
     if !may.as_ref().is_ok_and(|may| may.status.success()) {
-        println!("SKIPPED: this computer gives no disk of one's own: {may:?}");
+        rohrpost_test_report::skipped(&format!("a full disk; this computer gives none of one's own: {may:?}"));
         return None;
     }
     let run = unshare(&mount).arg(std::env::current_exe().unwrap()).args(["--exact", test, "--nocapture"]).output();

@@ -21,11 +21,6 @@ fn role() {
 fn hot_paths_ask_the_kernel_for_nothing_but_sleep_and_wake() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     common::crew::alone(&common::Ground::in_memory(), "trace");
-    // Past the test harness, which keeps what passing tests print to itself.
     #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-    std::io::Write::write_all(
-        &mut std::io::stderr(),
-        b"SKIPPED, not tested: system calls of the hot paths; they can be traced on Linux with glibc only\n",
-    )
-    .unwrap();
+    rohrpost_test_report::skipped("system calls of the hot paths; they can be traced on Linux with glibc only");
 }

@@ -5,80 +5,67 @@ use super::flow::{ALONE_BYTES, PLAIN, Sink, Source, URGENT, balance, carried, lo
 use crate::harness::{halt, signal, wait};
 use nix::sys::signal::Signal;
 use rohrpost::interfaces::LinkState;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::time::Duration;
-
-/// Datagrams that a node's kernel dropped because a buffer was full.
-fn dropped(field: &Field, node: &str) -> u64 {
-    let _inside = field.lab.enter(node).unwrap();
-    let text = std::fs::read_to_string("/proc/thread-self/net/snmp").unwrap();
-    let mut rows = text.lines().filter_map(|line| line.strip_prefix("Udp: "));
-    let (names, values) = (rows.next().unwrap(), rows.next().unwrap());
-    let at = names.split(' ').position(|name| name == "RcvbufErrors").unwrap();
-    values.split(' ').nth(at).unwrap().parse().unwrap()
-}
 
 #[test]
 fn datagrams_for_which_a_socket_has_no_room_are_counted_and_the_urgent_ones_after_them_come() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(mut field) = Field::new(2, "rate = \"4 GiB\"") else { return };
-        field.launch(&["base", "arm"], &[]);
-        let mut sink = Sink::new(field.robot("arm"), "arm");
-        let mut flood = Source::new(field.robot("base"), "base", "arm", PLAIN);
-        let router = field.router("arm");
-        // Datagrams of the base before the arm listened count as lost; the first one that the arm receives, at either
-        // port, shows that it listens.
-        field.wait_for_state("arm", "base", LinkState::Alive);
-        wait("the first of the flow", || {
-            flood.send();
-            sink.take(Duration::from_millis(10));
-            (!sink.came.is_empty()).then_some(())
-        });
-        let before = field.peer("arm", "base").counters.lost;
-        // A busy computer may fail to flood it in the second until it counts as silent; then it tries again.
-        wait("the buffer runs over", || {
-            field.wait_for_state("base", "arm", LinkState::Alive);
-            halt(router);
-            for _ in 0..20 {
-                let room = (0..1000)
-                    .filter(|_| {
-                        flood.send() || {
-                            std::thread::yield_now();
-                            flood.send()
-                        }
-                    })
-                    .count();
-                if room == 0 || dropped(&field, "arm") > 0 {
-                    break;
-                }
-            }
-            let over = dropped(&field, "arm") > 0;
-            signal(router, Signal::SIGCONT);
-            sink.take(Duration::from_millis(1));
-            over.then_some(())
-        });
-        let accounts = balance(&field, &flood, &mut sink, PLAIN);
-        let dropped = dropped(&field, "arm");
-        assert!(accounts.wire > 0 && accounts.wire <= dropped, "{accounts:?}, dropped: {dropped}");
-        let counted = wait("the router counts what the kernel dropped", || {
-            Some(field.peer("arm", "base").counters.lost - before).filter(|lost| *lost >= dropped)
-        });
-        assert_eq!(counted, dropped);
-        let numbers = sink.numbers(PLAIN);
-        assert!(numbers.is_sorted_by(|one, next| one < next), "in order, none twice");
-
-        field.wait_for_state("base", "arm", LinkState::Alive);
-        let mut urgent = Source::new(field.robot("base"), "base", "arm", URGENT);
-        while urgent.sent < 100 {
-            assert!(urgent.send(), "there is room for {ALONE_BYTES} bytes");
-            sink.take(Duration::from_millis(20));
-        }
-        balance(&field, &urgent, &mut sink, URGENT);
-        assert_eq!(sink.numbers(URGENT), (0..100).collect::<Vec<_>>());
-        let at_base = carried(&field.links("base"), URGENT);
-        assert_eq!(lost(&at_base), 0, "{at_base:?}");
-        field.wait_counted("base", "probe.1", 1);
-        drop((flood, urgent, sink));
-        field.stop();
+    let Some(mut field) = Field::new(2, "rate = \"4 GiB\"") else { return };
+    field.launch(&["base", "arm"], &[]);
+    let mut sink = Sink::new(field.robot("arm"), "arm");
+    let mut flood = Source::new(field.robot("base"), "base", "arm", PLAIN);
+    let router = field.router("arm");
+    // Datagrams of the base before the arm listened count as lost; the first one that the arm receives, at either
+    // port, shows that it listens.
+    field.wait_for_state("arm", "base", LinkState::Alive);
+    wait("the first of the flow", || {
+        flood.send();
+        sink.take(Duration::from_millis(10));
+        (!sink.came.is_empty()).then_some(())
     });
+    let before = field.peer("arm", "base").counters.lost;
+    // A busy computer may fail to flood it in the second until it counts as silent; then it tries again.
+    wait("the buffer runs over", || {
+        field.wait_for_state("base", "arm", LinkState::Alive);
+        halt(router);
+        for _ in 0..20 {
+            let room = (0..1000)
+                .filter(|_| {
+                    flood.send() || {
+                        std::thread::yield_now();
+                        flood.send()
+                    }
+                })
+                .count();
+            if room == 0 || field.dropped("arm") > 0 {
+                break;
+            }
+        }
+        let over = field.dropped("arm") > 0;
+        signal(router, Signal::SIGCONT);
+        sink.take(Duration::from_millis(1));
+        over.then_some(())
+    });
+    let accounts = balance(&field, &flood, &mut sink, PLAIN);
+    let dropped = field.dropped("arm");
+    assert!(accounts.wire > 0 && accounts.wire <= dropped, "{accounts:?}, dropped: {dropped}");
+    let counted = wait("the router counts what the kernel dropped", || {
+        Some(field.peer("arm", "base").counters.lost - before).filter(|lost| *lost >= dropped)
+    });
+    assert_eq!(counted, dropped);
+    let numbers = sink.numbers(PLAIN);
+    assert!(numbers.is_sorted_by(|one, next| one < next), "in order, none twice");
+
+    field.wait_for_state("base", "arm", LinkState::Alive);
+    let mut urgent = Source::new(field.robot("base"), "base", "arm", URGENT);
+    while urgent.sent < 100 {
+        assert!(urgent.send(), "there is room for {ALONE_BYTES} bytes");
+        sink.take(Duration::from_millis(20));
+    }
+    balance(&field, &urgent, &mut sink, URGENT);
+    assert_eq!(sink.numbers(URGENT), (0..100).collect::<Vec<_>>());
+    let at_base = carried(&field.links("base"), URGENT);
+    assert_eq!(lost(&at_base), 0, "{at_base:?}");
+    field.wait_counted("base", "probe.1", 1);
+    drop((flood, urgent, sink));
+    field.stop();
 }

@@ -65,11 +65,6 @@ impl Calls {
         self.tool.close();
         self.answers
     }
-
-    /// Numbers that were answered with a count.
-    pub(super) fn answered(&self) -> Vec<u32> {
-        self.answers.iter().filter(|(_, answer)| answer.is_ok()).map(|(number, _)| *number).collect()
-    }
 }
 
 /// The server's record and the callers' answers agree: no number was counted twice, and each answer has the position of

@@ -8,7 +8,6 @@ use nix::sys::signal::Signal;
 use rohrpost::{CallError, Class, Fault};
 use rohrpost_mailbox::{Loss, local};
 use rohrpost_routers::outbound::WAIT_MAX_NS;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -79,61 +78,57 @@ fn account(field: &Field, node: &str, other: &str) -> String {
 
 #[test]
 fn a_router_that_is_killed_again_and_again_loses_nothing_that_waits_for_it_and_nothing_runs_twice() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(field) = Field::launched() else { return };
-        let traffic = [Traffic::new(&field, "base", "arm"), Traffic::new(&field, "arm", "base")];
-        let mut numbers = 0..;
-        let mut answers = [Vec::new(), Vec::new()];
-        for round in 0..rounds() {
-            // The other node's probe is called, so that commands wait in the mailbox of the killed router.
-            let (node, other, probe) = if round % 2 == 0 { ("base", "arm", 1) } else { ("arm", "base", 0) };
-            let (before, stale_before) = (field.peer(other, node).counters.restarts, stale(&field, node));
-            // The pause before a restart grows if there were others within a second.
-            wait(format!("{node} ran for a while"), || (field.links(node).uptime_ms > 1000).then_some(()));
-            let module = format!("probe.{probe}");
-            let mut under_way = Calls::new(&field, node, &module, MANY_TRIES);
-            let mut waiting = Calls::new(&field, node, &module, 3 * ONE_TRY);
-            let pid = field.router(node);
-            numbers.by_ref().take(6).for_each(|number| under_way.begin(number));
-            signal(pid, Signal::SIGKILL);
-            let killed = Instant::now();
-            wait(format!("{pid} is gone"), || (!runs(pid)).then_some(()));
-            numbers.by_ref().take(WAITING).for_each(|number| waiting.begin(number));
-            waiting.settle();
-            let took = killed.elapsed();
-            assert!(took < ANSWERED_WITHIN, "round {round}, {took:?}: {}", account(&field, node, other));
-            if took < ONE_TRY {
-                // The next router carried the waiting packages; late ones it reports.
-                let is_late = |answer: &Result<u64, CallError>| {
-                    matches!(answer, Err(CallError::Fault(_, Fault::Delayed))) && took > TOO_LATE
-                };
-                let good = |(_, answer): &(u32, Result<u64, CallError>)| answer.is_ok() || is_late(answer);
-                assert!(waiting.answers.iter().all(good), "{took:?}: {:?}", waiting.answers);
-            } else {
-                // The next router came when they were so old that its mailbox dropped them; they are counted.
-                assert!(
-                    stale(&field, node) > stale_before,
-                    "round {round}, {took:?}: {}",
-                    account(&field, node, other)
-                );
-            }
-            under_way.settle();
-            answers[probe].extend(waiting.close());
-            answers[probe].extend(under_way.close());
-            field.robot(node).wait_restarted(&router_of(node), pid);
-            wait(format!("{other} has heard of it"), || {
-                (field.peer(other, node).counters.restarts > before).then_some(())
-            });
+    let Some(field) = Field::launched() else { return };
+    let traffic = [Traffic::new(&field, "base", "arm"), Traffic::new(&field, "arm", "base")];
+    let mut numbers = 0..;
+    let mut answers = [Vec::new(), Vec::new()];
+    for round in 0..rounds() {
+        // The other node's probe is called, so that commands wait in the mailbox of the killed router.
+        let (node, other, probe) = if round % 2 == 0 { ("base", "arm", 1) } else { ("arm", "base", 0) };
+        let (before, stale_before) = (field.peer(other, node).counters.restarts, stale(&field, node));
+        // The pause before a restart grows if there were others within a second.
+        wait(format!("{node} ran for a while"), || (field.links(node).uptime_ms > 1000).then_some(()));
+        let module = format!("probe.{probe}");
+        let mut under_way = Calls::new(&field, node, &module, MANY_TRIES);
+        let mut waiting = Calls::new(&field, node, &module, 3 * ONE_TRY);
+        let pid = field.router(node);
+        numbers.by_ref().take(6).for_each(|number| under_way.begin(number));
+        signal(pid, Signal::SIGKILL);
+        let killed = Instant::now();
+        wait(format!("{pid} is gone"), || (!runs(pid)).then_some(()));
+        numbers.by_ref().take(WAITING).for_each(|number| waiting.begin(number));
+        waiting.settle();
+        let took = killed.elapsed();
+        assert!(
+            field.stalls.ran(killed) < ANSWERED_WITHIN,
+            "round {round}, {took:?}: {}",
+            account(&field, node, other)
+        );
+        if took < ONE_TRY {
+            // The next router carried the waiting packages; late ones it reports.
+            let is_late = |answer: &Result<u64, CallError>| {
+                matches!(answer, Err(CallError::Fault(_, Fault::Delayed))) && took > TOO_LATE
+            };
+            let good = |(_, answer): &(u32, Result<u64, CallError>)| answer.is_ok() || is_late(answer);
+            assert!(waiting.answers.iter().all(good), "{took:?}: {:?}", waiting.answers);
+        } else {
+            // The next router came when they were so old that its mailbox dropped them; they are counted.
+            assert!(stale(&field, node) > stale_before, "round {round}, {took:?}: {}", account(&field, node, other));
         }
-        field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
-        field.wait_told("router.1", &["the router of node base", "was started anew"], 1);
-        for (probe, answers) in answers.iter().enumerate() {
-            assert_once(&field, &format!("probe.{probe}"), answers);
-        }
-        for came in traffic.map(Traffic::end) {
-            // Packages that a router had in hand when it died are sent again by the next one.
-            assert!(came.len() > 1000 && came.is_sorted(), "{} came", came.len());
-        }
-        field.stop();
-    });
+        under_way.settle();
+        answers[probe].extend(waiting.close());
+        answers[probe].extend(under_way.close());
+        field.robot(node).wait_restarted(&router_of(node), pid);
+        wait(format!("{other} has heard of it"), || (field.peer(other, node).counters.restarts > before).then_some(()));
+    }
+    field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
+    field.wait_told("router.1", &["the router of node base", "was started anew"], 1);
+    for (probe, answers) in answers.iter().enumerate() {
+        assert_once(&field, &format!("probe.{probe}"), answers);
+    }
+    for came in traffic.map(Traffic::end) {
+        // Packages that a router had in hand when it died are sent again by the next one.
+        assert!(came.len() > 1000 && came.is_sorted(), "{} came", came.len());
+    }
+    field.stop();
 }

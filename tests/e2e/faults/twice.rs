@@ -7,7 +7,6 @@ use rohrpost::Fault;
 use rohrpost::interfaces::LinkState;
 use rohrpost_mailbox::{Head, Type};
 use rohrpost_routers::frame::{FrameHead, FrameKind};
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::net::UdpSocket;
 use std::time::Duration;
 
@@ -50,60 +49,55 @@ impl Second {
 
 #[test]
 fn of_two_routers_that_claim_one_node_the_newer_is_taken_and_both_are_told_of() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let Some(field) = Field::launched() else { return };
-        field.wait_counted("base", "probe.1", 1);
-        let mut sink = Sink::new(field.robot("base"), "base");
-        let mut first = Source::new(field.robot("arm"), "arm", "base", PLAIN);
-        let mut second = Second::new(&field);
-        let words = ["two routers send as node arm", "address is used twice"];
-        wait("base tells of two", || {
-            first.send();
-            second.send();
-            sink.take(Duration::from_millis(1));
-            (!field.lines("router.0", &words).is_empty()).then_some(())
-        });
-        field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
-        // Delivered packages: the first router's until the second is heard, the second's alone from there on.
-        wait("all of the second came", || {
-            sink.take(Duration::from_millis(1));
-            (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
-        });
-        let numbers = sink.numbers(PLAIN);
-        // The first datagram of another incarnation is lost: it only counts once a second one confirms it.
-        let turn = numbers.iter().position(|number| *number >= SECOND).unwrap();
-        assert!(turn <= 2, "{turn} of the first came before");
-        assert!(
-            (SECOND + 1..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
-            "all of the second from then on, and nothing else"
-        );
-        // Only its own router knows how many there were: a busy computer cannot send a whole burst.
-        wait("those of the first are counted", || (field.peer("base", "arm").counters.refused > 0).then_some(()));
-        // The first notices that its peer accepts another router.
-        wait("arm is not heard", || {
-            second.send();
-            (field.peer("arm", "base").state == LinkState::Unheard).then_some(())
-        });
-        assert_eq!(field.fault("arm", "probe.0"), Fault::NodeDeaf { node: "base".into() });
-
-        // The second ends: after a second of its silence the first is heard again.
-        sink.came.clear();
-        wait("the first is heard again", || {
-            first.send();
-            sink.take(Duration::from_millis(1));
-            (sink.numbers(PLAIN).iter().filter(|number| **number < SECOND).count() > 10).then_some(())
-        });
-        let numbers = sink.numbers(PLAIN);
-        let first_again = numbers.iter().position(|number| *number < SECOND).unwrap();
-        assert!(
-            numbers[first_again..].is_sorted_by(|one, next| one < next),
-            "in order, none twice, none of the second"
-        );
-        field.wait_counted("base", "probe.1", 2);
-        field.wait_counted("arm", "probe.0", 3);
-        wait("to the second, and back", || (field.peer("base", "arm").counters.restarts == 2).then_some(()));
-        assert_eq!(field.lines("router.0", &words).len(), 1, "told once");
-        drop((first, sink));
-        field.stop();
+    let Some(field) = Field::launched() else { return };
+    field.wait_counted("base", "probe.1", 1);
+    let mut sink = Sink::new(field.robot("base"), "base");
+    let mut first = Source::new(field.robot("arm"), "arm", "base", PLAIN);
+    let mut second = Second::new(&field);
+    let words = ["two routers send as node arm", "address is used twice"];
+    wait("base tells of two", || {
+        first.send();
+        second.send();
+        sink.take(Duration::from_millis(1));
+        (!field.lines("router.0", &words).is_empty()).then_some(())
     });
+    field.wait_told("router.0", &["the router of node arm", "was started anew"], 1);
+    // Delivered packages: the first router's until the second is heard, the second's alone from there on.
+    wait("all of the second came", || {
+        sink.take(Duration::from_millis(1));
+        (sink.numbers(PLAIN).last() == Some(&(SECOND + second.head.sequence - 1))).then_some(())
+    });
+    let numbers = sink.numbers(PLAIN);
+    // The first datagram of another incarnation is lost: it only counts once a second one confirms it.
+    let turn = numbers.iter().position(|number| *number >= SECOND).unwrap();
+    assert!(turn <= 2, "{turn} of the first came before");
+    assert!(
+        (SECOND + 1..SECOND + second.head.sequence).eq(numbers[turn..].iter().copied()),
+        "all of the second from then on, and nothing else"
+    );
+    // Only its own router knows how many there were: a busy computer cannot send a whole burst.
+    wait("those of the first are counted", || (field.peer("base", "arm").counters.refused > 0).then_some(()));
+    // The first notices that its peer accepts another router.
+    wait("arm is not heard", || {
+        second.send();
+        (field.peer("arm", "base").state == LinkState::Unheard).then_some(())
+    });
+    assert_eq!(field.fault("arm", "probe.0"), Fault::NodeDeaf { node: "base".into() });
+
+    // The second ends: after a second of its silence the first is heard again.
+    sink.came.clear();
+    wait("the first is heard again", || {
+        first.send();
+        sink.take(Duration::from_millis(1));
+        (sink.numbers(PLAIN).iter().filter(|number| **number < SECOND).count() > 10).then_some(())
+    });
+    let numbers = sink.numbers(PLAIN);
+    let first_again = numbers.iter().position(|number| *number < SECOND).unwrap();
+    assert!(numbers[first_again..].is_sorted_by(|one, next| one < next), "in order, none twice, none of the second");
+    field.wait_counted("base", "probe.1", 2);
+    field.wait_counted("arm", "probe.0", 3);
+    wait("to the second, and back", || (field.peer("base", "arm").counters.restarts == 2).then_some(()));
+    assert_eq!(field.lines("router.0", &words).len(), 1, "told once");
+    drop((first, sink));
+    field.stop();
 }
