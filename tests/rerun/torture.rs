@@ -6,10 +6,10 @@
 //! that is `well`, which costs the computer more than one that does nothing; and none at all, `absent`, which costs it
 //! less. With a fault the robot must be no slower than with either, by a tenth at most.
 //!
-//! That is judged by ranks: of all pairs of a window with a fault and one in peace of the same round, no more than half
-//! have a ratio above that, but for chance. So load of the computer, which comes and goes, is on both sides. A window in
-//! which a processor stood still is taken again; nothing else is left out, and how many windows there are does not
-//! depend on what they say. More rounds leave less to chance:
+//! Windows are compared by ranks: of all pairs of a window with a fault and one in peace of the same round, no more
+//! than half have a ratio above that, but for chance. So load of the computer, which comes and goes, is on both sides.
+//! A window in which a processor stood still is taken again; nothing else is left out, and how many windows there are
+//! does not depend on what they say. More rounds leave less to chance:
 //! `ROHRPOST_TORTURE_ROUNDS=20 cargo xtask test --all`.
 
 use super::load::{Load, on_one_processor};

@@ -55,14 +55,15 @@ def take_names(session, number, own):
     session.register(number, random.choice([own + others, own + routers, own + many]))
 
 
-def connections(arguments, number):
-    """So many at once, of which none says hello."""
+def connections(session, arguments, number, tried):
+    """So many at once, of which none says hello. The session goes on meanwhile: a busy computer takes its time."""
     opened = []
     for _ in range(number):
         try:
             opened.append(connect(*arguments))
         except (OSError, ssl.SSLError):
             pass
+        session.listen(0.001, tried)
     for stream in opened:
         stream.close()
 
@@ -87,7 +88,7 @@ def main():
             take_names(session, turn, ranges)
             tried["names of others"] += 1
         if turn % 64 == 0:
-            connections(at, 20)
+            connections(session, at, 20, tried)
             tried["connections"] += 20
         session.listen(0.02, tried)
     print(json.dumps(tried), flush=True)
