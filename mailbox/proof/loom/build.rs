@@ -74,6 +74,8 @@ fn variants(out: &Path, proof: &Proof) -> String {
     let models = proof.parts.last().expect("a proof has models");
     let mut tests = String::new();
     for (model, preemptions) in proof.models {
+        let catches = proof.broken.iter().any(|broken| broken.caught_by == *model);
+        assert!(catches, "no variant names the model {model}: what does it prove?");
         let test = format!("#[test] fn {model}() {{ crate::holds({preemptions}, {models}::{model}); }}\n");
         tests.push_str(&test);
     }

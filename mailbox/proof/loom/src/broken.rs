@@ -9,7 +9,6 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("the_more_important_goes_first", 2),
     ("the_urgent_passes_what_is_known", 2),
     ("what_comes_as_the_level_sinks_is_next", 2),
-    ("no_alert_is_lost", 1),
     ("a_new_owner_says_its_own_level", 2),
     ("a_sender_that_dies_before_its_alert_is_heard", 2),
     ("two_alerts_are_two", 1),
@@ -29,7 +28,6 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("no_wake_up_is_lost_between_two", 2),
     ("no_wake_up_is_lost_when_displaced", 2),
     ("no_wake_up_is_lost_in_poll", 2),
-    ("no_wake_up_is_lost_in_poll_between_two", 1),
     ("a_dead_ringer_takes_no_wake_up_along", 2),
     ("no_wake_up_is_lost_between_two_mailboxes", 2),
     ("a_retired_mailbox_keeps_nothing", 3),
@@ -40,7 +38,6 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_sender_dies_with_a_claim", 2),
     ("a_sender_dies_with_a_ticket", 2),
     ("a_sender_dies_without_its_hint", 2),
-    ("a_sender_dies_after_its_hint", 2),
     ("a_displacer_dies", 2),
     ("a_replacer_dies_before_the_old_one_goes", 2),
     ("a_replacer_dies_when_the_old_one_is_gone", 2),
@@ -86,6 +83,13 @@ const ONLY_WITH_HORIZON: Edit = edit(
     "        // ORDERING: the words",
 );
 const WITHOUT_RETURN: Edit = edit("queue", "        if !slots.any_hint() {\n            return;\n        }\n", "");
+
+const IN_PLACE_WITHOUT_RELEASE: Edit = edit(
+    "slots",
+    "if !self.change(slot, claim.word, word) {",
+    "let success = if claim.place.is_some() { Ordering::Relaxed } else { Ordering::SeqCst };\n        if \
+     self.word(slot).compare_exchange(claim.word.0, word.0, success, Ordering::Relaxed).is_err() {",
+);
 
 const DROWSY: &str = "        receivers.iter().for_each(|receiver| receiver.mailbox.slots().drowsy());\n";
 const LOWER: &str =
@@ -392,6 +396,17 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "two_alerts_are_two",
         says: "passed",
     },
+    // To save the others the cache line. What is read may be the alert that was heeded already.
+    Broken {
+        name: "alerts_unless_alerted",
+        edits: &[edit(
+            "slots",
+            "self.hot.alert.0.swap(1, Ordering::Release);",
+            "if self.hot.alert.0.load(Ordering::Relaxed) == 0 { self.hot.alert.0.swap(1, Ordering::Release); }",
+        )],
+        caught_by: "two_alerts_are_two",
+        says: "passed",
+    },
     // A state raised to the level, and older than what is known of the level.
     Broken {
         name: "what_moved_alerts_nobody",
@@ -450,6 +465,17 @@ pub(crate) const BROKEN: &[Broken] = &[
         )],
         caught_by: "a_displaced_package_is_counted_and_not_received",
         says: RACE,
+    },
+    // The heap has the new package where the old one stood.
+    Broken {
+        name: "a_changed_slot_keeps_its_rank",
+        edits: &[edit(
+            "queue",
+            "self.heap[at as usize].0 = word;\n                at as usize",
+            "self.heap[at as usize].0 = word;\n                return",
+        )],
+        caught_by: "displacing_keeps_the_order",
+        says: "passed",
     },
     // The receiver takes the last package that could be displaced, and the mailbox is empty: still it is called full.
     Broken {
@@ -546,6 +572,28 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "the_newest_keeps_its_place",
         says: WRONG,
     },
+    // The word is an old one, and nothing new seems to be said by it. It is taken for what it says, without its hint.
+    Broken {
+        name: "reused_without_release",
+        edits: &[IN_PLACE_WITHOUT_RELEASE],
+        caught_by: "a_displaced_package_is_not_replaced_too",
+        says: RACE,
+    },
+    // The same beside a free slot, where the mark hands the body over as well as the word.
+    Broken {
+        name: "a_word_comes_back_without_release",
+        edits: &[
+            IN_PLACE_WITHOUT_RELEASE,
+            edit(
+                "slots",
+                "if !self.change(claim.slot, claim.word, marked) {",
+                "if self.word(claim.slot).compare_exchange(claim.word.0, marked.0, Ordering::Relaxed, \
+                 Ordering::Relaxed).is_err() {",
+            ),
+        ],
+        caught_by: "a_word_comes_back_with_the_newer_package",
+        says: RACE,
+    },
     // The older one is gone, and a sender that dies now has told nobody.
     Broken {
         name: "replaces_unmarked",
@@ -633,6 +681,13 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "no_wake_up_is_lost_between_two",
         says: ENDLESS,
     },
+    // That of the displaced package has woken the receiver already, which then finds a slot that is being filled.
+    Broken {
+        name: "a_displacer_rings_nobody",
+        edits: &[edit("slots", "let wake = rings(", "let wake = claim.victim().is_none() && rings(")],
+        caught_by: "no_wake_up_is_lost_when_displaced",
+        says: ENDLESS,
+    },
     // ---- sleeping on several mailboxes ----
     Broken {
         name: "drowsy_in_one_mailbox_only",
@@ -712,6 +767,33 @@ pub(crate) const BROKEN: &[Broken] = &[
         caught_by: "a_retired_mailbox_keeps_nothing",
         says: WRONG,
     },
+    // A sender that goes elsewhere with its package has displaced one all the same.
+    Broken {
+        name: "counts_the_displaced_when_accepted",
+        edits: &[
+            edit(
+                "rig",
+                "unsafe { *cell = body });\n        claim.victim().into_iter().for_each(|victim| \
+                 self.mailbox.count(victim));\n",
+                "unsafe { *cell = body });\n        let displaced = claim.victim();\n",
+            ),
+            edit(
+                "rig",
+                "Published::Accepted { posted, wake } => {\n",
+                "Published::Accepted { posted, wake } => {\n                displaced.into_iter().for_each(|victim| \
+                 self.mailbox.count(victim));\n",
+            ),
+        ],
+        caught_by: "a_retired_mailbox_counts_the_displaced",
+        says: WRONG,
+    },
+    // Whatever is neither free nor a package was in dead hands, it seems; a sender is filling it.
+    Broken {
+        name: "adopts_what_is_being_filled",
+        edits: &[edit("slots", "if word.state() != State::Taken {", "if word == FREE || word.is_ready() {")],
+        caught_by: "a_retired_mailbox_keeps_nothing_of_the_dead",
+        says: WRONG,
+    },
     // What a sender displaced, and has not counted yet when the counters are carried over.
     Broken {
         name: "settles_nothing",
@@ -766,6 +848,13 @@ pub(crate) const BROKEN: &[Broken] = &[
         name: "reclaims_nothing",
         edits: &[edit("slots", "freed += usize::from(self.change(slot, word, FREE));", "freed += 0;")],
         caught_by: "a_sender_dies_with_a_ticket",
+        says: WRONG,
+    },
+    // What replaces has its package elsewhere, but its claim is in this slot.
+    Broken {
+        name: "reclaim_leaves_what_replaces",
+        edits: &[edit("slots", "if dead(by) {", "if dead(by) && !victim.is_some_and(|victim| victim.replaced) {")],
+        caught_by: "a_replacer_dies_before_the_old_one_goes",
         says: WRONG,
     },
     // An accepted package is gone, and no counter knows.

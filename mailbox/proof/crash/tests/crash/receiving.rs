@@ -129,7 +129,7 @@ fn a_receiver_dies_adopting_what_killed_the_last_two() {
         assert_eq!(found.packages, [(1, false), (2, false)], "{death:?}");
         // Counted before it is dropped: at worst once too often, never not at all.
         let poison = found.lost(Loss::Poison);
-        assert!(poison == 1 || death.is_some() && poison == 2, "{death:?}: {poison}");
+        assert!(poison == 1 || death.is_some() && poison == 2, "{death:?}: {poison} counted as poison");
     });
 }
 
@@ -156,7 +156,7 @@ fn a_receiver_dies_replacing_a_mailbox_of_another_shape() {
         assert!(found.packages.is_empty(), "given up with the old mailbox, {death:?}");
         // Package 0 was in a dead one's hand already: if it dies again in the victim's, it is poison.
         let lost = found.lost(Loss::Closed) + found.lost(Loss::Poison);
-        assert!(lost == 3 || death.is_some() && lost == 4, "{death:?}: {lost}");
+        assert!(lost == 3 || death.is_some() && lost == 4, "{death:?}: {lost} counted as lost");
         all_usable(ground, receiver);
     });
 }

@@ -91,13 +91,37 @@ fn a_sender_dies_replacing(others: u32, steps_min: u64) {
             Some(_) => &[(1, 0), (0, 1)],
         };
         assert!(expected.contains(&(old, replaced)), "{death:?}: {old} received, {replaced} replaced");
-        let mut sender = ground.sender();
-        for id in 0..LATEST.slots {
-            sender.send(&Label { id, ..Label::default() }, &[]).unwrap();
-        }
-        drop(sender);
-        assert_eq!(receiver.close(), usize::from(LATEST.slots), "every slot can be used");
+        all_take_states(ground, receiver);
     });
+}
+
+/// Every slot takes a package of a state of its own.
+fn all_take_states(ground: &Ground, receiver: Receiver) {
+    let mut sender = ground.sender();
+    for id in 0..LATEST.slots {
+        sender.send(&Label { id, ..Label::default() }, &[]).unwrap();
+    }
+    drop(sender);
+    assert_eq!(receiver.close(), usize::from(LATEST.slots), "every slot can be used");
+}
+
+/// What it would replace has been received, which it finds out after it has said that it replaces it.
+#[test]
+fn a_sender_dies_finding_nothing_to_replace() {
+    each_step(
+        "send anew what was received",
+        8,
+        |_| (),
+        |ground, (), death| {
+            let mut receiver = ground.join().receiver(MAILBOX, LATEST).unwrap();
+            let found = drain(ground, &mut receiver, u64::from(death.is_some()));
+            assert_eq!((found.times(100), found.times(101)), (0, usize::from(accepted(death))), "{death:?}");
+            // It had said that it would, and is believed.
+            let believed = death.is_some_and(|death| death.step == "replace: marked");
+            assert_eq!(found.lost(Loss::Replaced), u64::from(believed), "{death:?}");
+            all_take_states(ground, receiver);
+        },
+    );
 }
 
 #[test]
@@ -133,9 +157,7 @@ fn a_sender_dies_being_refused() {
 
 #[test]
 fn a_sender_dies_beside_a_sleeping_receiver() {
-    a_sender_dies_beside_a_sleeper(6, |receiver| {
-        receiver.receive_timeout(Duration::from_secs(30)).map(|package| package.body()[0])
-    });
+    a_sender_dies_beside_a_sleeper(6, |receiver| receiver.receive_timeout(PATIENCE).map(|package| package.body()[0]));
 }
 
 #[test]
@@ -144,7 +166,7 @@ fn a_sender_dies_beside_a_receiver_that_sleeps_in_poll() {
         let (_far, near) = std::os::unix::net::UnixStream::pair().unwrap();
         let mut watches = Watches::new(receiver.participant()).unwrap();
         watches.add(&near, Interest::Read).unwrap();
-        let end = Instant::now() + Duration::from_secs(30);
+        let end = Instant::now() + PATIENCE;
         while Instant::now() < end {
             if let Some(package) = receiver.try_receive() {
                 return Some(package.body()[0]);
@@ -155,13 +177,18 @@ fn a_sender_dies_beside_a_receiver_that_sleeps_in_poll() {
     });
 }
 
+/// How long a receiver sleeps.
+const PATIENCE: Duration = Duration::from_secs(30);
+
 fn a_sender_dies_beside_a_sleeper(steps_min: u64, receive: fn(&mut Receiver) -> Option<u8>) {
     let scene = |ground: &Ground| {
         let mut receiver = ground.receiver();
         let (tell, told) = std::sync::mpsc::channel();
         let sleeper = std::thread::spawn(move || {
             tell.send(nix::unistd::gettid()).unwrap();
-            let woken = receive(&mut receiver);
+            let start = Instant::now();
+            // What is there when the sleep ends by itself has woken nobody.
+            let woken = receive(&mut receiver).filter(|_| start.elapsed() < PATIENCE);
             (receiver, woken)
         });
         until_asleep(told.recv().unwrap());

@@ -1,6 +1,6 @@
 //! What the victims do: each sets its scene, arms the step that will kill it, and does one operation.
 
-use crate::ground::{Ground, HIGH, LOW, MAILBOX, OTHER_SHAPE, SHAPE, send};
+use crate::ground::{Ground, HIGH, LATEST, LOW, MAILBOX, OTHER_SHAPE, SHAPE, send};
 use nix::sys::resource::{Resource, setrlimit};
 use rohrpost_mailbox_crash::{
     Interest, Label, Loan, Name, Node, Participant, Priority, TimeKeeper, TimeSource, Type, Watches, step,
@@ -51,6 +51,15 @@ fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             arm();
             send(&mut sender, LOW, 101).unwrap();
             die_with(sender);
+        }
+        "send anew what was received" => {
+            let mut receiver = ground.join().receiver(MAILBOX, LATEST).unwrap();
+            let mut sender = ground.sender();
+            send(&mut sender, LOW, 100).unwrap();
+            drop(receiver.try_receive().unwrap());
+            arm();
+            send(&mut sender, LOW, 101).unwrap();
+            die_with((sender, receiver));
         }
         "watch" => {
             let participant = ground.join();

@@ -1,0 +1,230 @@
+//! The mistakes, each with the scene that notices it. `broken!` asks whether its mistake is made.
+
+/// A change of the source. `from` must be there exactly once.
+pub(crate) struct Edit {
+    /// Without `.rs`.
+    pub(crate) file: &'static str,
+    pub(crate) from: &'static str,
+    pub(crate) to: &'static str,
+}
+
+const fn edit(file: &'static str, from: &'static str, to: &'static str) -> Edit {
+    Edit { file, from, to }
+}
+
+/// A mistake that one could make.
+pub(crate) struct Mistake {
+    pub(crate) name: &'static str,
+    pub(crate) edits: &'static [Edit],
+    /// The test that fails.
+    pub(crate) scene: &'static str,
+    /// What it says. `check …` is one of the aftermath.
+    pub(crate) says: &'static str,
+}
+
+const SENDING: &str = "sending::a_sender_dies_sending";
+
+pub(crate) const MISTAKES: &[Mistake] = &[
+    // ---- what the dead left in slots ----
+    Mistake {
+        name: "what_the_dead_filled_is_published",
+        edits: &[edit(
+            "slots",
+            "freed += usize::from(self.change(slot, word, FREE));",
+            "let left = if broken!(what_the_dead_filled_is_published) { Word::ready(Priority(0), 0) } else { FREE };
+                freed += usize::from(self.change(slot, word, left));",
+        )],
+        scene: SENDING,
+        says: "check Whole",
+    },
+    // The slot is lost for ever.
+    Mistake {
+        name: "claims_of_the_dead_stay",
+        edits: &[edit("slots", "if dead(by) {", "if !broken!(claims_of_the_dead_stay) && dead(by) {")],
+        scene: SENDING,
+        says: "check Usable",
+    },
+    Mistake {
+        name: "the_dead_forget_what_they_displaced",
+        edits: &[edit(
+            "slots",
+            "victim.into_iter().for_each(&mut lost);",
+            "victim.filter(|_| !broken!(the_dead_forget_what_they_displaced)).into_iter().for_each(&mut lost);",
+        )],
+        scene: "sending::a_sender_dies_displacing",
+        says: "no loss is hidden",
+    },
+    // Sent, and its sender died before it could hint.
+    Mistake {
+        name: "a_search_looks_at_hints_alone",
+        edits: &[edit(
+            "queue",
+            "(0..slots.count()).for_each(|slot| self.defer(slot));",
+            "if !broken!(a_search_looks_at_hints_alone) { (0..slots.count()).for_each(|slot| self.defer(slot)); }",
+        )],
+        scene: SENDING,
+        says: "check Drained",
+    },
+    Mistake {
+        name: "what_was_in_dead_hands_stays_there",
+        edits: &[edit(
+            "slots",
+            "if word.state() != State::Taken {",
+            "if broken!(what_was_in_dead_hands_stays_there) || word.state() != State::Taken {",
+        )],
+        scene: "receiving::a_receiver_dies_receiving",
+        says: "check Drained",
+    },
+    // It kills its next receiver, and the one after that.
+    Mistake {
+        name: "what_was_in_dead_hands_is_not_marked",
+        edits: &[edit(
+            "slots",
+            "self.change(slot, word, word.redelivered());",
+            "let again = if broken!(what_was_in_dead_hands_is_not_marked) {
+                    Word::ready(word.priority(), word.ticket())
+                } else {
+                    word.redelivered()
+                };
+                self.change(slot, word, again);",
+        )],
+        scene: "receiving::a_receiver_dies_receiving",
+        says: "assertion `left == right` failed",
+    },
+    Mistake {
+        name: "poison_is_dropped_uncounted",
+        edits: &[edit(
+            "slots",
+            "poison(word.priority());",
+            "if !broken!(poison_is_dropped_uncounted) { poison(word.priority()); }",
+        )],
+        scene: "receiving::a_receiver_dies_adopting_what_killed_the_last_two",
+        says: "0 counted as poison",
+    },
+    Mistake {
+        name: "a_death_rings_nobody",
+        edits: &[edit(
+            "node",
+            "(0..PARTICIPANTS_MAX as u16).filter(there)",
+            "(0..PARTICIPANTS_MAX as u16).filter(there).filter(|_| !broken!(a_death_rings_nobody))",
+        )],
+        scene: "sending::a_sender_dies_beside_a_sleeping_receiver",
+        says: "left: None",
+    },
+    // ---- accounts ----
+    Mistake {
+        name: "the_stale_are_dropped_uncounted",
+        edits: &[edit(
+            "receiver",
+            "self.segment.page().counters.lost(taken.word().priority(), Loss::Stale, 1);",
+            "let counted = u64::from(!broken!(the_stale_are_dropped_uncounted));
+            self.segment.page().counters.lost(taken.word().priority(), Loss::Stale, counted);",
+        )],
+        scene: "receiving::a_receiver_dies_dropping_stale_packages",
+        says: "check Accounts",
+    },
+    Mistake {
+        name: "what_is_given_up_is_uncounted",
+        edits: &[edit(
+            "registry",
+            "old.page().counters.lost(taken.word().priority(), Loss::Closed, 1);",
+            "let counted = u64::from(!broken!(what_is_given_up_is_uncounted));
+        old.page().counters.lost(taken.word().priority(), Loss::Closed, counted);",
+        )],
+        scene: "receiving::a_receiver_dies_replacing_a_mailbox_of_another_shape",
+        says: "0 counted as lost",
+    },
+    // ---- the mailbox goes on ----
+    Mistake {
+        name: "equals_are_displaced",
+        edits: &[edit(
+            "slots",
+            "priority.outranks(word.priority())",
+            "(priority.outranks(word.priority()) || broken!(equals_are_displaced) && priority == word.priority())",
+        )],
+        scene: SENDING,
+        says: "check Full",
+    },
+    Mistake {
+        name: "the_last_slot_is_overlooked",
+        edits: &[edit(
+            "queue",
+            "if slot >= slots.count() {",
+            "if slot >= slots.count() - usize::from(broken!(the_last_slot_is_overlooked)) {",
+        )],
+        scene: SENDING,
+        says: "check Received",
+    },
+    Mistake {
+        name: "the_last_goes_first",
+        edits: &[edit(
+            "slots",
+            "claim.place.map_or(ticket, Word::ticket));",
+            "if broken!(the_last_goes_first) { !ticket } else { claim.place.map_or(ticket, Word::ticket) });",
+        )],
+        scene: SENDING,
+        says: "check InOrder",
+    },
+    Mistake {
+        name: "nothing_is_released",
+        edits: &[edit(
+            "slots",
+            "self.change(taken.slot, taken.word, FREE);",
+            "if !broken!(nothing_is_released) { self.change(taken.slot, taken.word, FREE); }",
+        )],
+        scene: SENDING,
+        says: "check UsableAgain",
+    },
+    Mistake {
+        name: "closing_finds_nothing",
+        edits: &[edit(
+            "receiver",
+            "while let Some(taken) = self.queue.take(&slots) {",
+            "while let Some(taken) = self.queue.take(&slots).filter(|_| !broken!(closing_finds_nothing)) {",
+        )],
+        scene: SENDING,
+        says: "check Closed",
+    },
+    // ---- the node ends ----
+    // Locks tell the living from the dead, not what they wrote.
+    Mistake {
+        name: "the_table_is_believed",
+        edits: &[
+            edit(
+                "node",
+                "let alive = |index: &u16| lock::is_locked(",
+                "let alive = |index: &u16| broken!(the_table_is_believed) || lock::is_locked(",
+            ),
+            edit(
+                "participant",
+                "entry.pid.store(0, Ordering::Release);",
+                "if !broken!(the_table_is_believed) { entry.pid.store(0, Ordering::Release); }",
+            ),
+        ],
+        scene: SENDING,
+        says: "check Nobody",
+    },
+    Mistake {
+        name: "places_stay_locked",
+        edits: &[edit(
+            "participant",
+            "        self.leave();\n",
+            "        self.leave();
+        if broken!(places_stay_locked) {
+            return std::mem::forget(self.file.try_clone());
+        }\n",
+        )],
+        scene: SENDING,
+        says: "check Removable",
+    },
+    Mistake {
+        name: "the_directory_stays",
+        edits: &[edit(
+            "registry",
+            "fs::remove_dir_all(self.path()).map_err(failed)?;",
+            "if !broken!(the_directory_stays) { fs::remove_dir_all(self.path()).map_err(failed)?; }",
+        )],
+        scene: SENDING,
+        says: "check Gone",
+    },
+];

@@ -1,0 +1,79 @@
+//! Runs scenes with and without a mistake.
+
+use crate::catalog::MISTAKES;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+const MISTAKE: &str = "ROHRPOST_MISTAKE";
+
+/// Whether this process makes this mistake.
+pub(crate) fn is_made(mistake: &str) -> bool {
+    static MADE: OnceLock<Option<String>> = OnceLock::new();
+    MADE.get_or_init(|| std::env::var(MISTAKE).ok()).as_deref() == Some(mistake)
+}
+
+fn scenes(arguments: &[&str], mistake: &str) -> (Output, String) {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    let output = command.args(["--ignored", "--nocapture"]).args(arguments).env(MISTAKE, mistake).output().unwrap();
+    let text = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat();
+    (output, text)
+}
+
+pub(crate) fn is_noticed(name: &str) {
+    let mistake = MISTAKES.iter().find(|mistake| mistake.name == name).unwrap();
+    let (output, text) = scenes(&["--exact", mistake.scene], name);
+    assert!(text.contains("running 1 test"), "{}: there is no such scene:\n{text}", mistake.scene);
+    assert!(!output.status.success(), "{} does not notice {name}", mistake.scene);
+    assert!(text.contains(mistake.says), "it should say {:?}, not:\n{text}", mistake.says);
+}
+
+/// The crash points of this source: line and name.
+fn steps(source: &str) -> impl Iterator<Item = (usize, &str)> {
+    source.lines().enumerate().filter_map(|(at, line)| {
+        let (step, _) = line.trim_start().strip_prefix("step!(\"")?.split_once('"')?;
+        Some((at + 1, step))
+    })
+}
+
+/// Those that nothing died at, each with its place.
+fn survived(file: &str, source: &str, died: &BTreeSet<&str>) -> Vec<String> {
+    let survived = steps(source).filter(|(_, step)| !died.contains(step));
+    survived.map(|(line, step)| format!("mailbox/src/{file}:{line}: {step}")).collect()
+}
+
+#[test]
+fn without_a_mistake_all_scenes_pass_and_die_at_every_step() {
+    let (output, text) = scenes(&[], "");
+    assert!(output.status.success(), "{text}");
+    let died: BTreeSet<&str> = text.lines().filter_map(|line| Some(line.split_once("died at ")?.1)).collect();
+    let (mut written, mut named, mut missed) = (0, BTreeSet::new(), Vec::new());
+    for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src")).unwrap() {
+        let path = entry.unwrap().path();
+        let (file, source) = (path.file_name().unwrap().to_str().unwrap(), std::fs::read_to_string(&path).unwrap());
+        written += source.matches("step!(").count();
+        named.extend(steps(&source).map(|(_, step)| step.to_owned()));
+        missed.extend(survived(file, &source, &died));
+    }
+    assert!(missed.is_empty(), "no scene dies at\n{}", missed.join("\n"));
+    // Of two with one name, the other would hide that one is never died at.
+    assert_eq!(named.len(), written, "each `step!` has a line and a name of its own: {named:#?}");
+}
+
+#[test]
+fn a_step_that_no_scene_dies_at_is_named() {
+    let source = "fn claim() {\n    step!(\"claim: before\");\n    step!(\"claim: new\");\n}\n";
+    let died = BTreeSet::from(["claim: before"]);
+    assert_eq!(survived("slots.rs", source, &died), ["mailbox/src/slots.rs:3: claim: new"]);
+}
+
+#[test]
+fn each_check_of_the_aftermath_fails_with_a_mistake() {
+    let aftermath = include_str!("../crash/aftermath.rs");
+    let checks: BTreeSet<&str> =
+        aftermath.split("Check::").skip(1).filter_map(|rest| rest.split_once('.')).map(|(check, _)| check).collect();
+    let said: BTreeSet<&str> = MISTAKES.iter().filter_map(|mistake| mistake.says.strip_prefix("check ")).collect();
+    let cannot_fail: Vec<_> = checks.difference(&said).collect();
+    assert!(cannot_fail.is_empty() && checks.len() > 10, "no mistake is noticed by {cannot_fail:?}");
+}
