@@ -139,6 +139,21 @@ pub(crate) const CARRYING: Group = Group {
             )],
         },
         Planted {
+            name: "ReportsDelivered",
+            text: "Inbound: a package is reported as not delivered, and is delivered.",
+            shows_in: "inbound::tests::names::a_node_speaks_for_its_own_names_alone",
+            edits: &[edit(
+                "inbound/peer.rs",
+                "Ok(()) => self.stats.inn.passed(head.priority, head.len),",
+                r"Ok(()) => {
+                if broken!(ReportsDelivered) {
+                    deliver.lost(Some(self.from), head, body, Cause::MailboxFull);
+                }
+                self.stats.inn.passed(head.priority, head.len);
+            }",
+            )],
+        },
+        Planted {
             name: "TakesCopies",
             text: "Inbound: duplicates are taken.",
             shows_in: "inbound::tests::a_window_knows_gaps_and_copies",
