@@ -86,6 +86,13 @@ fn every_mistake_names_a_promise_or_is_said_to_break_none() {
 }
 
 #[test]
+fn two_masters_of_one_term_are_told() {
+    let caught = CAUGHT.iter().find(|caught| caught.mistake == Mistake::SharesTerms).expect("it is there");
+    let problems = with(caught.mistake, || run(caught.network.plan(caught.seed), guard, false)).problems;
+    assert!(problems.iter().any(|problem| problem.text.contains("are masters of Term")), "{problems:?}");
+}
+
+#[test]
 fn a_mistake_that_a_network_does_not_show_is_told_with_the_next_seed() {
     let caught = CAUGHT.iter().find(|caught| caught.mistake == Mistake::IgnoresLevels).expect("it is there");
     let told = unnoticed(&Caught { promise: Promise::Displacing, ..*caught }, 1).expect("another promise is broken");

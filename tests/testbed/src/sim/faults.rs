@@ -10,6 +10,7 @@ use super::plan::{SYSTEM, fixed, incarnation};
 use super::seals::altered;
 use super::spans::MS;
 use super::station::{Arrived, Origin, Port};
+use super::ticking;
 use super::world::{Event, World};
 use rohrpost_mailbox::{Head, Name, Priority, Type, local};
 use rohrpost_routers::admission::{PACKET, TUNNEL};
@@ -115,8 +116,12 @@ impl World<'_> {
                     }
                     let alters = self.plan.sealed && self.chance.percent(50);
                     let bytes = if alters { altered(&arrived.bytes, &mut self.chance) } else { arrived.bytes.clone() };
-                    let origin = if alters || to != receiver { Origin::Made } else { arrived.origin };
-                    let arrived = Arrived { bytes, origin, ..arrived };
+                    // From an address that is not its sender's.
+                    let strays = arrived.port == ticking::PORT && self.chance.percent(30);
+                    let nodes = self.stations.len();
+                    let source = arrived.source.map(|node| if strays { (node + 1) % nodes } else { node });
+                    let origin = if alters || strays || to != receiver { Origin::Made } else { arrived.origin };
+                    let arrived = Arrived { bytes, source, origin, ..arrived };
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
                     let life = (to == receiver && !self.plan.sealed).then_some(life);
                     self.at(at_ns, Event::Again { to, life, arrived });

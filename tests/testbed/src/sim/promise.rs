@@ -30,9 +30,9 @@ pub enum Promise {
     Displacing,
     /// Nothing leaves or is delivered that waited for too long, and a command hurries no more than its sender.
     Fresh,
-    /// No more bytes a second than allowed.
+    /// No more bytes a second than allowed, and no datagram of its own for what others wait behind that fit in it.
     Pace,
-    /// Queue, quotas and reassembly stay within their limits.
+    /// Queue, quotas and reassembly stay within their limits, and no flood is taken in faster than it leaves.
     Bounded,
     /// What a router sent, and nobody altered, is rejected only for what is so: it came before, it is too old, or its
     /// incarnation, key or configuration is not the one that its receiver goes by.

@@ -1,6 +1,6 @@
 //! What a router could do wrong with packages and datagrams.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted, edit};
 
 pub(crate) const CARRYING: Group = Group {
     name: "CARRYING",
@@ -75,6 +75,26 @@ pub(crate) const CARRYING: Group = Group {
                 r"if !broken!(ForgetsDisplaced) {
             gone(&waiting, beginning);
         }",
+            )],
+        },
+        Planted {
+            name: "AlwaysAlone",
+            text: "Sending: each package leaves in a datagram of its own, whatever waits behind it.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "driver/free.rs",
+                "transmitter.accept(outlet, package, taken == 0 && is_alone());",
+                "transmitter.accept(outlet, package, broken!(AlwaysAlone) || (taken == 0 && is_alone()));",
+            )],
+        },
+        Planted {
+            name: "NeverStops",
+            text: "Sending: the mailbox is emptied however much waits in the queue.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "driver/free.rs",
+                "if accepts && on.outlet().queue().0.has_plenty() {",
+                "if accepts && on.outlet().queue().0.has_plenty() && !broken!(NeverStops) {",
             )],
         },
         Planted {

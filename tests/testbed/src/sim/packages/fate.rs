@@ -11,7 +11,7 @@ use rohrpost_routers::security::Rejection;
 
 /// How a router counts a datagram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Fate {
+enum Fate {
     Taken,
     Duplicate,
     Old,
@@ -58,8 +58,28 @@ impl Packages {
         })
     }
 
+    /// A datagram was handled: notes what became of it. `clear`: what could be read of it; `before`: what was counted of
+    /// its source.
+    pub(super) fn handled(&mut self, io: &mut Io<'_>, arrived: &Arrived, clear: &[u8], before: &Counted) {
+        let source = arrived.source.filter(|node| *node != io.node);
+        let fate = self.fate(io, arrived, before, &self.counted(source));
+        io.line(|| format!("from {source:?}: {}, {fate:?}", shown(clear)));
+        if let Some(fate) = fate {
+            self.check_fate(io, arrived, fate);
+        }
+        match fate {
+            Some(Fate::Taken) => {
+                io.oracle.took(io.now, io.life, (clear, self.first_of(clear)), self.settings.digest);
+                self.hears(io, source);
+            }
+            Some(Fate::Duplicate) => io.oracle.saw("dropped as a copy"),
+            Some(_) if self.seals.is_some() => io.oracle.saw("rejected"),
+            _ => io.oracle.saw("dropped as wrong or old"),
+        }
+    }
+
     /// What became of the datagram that was handled between two counts; none: it is an answer, and was counted nowhere.
-    pub(super) fn fate(&self, io: &mut Io<'_>, arrived: &Arrived, before: &Counted, after: &Counted) -> Option<Fate> {
+    fn fate(&self, io: &mut Io<'_>, arrived: &Arrived, before: &Counted, after: &Counted) -> Option<Fate> {
         let counts = before.iter().zip(after).map(|(before, after)| after - before);
         let counted: Vec<_> = FATES.into_iter().zip(counts).filter(|(_, count)| *count > 0).collect();
         let answers = if self.seals.is_some() { FrameKind::Hello } else { FrameKind::Refusal };
@@ -116,7 +136,7 @@ impl Packages {
     }
 
     /// A datagram was counted so.
-    pub(super) fn check_fate(&self, io: &mut Io<'_>, arrived: &Arrived, fate: Fate) {
+    fn check_fate(&self, io: &mut Io<'_>, arrived: &Arrived, fate: Fate) {
         let is_allowed = match FrameHead::read(&arrived.bytes) {
             Ok((head, _)) => self.is_allowed(io, arrived, &head, fate),
             Err(_) => !matches!(arrived.origin, Origin::Sent { .. }),

@@ -11,7 +11,6 @@ mod settings;
 mod slotted;
 mod watch;
 
-use fate::Fate;
 pub use free::Free;
 use receiving::RxSystem;
 pub(super) use settings::{ROUTER_CLASS, digest};
@@ -281,22 +280,7 @@ impl Packages {
         let source = arrived.source.filter(|node| *node != io.node);
         let before = self.counted(source);
         let Some(clear) = self.take(io, arrived) else { return io.oracle.saw("older than its router") };
-        let after = self.counted(source);
-        let fate = self.fate(io, arrived, &before, &after);
-        io.line(|| format!("from {source:?}: {}, {fate:?}", shown(&clear)));
-        if let Some(fate) = fate {
-            self.check_fate(io, arrived, fate);
-        }
-        match fate {
-            Some(Fate::Taken) => {
-                let first = self.first_of(&clear);
-                io.oracle.took(io.now, io.life, (&clear, first), self.settings.digest);
-                self.hears(io, source);
-            }
-            Some(Fate::Duplicate) => io.oracle.saw("dropped as a copy"),
-            Some(_) if self.seals.is_some() => io.oracle.saw("rejected"),
-            _ => io.oracle.saw("dropped as wrong or old"),
-        }
+        self.handled(io, arrived, &clear, &before);
         self.answer_callers(io);
     }
 
