@@ -109,7 +109,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::HalfBound, Promise::TimeBound, Network::Rough, 0),
     caught(Mistake::OldSamples, Promise::TimeBound, Network::Free, 71),
     caught(Mistake::Stubborn, Promise::OneMaster, Network::Rough, 0),
-    caught(Mistake::SharesTerms, Promise::OneMaster, Network::Free, 0),
+    caught(Mistake::SharesTerms, Promise::OneMaster, Network::Free, 3),
     caught(Mistake::TakesAnyAddress, Promise::Admission, Network::Rough, 0),
     caught(Mistake::SleepsUnnoticed, Promise::TimeBound, Network::Unsteady, 3),
     caught(Mistake::SleepsUnnoticed, Promise::SilentWhenUnsure, Network::UnsteadySlotted, 6),
