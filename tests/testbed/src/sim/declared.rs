@@ -28,7 +28,7 @@ const HEADS_BYTES: u64 = 100;
 impl Plan {
     /// The declared flows come first; behind them one flood for each node, of the lowest level.
     pub fn declared(seed: u64) -> Self {
-        let mut plan = Self::slotted(seed);
+        let mut plan = Self::small_slotted(seed);
         let mut chance = Chance::new(seed ^ 0xf10);
         plan.faults.clear();
         plan.calls.clear();

@@ -9,7 +9,8 @@ use super::packages::{ROUTER_CLASS, digest};
 use super::plan::{SYSTEM, fixed, incarnation};
 use super::seals::altered;
 use super::spans::MS;
-use super::station::Arrived;
+use super::station::{Arrived, Origin, Port};
+use super::ticking;
 use super::world::{Event, World};
 use rohrpost_mailbox::{Head, Name, Priority, Type, local};
 use rohrpost_routers::admission::{PACKET, TUNNEL};
@@ -18,6 +19,11 @@ use std::rc::Rc;
 
 /// The last that a router could send.
 const SEQUENCE_MAX: u64 = (1 << 48) - 1;
+
+/// A datagram that no router sent.
+fn made(port: Port, source: Option<usize>, bytes: Rc<[u8]>) -> Arrived {
+    Arrived { port, source, bytes, stamp: Now::default(), origin: Origin::Made }
+}
 
 impl World<'_> {
     pub(super) fn begin(&mut self, index: usize) {
@@ -84,7 +90,7 @@ impl World<'_> {
                     let known = self.chance.percent(70).then(|| self.chance.below(self.stations.len() as u64) as usize);
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
                     let port = usize::from(self.chance.percent(20));
-                    let arrived = Arrived { port, source: known, bytes, stamp: Now::default(), damaged: false };
+                    let arrived = made(port, known, bytes);
                     self.at(at_ns, Event::Arrive { to, arrived });
                 }
             }
@@ -93,7 +99,7 @@ impl World<'_> {
                 self.oracle.saw("forged");
                 for _ in 0..count {
                     let bytes = self.forged(from, to);
-                    let arrived = Arrived { port: 0, source: Some(from), bytes, stamp: Now::default(), damaged: false };
+                    let arrived = made(0, Some(from), bytes);
                     let at_ns = self.now_ns + self.chance.below(50 * MS);
                     self.at(at_ns, Event::Arrive { to, arrived });
                 }
@@ -110,7 +116,12 @@ impl World<'_> {
                     }
                     let alters = self.plan.sealed && self.chance.percent(50);
                     let bytes = if alters { altered(&arrived.bytes, &mut self.chance) } else { arrived.bytes.clone() };
-                    let arrived = Arrived { bytes, ..arrived };
+                    // From an address that is not its sender's.
+                    let strays = arrived.port == ticking::PORT && self.chance.percent(30);
+                    let nodes = self.stations.len();
+                    let source = arrived.source.map(|node| if strays { (node + 1) % nodes } else { node });
+                    let origin = if alters || strays || to != receiver { Origin::Made } else { arrived.origin };
+                    let arrived = Arrived { bytes, source, origin, ..arrived };
                     let at_ns = self.now_ns + self.chance.below(100 * MS);
                     let life = (to == receiver && !self.plan.sealed).then_some(life);
                     self.at(at_ns, Event::Again { to, life, arrived });

@@ -4,7 +4,7 @@ use super::table::{Group, Table};
 use rohrpost_mailbox::Name;
 use rohrpost_network::LEVELS;
 use rohrpost_routers::frame::NodeIndex;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 
 /// Packages that one incarnation of a router has to account for.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
@@ -50,6 +50,8 @@ pub struct Receiving {
     pub(super) taken: Table<u64, Taken>,
     /// The incarnation of each peer that was heard last.
     pub(super) present: Table<NodeIndex, u64>,
+    /// Incarnation and sequence of each datagram of a peer that was not confirmed, and when it came, local ns.
+    pub(super) doubted: Table<NodeIndex, VecDeque<(u64, u64, u64)>>,
     /// Last place that was delivered, of sender, receiver and priority.
     pub(super) last: Table<(Name, Name, u8), u32>,
 }
@@ -72,4 +74,6 @@ pub(super) struct Taken {
     pub(super) highest: u64,
     /// It was taken for over, and came back: what was missing meanwhile is not counted.
     pub(super) unclear: bool,
+    /// With which sequence it came back last.
+    pub(super) back: u64,
 }

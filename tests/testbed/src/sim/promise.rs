@@ -30,10 +30,13 @@ pub enum Promise {
     Displacing,
     /// Nothing leaves or is delivered that waited for too long, and a command hurries no more than its sender.
     Fresh,
-    /// No more bytes a second than allowed.
+    /// No more bytes a second than allowed, and no datagram of its own for what others wait behind that fit in it.
     Pace,
-    /// Queue, quotas and reassembly stay within their limits.
+    /// Queue, quotas and reassembly stay within their limits, and no flood is taken in faster than it leaves.
     Bounded,
+    /// What a router sent, and nobody altered, is rejected only for what is so: it came before, it is too old, or its
+    /// incarnation, key or configuration is not the one that its receiver goes by.
+    Rejection,
     /// What a router says of its peers and of losses on the wire is so.
     Links,
     /// Nothing is delivered that is not admitted: where datagrams are sealed, in the name of another node; to a
@@ -58,4 +61,30 @@ pub enum Promise {
     /// With time slots nobody sends while its own bound is greater than what is allowed, or while it is further off in
     /// truth.
     SilentWhenUnsure,
+}
+
+impl Promise {
+    /// All; the last one stands last.
+    pub const ALL: [Self; Self::SilentWhenUnsure as usize + 1] = [
+        Self::Accounts,
+        Self::AtMostOnce,
+        Self::NoCopies,
+        Self::Order,
+        Self::Unchanged,
+        Self::Urgency,
+        Self::Displacing,
+        Self::Fresh,
+        Self::Pace,
+        Self::Bounded,
+        Self::Rejection,
+        Self::Links,
+        Self::Admission,
+        Self::Recovery,
+        Self::TimeBound,
+        Self::TimeForward,
+        Self::OneMaster,
+        Self::Exclusive,
+        Self::InWindow,
+        Self::SilentWhenUnsure,
+    ];
 }

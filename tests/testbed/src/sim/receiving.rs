@@ -6,9 +6,15 @@ use super::oracle::Oracle;
 use super::package::{Package, Role, admitted};
 use super::packages::ROUTER_CLASS;
 use super::promise::Promise;
+use super::spans::S;
 use rohrpost_mailbox::{Head, local};
-use rohrpost_routers::frame::{Frame, NodeIndex};
+use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, NodeIndex};
 use rohrpost_routers::inbound::{REORDER_MAX, WINDOW};
+
+/// A second datagram confirms a first one within this time, ns.
+const CONFIRMED_WITHIN_NS: u64 = 2 * S;
+/// So many that wait for a second are remembered of each peer at least.
+const DOUBTED_KEPT: usize = 3;
 
 impl Oracle {
     /// A router took a datagram: each whole package in it has a fate by now, and so has a large one of which this was
@@ -31,7 +37,9 @@ impl Oracle {
         };
         let is_known = receiving.taken.contains_key(&head.incarnation);
         let taken = receiving.taken.entry(head.incarnation).or_insert_with(|| Taken { start, ..Taken::default() });
-        taken.unclear |= is_known && before != Some(head.incarnation);
+        if is_known && before != Some(head.incarnation) {
+            (taken.unclear, taken.back) = (true, head.sequence);
+        }
         taken.from = head.from;
         taken.highest = taken.highest.max(head.sequence);
         if !taken.sequences.insert(head.sequence) {
@@ -53,15 +61,50 @@ impl Oracle {
         }
     }
 
-    /// A router dropped a datagram as one that it had before: it had, or it is too old to tell.
-    pub fn dropped_as_copy(&mut self, now: Now, life: u32, datagram: &[u8]) {
-        let Ok((head, _)) = Frame::parse(datagram) else { return };
-        let taken = self.receiving.entry(life).or_default().taken.entry(head.incarnation).or_default();
-        if !taken.sequences.contains(&head.sequence) && head.sequence + WINDOW > taken.highest && !taken.unclear {
-            let highest = taken.highest;
-            let text = format!("datagram {} was dropped as a copy; {highest} is the highest that came", head.sequence);
-            self.broken(now, Promise::Accounts, text);
+    /// Whether a datagram has whole packages, and a router took none that was sent behind it.
+    pub fn is_newest(&self, life: u32, datagram: &[u8]) -> bool {
+        let Ok((head, _)) = FrameHead::read(datagram) else { return false };
+        let taken = self.receiving.get(&life).and_then(|receiving| receiving.taken.get(&head.incarnation));
+        head.kind == FrameKind::Packages && taken.is_none_or(|taken| head.sequence > taken.highest)
+    }
+
+    /// Whether a router took a datagram before, or cannot tell: it is out of the window, or from before the sequence
+    /// from which on its incarnation is heard; that is `first`, or where it came back.
+    pub fn came(&self, life: u32, head: &FrameHead, first: u64) -> bool {
+        let receiving = self.receiving.get(&life);
+        let Some(taken) = receiving.and_then(|receiving| receiving.taken.get(&head.incarnation)) else {
+            return head.sequence < first;
+        };
+        let is_before = head.sequence < first.max(taken.back) || head.sequence + WINDOW <= taken.highest;
+        is_before || taken.sequences.contains(&head.sequence)
+    }
+
+    /// Whether a datagram may be of an incarnation that is over, or not confirmed: a router takes
+    /// - what goes on of an incarnation before, only while its successor `is_silent`;
+    /// - a new incarnation, and what is out of the window, only when a second datagram within [`CONFIRMED_WITHIN_NS`]
+    ///   is near. It remembers a few that waited for a second.
+    pub fn may_be_old(&mut self, now: Now, life: u32, head: &FrameHead, is_silent: bool) -> bool {
+        let receiving = self.receiving.entry(life).or_default();
+        let present = receiving.present.get(&head.from).copied();
+        match receiving.taken.get(&head.incarnation) {
+            Some(taken) if present != Some(head.incarnation) => {
+                return !is_silent || head.sequence <= taken.highest;
+            }
+            Some(taken) if head.sequence.abs_diff(taken.highest + 1) < WINDOW => return false,
+            None if present.is_none() => return false,
+            _ => {}
         }
+        let doubted = receiving.doubted.entry(head.from).or_default();
+        let confirms = |(incarnation, sequence, at_ns): &(u64, u64, u64)| {
+            let is_near = *sequence != head.sequence && sequence.abs_diff(head.sequence) < WINDOW;
+            *incarnation == head.incarnation && is_near && now.monotonic_ns < at_ns + CONFIRMED_WITHIN_NS
+        };
+        let is_confirmed = doubted.iter().any(confirms);
+        doubted.push_back((head.incarnation, head.sequence, now.monotonic_ns));
+        if doubted.len() > DOUBTED_KEPT {
+            doubted.pop_front();
+        }
+        !is_confirmed
     }
 
     fn receipt(&mut self, life: u32, number: u32) -> &mut Receipt {

@@ -28,7 +28,7 @@ impl Plan {
     /// unnoticed.
     pub fn rough(seed: u64) -> Self {
         let mut chance = Chance::new(seed);
-        let mut plan = Self::new(seed);
+        let mut plan = Self::small(seed);
         plan.nodes = (0..3).map(|index| super::plan::node(index, &mut chance)).collect();
         plan.shape = Shape {
             datagram_bytes_max: chance.pick(&[1472, 4000]),
@@ -96,7 +96,7 @@ impl Plan {
     /// transmit at once only where the plan says that the network is divided; all else that is promised holds at any
     /// time.
     pub fn rough_slotted(seed: u64) -> Self {
-        let mut plan = Self::slotted(seed);
+        let mut plan = Self::small_slotted(seed);
         let mut chance = Chance::new(seed ^ 0x10_06);
         let Quality { delay_ns, jitter_ns, .. } = plan.quality;
         plan.quality = Quality { delay_ns, jitter_ns, reorder_ppm: 20_000, ..QUALITY };

@@ -44,9 +44,9 @@ impl PackageSeals {
         self.all.reached() & 1 << node != 0
     }
 
-    /// Datagrams that were not taken.
-    pub(super) fn rejected(&self, peer: Option<u8>) -> u64 {
-        Rejection::ALL.iter().map(|why| self.all.rejections(Port::Packages).of(peer, *why)).sum()
+    /// Datagrams that were not taken for that reason.
+    pub(super) fn rejected(&self, peer: Option<u8>, why: Rejection) -> u64 {
+        self.all.rejections(Port::Packages).of(peer, why)
     }
 }
 

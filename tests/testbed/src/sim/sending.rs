@@ -47,6 +47,11 @@ impl Oracle {
         }
     }
 
+    /// Bytes of all packages that wait in a router.
+    pub fn waiting_bytes(&self, life: u32) -> usize {
+        self.sending.get(&life).map_or(0, |sending| sending.waiting.values().map(|waiting| waiting.bytes).sum())
+    }
+
     /// What an incarnation of a router has to account for.
     pub fn account(&self, life: u32) -> Account {
         self.sending.get(&life).map(|sending| sending.account).unwrap_or_default()

@@ -89,6 +89,22 @@ pub struct Sent {
     pub bytes: Rc<[u8]>,
     /// When it was handed over; [`Now::default`] for what leaves at once.
     pub handed: Now,
+    /// Incarnation of the receiver that it is sealed to, where it is sealed to one.
+    pub sealed_to: Option<u64>,
+}
+
+/// Where a datagram that comes in is from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Origin {
+    /// A router sent it to this node, and it is as it was; the wire may have doubled it, or somebody repeated it.
+    Sent {
+        /// See [`Sent::sealed_to`].
+        sealed_to: Option<u64>,
+    },
+    /// The same, but bits of it were flipped on the way.
+    Damaged,
+    /// Somebody made it, altered it or brought it to another node.
+    Made,
 }
 
 /// A datagram that came in.
@@ -102,8 +118,8 @@ pub struct Arrived {
     pub bytes: Rc<[u8]>,
     /// When the kernel had it.
     pub stamp: Now,
-    /// Whether bits of it were flipped.
-    pub damaged: bool,
+    /// Where it is from.
+    pub origin: Origin,
 }
 
 /// A protocol of a router.

@@ -15,7 +15,7 @@ const WRONG_NS: u64 = 400_000_000;
 impl Plan {
     /// A network of which some computers sleep for a while, and some clocks are slewed.
     pub fn unsteady(seed: u64) -> Self {
-        let mut plan = Self::new(seed);
+        let mut plan = Self::small(seed);
         plan.disturb_clocks();
         plan.time();
         // A node that is too far off waits for an epoch.
@@ -25,7 +25,7 @@ impl Plan {
 
     /// The same with time slots.
     pub fn unsteady_slotted(seed: u64) -> Self {
-        let mut plan = Self::slotted(seed);
+        let mut plan = Self::small_slotted(seed);
         plan.disturb_clocks();
         plan.time_slots();
         plan.divide();

@@ -1,6 +1,6 @@
 //! What a router could do wrong with packages and datagrams.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted, edit};
 
 pub(crate) const CARRYING: Group = Group {
     name: "CARRYING",
@@ -78,6 +78,26 @@ pub(crate) const CARRYING: Group = Group {
             )],
         },
         Planted {
+            name: "AlwaysAlone",
+            text: "Sending: each package leaves in a datagram of its own, whatever waits behind it.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "driver/free.rs",
+                "transmitter.accept(outlet, package, taken == 0 && is_alone());",
+                "transmitter.accept(outlet, package, broken!(AlwaysAlone) || (taken == 0 && is_alone()));",
+            )],
+        },
+        Planted {
+            name: "NeverStops",
+            text: "Sending: the mailbox is emptied however much waits in the queue.",
+            shows_in: IN_NETWORKS,
+            edits: &[edit(
+                "driver/free.rs",
+                "if accepts && on.outlet().queue().0.has_plenty() {",
+                "if accepts && on.outlet().queue().0.has_plenty() && !broken!(NeverStops) {",
+            )],
+        },
+        Planted {
             name: "Unpaced",
             text: "Outbound: the bytes a second have no limit.",
             shows_in: "outbound::tests::the_rate_is_kept",
@@ -136,6 +156,21 @@ pub(crate) const CARRYING: Group = Group {
                 "link.rs",
                 "if is_unheard { PeerLinkState::Unheard }",
                 "if is_unheard && !broken!(NeverUnheard) { PeerLinkState::Unheard }",
+            )],
+        },
+        Planted {
+            name: "ReportsDelivered",
+            text: "Inbound: a package is reported as not delivered, and is delivered.",
+            shows_in: "inbound::tests::names::a_node_speaks_for_its_own_names_alone",
+            edits: &[edit(
+                "inbound/peer.rs",
+                "Ok(()) => self.stats.inn.passed(head.priority, head.len),",
+                r"Ok(()) => {
+                if broken!(ReportsDelivered) {
+                    deliver.lost(Some(self.from), head, body, Cause::MailboxFull);
+                }
+                self.stats.inn.passed(head.priority, head.len);
+            }",
             )],
         },
         Planted {

@@ -3,6 +3,7 @@
 mod carrying;
 mod lan;
 pub mod planted;
+mod rejecting;
 mod session;
 mod slots;
 mod time;
@@ -16,6 +17,7 @@ pub const GROUPS: &[Group] = &[
     lan::CROWDED,
     lan::FORGED,
     lan::LAN,
+    rejecting::REJECTING,
     session::SESSION,
     slots::IN_SLOT,
     slots::SLOTS,

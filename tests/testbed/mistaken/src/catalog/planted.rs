@@ -14,13 +14,16 @@ pub(super) const fn edit(file: &'static str, from: &'static str, to: &'static st
     Edit { file, from, to }
 }
 
+/// No test of the routers' own runs what makes such a mistake; a simulated network does.
+pub const IN_NETWORKS: &str = "";
+
 /// A mistake.
 pub struct Planted {
     /// Its name, as in [`Mistake`](crate::mistakes::Mistake).
     pub name: &'static str,
     /// The core, and what it does wrong.
     pub text: &'static str,
-    /// The routers' own test that fails with it.
+    /// The routers' own test that fails with it; or [`IN_NETWORKS`].
     pub shows_in: &'static str,
     /// The changes.
     pub edits: &'static [Edit],

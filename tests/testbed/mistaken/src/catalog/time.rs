@@ -1,6 +1,6 @@
 //! What a clock could do wrong.
 
-use super::planted::{Group, Planted, edit};
+use super::planted::{Group, IN_NETWORKS, Planted, edit};
 
 pub(crate) const TIME: Group = Group {
     name: "TIME",
@@ -82,6 +82,34 @@ pub(crate) const TIME: Group = Group {
         }
         let heard = self.election.sync(head.from, head.incarnation, sync, received.ns, followed);",
             )],
+        },
+        Planted {
+            name: "SharesTerms",
+            text: "Time: terms of two nodes that begin one at once are the same.",
+            shows_in: "time::tests::promises_hold_in_every_scene",
+            edits: &[edit(
+                "time/election.rs",
+                "let next = Term::new(self.highest.max(own).round().saturating_add(1), rank);",
+                r"let rank = if broken!(SharesTerms) { 0 } else { rank };
+        let next = Term::new(self.highest.max(own).round().saturating_add(1), rank);",
+            )],
+        },
+        Planted {
+            name: "TakesAnyAddress",
+            text: "Time: a frame is taken from whatever address it comes.",
+            shows_in: IN_NETWORKS,
+            edits: &[
+                edit(
+                    "driver/clock.rs",
+                    "} else if !is_from_its_node {",
+                    "} else if !is_from_its_node && !broken!(TakesAnyAddress) {",
+                ),
+                edit(
+                    "driver/clock.rs",
+                    "let is_there = |from| node == Some(from);",
+                    "let is_there = |from| node == Some(from) || broken!(TakesAnyAddress);",
+                ),
+            ],
         },
     ],
 };

@@ -2,12 +2,13 @@
 
 use super::{LISTEN_NS, Packages};
 use crate::sim::clock::Now;
+use crate::sim::promise::Promise;
 use crate::sim::station::{Arrived, Io, Layer, Port};
 use rohrpost_mailbox::Priority;
 use rohrpost_routers::driver::{
     FreeDriver, FreeStep, Handover, Inlet, NotSent, Nowhere, Outlet, RealTimeOutlet, Wakes,
 };
-use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::frame::{HEAD_BYTES, NodeIndex};
 use rohrpost_routers::outbound::{Outbound, Package};
 use rohrpost_routers::report::Report;
 use rohrpost_routers::settings::Settings;
@@ -26,6 +27,35 @@ pub struct Free {
 struct FreeSystem<'a, 'b> {
     packages: &'a mut Packages,
     io: &'a mut Io<'b>,
+    /// The driver has taken a package since it was polled.
+    has_taken: bool,
+}
+
+impl FreeSystem<'_, '_> {
+    /// A package leaves at once. In a datagram of its own it does only if none waits behind it, or no second one of its
+    /// size would fit.
+    fn leaves_alone(&mut self, head: &[u8], body: &[u8]) {
+        self.io.oracle.saw("sent at once");
+        let two_bytes = 2 * (head.len() + body.len()) - HEAD_BYTES;
+        if !self.io.host.transit.is_empty() && two_bytes <= self.packages.settings.network.datagram_bytes_max {
+            let text = format!("{} bytes leave alone, and more wait in the mailbox", body.len());
+            self.io.oracle.broken(self.io.now, Promise::Pace, text);
+        }
+    }
+
+    /// With plenty in the queue the driver takes one package each time it is polled, the most important: what it took
+    /// of a flood would only be lost to its quota. Where datagrams are sealed, what waits for a session does not count.
+    fn takes(&mut self) {
+        let shape = &self.io.plan.shape;
+        let plenty_bytes = (2 * shape.datagram_bytes_max).max(shape.quota_bytes / 2);
+        let waiting_bytes = self.io.oracle.waiting_bytes(self.io.life);
+        let is_plenty = self.packages.seals.is_none() && waiting_bytes >= plenty_bytes;
+        if self.has_taken && is_plenty && !self.io.host.transit.is_empty() {
+            let text = format!("node {} takes more, and {waiting_bytes} bytes wait in its queue", self.io.node);
+            self.io.oracle.broken(self.io.now, Promise::Bounded, text);
+        }
+        self.has_taken = true;
+    }
 }
 
 impl Outlet for FreeSystem<'_, '_> {
@@ -46,7 +76,7 @@ impl Outlet for FreeSystem<'_, '_> {
     }
 
     fn send_parts(&mut self, _: u64, to: NodeIndex, head: &[u8], body: &[u8]) -> Result<(), NotSent> {
-        self.io.oracle.saw("sent at once");
+        self.leaves_alone(head, body);
         self.packages.hand_over(self.io, to, &[head, body].concat())
     }
 
@@ -79,6 +109,7 @@ impl Inlet for FreeSystem<'_, '_> {
     }
 
     fn take<T>(&mut self, what: impl FnOnce(&mut Self, &Package<'_>, &dyn Fn() -> bool) -> T) -> Option<T> {
+        self.takes();
         let parcel = loop {
             let parcel = self.packages.take_parcel(self.io)?;
             if !self.io.is_intruders(&parcel) {
@@ -125,7 +156,9 @@ impl Free {
     fn run(&mut self, io: &mut Io<'_>) {
         let Self { packages, driver, .. } = self;
         let (until_ns, is_exact, wakes) = loop {
-            if let FreeStep::Sleep { until_ns, is_exact, wakes } = driver.poll(&mut FreeSystem { packages, io }) {
+            if let FreeStep::Sleep { until_ns, is_exact, wakes } =
+                driver.poll(&mut FreeSystem { packages, io, has_taken: false })
+            {
                 break (until_ns, is_exact, wakes);
             }
         };

@@ -4,6 +4,7 @@
 //! does, by what is in `slotted`. What the driver that receives has is in `receiving`, what must hold is in `checks`.
 
 mod checks;
+mod fate;
 mod free;
 mod receiving;
 mod settings;
@@ -25,8 +26,8 @@ use super::seals::{PackageSeals, checked, incarnation, opened, sealed};
 use super::station::{Arrived, Io, Port, STRANGER, Sent};
 use rohrpost_mailbox::{Head, Options, Type};
 use rohrpost_routers::driver::{Answer, NotSent, RxDriver};
-use rohrpost_routers::frame::{Frame, FrameHead, FrameKind, HEAD_BYTES, NodeIndex};
-use rohrpost_routers::inbound;
+use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, NodeIndex};
+use rohrpost_routers::inbound::{self, SOCKET_MAX_NS};
 use rohrpost_routers::intake::hurries;
 use rohrpost_routers::outbound::{Accepted, Outbound, Package};
 use rohrpost_routers::report::Report;
@@ -181,7 +182,8 @@ impl Packages {
             Some(since_ns) => still_fresh(io, since_ns),
         }
         io.line(|| format!("sends {} bytes to {to}: {}", bytes.len(), shown(&bytes)));
-        io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed, handed: io.now });
+        let sealed_to = self.seals.as_ref().and_then(|seals| seals.all.incarnation(to));
+        io.sent.push(Sent { port: PORT, to: to.into(), bytes: sealed, handed: io.now, sealed_to });
         Ok(())
     }
 
@@ -206,9 +208,13 @@ impl Packages {
         let now_ns = io.now.monotonic_ns;
         let (source, arrived_ns) = (arrived.source.map_or(STRANGER, address), arrived.stamp.monotonic_ns);
         if self.receiver.passes_over(now_ns.saturating_sub(arrived_ns)) {
+            if now_ns.saturating_sub(arrived_ns) <= SOCKET_MAX_NS {
+                io.oracle.broken(io.now, Promise::Rejection, format!("what came at {arrived_ns} ns is passed over"));
+            }
             return None;
         }
-        let came = Some(Came { at_ns: arrived_ns, incarnation: incarnation(&arrived.bytes) });
+        let is_newest = io.oracle.is_newest(io.life, &arrived.bytes);
+        let came = Some(Came { at_ns: arrived_ns, incarnation: incarnation(&arrived.bytes), is_newest });
         let mut bytes = arrived.bytes.to_vec();
         let envelope = inbound::Envelope { source, arrived_ns, bytes: bytes.len() };
         let (receiver, mut system) = self.receiving(io, came);
@@ -266,18 +272,6 @@ impl Packages {
         let gate = self.receiver.gate()?;
         Some(FrameHead::read(datagram).map_or(0, |(head, _)| gate.first(head.from)))
     }
-
-    fn counted(&self, source: Option<usize>) -> (u64, u64, u64) {
-        let Some(peer) = source.map(|node| self.stats.peer(node as NodeIndex)) else {
-            let rejected = self.seals.as_ref().map_or(0, |seals| seals.rejected(None));
-            return (0, 0, self.stats.foreign.get() + rejected);
-        };
-        let rejected = self.seals.as_ref().map_or(0, |seals| seals.rejected(source.map(|node| node as NodeIndex)));
-        let received = &peer.received;
-        let dropped =
-            rejected + received.old.get() + received.damaged.get() + received.refused.get() + self.stats.foreign.get();
-        (received.datagrams.get(), received.duplicates.get(), dropped)
-    }
 }
 
 impl Packages {
@@ -286,30 +280,7 @@ impl Packages {
         let source = arrived.source.filter(|node| *node != io.node);
         let before = self.counted(source);
         let Some(clear) = self.take(io, arrived) else { return io.oracle.saw("older than its router") };
-        let after = self.counted(source);
-        let (taken, copies, dropped) = (after.0 - before.0, after.1 - before.1, after.2 - before.2);
-        io.line(|| format!("from {source:?}: {}, taken {taken}, copies {copies}", shown(&clear)));
-        let kind = FrameHead::read(&arrived.bytes).ok().map(|(head, _)| head.kind);
-        let is_answer = match self.seals {
-            None => kind == Some(FrameKind::Refusal),
-            Some(_) => kind == Some(FrameKind::Hello),
-        };
-        if taken + copies + dropped != 1 && !(is_answer && taken + copies + dropped == 0) {
-            let text = format!("a datagram was counted as {taken} taken, {copies} copies, {dropped} dropped");
-            io.oracle.broken(io.now, Promise::Accounts, text);
-        }
-        if taken > 0 {
-            let first = self.first_of(&clear);
-            io.oracle.took(io.now, io.life, (&clear, first), self.settings.digest);
-            self.hears(io, source);
-        } else if copies > 0 {
-            io.oracle.saw("dropped as a copy");
-            io.oracle.dropped_as_copy(io.now, io.life, &arrived.bytes);
-        } else if dropped > 0 && self.seals.is_some() {
-            io.oracle.saw("rejected");
-        } else {
-            io.oracle.saw("dropped as wrong or old");
-        }
+        self.handled(io, arrived, &clear, &before);
         self.answer_callers(io);
     }
 

@@ -97,6 +97,6 @@ impl Packages {
     pub(in crate::sim) fn send_answer(&mut self, io: &mut Io<'_>, to: IpAddr, datagram: &[u8]) {
         let node = (0..io.plan.nodes.len()).find(|node| address(*node) == to);
         let Some(to) = node else { return io.oracle.saw("refused where no node is") };
-        io.sent.push(Sent { port: PORT, to, bytes: Rc::from(datagram), handed: io.now });
+        io.sent.push(Sent { port: PORT, to, bytes: Rc::from(datagram), handed: io.now, sealed_to: None });
     }
 }

@@ -17,6 +17,8 @@ pub(super) struct Came {
     pub(super) at_ns: u64,
     /// Life of its sender, as it says.
     pub(super) incarnation: u64,
+    /// It has whole packages, and nothing that was sent behind it came before it.
+    pub(super) is_newest: bool,
 }
 
 /// Takes what the cores tell of.
@@ -44,6 +46,9 @@ impl Report for Watch<'_, '_> {
         io.line(|| format!("{}: from or to {peer:?}, {head:?}", cause.word()));
         if cause == Cause::Late && io.plan.is_in_order() {
             io.oracle.broken(io.now, Promise::Order, format!("late, and nothing was reordered: {head:?}"));
+        }
+        if cause == Cause::Late && self.came.is_some_and(|came| came.is_newest) {
+            io.oracle.broken(io.now, Promise::Rejection, format!("late, and nothing newer came: {head:?}"));
         }
         let number = if self.is_out {
             io.oracle.lost_before(io.now, io.life, head, cause)

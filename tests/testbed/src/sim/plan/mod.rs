@@ -20,6 +20,20 @@ use rohrpost_routers::frame::NodeIndex;
 
 /// System of all nodes.
 pub const SYSTEM: u8 = 1;
+/// Nodes of a large network, from and to.
+pub(super) const LARGE: (u64, u64) = (24, NODES_MAX as u64);
+/// So many of them at most may be master.
+pub(super) const LARGE_MASTERS_MAX: usize = 3;
+/// When the faults of a large network are over.
+const LARGE_FIXED_NS: u64 = 2 * S;
+/// The seed of a large network in each hundred.
+const LARGE_SEED: u64 = 22;
+
+/// Whether this seed is that of a large network.
+pub(super) fn is_large(seed: u64) -> bool {
+    seed % 100 == LARGE_SEED
+}
+
 /// One computer.
 #[derive(Clone, Debug)]
 pub struct NodePlan {
@@ -136,11 +150,19 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Draws it.
+    /// Draws it. One of a hundred is large.
     pub fn new(seed: u64) -> Self {
+        let mut plan = Self::small(seed);
+        if is_large(seed) {
+            plan.enlarge();
+        }
+        plan
+    }
+
+    /// One of up to 16 nodes.
+    pub(super) fn small(seed: u64) -> Self {
         let mut chance = Chance::new(seed);
         let count = match chance.below(100) {
-            0 if seed.is_multiple_of(8) => chance.between(24, NODES_MAX as u64),
             0..4 => chance.between(9, 16),
             _ => chance.between(2, 8),
         } as usize;
@@ -193,6 +215,20 @@ impl Plan {
         self.draw_flows(&mut chance.fork());
         self.draw_calls(&mut chance.fork());
         self.draw_faults(&mut chance.fork());
+    }
+
+    /// The same with as many nodes as there may be, and shorter, since each sends to each.
+    fn enlarge(&mut self) {
+        let mut chance = Chance::new(self.seed ^ 0x1a_46e);
+        let count = chance.between(LARGE.0, LARGE.1);
+        self.nodes = (0..count as usize).map(|index| node(index, &mut chance)).collect();
+        self.masters = masters(self.nodes.len(), &mut chance);
+        self.masters.truncate(LARGE_MASTERS_MAX);
+        self.shape.interval_ns = self.shape.interval_ns.min(S / 4);
+        self.fixed_ns = LARGE_FIXED_NS;
+        self.time();
+        self.draw_all(&mut chance);
+        self.draw_intruders();
     }
 
     /// When all must be well, and when it ends, from when the last fault is over.
@@ -263,7 +299,7 @@ impl Plan {
 
     /// A network in which nothing goes wrong.
     pub fn calm(seed: u64) -> Self {
-        let mut plan = Self::new(seed);
+        let mut plan = Self::small(seed);
         plan.faults.clear();
         plan.flows.retain(|flow| flow.burst == 1);
         plan.quality = fixed(plan.quality);

@@ -1,6 +1,6 @@
 //! Networks with time slots, and their tables, drawn from a seed.
 
-use super::Plan;
+use super::{LARGE, Plan, is_large};
 use crate::sim::chance::Chance;
 use crate::sim::divided::Divisions;
 use crate::sim::fault::{Fault, Planned};
@@ -13,7 +13,9 @@ use rohrpost_routers::security::TAG_BYTES;
 use rohrpost_routers::time::{JOINING_SYNCS, TIME_BYTES};
 use std::time::Duration;
 
-/// A cycle is so long at most.
+/// Nodes of most networks, from and to.
+const SMALL: (u64, u64) = (2, 6);
+/// A cycle is so long at most, unless the slots of many nodes need more.
 const CYCLE_NS_MAX: u64 = 20 * MS;
 /// A master is given so long at least to answer.
 const DEAF_NS: u64 = 200 * MS;
@@ -27,12 +29,17 @@ const SEALED_JOINS_CYCLES: u64 = 48;
 impl Plan {
     /// A network with time slots.
     pub fn slotted(seed: u64) -> Self {
-        Self::slotted_of(seed, (2, 6), 3)
+        Self::slotted_of(seed, if is_large(seed) { LARGE } else { SMALL }, 3)
+    }
+
+    /// One of up to six nodes.
+    pub(in crate::sim) fn small_slotted(seed: u64) -> Self {
+        Self::slotted_of(seed, SMALL, 3)
     }
 
     /// One of so many nodes, from and to, of which so many at most may be master.
     pub(in crate::sim) fn slotted_of(seed: u64, nodes: (u64, u64), masters_max: usize) -> Self {
-        let mut plan = Self::new(seed);
+        let mut plan = Self::small(seed);
         let mut chance = Chance::new(seed ^ 0x51_07);
         let chance = &mut chance;
         plan.nodes = (0..chance.between(nodes.0, nodes.1) as usize).map(|index| super::node(index, chance)).collect();
@@ -67,7 +74,7 @@ impl Plan {
     /// A network with time slots in which nothing goes wrong but that datagrams are lost and threads wake late, for so
     /// many cycles.
     pub fn lossy_slotted(seed: u64, cycles: u64) -> Self {
-        let mut plan = Self::slotted(seed);
+        let mut plan = Self::small_slotted(seed);
         plan.faults.clear();
         plan.flows.clear();
         plan.calls.clear();

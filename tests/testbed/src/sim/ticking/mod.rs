@@ -1,5 +1,6 @@
 //! The layer that keeps time: the driver of the shell on a simulated platform, and watched.
 
+mod rejected;
 mod watch;
 
 use super::clock::Now;
@@ -118,7 +119,13 @@ impl TimePlatform for TimeSystem<'_, '_> {
             }
         }
         *sent += 1;
-        self.io.sent.push(Sent { port: PORT, to: to.into(), bytes: Rc::from(datagram), handed: self.io.now });
+        self.io.sent.push(Sent {
+            port: PORT,
+            to: to.into(),
+            bytes: Rc::from(datagram),
+            handed: self.io.now,
+            sealed_to: None,
+        });
     }
 
     fn write(&mut self, record: &TimeRecord) -> bool {
@@ -161,7 +168,7 @@ impl Ticking {
 
     /// The same, sealing what it sends.
     pub(super) fn sealed(self, all: &Arc<PeerSessions>, in_slots: bool) -> Self {
-        Self { driver: self.driver.sealed(all, in_slots), ..self }
+        Self { driver: self.driver.sealed(all, in_slots), watch: self.watch.sealed(all), ..self }
     }
 
     /// The same with time slots; all of its datagrams leave in windows.

@@ -1,5 +1,6 @@
 //! What is watched of a node's time: from where it has what it goes by, and that one master alone is followed.
 
+use super::rejected::TimeRejections;
 use crate::sim::clock::Now;
 use crate::sim::promise::Promise;
 use crate::sim::spans::S;
@@ -7,9 +8,11 @@ use crate::sim::station::{Arrived, Io};
 use rohrpost_mailbox::TimeRecord;
 use rohrpost_routers::driver::{TimeEvent, TimeSource};
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
+use rohrpost_routers::security::PeerSessions;
 use rohrpost_routers::time::message::TimeMessage;
-use rohrpost_routers::time::{Clock, JOINING_SYNCS, RATE_MAX_PPB, Role, TIME_BYTES, Term, TimeEstimate};
+use rohrpost_routers::time::{Clock, Ignored, JOINING_SYNCS, RATE_MAX_PPB, Role, TIME_BYTES, Term, TimeEstimate};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
 /// All routers have begun, and one of them is master.
 const STARTED_NS: u64 = S;
@@ -74,6 +77,7 @@ pub(super) struct TimeWatch {
     overheard: BTreeMap<(NodeIndex, u64), VecDeque<TimeFrame>>,
     /// What came last.
     arrived: Option<Arrived>,
+    rejections: TimeRejections,
     /// What the page says.
     written: Option<TimeRecord>,
 }
@@ -87,12 +91,19 @@ impl TimeWatch {
             told: VecDeque::new(),
             overheard: BTreeMap::new(),
             arrived: None,
+            rejections: TimeRejections::default(),
             written,
         }
     }
 
+    /// The same, of a node that seals what it sends.
+    pub(super) fn sealed(self, all: &Arc<PeerSessions>) -> Self {
+        Self { rejections: TimeRejections::of(Some(all.clone())), ..self }
+    }
+
     /// A datagram is read.
     pub(super) fn reads(&mut self, arrived: Arrived) {
+        self.rejections.reads(&arrived);
         self.arrived = Some(arrived);
     }
 
@@ -108,11 +119,25 @@ impl TimeWatch {
                 io.line(|| format!("time: {why}"));
                 io.oracle.saw("time: unsteady");
             }
-            TimeEvent::NotOpened { .. } => io.oracle.saw("time: rejected"),
-            TimeEvent::NoFrame => io.oracle.saw("time: no frame"),
+            TimeEvent::NotOpened { .. } | TimeEvent::NoFrame => {
+                let is_frame = !matches!(event, TimeEvent::NoFrame);
+                io.oracle.saw(if is_frame { "time: rejected" } else { "time: no frame" });
+                if let Some(arrived) = &self.arrived {
+                    self.rejections.is_rejected(io, arrived);
+                }
+            }
             TimeEvent::Hears => self.before = (clock.coarse(io.now.monotonic_ns), clock.role()),
             TimeEvent::Heard { source, head, rest, taken } => {
                 io.line(|| format!("time: {:?} from {}, {source:?}: {taken:?}", head.kind, head.from));
+                if let Some(arrived) = &self.arrived {
+                    self.rejections.opens(io, arrived, source, head, clock.digest());
+                }
+                if let (TimeSource::Proven, Ok(TimeMessage::Sync(sync))) = (source, TimeMessage::parse(head.kind, rest))
+                    && !sync.replacement
+                {
+                    let is_late = taken == Some(Err(Ignored::Late));
+                    self.rejections.syncs(io, clock, head, &sync, is_late);
+                }
                 self.hears(io, clock, (source, taken == Some(Ok(()))), head, rest);
                 self.look(io, clock);
             }

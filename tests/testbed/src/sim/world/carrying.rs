@@ -6,9 +6,8 @@ use crate::sim::clock::Now;
 use crate::sim::promise::{Problem, Promise};
 use crate::sim::seals::damage;
 use crate::sim::spans::US;
-use crate::sim::station::{Arrived, Io, Port, Router, Sent};
+use crate::sim::station::{Arrived, Io, Origin, Router, Sent};
 use crate::sim::wire::LEAD_NS;
-use std::rc::Rc;
 
 impl World<'_> {
     /// Lets the layers of a node do something, if that incarnation of its router still runs, and carries away what
@@ -38,15 +37,16 @@ impl World<'_> {
 
     /// Puts on the wire what a router has sent.
     fn carry(&mut self, node: usize) {
-        for Sent { port, to, bytes, handed } in std::mem::take(&mut self.sent) {
+        for sent in std::mem::take(&mut self.sent) {
+            let port = sent.port;
             let Some(router) = &mut self.stations[node].router else { return };
             let (life, index) = (router.life, router.sent[port]);
             router.sent[port] += 1;
-            let (left_ns, out_ns) = self.transmit(node, bytes.len(), handed.true_ns.max(self.now_ns));
+            let (left_ns, out_ns) = self.transmit(node, sent.bytes.len(), sent.handed.true_ns.max(self.now_ns));
             if port > 0 || self.plan.slots.is_some() {
                 self.at(left_ns, Event::Left { node, life, port, index });
             }
-            self.pass(node, to, port, bytes, out_ns);
+            self.pass(node, &sent, out_ns);
         }
     }
 
@@ -69,22 +69,23 @@ impl World<'_> {
     }
 
     /// Lets a link do with a datagram what it does.
-    fn pass(&mut self, from: usize, to: usize, port: Port, bytes: Rc<[u8]>, out_ns: u64) {
+    fn pass(&mut self, from: usize, sent: &Sent, out_ns: u64) {
+        let Sent { port, to, ref bytes, sealed_to, .. } = *sent;
         let passages = self.links[from][to].pass(out_ns, bytes.len(), &mut self.chance);
         if passages[0].is_none() {
             self.trace.line(self.now_ns, || format!("the wire loses {} bytes from {from} to {to}:{port}", bytes.len()));
             self.oracle.saw("lost on the wire");
         }
         for passage in passages.into_iter().flatten() {
-            let mut bytes = bytes.clone();
+            let (mut bytes, mut origin) = (bytes.clone(), Origin::Sent { sealed_to });
             if passage.damaged {
                 self.oracle.saw("damaged on the wire");
                 if self.plan.checksum {
                     continue;
                 }
-                bytes = damage(&bytes, &mut self.chance);
+                (bytes, origin) = (damage(&bytes, &mut self.chance), Origin::Damaged);
             }
-            let arrived = Arrived { port, source: Some(from), bytes, stamp: Now::default(), damaged: passage.damaged };
+            let arrived = Arrived { port, source: Some(from), bytes, stamp: Now::default(), origin };
             self.at(passage.at_ns, Event::Arrive { to, arrived });
         }
     }
