@@ -65,3 +65,29 @@ impl WindowLog {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tdma::{Carries, WindowKind, Wire};
+    use rohrpost_network::Tdma;
+    use std::time::Duration;
+
+    #[test]
+    fn a_window_that_was_over_when_its_last_call_came_back_is_counted() {
+        let (cycle, part) = (Duration::from_millis(10), Duration::from_millis(1));
+        let link_bytes_s = 125_000_000;
+        let tdma = Tdma { cycle, synchronisation: part, guard: part, link_bytes_s, slots: Vec::new(), tunnel: None };
+        let wire = Wire::new(&tdma, 28);
+        let window = Window { kind: WindowKind::Slot { index: 0 }, cycle: 0, begin_ns: 1_000_000, end_ns: 2_000_000 };
+        let mut log = WindowLog::default();
+        for (back_ns, over_ns, overran) in [(900, 0, 0), (1000, 0, 0), (1001, 1, 1), (5000, 4000, 2)] {
+            let mut tx_window = TransmitWindow::new(window, 100, 1000, Carries::All, 0, wire);
+            tx_window.takes(500, 0);
+            log.used(&tx_window, 500, back_ns);
+            let used = log.windows[WINDOWS - 1].unwrap();
+            assert_eq!((used.over_ns, log.overran), (over_ns, overran), "back at {back_ns} ns");
+            assert_eq!(used.spare_ns, tx_window.spare_ns(), "as it was decided");
+        }
+    }
+}

@@ -42,7 +42,7 @@ pub struct TransmitWindow {
 }
 
 impl TransmitWindow {
-    pub(super) fn new(window: Window, begin_ns: u64, end_ns: u64, carries: Carries, lead_ns: u64, wire: Wire) -> Self {
+    pub(crate) fn new(window: Window, begin_ns: u64, end_ns: u64, carries: Carries, lead_ns: u64, wire: Wire) -> Self {
         Self {
             window,
             begin_ns,
