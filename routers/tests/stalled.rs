@@ -95,17 +95,17 @@ fn a_way_that_stands_still_keeps_nobody_else_waiting() {
         let shape = Shape { slots: 64, ..Shape::default() };
         let mut receivers = [1, 2].map(|node: usize| join(node).receiver(module(node as u8), shape).unwrap());
         let mut senders = [1, 2].map(|node: u8| join(0).sender(module(node)).unwrap());
-        let mut id = 0;
+        let mut id = 0_u16;
         let mut goes = |to: usize| {
-            let (began, first) = (Instant::now(), id + 1);
+            let (began, first) = (Instant::now(), id.wrapping_add(1));
             loop {
-                id += 1;
+                id = id.wrapping_add(1);
                 let _ = senders[to].send(&label(module(0), 100, id), &[&[7; 1000]]);
                 let until = Instant::now() + Duration::from_millis(20);
                 let left = || until.saturating_duration_since(Instant::now());
                 // Before it what waited so far may come, which is much.
                 while let Some(came) = receivers[to].receive_timeout(left()) {
-                    if came.head().id >= first {
+                    if came.head().id.wrapping_sub(first) < u16::MAX / 2 {
                         return;
                     }
                 }
