@@ -5,7 +5,7 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
-use common::kept::assert_kept;
+use common::kept::{assert_inside, assert_kept, validate};
 use common::relay::Relay;
 use common::talk::{Listeners, PAUSE, talk, talkers};
 use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, label, name};
@@ -107,13 +107,17 @@ fn goes_on_behind_a_slow_bridge(segment: &Segment, listeners: &mut Listeners) ->
     listeners.say_all(&mut talkers, ROUNDS);
     let silent = segment.stations[2].slots().silent;
     let replaced = || ALL.into_iter().find_map(|node| segment.replaced(node, since_ns));
-    if replaced().is_none() {
-        // What the relay holds when it ends is lost.
-        listeners.hear_all(&ALL, &(0..ROUNDS).collect::<Vec<_>>());
-    }
+    // What the relay holds when it ends is lost.
+    listeners.hear_all_unless(&ALL, &(0..ROUNDS).collect::<Vec<_>>(), || replaced().is_some());
     assert!(relay.end() > 300, "data and time take that way");
-    assert_kept("behind a slow bridge", segment, 0, &capture.end());
-    replaced().map_or(Ok(()), Err)?;
+    let crossed = capture.end();
+    if let Some(late) = replaced() {
+        let turned_ns = ALL.into_iter().filter_map(|node| segment.own_log(node).turned_ns(since_ns)).min();
+        let before = &crossed[..crossed.partition_point(|frame| Some(frame.at_ns) < turned_ns)];
+        assert_inside("until another was master", segment, &validate(before, segment.time_of(0)));
+        return Err(late);
+    }
+    assert_kept("behind a slow bridge", segment, 0, &crossed);
     assert_eq!(silent, None);
     Ok(())
 }
