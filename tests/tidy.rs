@@ -103,8 +103,7 @@ const LONG: &[(&str, usize)] = &[
     ("routers/src/time/clock.rs", 420),
     ("routers/src/time/clock/slots.rs", 437),
     ("routers/src/time/election.rs", 408),
-    ("routers/tests/shell.rs", 419),
-    ("routers/tests/slots_common/mod.rs", 450),
+    ("routers/tests/shell.rs", 410),
     ("tests/e2e/probe.rs", 413),
 ];
 

@@ -16,7 +16,7 @@ use rohrpost_mailbox::monotonic_ns;
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use rohrpost_routers::shell::clock::{ClockParts, ClockService, ClockSnapshot, Skew};
 use rohrpost_routers::time::{Exchange, Role, TimeSettings};
-use std::io::Write;
+use rohrpost_testbed::report;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -45,7 +45,7 @@ fn lab() -> Option<Lab> {
     match Lab::new(&specs, 1500) {
         Ok(lab) => Some(lab),
         Err(LabError::NotAllowed(error)) => {
-            let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: network namespaces ({error})");
+            report::skipped(&format!("network namespaces ({error})"));
             None
         }
         Err(error) => panic!("{error}"),

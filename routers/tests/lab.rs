@@ -5,8 +5,9 @@
 
 use nix::sys::socket::{getsockopt, sockopt};
 use rohrpost_routers::lab::{DEVICE, Lab, LabError, NodeSpec};
+use rohrpost_testbed::report;
 use std::collections::BTreeSet;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -24,8 +25,7 @@ fn lab(addresses: &[&str], mtu: u16) -> Option<Lab> {
     match Lab::new(&specs(addresses), mtu) {
         Ok(lab) => Some(lab),
         Err(LabError::NotAllowed(error)) => {
-            // Past the test harness, which keeps what passing tests print to itself.
-            let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: network namespaces ({error})");
+            report::skipped(&format!("network namespaces ({error})"));
             None
         }
         Err(error) => panic!("{error}"),

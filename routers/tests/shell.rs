@@ -17,7 +17,6 @@ use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::security::Port;
 use rohrpost_routers::shell::{Shell, listen};
 use rohrpost_routers::stats::Stats;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
@@ -68,59 +67,51 @@ fn answer(pair: &Pair, replies: &mut Receiver, to: Name, body: &[u8]) -> String 
 
 #[test]
 fn an_undeliverable_command_comes_back_and_says_why() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let mut pair = Pair::new();
-        let mut replies = replies(&pair);
-        assert_eq!(answer(&pair, &mut replies, module(1), b"call and arguments"), "callno-mailbox");
-        let small = Shape { slots: 2, body_bytes_max: 8, ..Shape::default() };
-        let mut receiver = pair.sides[1].receiver(module(1), small);
-        assert_eq!(answer(&pair, &mut replies, module(1), b"call and arguments"), "calltoo-large");
-        assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callmailbox-full");
-        assert!(receiver.try_receive().is_some());
-        let elsewhere = module(1).with_local(9);
-        assert_eq!(
-            answer(&pair, &mut replies, elsewhere, b"call"),
-            "callno-mailbox",
-            "a mailbox that the module has not"
-        );
-        pair.sides[1].shell = None;
-        until("node 1 is silent", || pair.sides[0].sees(1) == PeerLinkState::Silent);
-        assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callsilent");
-        // Data are counted, and nobody is told.
-        let data = rohrpost_mailbox::Label { kind: Type::data(1), ..label(replies.name(), 90, u16::MAX) };
-        pair.sides[0].sender(module(1)).send(&data, &[b"data"]).unwrap();
-        until("it is counted", || {
-            let mut classes = pair.sides[0].shell().stats().out.classes();
-            classes.any(|(priority, class)| priority.0 == 90 && class.lost_in_all() == 1)
-        });
-        while let Some(package) = replies.try_receive() {
-            assert_ne!(package.head().id, u16::MAX, "of commands, late ones");
-        }
+    let mut pair = Pair::new();
+    let mut replies = replies(&pair);
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call and arguments"), "callno-mailbox");
+    let small = Shape { slots: 2, body_bytes_max: 8, ..Shape::default() };
+    let mut receiver = pair.sides[1].receiver(module(1), small);
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call and arguments"), "calltoo-large");
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callmailbox-full");
+    assert!(receiver.try_receive().is_some());
+    let elsewhere = module(1).with_local(9);
+    assert_eq!(answer(&pair, &mut replies, elsewhere, b"call"), "callno-mailbox", "a mailbox that the module has not");
+    pair.sides[1].shell = None;
+    until("node 1 is silent", || pair.sides[0].sees(1) == PeerLinkState::Silent);
+    assert_eq!(answer(&pair, &mut replies, module(1), b"call"), "callsilent");
+    // Data are counted, and nobody is told.
+    let data = rohrpost_mailbox::Label { kind: Type::data(1), ..label(replies.name(), 90, u16::MAX) };
+    pair.sides[0].sender(module(1)).send(&data, &[b"data"]).unwrap();
+    until("it is counted", || {
+        let mut classes = pair.sides[0].shell().stats().out.classes();
+        classes.any(|(priority, class)| priority.0 == 90 && class.lost_in_all() == 1)
     });
+    while let Some(package) = replies.try_receive() {
+        assert_ne!(package.head().id, u16::MAX, "of commands, late ones");
+    }
 }
 
 #[test]
 fn packages_in_the_routers_mailbox_outlive_it() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let mut pair = Pair::new();
-        let mut receiver = pair.sides[1].receiver(module(1), Shape { slots: 64, ..Shape::default() });
-        let mut sender = pair.sides[0].sender(module(1));
-        let mut id = 0;
-        for _ in 0..5 {
-            pair.sides[0].shell = None;
-            for _ in 0..10 {
-                sender.send(&label(module(0), 100, id), &[b"waits"]).unwrap();
-                id += 1;
-            }
-            pair.sides[0].start();
-            for wanted in id - 10..id {
-                assert_eq!(receiver.receive_timeout(PATIENCE).unwrap().head().id, wanted);
-            }
+    let mut pair = Pair::new();
+    let mut receiver = pair.sides[1].receiver(module(1), Shape { slots: 64, ..Shape::default() });
+    let mut sender = pair.sides[0].sender(module(1));
+    let mut id = 0;
+    for _ in 0..5 {
+        pair.sides[0].shell = None;
+        for _ in 0..10 {
+            sender.send(&label(module(0), 100, id), &[b"waits"]).unwrap();
+            id += 1;
         }
-        assert!(receiver.try_receive().is_none());
-        let restarts = pair.sides[1].shell().stats().peer(0).received.restarts.get();
-        assert!((1..=5).contains(&restarts), "seen as one that was started anew: {restarts}");
-    });
+        pair.sides[0].start();
+        for wanted in id - 10..id {
+            assert_eq!(receiver.receive_timeout(PATIENCE).unwrap().head().id, wanted);
+        }
+    }
+    assert!(receiver.try_receive().is_none());
+    let restarts = pair.sides[1].shell().stats().peer(0).received.restarts.get();
+    assert!((1..=5).contains(&restarts), "seen as one that was started anew: {restarts}");
 }
 
 #[test]

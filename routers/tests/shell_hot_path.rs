@@ -10,7 +10,6 @@ use common::{PATIENCE, Pair, Side, label, module, turns};
 use rohrpost_mailbox::{BODY_BYTES_MAX, Receiver, SendError, Sender, Shape};
 use rohrpost_routers::security::Port;
 use rohrpost_routers::stats::Stats;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -66,14 +65,12 @@ fn round(sender: &mut Sender, receiver: &mut Receiver, large: &[u8]) {
 /// All ways of sending in one test, one after the other: all threads of the process are counted.
 #[test]
 fn no_package_takes_from_the_heap() {
-    repeated_on_stall(Watched::Ordinary, || {
-        as_packages_come(&paced(Side::start));
-        let sealed = paced(Side::seal);
-        as_packages_come(&sealed);
-        assert!(sealed.sides[0].shell.as_ref().unwrap().rejections(Port::Packages).is_some());
-        drop(sealed);
-        in_time_slots();
-    });
+    as_packages_come(&paced(Side::start));
+    let sealed = paced(Side::seal);
+    as_packages_come(&sealed);
+    assert!(sealed.sides[0].shell.as_ref().unwrap().rejections(Port::Packages).is_some());
+    drop(sealed);
+    in_time_slots();
 }
 
 /// Two nodes on a network that a large package keeps busy for a while: what is sent meanwhile waits, however soon the

@@ -15,7 +15,6 @@ use nix::sys::signal::{Signal, raise};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 use rohrpost_mailbox::Shape;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -141,34 +140,31 @@ fn call_name(number: libc::c_long, arguments: [u64; 6]) -> String {
 
 #[test]
 fn a_package_costs_one_call_to_send_one_to_receive_and_those_to_sleep_and_wake() {
-    repeated_on_stall(Watched::Ordinary, || {
-        let mut child = Command::new(std::env::current_exe().unwrap());
-        child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, "1");
-        let child = child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-        let Traced { calls, seconds } = trace();
-        drop(child);
-        let others = OTHERS_ALWAYS + (OTHERS_PER_SECOND * seconds) as u64;
-        let of = |thread: &str, call: &str| calls.get(&(thread.to_owned(), call.to_owned())).copied().unwrap_or(0);
-        let both = |call: &str, thread: &str, least: u64| {
-            let times = of(thread, call);
-            let most = PACKAGES + others;
-            assert!((least..=most).contains(&times), "{thread}, {call}: not {least} to {most} times: {calls:?}");
-        };
-        both("send", "tx", PACKAGES);
-        both("sleep", "tx", 1);
-        both("receive", "rx", PACKAGES);
-        // None, if the module was never quick enough to sleep before its package came.
-        both("wake", "rx", 0);
-        both("pause", "tx", 0);
-        both("pause", "rx", 0);
-        let known = |thread: &str, call: &str| match thread {
-            "tx" => ["send", "sleep", "pause", "clock"].contains(&call),
-            "rx" => ["receive", "wake", "pause", "clock"].contains(&call),
-            _ => true,
-        };
-        // With a hello the two threads hand over to each other by a channel, where one may wait for the other.
-        let unknown: u64 =
-            calls.iter().filter(|((thread, call), _)| !known(thread, call)).map(|(_, times)| times).sum();
-        assert!(unknown <= others, "{unknown} calls that no package needs, at most {others} are right: {calls:?}");
-    });
+    let mut child = Command::new(std::env::current_exe().unwrap());
+    child.args(["--exact", "role", "--nocapture", "--test-threads=1"]).env(ROLE, "1");
+    let child = child.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
+    let Traced { calls, seconds } = trace();
+    drop(child);
+    let others = OTHERS_ALWAYS + (OTHERS_PER_SECOND * seconds) as u64;
+    let of = |thread: &str, call: &str| calls.get(&(thread.to_owned(), call.to_owned())).copied().unwrap_or(0);
+    let both = |call: &str, thread: &str, least: u64| {
+        let times = of(thread, call);
+        let most = PACKAGES + others;
+        assert!((least..=most).contains(&times), "{thread}, {call}: not {least} to {most} times: {calls:?}");
+    };
+    both("send", "tx", PACKAGES);
+    both("sleep", "tx", 1);
+    both("receive", "rx", PACKAGES);
+    // None, if the module was never quick enough to sleep before its package came.
+    both("wake", "rx", 0);
+    both("pause", "tx", 0);
+    both("pause", "rx", 0);
+    let known = |thread: &str, call: &str| match thread {
+        "tx" => ["send", "sleep", "pause", "clock"].contains(&call),
+        "rx" => ["receive", "wake", "pause", "clock"].contains(&call),
+        _ => true,
+    };
+    // With a hello the two threads hand over to each other by a channel, where one may wait for the other.
+    let unknown: u64 = calls.iter().filter(|((thread, call), _)| !known(thread, call)).map(|(_, times)| times).sum();
+    assert!(unknown <= others, "{unknown} calls that no package needs, at most {others} are right: {calls:?}");
 }

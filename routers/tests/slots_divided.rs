@@ -6,13 +6,14 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
+use common::kept::{assert_kept_by, validate};
 use common::process::{Router, be_a_router};
 use common::talk::{Listeners, talk};
-use common::{Capture, Crossed, MASTERS, Segment, assert_kept, name, table, validate};
+use common::{Capture, Crossed, MASTERS, Segment, instant, name, table};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
 use rohrpost_routers::link::PeerLinkState;
 use rohrpost_routers::time::Role;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_testbed::stalls::{Late, unless_stalled};
 use std::sync::{Arc, Weak};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -71,6 +72,11 @@ fn time_of_others(crossed: &[Crossed]) -> TimeRecord {
     }
 }
 
+/// How many frames lie outside of their senders' slots by this time.
+fn foreign(crossed: &[Crossed], time: &TimeRecord) -> usize {
+    validate(crossed, |at_ns| time.at(at_ns).ns).outside.len()
+}
+
 /// Whether both masters have spoken lately, by times that are so far from each other.
 fn are_apart(crossed: &[Crossed]) -> bool {
     let last = |master| ahead_ns(crossed, master, 0).next_back();
@@ -85,8 +91,8 @@ fn in_a_process_of_its_own() {
 
 #[test]
 fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
-    repeated_on_stall(Watched::RealTime, || {
-        let Some(mut segment) = Segment::at_rest(None) else { return };
+    unless_stalled(|_| {
+        let Some(mut segment) = Segment::at_rest(None) else { return Ok(()) };
         let Segment { stations, lab, .. } = &mut segment;
         stations[usize::from(OTHERS[0])].skew.rate_ppb = FAST_PPB;
         let lonely = &mut stations[usize::from(LONELY)];
@@ -109,9 +115,7 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         });
         talk(&segment, &mut listeners, &OTHERS, 100);
         segment.wait_until("the parts have two times, and have sent by them", |_| {
-            capture.so_far(|crossed| {
-                are_apart(crossed) && validate(crossed, &time_of_others(crossed)).outside.len() > FOREIGN
-            })
+            capture.so_far(|crossed| are_apart(crossed) && foreign(crossed, &time_of_others(crossed)) > FOREIGN)
         });
 
         segment.lab.unite(&[&name(LONELY)]).unwrap();
@@ -125,30 +129,34 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
         talk(&segment, &mut listeners, &ALL, 100);
         drop(held);
         reader.join().unwrap();
-
-        let crossed = capture.end();
-        let time = time_of_others(&crossed);
-        // When both know of each other.
-        let meets_ns =
-            ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).find(|at_ns| *at_ns > united_ns).unwrap();
-        let healed_ns = meets_ns + (HEALED_CYCLES * table().cycle).as_nanos() as u64;
-        let [before, after] = {
-            let (before, rest) = crossed.split_at(crossed.partition_point(|frame| frame.at_ns < united_ns));
-            [before, &rest[rest.partition_point(|frame| frame.at_ns < healed_ns)..]]
-        };
-        let foreign = validate(before, &time).outside.len();
-        assert!(foreign > FOREIGN / 2, "the parts had two times: {foreign} frames of {}", before.len());
-        if let Some((leads_ns, _)) = ahead_ns(after, LONELY, 0).next() {
-            // By the true clock, some of these may be replacements: of a master that stood still.
-            let last_ns =
-                ahead_ns(&crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).rfind(|at_ns| *at_ns < leads_ns).unwrap();
-            let silent_ns = leads_ns - last_ns;
-            assert!(
-                silent_ns > table().cycle.as_nanos() as u64,
-                "there is one master, and it spoke {silent_ns} ns before"
-            );
-        }
-        // Where masters stand still there may be a third master, with another time.
-        assert_kept("two parts that are one again", after, &time);
+        check(&segment, &capture.end(), united_ns)
     });
+}
+
+/// `united_ns`: when the parts were one again.
+fn check(segment: &Segment, crossed: &[Crossed], united_ns: u64) -> Result<(), Late> {
+    let time = time_of_others(crossed);
+    let before = &crossed[..crossed.partition_point(|frame| frame.at_ns < united_ns)];
+    let foreign = foreign(before, &time);
+    assert!(foreign > FOREIGN / 2, "the parts had two times: {foreign} frames of {}", before.len());
+    // When both know of each other.
+    let meets_ns = ahead_ns(crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).find(|at_ns| *at_ns > united_ns).unwrap();
+    let yields_ns = segment.own_log(LONELY).follows_ns(OTHERS[0], united_ns).unwrap();
+    let healed_ns = meets_ns + (HEALED_CYCLES * table().cycle).as_nanos() as u64;
+    if yields_ns > healed_ns {
+        let what = format!("it yields {} ns after the parts met", yields_ns - meets_ns);
+        let [since, until] = [meets_ns, yields_ns].map(instant);
+        return Err(Late { what, since, until, by: HEALED_CYCLES / 2 * table().cycle });
+    }
+    // Where masters stand still there may be a third master, with another time.
+    segment.replaced(LONELY, yields_ns).map_or(Ok(()), Err)?;
+    let after = &crossed[crossed.partition_point(|frame| frame.at_ns < yields_ns)..];
+    if let Some((leads_ns, _)) = ahead_ns(after, LONELY, 0).next() {
+        // By the true clock, some of these may be replacements: of a master that stood still.
+        let last_ns = ahead_ns(crossed, OTHERS[0], 0).map(|(at_ns, _)| at_ns).rfind(|at_ns| *at_ns < leads_ns).unwrap();
+        let silent_ns = leads_ns - last_ns;
+        assert!(silent_ns > table().cycle.as_nanos() as u64, "there is one master, and it spoke {silent_ns} ns before");
+    }
+    assert_kept_by("two parts that are one again", segment, after, |at_ns| time.at(at_ns).ns);
+    Ok(())
 }

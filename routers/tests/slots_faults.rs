@@ -5,15 +5,17 @@
 #[path = "slots_common/mod.rs"]
 mod common;
 
+use common::kept::{assert_inside, assert_kept, validate};
 use common::relay::Relay;
 use common::talk::{Listeners, PAUSE, talk, talkers};
-use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, assert_kept, label, name};
+use common::{Capture, MASTERS, NODES, PATIENCE, Segment, Station, label, name};
+use rohrpost_mailbox::monotonic_ns;
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_routers::frame::FrameKind;
 use rohrpost_routers::shell::Failure;
 use rohrpost_routers::tdma::Silent;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
-use std::io::Write;
+use rohrpost_testbed::report;
+use rohrpost_testbed::stalls::{Late, unless_stalled};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -36,115 +38,102 @@ fn knows_its_rate(station: &Station) -> bool {
 
 #[test]
 fn a_slave_with_a_drifting_clock_keeps_its_slots() {
-    repeated_on_stall(Watched::RealTime, || {
-        let Some(mut segment) = Segment::at_rest(None) else { return };
-        let Segment { stations, lab, .. } = &mut segment;
-        stations[2].skew.rate_ppb = DRIFT_PPB;
-        stations[2].skew.wander_ppb = SWING_PPB;
-        stations.iter_mut().for_each(|station| station.start(lab));
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-        let (mut listeners, time, began) =
-            (Listeners::new(&segment), segment.stations[0].clock().record, Instant::now());
-        let capture = Capture::start(&segment.lab);
-        let knows_its_rate = || (segment.stations[2].clock().rate_ppb.abs() - DRIFT_PPB).abs() < 2 * SWING_PPB as i64;
-        // A new master is measured anew.
-        while began.elapsed() < DRIFTS || (!knows_its_rate() && began.elapsed() < PATIENCE) {
-            talk(&segment, &mut listeners, &ALL, 100);
-        }
-        assert!(knows_its_rate(), "{} ppb", segment.stations[2].clock().rate_ppb);
-        assert_kept("two clocks that drift", &capture.end(), &time);
-    });
+    let Some(mut segment) = Segment::at_rest(None) else { return };
+    let Segment { stations, lab, .. } = &mut segment;
+    stations[2].skew.rate_ppb = DRIFT_PPB;
+    stations[2].skew.wander_ppb = SWING_PPB;
+    stations.iter_mut().for_each(|station| station.start(lab));
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    let (mut listeners, began) = (Listeners::new(&segment), Instant::now());
+    let capture = Capture::start(&segment.lab);
+    let off_ppb = || (segment.stations[2].clock().rate_ppb.abs() - DRIFT_PPB).abs();
+    // A new master is measured anew.
+    while began.elapsed() < DRIFTS || off_ppb() >= 2 * SWING_PPB as i64 {
+        assert!(began.elapsed() < PATIENCE, "its rate is {} ppb off", off_ppb());
+        talk(&segment, &mut listeners, &ALL, 100);
+    }
+    assert_kept("two clocks that drift", &segment, 0, &capture.end());
 }
 
 #[test]
 fn behind_a_bridge_that_delays_by_more_than_the_guard_allows_a_node_is_silent_and_says_why() {
-    repeated_on_stall(Watched::RealTime, || {
-        let Some(mut segment) = Segment::at_rest(None) else { return };
-        let Segment { stations, lab, .. } = &mut segment;
-        stations[2].late = Some("delay=2ms,jitter=500us,seed=7".parse().unwrap());
-        stations.iter_mut().for_each(|station| station.start(lab));
-        let capture = Capture::start(lab);
-        segment.wait_until("node 2 knows the time too badly", |segment| {
-            let (clock, slots) = (segment.stations[2].clock(), segment.stations[2].slots());
-            clock.exchanges > 5 && matches!(slots.silent, Some(Silent::BoundTooLarge { .. }))
-        });
-        let mut listeners = Listeners::new(&segment);
-        talk(&segment, &mut listeners, &[0, 1], 100);
-        let crossed = capture.end();
-        let speaks = |kind| matches!(kind, FrameKind::Alive | FrameKind::Packages);
-        assert!(crossed.iter().any(|frame| frame.from == 2), "it asks for the time");
-        assert!(!crossed.iter().any(|frame| frame.from == 2 && speaks(frame.kind)), "and says nothing else");
-
-        // The bridge is as quick as others again.
-        let Segment { stations, lab, .. } = &mut segment;
-        stations[2].shell = None;
-        stations[2].late = None;
-        stations[2].start(lab);
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-        talk(&segment, &mut listeners, &ALL, 50);
+    let Some(mut segment) = Segment::at_rest(None) else { return };
+    let Segment { stations, lab, .. } = &mut segment;
+    stations[2].late = Some("delay=2ms,jitter=500us,seed=7".parse().unwrap());
+    stations.iter_mut().for_each(|station| station.start(lab));
+    let capture = Capture::start(lab);
+    segment.wait_until("node 2 knows the time too badly", |segment| {
+        let (clock, slots) = (segment.stations[2].clock(), segment.stations[2].slots());
+        clock.exchanges > 5 && matches!(slots.silent, Some(Silent::BoundTooLarge { .. }))
     });
-}
+    let mut listeners = Listeners::new(&segment);
+    talk(&segment, &mut listeners, &[0, 1], 100);
+    let crossed = capture.end();
+    let speaks = |kind| matches!(kind, FrameKind::Alive | FrameKind::Packages);
+    assert!(crossed.iter().any(|frame| frame.from == 2), "it asks for the time");
+    assert!(!crossed.iter().any(|frame| frame.from == 2 && speaks(frame.kind)), "and says nothing else");
 
-/// A master that stands still for three cycles is replaced, and rightly: then it is tried again, so many times in all.
-const TRIES: usize = 8;
+    // The bridge is as quick as others again.
+    let Segment { stations, lab, .. } = &mut segment;
+    stations[2].shell = None;
+    stations[2].late = None;
+    stations[2].start(lab);
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    talk(&segment, &mut listeners, &ALL, 50);
+}
 
 #[test]
 fn behind_a_bridge_that_becomes_slow_a_node_keeps_its_slots_and_loses_nothing() {
-    repeated_on_stall(Watched::RealTime, || {
-        let Some(segment) = Segment::start() else { return };
+    unless_stalled(|_| {
+        let Some(segment) = Segment::start() else { return Ok(()) };
         let mut listeners = Listeners::new(&segment);
-        let is_kept = (0..TRIES).any(|_| {
-            segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-            segment.wait_until("node 2 knows its rate", |segment| knows_its_rate(&segment.stations[2]));
-            goes_on_behind_a_slow_bridge(&segment, &mut listeners)
-        });
-        assert!(is_kept, "there was another master in each of {TRIES} tries");
+        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+        segment.wait_until("node 2 knows its rate", |segment| knows_its_rate(&segment.stations[2]));
+        goes_on_behind_a_slow_bridge(&segment, &mut listeners)?;
+        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
         talk(&segment, &mut listeners, &ALL, 50);
+        Ok(())
     });
 }
 
-/// False when another master began meanwhile: its time cannot be measured from behind such a bridge.
-fn goes_on_behind_a_slow_bridge(segment: &Segment, listeners: &mut Listeners) -> bool {
+/// The time of another master that began meanwhile could not be measured from behind such a bridge.
+fn goes_on_behind_a_slow_bridge(segment: &Segment, listeners: &mut Listeners) -> Result<(), Late> {
     const ROUNDS: u16 = 300;
-    let terms = || segment.stations.iter().map(|station| station.clock().term).collect::<Vec<_>>();
-    let (before, time) = (terms(), segment.stations[0].clock().record);
+    let since_ns = monotonic_ns();
     let mut talkers = talkers(segment, &ALL);
     listeners.acquaint(&mut talkers);
     let capture = Capture::start(&segment.lab);
     let relay = Relay::start(segment, 2, HELD_BACK, |_| false);
     listeners.say_all(&mut talkers, ROUNDS);
     let silent = segment.stations[2].slots().silent;
-    let is_same = || terms() == before;
-    if is_same() {
-        // What the relay holds when it ends is lost.
-        listeners.hear_all(&ALL, &(0..ROUNDS).collect::<Vec<_>>());
-    }
+    let replaced = || ALL.into_iter().find_map(|node| segment.replaced(node, since_ns));
+    // What the relay holds when it ends is lost.
+    listeners.hear_all_unless(&ALL, &(0..ROUNDS).collect::<Vec<_>>(), || replaced().is_some());
     assert!(relay.end() > 300, "data and time take that way");
-    if !is_same() {
-        return false;
+    let crossed = capture.end();
+    if let Some(late) = replaced() {
+        let turned_ns = ALL.into_iter().filter_map(|node| segment.own_log(node).turned_ns(since_ns)).min();
+        let before = &crossed[..crossed.partition_point(|frame| Some(frame.at_ns) < turned_ns)];
+        assert_inside("until another was master", segment, &validate(before, segment.time_of(0)));
+        return Err(late);
     }
-    assert_kept("behind a slow bridge", &capture.end(), &time);
+    assert_kept("behind a slow bridge", segment, 0, &crossed);
     assert_eq!(silent, None);
-    true
+    Ok(())
 }
 
 #[test]
 fn a_master_with_arriving_packages_is_not_replaced_for_missing_syncs() {
-    repeated_on_stall(Watched::RealTime, || {
-        let Some(segment) = Segment::start() else { return };
-        assert!(
-            (0..TRIES).any(|_| stays_master_without_syncs(&segment)),
-            "replaced {TRIES} times, though its packages came"
-        );
-    });
+    unless_stalled(|_| Segment::start().map_or(Ok(()), |segment| stays_master_without_syncs(&segment)));
 }
 
-/// Whether the master stays one while it speaks, and its Syncs do not reach the backup.
-fn stays_master_without_syncs(segment: &Segment) -> bool {
+/// The master stays one while it speaks, and its Syncs do not reach the backup.
+fn stays_master_without_syncs(segment: &Segment) -> Result<(), Late> {
     segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
     let heard_of = || segment.stations[2].clock().master;
     segment.wait_until("there is a master", |_| heard_of().is_some());
-    let Some(master) = heard_of() else { return false };
+    let since_ns = monotonic_ns();
+    let master = heard_of().unwrap();
     let backup = &segment.stations[usize::from(MASTERS[0] + MASTERS[1] - master)];
     segment.wait_until("the backup follows, and knows its rate", |_| {
         backup.clock().master == Some(master) && knows_its_rate(backup)
@@ -168,7 +157,9 @@ fn stays_master_without_syncs(segment: &Segment) -> bool {
         let clock = backup.clock();
         assert!(relay.end() > 0);
         is_over.store(true, Ordering::Relaxed);
-        (clock.master, clock.term) == (Some(master), term)
+        segment.replaced(backup.own, since_ns).map_or(Ok(()), Err)?;
+        assert_eq!((clock.master, clock.term), (Some(master), term));
+        Ok(())
     })
 }
 
@@ -181,30 +172,26 @@ fn shape(segment: &Segment, node: u8, words: &str) -> bool {
 
 #[test]
 fn what_a_device_does_not_take_is_counted_and_nobody_waits_for_it() {
-    repeated_on_stall(Watched::RealTime, || {
-        let Some(segment) = Segment::start() else { return };
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-        // A thousandth of what `link` says.
-        if !shape(&segment, 2, "qdisc add dev lan root tbf rate 1mbit burst 1600 limit 10000000") {
-            // Past the test harness, which keeps what passing tests print to itself.
-            let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: a device that is too slow (`tc` with tbf)");
-            return;
+    let Some(segment) = Segment::start() else { return };
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    // A thousandth of what `link` says.
+    if !shape(&segment, 2, "qdisc add dev lan root tbf rate 1mbit burst 1600 limit 10000000") {
+        return report::skipped("a device that is too slow (`tc` with tbf)");
+    }
+    let (mut listeners, slow) = (Listeners::new(&segment), &segment.stations[2]);
+    let full = || slow.shell().failures().of(Failure::Full);
+    let (mut flood, mut id, began) = (slow.sender(1), 0, Instant::now());
+    while full() < 100 {
+        assert!(began.elapsed() < PATIENCE, "all is taken: {:?}", slow.slots());
+        // What finds no room in the router's mailbox comes a little later.
+        if flood.send(&label(2, 100, id), &[&[7; 1000]]).is_err() {
+            std::thread::sleep(Duration::from_micros(200));
         }
-        let (mut listeners, slow) = (Listeners::new(&segment), &segment.stations[2]);
-        let full = || slow.shell().failures().of(Failure::Full);
-        let (mut flood, mut id, began) = (slow.sender(1), 0, Instant::now());
-        while full() < 100 {
-            assert!(began.elapsed() < PATIENCE, "all is taken: {:?}", slow.slots());
-            // What finds no room in the router's mailbox comes a little later.
-            if flood.send(&label(2, 100, id), &[&[7; 1000]]).is_err() {
-                std::thread::sleep(Duration::from_micros(200));
-            }
-            id = id.wrapping_add(1);
-        }
-        let used = slow.slots().counts.used;
-        talk(&segment, &mut listeners, &[0, 1], 50);
-        segment.wait_until("it goes on with its slots", |segment| segment.stations[2].slots().counts.used > used);
-        assert!(shape(&segment, 2, "qdisc del dev lan root"));
-        talk(&segment, &mut listeners, &[0, 2], 50);
-    });
+        id = id.wrapping_add(1);
+    }
+    let used = slow.slots().counts.used;
+    talk(&segment, &mut listeners, &[0, 1], 50);
+    segment.wait_until("it goes on with its slots", |segment| segment.stations[2].slots().counts.used > used);
+    assert!(shape(&segment, 2, "qdisc del dev lan root"));
+    talk(&segment, &mut listeners, &[0, 2], 50);
 }

@@ -7,10 +7,13 @@ mod common;
 
 use common::{PATIENCE, Pair, Side, label, module, router, turns};
 use rohrpost_config::TRANSIT;
-use rohrpost_mailbox::{Name, Node, Receiver, Shape, local};
+use rohrpost_mailbox::sys::{Scheduling, schedule};
+use rohrpost_mailbox::{Name, Node, Receiver, Sender, Shape, local, monotonic_ns};
 use rohrpost_network::Tdma;
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
+use rohrpost_routers::tdma::SlotTable;
+use rohrpost_testbed::stalls::{Late, unless_stalled};
 use std::net::IpAddr;
+use std::panic::resume_unwind;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -20,6 +23,13 @@ const ROUNDS: u16 = 10;
 const PACKAGES: u16 = 20;
 /// Long enough for a router that would take them from the mailbox as they come, short beside a cycle.
 const AWHILE: Duration = Duration::from_millis(8);
+
+/// With this number it says that slots have begun; it counts for nothing else.
+const HELLO: u16 = u16::MAX;
+/// A router wakes up so long before its slot at most.
+const SPINS: Duration = Duration::from_millis(1);
+/// From the first package to the end of the router; a slot is further away than that before it begins.
+const LEFT: Duration = Duration::from_millis(30);
 
 /// A slot each, far apart.
 fn seldom() -> Tdma {
@@ -73,39 +83,70 @@ fn adopt(side: &Side) -> Receiver {
     side.receiver(transit(), shape)
 }
 
+/// How long it is until the router of node 0 may wake up for its next slot, by the time that node 1 follows.
+fn until_next_slot(pair: &Pair) -> Duration {
+    let now_ns = pair.sides[1].shell.as_ref().unwrap().clock().unwrap().snapshot().record.at(monotonic_ns()).ns;
+    let table = SlotTable::new(&seldom(), &[0], 0, 2, 28);
+    // What lasts still counts, too: one window and the guard before it.
+    let next_ns = table.next_slot(now_ns - seldom().guard.as_nanos() as u64).unwrap().begin_ns;
+    Duration::from_nanos(next_ns.saturating_sub(now_ns)).saturating_sub(SPINS)
+}
+
+/// Waits until the router's slots have begun, and one has just taken what there was.
+fn wait_for_a_slot(pair: &Pair, sender: &mut Sender, receiver: &mut Receiver) {
+    let began = Instant::now();
+    let waiting = || pair.sides[0].node.look_at(transit()).map_or(0, |mailbox| mailbox.depth);
+    let mut hello = || {
+        let _ = sender.send(&label(module(0), 100, HELLO), &[b"hello"]);
+        receiver.receive_timeout(Duration::from_millis(100)).is_some()
+    };
+    while !hello() || waiting() > 0 || until_next_slot(pair) < LEFT {
+        assert!(began.elapsed() < PATIENCE, "nothing comes");
+    }
+}
+
+/// Packages are sent between two slots, and the router is killed before the next: all of them wait.
+fn round(pair: &Pair, sender: &mut Sender, receiver: &mut Receiver, killed: Killed) -> Result<(), Late> {
+    // Load that is not in real time must not keep this from what is to happen before the slot.
+    let _ = schedule(Scheduling::Fifo(1));
+    wait_for_a_slot(pair, sender, receiver);
+    let (began, left) = (Instant::now(), until_next_slot(pair));
+    for id in 0..PACKAGES {
+        sender.send(&label(module(0), 100, id), &[b"waits for a slot"]).unwrap();
+    }
+    std::thread::sleep(AWHILE);
+    drop(killed);
+    let took = began.elapsed();
+    let ids = |mailbox: &mut Receiver| {
+        let numbers = std::iter::from_fn(|| mailbox.try_receive().map(|package| package.head().id));
+        numbers.filter(|id| *id != HELLO).collect::<Vec<_>>()
+    };
+    // What the killed router has sent is not on its way any more, but the other may not have taken it yet.
+    let (waits, came) = (ids(&mut adopt(&pair.sides[0])), ids(receiver));
+    assert!((0..PACKAGES).collect::<Vec<_>>().starts_with(&came), "in order, none twice: {came:?}");
+    assert!((0..PACKAGES).collect::<Vec<_>>().ends_with(&waits), "in order, none twice: {waits:?}");
+    assert!(came.len() + waits.len() <= PACKAGES.into(), "{came:?} came, and {waits:?} wait");
+    if took >= left {
+        let what = format!("the router was killed {:?} after its slot had begun", took - left);
+        return Err(Late::now(what, began, left - AWHILE));
+    }
+    assert_eq!((came.len(), waits.len()), (0, PACKAGES.into()), "no slot came: all wait");
+    Ok(())
+}
+
 #[test]
 fn what_waits_for_a_slot_outlives_a_router_that_is_killed() {
-    repeated_on_stall(Watched::RealTime, || {
+    unless_stalled(|_| {
         let mut pair = Pair::with(Some(seldom()));
         pair.sides[0].shell = None;
         let there = Shape { slots: 256, ..Shape::default() };
         let mut receiver = pair.sides[1].receiver(module(1), there);
         let mut sender = pair.sides[0].sender(module(1));
-        let waiting = || pair.sides[0].node.look_at(transit()).map_or(0, |mailbox| mailbox.depth);
-        let mut kept = 0;
-        for round in 0..ROUNDS {
-            let killed = start(&pair.sides[0], round);
-            // Its slots have begun, and one has just taken what there was.
-            let began = Instant::now();
-            let mut hello = || {
-                let _ = sender.send(&label(module(0), 100, u16::MAX), &[b"hello"]);
-                receiver.receive_timeout(Duration::from_millis(100)).is_some()
-            };
-            while !hello() || waiting() > 0 {
-                assert!(began.elapsed() < PATIENCE, "round {round}: nothing comes");
-            }
-            for id in 0..PACKAGES {
-                sender.send(&label(module(0), 100, id), &[b"waits for a slot"]).unwrap();
-            }
-            std::thread::sleep(AWHILE);
-            drop(killed);
-            let mut left = adopt(&pair.sides[0]);
-            let ids: Vec<_> = std::iter::from_fn(|| left.try_receive().map(|package| package.head().id)).collect();
-            // On a busy computer a slot may have come in between.
-            kept += u16::from(ids == (0..PACKAGES).collect::<Vec<_>>());
-            println!("round {round}: {} of {PACKAGES} left", ids.len());
-            while receiver.try_receive().is_some() {}
-        }
-        assert!(kept * 2 >= ROUNDS, "all were kept in {kept} of {ROUNDS} rounds");
+        (0..ROUNDS).try_for_each(|number| {
+            let killed = start(&pair.sides[0], number);
+            let round = || round(&pair, &mut sender, &mut receiver, killed);
+            // In a thread of its own: routers would inherit how it is scheduled.
+            std::thread::scope(|scope| scope.spawn(round).join()).unwrap_or_else(|panic| resume_unwind(panic))
+        })
     });
 }

@@ -28,6 +28,8 @@ pub(super) fn of(shell: &Shell, slots: &SlotStatus) -> SlotState {
         synchronisations_missed: syncs.missed,
         synchronisations_late: counts.synchronisations_late,
         held: seen.held,
+        overran: seen.overran,
+        behind: seen.behind,
         unproven: counts.unproven,
         roles: counts.roles,
         lead_ns: seen.lead_ns.0,

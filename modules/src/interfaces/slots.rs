@@ -55,6 +55,13 @@ pub struct SlotState {
     /// one.
     #[schema(unit = "datagrams")]
     pub held: u64,
+    /// Slots and synchronisation windows that were over when the call for their last datagram came back: the router
+    /// stood still in it, and the datagram may have left outside.
+    #[schema(unit = "slots")]
+    pub overran: u64,
+    /// Slots that began too late, or took too long, for what bounds assume: packages may have waited for the next one.
+    #[schema(unit = "slots")]
+    pub behind: u64,
     /// Hellos that it sent, without a time of its own, by the time of an unverified node: some when it joins, more
     /// while recorded datagrams are repeated.
     #[schema(unit = "hellos")]

@@ -56,8 +56,8 @@ impl AnswerQueue {
     pub(super) fn answer(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
         let (now_ns, asks) = (on.local_ns(), tx_window.carries == Carries::Hello);
         let overheard = if asks { on.clock().overheard(now_ns) } else { None };
-        if let Some(bytes) = self.send_next(on, tx_window, overheard.map(|(from, _)| from)) {
-            tx_window.takes(on.local_ns(), bytes);
+        if let Some((fitted_ns, bytes)) = self.send_next(on, tx_window, overheard.map(|(from, _)| from)) {
+            tx_window.takes(fitted_ns, bytes);
             if asks {
                 on.happened(SlotEvent::AnsweredOverheard(tx_window));
                 on.time().0.asked_overheard(now_ns);
@@ -65,14 +65,14 @@ impl AnswerQueue {
         }
     }
 
-    /// Sends the next that the window carries and that fits, a hello to the node `first` before others; as how many
-    /// bytes slots count it.
+    /// Sends the next that the window carries and that fits, a hello to the node `first` before others; when it was
+    /// found to fit, and as how many bytes slots count it.
     fn send_next(
         &mut self,
         on: &mut impl Platform,
         tx_window: &TransmitWindow,
         first: Option<NodeIndex>,
-    ) -> Option<usize> {
+    ) -> Option<(u64, usize)> {
         let now_ns = on.monotonic_ns();
         self.look(on, now_ns);
         // What was looked through before takes its time.
@@ -82,12 +82,12 @@ impl AnswerQueue {
             let (said, datagram) = if fits(HELLO_SLOT_BYTES) { hellos.take(now_ns, first) } else { None }?;
             on.send_answer(self.settings.nodes[usize::from(said.to)].address, &datagram);
             hellos.left(said);
-            return Some(HELLO_SLOT_BYTES);
+            return Some((local_ns, HELLO_SLOT_BYTES));
         }
         match self.refusal.take()? {
             Answer::Refusal { to, bytes, datagram } if tx_window.carries_refusal() && fits(bytes) => {
                 on.send_answer(to, &datagram[..bytes]);
-                Some(bytes)
+                Some((local_ns, bytes))
             }
             refusal => {
                 self.refusal = Some(refusal);

@@ -20,6 +20,10 @@ pub struct Used {
     pub datagrams: u64,
     /// Their bytes on the wire, all heads counted.
     pub wire_bytes: u64,
+    /// The last one was decided on when it would still be off the wire so long before the end, ns. Never less than 0.
+    pub spare_ns: i64,
+    /// The call for the last one came back so long after the end, ns; 0: before it.
+    pub over_ns: u64,
 }
 
 /// The last windows, and what missed its own.
@@ -27,14 +31,20 @@ pub struct Used {
 pub struct WindowLog {
     /// Datagrams that waited for the next slot, since the thread stood still between their making and their leaving.
     pub held: u64,
+    /// Windows that were over when the call for their last datagram came back: it may have left outside.
+    pub overran: u64,
+    /// Slots that began too late, or took too long, for what bounds assume.
+    pub behind: u64,
     /// The last windows that were used, the oldest first, as far as there were so many.
     pub windows: [Option<Used>; WINDOWS],
 }
 
 impl WindowLog {
     /// A window is over. Its first datagram was handed over so that it was on the wire at `first_ns`, local, by the
-    /// usual lead.
-    pub(super) fn used(&mut self, tx_window: &TransmitWindow, first_ns: u64) {
+    /// usual lead; the call for its last one came back at `back_ns`.
+    pub(super) fn used(&mut self, tx_window: &TransmitWindow, first_ns: u64, back_ns: u64) {
+        let over_ns = back_ns.saturating_sub(tx_window.end_ns);
+        self.overran += u64::from(over_ns > 0);
         self.windows.rotate_left(1);
         self.windows[WINDOWS - 1] = Some(Used {
             window: tx_window.window,
@@ -42,6 +52,8 @@ impl WindowLog {
             by_kernel: false,
             datagrams: tx_window.datagrams(),
             wire_bytes: tx_window.wire_bytes(),
+            spare_ns: tx_window.spare_ns(),
+            over_ns,
         });
     }
 
@@ -50,6 +62,32 @@ impl WindowLog {
         if let Some(Some(used)) = self.windows.last_mut() {
             used.off_ns = stamp.ns.wrapping_sub(begin_ns).cast_signed();
             used.by_kernel = stamp.by_kernel;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tdma::{Carries, WindowKind, Wire};
+    use rohrpost_network::Tdma;
+    use std::time::Duration;
+
+    #[test]
+    fn a_window_that_was_over_when_its_last_call_came_back_is_counted() {
+        let (cycle, part) = (Duration::from_millis(10), Duration::from_millis(1));
+        let link_bytes_s = 125_000_000;
+        let tdma = Tdma { cycle, synchronisation: part, guard: part, link_bytes_s, slots: Vec::new(), tunnel: None };
+        let wire = Wire::new(&tdma, 28);
+        let window = Window { kind: WindowKind::Slot { index: 0 }, cycle: 0, begin_ns: 1_000_000, end_ns: 2_000_000 };
+        let mut log = WindowLog::default();
+        for (back_ns, over_ns, overran) in [(900, 0, 0), (1000, 0, 0), (1001, 1, 1), (5000, 4000, 2)] {
+            let mut tx_window = TransmitWindow::new(window, 100, 1000, Carries::All, 0, wire);
+            tx_window.takes(500, 0);
+            log.used(&tx_window, 500, back_ns);
+            let used = log.windows[WINDOWS - 1].unwrap();
+            assert_eq!((used.over_ns, log.overran), (over_ns, overran), "back at {back_ns} ns");
+            assert_eq!(used.spare_ns, tx_window.spare_ns(), "as it was decided");
         }
     }
 }

@@ -262,10 +262,12 @@ impl SlotDriver {
             self.send_packages(on, &mut tx_window);
             on.queue_changed();
         }
+        let back_ns = on.local_ns();
+        self.log.behind += u64::from(tx_window.fell_behind);
         self.scheduler.close(&tx_window);
         if tx_window.datagrams() > 0 {
             let (_, lead_ns) = self.scheduler.lead_ns();
-            self.log.used(&tx_window, called_ns + lead_ns);
+            self.log.used(&tx_window, called_ns + lead_ns, back_ns);
         }
         on.happened(SlotEvent::Closed(&tx_window));
         self.look(on);
@@ -305,6 +307,7 @@ impl SlotDriver {
             self.hand_over(on, tx_window, now_ns, to, bytes);
         }
         if tx_window.is_behind(on.local_ns()) {
+            tx_window.fell_behind = true;
             left_out(on, on.monotonic_ns());
         }
     }
@@ -370,6 +373,7 @@ impl SlotDriver {
             let (usual_ns, _) = self.scheduler.lead_ns();
             let to_wire_ns = usual_ns.max(on.monotonic_ns().saturating_sub(handed_ns));
             if tx_window.is_late(now_ns + (to_wire_ns - usual_ns), bytes) {
+                tx_window.fell_behind = true;
                 left_out(on, handed_ns);
             }
             on.queue().0.sent(handed_ns + tx_window.arrives_after_ns(now_ns, bytes, to_wire_ns));

@@ -37,10 +37,12 @@ pub struct TransmitWindow {
     planned_ns: u64,
     datagrams: u64,
     wire_bytes: u64,
+    /// It began too late, or took too long, for what bounds assume.
+    pub(crate) fell_behind: bool,
 }
 
 impl TransmitWindow {
-    pub(super) fn new(window: Window, begin_ns: u64, end_ns: u64, carries: Carries, lead_ns: u64, wire: Wire) -> Self {
+    pub(crate) fn new(window: Window, begin_ns: u64, end_ns: u64, carries: Carries, lead_ns: u64, wire: Wire) -> Self {
         Self {
             window,
             begin_ns,
@@ -52,6 +54,7 @@ impl TransmitWindow {
             planned_ns: 0,
             datagrams: 0,
             wire_bytes: 0,
+            fell_behind: false,
         }
     }
 
@@ -108,6 +111,11 @@ impl TransmitWindow {
     fn starts_ns(&self, now_ns: u64) -> u64 {
         let at_once_ns = now_ns.saturating_add(self.lead_ns);
         self.free_ns.max(at_once_ns)
+    }
+
+    /// What was handed over is off the wire so long before the end, as planned, ns.
+    pub fn spare_ns(&self) -> i64 {
+        self.end_ns.wrapping_sub(self.free_ns).cast_signed()
     }
 
     /// Datagrams so far.

@@ -4,7 +4,7 @@ use super::{Segment, Station, name};
 use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use rohrpost_mailbox::Node;
+use rohrpost_mailbox::{Node, monotonic_ns};
 use rohrpost_routers::shell::clock::Skew;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -52,6 +52,7 @@ impl Router {
     pub(crate) fn kill(mut self, segment: &Segment, own: u8) {
         self.signal(Signal::SIGKILL);
         self.child.wait().unwrap();
+        segment.deaths.borrow_mut().push((own, monotonic_ns()));
         // As launch does.
         segment.stations[usize::from(own)].node.announce_death();
     }

@@ -103,9 +103,17 @@ impl Listeners {
     /// Waits until all these numbers have come from each of the nodes to each other. That one does not come is known
     /// once a later number has: between two nodes nothing changes its order.
     pub(crate) fn hear_all(&mut self, nodes: &[u8], numbers: &[u16]) {
+        self.hear_all_unless(nodes, numbers, || false);
+    }
+
+    /// The same, unless something happens that may keep them up.
+    pub(crate) fn hear_all_unless(&mut self, nodes: &[u8], numbers: &[u16], has_happened: impl Fn() -> bool) {
         let began = Instant::now();
         for (from, to) in nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to))) {
             while from != to && self.heard[usize::from(to)][usize::from(from)] != numbers {
+                if has_happened() {
+                    return;
+                }
                 let heard = &self.heard[usize::from(to)][usize::from(from)];
                 assert!(numbers.starts_with(heard) && began.elapsed() < PATIENCE, "{from} to {to}: {heard:?}");
                 std::thread::sleep(Duration::from_millis(1));

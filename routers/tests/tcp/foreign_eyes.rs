@@ -3,11 +3,11 @@
 
 use crate::ground::{System, node, start_sealed, wait};
 use crate::lan::Side;
-use crate::network::skipped;
 use crate::sealed::{Authority, Holds};
 use rohrpost_mailbox::{Label, Name, Node, Priority, Shape, Type};
 use rohrpost_routers::lab::{Capture, Lab, LabError, NodeSpec};
 use rohrpost_routers::tcp::ServerSeal;
+use rohrpost_testbed::report::skipped;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::net::{IpAddr, SocketAddr};

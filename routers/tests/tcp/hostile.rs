@@ -8,7 +8,6 @@ use proptest::test_runner::{RngAlgorithm, TestRng};
 use rohrpost_mailbox::{Head, Priority, Type};
 use rohrpost_routers::session::frame::{Carried, Range, Ranges, SessionHello, SessionMessage};
 use rohrpost_routers::tcp::{ClientSeal, LinkState, Moved, ServerSeal, Stream};
-use rohrpost_testbed::stall_detector::{Watched, repeated_on_stall};
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
@@ -306,14 +305,10 @@ fn others_are_served(authority: Option<&Authority>) {
 
 #[test]
 fn a_well_behaved_client_is_served_while_others_attack() {
-    repeated_on_stall(Watched::Ordinary, || {
-        others_are_served(None);
-    });
+    others_are_served(None);
 }
 
 #[test]
 fn a_client_with_a_certificate_is_served_while_those_without_attack() {
-    repeated_on_stall(Watched::Ordinary, || {
-        others_are_served(Some(&Authority::new()));
-    });
+    others_are_served(Some(&Authority::new()));
 }

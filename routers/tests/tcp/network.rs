@@ -5,7 +5,7 @@ use crate::sealed::{Authority, Holds};
 use rohrpost_mailbox::{Label, Priority, Type};
 use rohrpost_routers::lab::{DEVICE, Lab, LabError, NodeSpec};
 use rohrpost_routers::tcp::{LinkState, ServerSeal, ServerShell};
-use std::io::Write;
+use rohrpost_testbed::report::skipped;
 use std::net::SocketAddr;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -18,11 +18,6 @@ const LARGE: Priority = Priority(50);
 const FAR: &str = "the client of system 1";
 /// What nobody may read.
 const SECRET: &[u8] = b"nobody may read this";
-
-/// Past the test harness, which keeps what passing tests print to itself.
-pub(crate) fn skipped(what: &str) {
-    let _ = writeln!(std::io::stderr(), "SKIPPED, not tested: {what}");
-}
 
 /// The TCP router on `base`, system 2 beside it, and system 1 on `far`.
 struct Network {

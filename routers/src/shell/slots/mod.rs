@@ -168,8 +168,8 @@ impl Platform for System {
         let (before, silent) = (snapshot.silent, scheduler.silent());
         messages::tell_change(before, silent, || messages::parted(settings, clock.clock().parted_by(clock.now_ns())));
         let (counts, lead_ns) = (scheduler.counts(clock.clock()), scheduler.lead_ns());
-        let WindowLog { held, windows } = *log;
-        *snapshot = SlotSnapshot { counts, silent, lead_ns, held, windows, ..*snapshot };
+        let WindowLog { held, overran, behind, windows } = *log;
+        *snapshot = SlotSnapshot { counts, silent, lead_ns, held, overran, behind, windows, ..*snapshot };
         state.show(snapshot);
     }
 

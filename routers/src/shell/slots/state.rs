@@ -18,6 +18,10 @@ pub struct SlotSnapshot {
     pub granted: ActualScheduling,
     /// Datagrams that waited for the next slot, since the thread stood still between their making and their leaving.
     pub held: u64,
+    /// Windows that were over when the call for their last datagram came back: it may have left outside.
+    pub overran: u64,
+    /// Slots that began too late, or took too long, for what bounds assume.
+    pub behind: u64,
     /// The last windows that were used, the oldest first, as far as there were so many.
     pub windows: [Option<Used>; WINDOWS],
 }
@@ -31,6 +35,8 @@ impl SlotSnapshot {
             lead_ns: (0, 0),
             granted: ActualScheduling::Ordinary,
             held: 0,
+            overran: 0,
+            behind: 0,
             windows: [None; WINDOWS],
         }
     }

@@ -216,6 +216,8 @@ fn what_was_handed_over_counts() {
         assert!(datagrams < 100, "it does not end");
     }
     assert_eq!(datagrams, 4, "of 1066 bytes each");
+    let left_ns = (tx_window.end_ns - tx_window.begin_ns) - 4 * wire_ns;
+    assert_eq!(tx_window.spare_ns(), left_ns.cast_signed(), "behind the last");
     let arrives_after_ns = tx_window.arrives_after_ns(tx_window.begin_ns, 1_000, 5 * US);
     assert!(arrives_after_ns >= 6 * wire_ns, "behind those: {arrives_after_ns}");
     assert!(
