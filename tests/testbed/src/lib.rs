@@ -3,7 +3,6 @@
 #![forbid(unsafe_code)]
 
 pub mod sim;
-pub mod stall_detector;
 pub mod stalls;
 
 pub use rohrpost_test_report as report;

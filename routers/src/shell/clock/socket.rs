@@ -61,7 +61,7 @@ impl TimeSocket {
         }
         socket.set_nonblocking(true)?;
         let others: Vec<IpAddr> = peers.iter().filter(|peer| **peer != own).map(SocketAddr::ip).collect();
-        // Refused, all of it is read, and repeated_on_stall as before.
+        // Where the kernel refuses the filter, all datagrams are read; each is checked in any case.
         let _ = filter::take_time_only_from(&socket, &others, digest);
         socket.bind(&own.into())?;
         Ok(Self {
