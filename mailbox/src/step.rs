@@ -1,6 +1,6 @@
 //! Crash points: named steps at which a process can be told to die, so that a test can visit every instruction boundary
-//! that matters. Each has a name and a line of its own, and `mailbox/proof/crash` shows that each is died at. Without the
-//! feature `crash-points` they are nothing at all.
+//! that matters. Each has a name and a line of its own, and `mailbox/proof/crash` shows that each is died at. They are
+//! nothing at all without the feature `crash-points`.
 
 /// A step of an operation on shared memory: with the feature `crash-points`, the armed one aborts the process here.
 macro_rules! step {

@@ -5,12 +5,15 @@ use std::fmt::Write;
 use std::path::Path;
 use std::{env, fs};
 
-#[path = "src/broken.rs"]
+#[path = "src/broken/mod.rs"]
 mod broken;
 #[path = "src/cell_broken.rs"]
 mod cell_broken;
+#[path = "src/mirrored.rs"]
+mod mirrored;
 
-use broken::{Broken, Edit, MIRRORED};
+use broken::{Broken, Edit};
+use mirrored::MIRRORED;
 
 const MAILBOX: &str = "../../src";
 /// Files of this crate; the others are the mailbox's.
@@ -24,7 +27,8 @@ struct Proof {
     parts: &'static [&'static str],
     /// Each model and the bound on its preemptions.
     models: &'static [(&'static str, usize)],
-    broken: &'static [Broken],
+    /// Its variants, in groups.
+    broken: &'static [&'static [Broken]],
 }
 
 const PROOFS: [Proof; 2] = [
@@ -38,7 +42,7 @@ const PROOFS: [Proof; 2] = [
         real: "real_cell",
         parts: &["cell", "cell_models"],
         models: cell_broken::MODELS,
-        broken: cell_broken::BROKEN,
+        broken: &[cell_broken::BROKEN],
     },
 ];
 
@@ -74,13 +78,13 @@ fn variants(out: &Path, proof: &Proof) -> String {
     let models = proof.parts.last().expect("a proof has models");
     let mut tests = String::new();
     for (model, preemptions) in proof.models {
-        let catches = proof.broken.iter().any(|broken| broken.caught_by == *model);
+        let catches = proof.broken.iter().copied().flatten().any(|broken| broken.caught_by == *model);
         assert!(catches, "no variant names the model {model}: what does it prove?");
         let test = format!("#[test] fn {model}() {{ crate::holds({preemptions}, {models}::{model}); }}\n");
         tests.push_str(&test);
     }
     let mut index = variant(out, proof.parts, proof.real, &[], &tests);
-    for broken in proof.broken {
+    for broken in proof.broken.iter().copied().flatten() {
         let (_, preemptions) =
             proof.models.iter().find(|(model, _)| *model == broken.caught_by).expect("`caught_by` names a model");
         let test = format!(

@@ -1,12 +1,12 @@
 //! Writes the slot core once as it is and once per broken variant, each beside the runs. What is broken stands in the
-//! table of the models (`../loom/src/broken.rs`), so that a change of the core is followed in one place.
+//! tables of the models (`../loom/src/broken`), so that a change of the core is followed in one place.
 
 use std::fmt::Write;
 use std::path::Path;
 use std::{env, fs};
 
 #[allow(dead_code)]
-#[path = "../loom/src/broken.rs"]
+#[path = "../loom/src/broken/mod.rs"]
 mod broken;
 #[path = "src/caught.rs"]
 mod caught;
@@ -18,7 +18,7 @@ const CORE: [&str; 7] = ["word", "full", "hot", "slots", "queue", "bell", "cell"
 const OURS: [&str; 2] = ["rig", "runs"];
 
 fn main() {
-    for read in ["src", "../loom/src/broken.rs", "../../src"] {
+    for read in ["src", "../loom/src/broken", "../../src"] {
         println!("cargo:rerun-if-changed={read}");
     }
     let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
@@ -36,9 +36,8 @@ fn generate(out: &Path) -> String {
     let mut modules = variant(out, "real", &[]);
     let mut table = String::from("pub(crate) const BROKEN: &[(&str, &str, fn())] = &[\n");
     for (name, run) in CAUGHT {
-        let broken = BROKEN.iter().find(|broken| broken.name == *name);
-        let broken =
-            broken.unwrap_or_else(|| panic!("caught.rs names {name}, which ../loom/src/broken.rs has no more"));
+        let broken = BROKEN.iter().copied().flatten().find(|broken| broken.name == *name);
+        let broken = broken.unwrap_or_else(|| panic!("caught.rs names {name}, which ../loom/src/broken has no more"));
         modules.push_str(&variant(out, name, broken.edits));
         writeln!(table, "({name:?}, {run:?}, {name}::runs::{run}),").expect("a String takes all");
     }

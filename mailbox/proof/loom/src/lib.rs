@@ -4,14 +4,14 @@
 //! ```text
 //!  mailbox/src/{word,slots,queue,…}.rs ─┬── unchanged ──▶ variants::real        every model holds
 //!  src/models.rs ───────────────────────┤
-//!  src/broken.rs, one edit or a few ────┴── edited ─────▶ variants::no_fence_e  one model fails, and says how
+//!  src/broken/, one edit or a few ──────┴── edited ─────▶ variants::no_fence_e  one model fails, and says how
 //!                                                        variants::…
 //! ```
 //!
 //! - `models.rs`: the programs; read these first. Each is named after what it shows.
-//! - `broken.rs`: a table of mistakes, each with the model that catches it. A proof that cannot fail proves nothing. An
-//!   edit must find its text exactly once, so that a variant cannot rot: the build fails and names it. So it does with a
-//!   model that no variant names.
+//! - `broken`: tables of mistakes, each with the model that catches it. A proof that cannot fail proves nothing. An
+//!   edit must find its text exactly once, so that a variant cannot rot: the build fails and names it. So it does with
+//!   a model that no variant names.
 //! - `step.rs`: the core's crash points, here places to switch threads and to die.
 //! - `cell_models.rs`, `cell_broken.rs`: the same for the single-writer cells of `cell.rs`.
 //! - `build.rs`: puts them together with loom's atomics. It also compares what the models had to write again (what is

@@ -4,7 +4,7 @@
 //! ```text
 //!  mailbox/src/{word,slots,…,cell}.rs ─────┬── unchanged ──▶ every run ends, and nothing is reported
 //!  src/{rig,runs}.rs ──────────────────────┤
-//!  ../loom/src/broken.rs, one edit each ───┴── edited ─────▶ a data race is reported (src/caught.rs says in which run)
+//!  ../loom/src/broken/, one edit each ─────┴── edited ─────▶ a data race is reported (src/caught.rs says in which run)
 //! ```
 //!
 //! `cargo xtask tsan` builds and runs this. Each run is a process of its own. The standard library is not instrumented:

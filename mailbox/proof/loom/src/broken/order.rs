@@ -1,0 +1,220 @@
+//! Mistakes in handing over bodies, hints and the order of packages.
+
+use super::variant::{Broken, Edit, FENCE_E, NO_FENCE_E, RACE, WRONG, edit};
+
+/// Every look is one with a horizon, as after a first one that senders were quicker than.
+const ONLY_WITH_HORIZON: Edit = edit(
+    "queue",
+    "        self.collect(slots, u64::MAX);\n        // ORDERING: the words",
+    "        // ORDERING: the words",
+);
+
+const WITHOUT_RETURN: Edit = edit("queue", "        if !slots.any_hint() {\n            return;\n        }\n", "");
+
+pub(crate) const BROKEN: &[Broken] = &[
+    // ---- the word hands the body over: (A) to (D) ----
+    // The important sender's write of the body races with that of the unimportant one, which it displaces.
+    Broken {
+        name: "publish_without_release",
+        edits: &[edit(
+            "slots",
+            "if !self.change(slot, claim.word, word) {",
+            "if self.word(slot).compare_exchange(claim.word.0, word.0, Ordering::Acquire, Ordering::Relaxed).is_err() \
+             {",
+        )],
+        caught_by: "a_displaced_package_is_counted_and_not_received",
+        says: RACE,
+    },
+    // The receiver loses packages or reads a body while its sender writes it, whichever loom meets first. All of them
+    // must go for a race on the body: the hint's Acquire or the ticket counter's, which are there for other reasons,
+    // hands the body over as well as the word's.
+    Broken {
+        name: "receiver_without_acquire",
+        edits: &[
+            edit(
+                "slots",
+                "self.change(slot, seen, word).then_some",
+                "self.word(slot).compare_exchange(seen.0, word.0, Ordering::Release, \
+                 Ordering::Relaxed).is_ok().then_some",
+            ),
+            edit(
+                "slots",
+                "Word(self.word(slot).load(Ordering::Acquire))",
+                "Word(self.word(slot).load(Ordering::Relaxed))",
+            ),
+            edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
+            edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)"),
+            edit("queue", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
+            edit("hot", "hints.load(Ordering::SeqCst)", "hints.load(Ordering::Relaxed)"),
+        ],
+        caught_by: "a_body_is_handed_over_whole",
+        says: WRONG,
+    },
+    // The sender's next write of the body races with the receiver's read.
+    Broken {
+        name: "release_without_release",
+        edits: &[edit(
+            "slots",
+            "        self.change(taken.slot, taken.word, FREE);\n",
+            "        let _ = self.word(taken.slot).compare_exchange(taken.word.0, FREE.0, Ordering::Acquire, \
+             Ordering::Relaxed);\n",
+        )],
+        caught_by: "a_body_is_handed_over_whole",
+        says: RACE,
+    },
+    // The same race, seen from the other side.
+    Broken {
+        name: "claim_without_acquire",
+        edits: &[edit(
+            "slots",
+            "&& self.change(slot, FREE, word) {",
+            "&& self.word(slot).compare_exchange(FREE.0, word.0, Ordering::Release, Ordering::Relaxed).is_ok() {",
+        )],
+        caught_by: "a_body_is_handed_over_whole",
+        says: RACE,
+    },
+    // Two senders have one slot.
+    Broken {
+        name: "claim_without_compare",
+        edits: &[edit(
+            "slots",
+            "&& self.change(slot, FREE, word) {",
+            "&& { self.word(slot).swap(word.0, Ordering::AcqRel); true } {",
+        )],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // ---- hints ----
+    // The receiver swaps the hint, finds the slot still Filling, and never looks again.
+    Broken {
+        name: "hint_before_word",
+        edits: &[
+            edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
+            edit(
+                "slots",
+                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n",
+                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n        \
+                 self.hint(slot);\n",
+            ),
+        ],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // The same, by reordering: the hint is seen before the word it speaks of.
+    Broken {
+        name: "hint_without_release",
+        edits: &[edit(
+            "hot",
+            "fetch_or(1 << (slot % 64), Ordering::SeqCst)",
+            "fetch_or(1 << (slot % 64), Ordering::Relaxed)",
+        )],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // And from the receiver's side.
+    Broken {
+        name: "hint_without_acquire",
+        edits: &[edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.swap(0, Ordering::Release)")],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // A hint set between the look at its word and the swap is wiped out.
+    Broken {
+        name: "hints_cleared_after_the_look",
+        edits: &[
+            edit("queue", "hints.swap(0, Ordering::AcqRel)", "hints.load(Ordering::Acquire)"),
+            edit(
+                "queue",
+                "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            }\n",
+                "if word.ticket() < horizon { self.insert(word, slot) } else { self.defer(slot) }\n            \
+                 }\n            if fresh != 0 { hints.swap(0, Ordering::AcqRel); }\n",
+            ),
+        ],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // ---- order ----
+    // The receiver looks at slot 0, which is free; then both packages are published; then it sees the second in slot 1.
+    Broken {
+        name: "no_horizon",
+        edits: &[
+            ONLY_WITH_HORIZON,
+            WITHOUT_RETURN,
+            edit("queue", "if word.ticket() < horizon {", "if word.ticket() < u64::MAX {"),
+        ],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+    // The counter is read, but not what was published before: slot 0 looks free still.
+    Broken {
+        name: "horizon_without_acquire",
+        edits: &[
+            ONLY_WITH_HORIZON,
+            WITHOUT_RETURN,
+            edit("queue", "ticket.0.load(Ordering::Acquire)", "ticket.0.load(Ordering::Relaxed)"),
+        ],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+    // The same from the other side. Only without fence (E): it stands between a sender's hint and its next ticket.
+    Broken {
+        name: "ticket_without_release",
+        edits: &[
+            ONLY_WITH_HORIZON,
+            WITHOUT_RETURN,
+            edit("slots", "ticket.0.fetch_add(1, Ordering::AcqRel)", "ticket.0.fetch_add(1, Ordering::Acquire)"),
+            edit("slots", FENCE_E, NO_FENCE_E),
+        ],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+    // A deferred slot must be looked at again though its hint is gone.
+    Broken {
+        name: "too_young_is_forgotten",
+        edits: &[ONLY_WITH_HORIZON, WITHOUT_RETURN, edit("queue", "else { self.defer(slot) }", "else { }")],
+        caught_by: "everything_arrives_once_and_in_order",
+        says: WRONG,
+    },
+    // Claimed first, published second: the order would be that of claiming, and T no longer a horizon.
+    Broken {
+        name: "ticket_at_claim",
+        edits: &[
+            edit(
+                "slots",
+                "    segment: u64,\n    word: Word,\n    /// The package that",
+                "    segment: u64,\n    word: Word,\n    ticket: u64,\n    /// The package that",
+            ),
+            edit(
+                "slots",
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false });",
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false, ticket: \
+                 self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+            ),
+            edit(
+                "slots",
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });",
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late, ticket: \
+                 self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
+            ),
+            edit(
+                "slots",
+                "slot: old.slot, segment, word, place: Some(old.word), late: false })",
+                "slot: old.slot, segment, word, place: Some(old.word), late: false, ticket: 0 })",
+            ),
+            edit(
+                "slots",
+                "let ticket = self.hot.ticket.0.fetch_add(1, Ordering::AcqRel);",
+                "let ticket = claim.ticket;",
+            ),
+        ],
+        caught_by: "publishing_gives_the_order",
+        says: WRONG,
+    },
+    // The first look meets the second package of a sender; the first came behind it, and no other look follows.
+    Broken {
+        name: "no_look_for_more",
+        edits: &[edit("queue", "if !slots.any_hint() {", "if true {")],
+        caught_by: "a_second_package_never_passes_the_first",
+        says: WRONG,
+    },
+];
