@@ -125,7 +125,7 @@ fn a_module_that_ends_again_and_again_floods_neither_the_terminal_nor_the_log() 
         ("exit-at-start = 3", "a probe was asked to end with 3", 4),
         ("panic-at-start = true", "a probe was asked to panic", 16),
     ] {
-        let place = Place::new();
+        let (place, began) = (Place::new(), Instant::now());
         let restart = "restart = { policy = \"always\", backoff = \"1 ms\", at-most = 1000, within = \"50 ms\" }";
         let config = place.config(&[OUTPUT, &probe("probe.0", settings, restart), &probe("probe.1", "", "")]);
         let mut launch = place.launch(&config);
@@ -143,11 +143,15 @@ fn a_module_that_ends_again_and_again_floods_neither_the_terminal_nor_the_log() 
         let ends = place.recorded("start");
         assert!(ends < 160, "{ends} ends, of which the last that is told is the eightieth at most");
         let told = out.lines().filter(|line| line.starts_with("probe.0 ") && line.contains("starts again in ")).count();
-        assert!((8..=9).contains(&told), "{told} of {ends} are told: {out}");
+        // Other last words are told in full, every ten seconds at most: a busy computer may end one before all are said.
+        let others = began.elapsed().as_secs() as usize / 10;
+        assert!((8..=9 + others).contains(&told), "{told} of {ends} are told: {out}");
         let count = |text: &str| out.lines().filter(|line| line.contains(text)).count();
-        assert_eq!((count(" times in "), count(" in a row; its last words: ")), (told - 5, told - 5), "{out}");
+        let in_sums = count(" times in ");
+        assert_eq!(count(" in a row; its last words: "), in_sums, "{out}");
+        assert!((5..=5 + others).contains(&(told - in_sums)), "{out}");
         assert!(count(cause) <= told, "{out}");
-        let lines_max = 5 * lines_of_each_end + told + 6;
+        let lines_max = (5 + others) * lines_of_each_end + told + 6;
         assert!(out.lines().count() <= lines_max, "{out}");
         assert!(log.len() <= lines_max, "{} lines: {log:#?}", log.len());
         let causes = log.iter().filter(|line| line["text"].as_str().unwrap().contains(cause)).count();
