@@ -151,9 +151,12 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
     (Mistake::NeverInAdvance, "an urgent package that waits for the pace breaks no promise but that of speed"),
     (Mistake::WaitsForOne, "no socket is ever without room here"),
     (Mistake::OpensTwice, "what is opened twice is dropped as a duplicate behind it"),
-    (Mistake::BeginsUnproven, "an incarnation that is over sends nothing, and the one that lives asks again within 20 ms"),
-    (Mistake::NeverUnheard, "no network of the first hundred shows it: few links are cut one way for so long"),
-    (Mistake::KeepsOwnTime, "no network of the first hundred shows it: few nodes turn while their first master lives"),
+    (
+        Mistake::BeginsUnproven,
+        "an incarnation that is over sends nothing, and the one that lives asks again within 20 ms",
+    ),
+    (Mistake::NeverUnheard, "no network of the first hundred cuts a link one way for so long"),
+    (Mistake::KeepsOwnTime, "no network of the first hundred has a node that turns while its master lives"),
     (Mistake::WaitsForEver, "another node begins the time, or patience ends when a session begins"),
     (Mistake::BelievesUnopened, "what is believed of a peer changes what callers are told, and loses nothing"),
 ];
