@@ -131,6 +131,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::SyncInForeignWindow, Promise::SilentWhenUnsure, Network::Slotted, 2),
     // Nodes that begin or join a time.
     caught(Mistake::BeginsAtOnce, Promise::Exclusive, Network::Slotted, 5),
+    caught(Mistake::Stubborn, Promise::Exclusive, Network::Slotted, 21),
     caught(Mistake::BeginsForEver, Promise::Recovery, Network::Slotted, 0),
     caught(Mistake::TrustsItself, Promise::SilentWhenUnsure, Network::Slotted, 1),
     caught(Mistake::AsksTooSoon, Promise::InWindow, Network::Slotted, 1),
@@ -148,11 +149,14 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
     (Mistake::MixesPackages, "no two heads of this simulation are the same"),
     (Mistake::CountsPartsTwice, "a duplicate of a fragment is dropped as a datagram"),
     (Mistake::NeverInAdvance, "an urgent package that waits for the pace breaks no promise but that of speed"),
-    (Mistake::WaitsForOne, "no socket without room here"),
+    (Mistake::WaitsForOne, "no socket is ever without room here"),
     (Mistake::OpensTwice, "what is opened twice is dropped as a duplicate behind it"),
-    (Mistake::BeginsUnproven, "a hello that is sent again says nothing that its incarnation did not begin by before"),
-    (Mistake::NeverUnheard, "no network of the first hundred cuts one way for so long that anything comes of it"),
-    (Mistake::KeepsOwnTime, "no network of the first hundred turns a node while its first master lives"),
+    (
+        Mistake::BeginsUnproven,
+        "an incarnation that is over sends nothing, and the one that lives asks again within 20 ms",
+    ),
+    (Mistake::NeverUnheard, "no network of the first hundred cuts a link one way for so long"),
+    (Mistake::KeepsOwnTime, "no network of the first hundred has a node that turns while its master lives"),
     (Mistake::WaitsForEver, "another node begins the time, or patience ends when a session begins"),
     (Mistake::BelievesUnopened, "what is believed of a peer changes what callers are told, and loses nothing"),
 ];

@@ -58,8 +58,8 @@ impl Packages {
         })
     }
 
-    /// A datagram was handled: notes what became of it. `clear`: what could be read of it; `before`: what was counted of
-    /// its source.
+    /// A datagram was handled: notes what became of it. `clear`: what could be read of it; `before`: what was counted
+    /// of its source.
     pub(super) fn handled(&mut self, io: &mut Io<'_>, arrived: &Arrived, clear: &[u8], before: &Counted) {
         let source = arrived.source.filter(|node| *node != io.node);
         let fate = self.fate(io, arrived, before, &self.counted(source));
