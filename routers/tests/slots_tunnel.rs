@@ -5,9 +5,9 @@
 //! From its publishing to the moment at which the bridge sees it: that is what bounds are about, and no thread that
 //! wakes up is in it. On a computer with much to do the thread of the time slots comes too late now and then, and
 //! leaves a slot out, or loses its processor in the middle of one; a bound holds for slots that are kept. The router
-//! counts those that are not. So a package that is later than its bound is right only if its router counted one of these
-//! in that time; all others keep their bounds. If the tunnel's traffic went before packages, a third of them would be
-//! later (it fills the slots of one node at a time).
+//! counts those that are not. So a package that is later than its bound is right only if its router counted one of
+//! these in that time; all others keep their bounds. If the tunnel's traffic went before packages, a third of them
+//! would be later (it fills the slots of one node at a time).
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

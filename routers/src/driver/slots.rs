@@ -262,13 +262,9 @@ impl SlotDriver {
             self.send_packages(on, &mut tx_window);
             on.queue_changed();
         }
-        let back_ns = on.local_ns();
-        self.log.behind += u64::from(tx_window.fell_behind);
         self.scheduler.close(&tx_window);
-        if tx_window.datagrams() > 0 {
-            let (_, lead_ns) = self.scheduler.lead_ns();
-            self.log.used(&tx_window, called_ns + lead_ns, back_ns);
-        }
+        let (_, lead_ns) = self.scheduler.lead_ns();
+        self.log.closed(&tx_window, called_ns + lead_ns, on.local_ns());
         on.happened(SlotEvent::Closed(&tx_window));
         self.look(on);
     }

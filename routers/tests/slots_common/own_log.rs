@@ -156,14 +156,14 @@ impl OwnLog {
         self.looks().last().map_or(0, |look| look.at_ns)
     }
 
-    /// Whether it counted between these moments that it left a slot out, began one too late, took too long in one, missed
-    /// or overran one.
+    /// Whether it counted between these moments that it left a slot out, began one too late, took too long in one,
+    /// missed or overran one.
     pub(crate) fn has_left_out(&self, since_ns: u64, until_ns: u64) -> bool {
         let until_ns = until_ns + 2 * EVERY.as_nanos() as u64;
-        let mut looks = self.looks().skip_while(|look| look.at_ns + 2 * EVERY.as_nanos() as u64 + 1 < since_ns);
-        let before = looks.next().map_or(0, |look| look.left_out);
+        let before = self.looks().take_while(|look| look.at_ns <= since_ns).last().map_or(0, |look| look.left_out);
         let has_overrun = |look: &Look| look.windows.iter().any(|window| window.over_ns > 0);
-        looks.take_while(|look| look.at_ns < until_ns).any(|look| look.left_out != before || has_overrun(look))
+        let mut within = self.looks().filter(|look| (since_ns + 1..until_ns).contains(&look.at_ns));
+        within.any(|look| look.left_out != before || has_overrun(look))
     }
 
     /// When it was first seen to follow this master, from this moment on.
@@ -179,7 +179,7 @@ impl OwnLog {
         looks.find(|look| look.master != before).map(|look| look.at_ns)
     }
 
-    /// To be shown: looks with windows in the cycles around a moment of system time, or before which windows are missing.
+    /// To be shown: looks with windows in the cycles around a moment of system time, or before which some are missing.
     pub(crate) fn near(&self, system_ns: u64) -> Vec<&Look> {
         let is_near = |window: &OwnWindow| window.begin_ns.abs_diff(system_ns) < NEAR_NS;
         self.looks().filter(|look| look.is_gap || look.windows.iter().any(is_near)).collect()
