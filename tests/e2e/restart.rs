@@ -150,8 +150,9 @@ fn a_module_that_ends_again_and_again_floods_neither_the_terminal_nor_the_log() 
         let in_sums = count(" times in ");
         assert_eq!(count(" in a row; its last words: "), in_sums, "{out}");
         assert!((5..=5 + others).contains(&(told - in_sums)), "{out}");
-        assert!(count(cause) <= told, "{out}");
-        let lines_max = (5 + others) * lines_of_each_end + told + 6;
+        // One that ends by itself when all are stopped is told in full, too.
+        assert!(count(cause) <= told + 1, "{out}");
+        let lines_max = (5 + others + 1) * lines_of_each_end + told + 6;
         assert!(out.lines().count() <= lines_max, "{out}");
         assert!(log.len() <= lines_max, "{} lines: {log:#?}", log.len());
         let causes = log.iter().filter(|line| line["text"].as_str().unwrap().contains(cause)).count();
