@@ -1,5 +1,6 @@
 //! Where a sender looks for a free slot first.
 
+use crate::slots::Slots;
 use crate::word::Claimant;
 
 /// Where a sender looks for a free slot first.
@@ -39,10 +40,10 @@ impl Place {
         &mut self.cursor
     }
 
-    pub(crate) fn found(&mut self, slot: usize, count: usize) {
+    pub(crate) fn found(&mut self, slot: usize, slots: &Slots<'_>) {
         if self.away > 0 {
             self.away -= 1;
-        } else if slot == (self.home + self.turn) % count {
+        } else if slot == slots.slot_of(self.home + self.turn) {
             self.turn = (self.turn + 1) % Self::HOME;
         } else {
             self.away = Self::AWAY;

@@ -172,8 +172,8 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
                 "slots",
-                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n",
-                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n        \
+                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { claim.place.ticket() });\n",
+                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { claim.place.ticket() });\n        \
                  self.hint(slot);\n",
             ),
         ],
@@ -266,20 +266,20 @@ pub(crate) const BROKEN: &[Broken] = &[
             ),
             edit(
                 "slots",
-                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false });",
-                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false, ticket: \
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: FREE, late: false });",
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: FREE, late: false, ticket: \
                  self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });",
-                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late, ticket: \
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: FREE, late });",
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: FREE, late, ticket: \
                  self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "slot: old.slot, segment, word, place: Some(old.word), late: false })",
-                "slot: old.slot, segment, word, place: Some(old.word), late: false, ticket: 0 })",
+                "slot: old.slot, segment, word, place: old.word, late: false })",
+                "slot: old.slot, segment, word, place: old.word, late: false, ticket: 0 })",
             ),
             edit(
                 "slots",
@@ -525,7 +525,7 @@ pub(crate) const BROKEN: &[Broken] = &[
                 "if self.last.is_some_and(|old| slots.replace(&mut claim, old)) {",
                 "let late = self.last;\n        if false {",
             ),
-            edit("slots", "claim.place.map_or(ticket, Word::ticket)", "claim.place.map_or(0, Word::ticket)"),
+            edit("slots", "{ ticket } else { claim.place.ticket() }", "{ 0 } else { claim.place.ticket() }"),
             edit(
                 "rig",
                 "                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);",
@@ -542,7 +542,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
     Broken {
         name: "the_newest_goes_to_the_end",
-        edits: &[edit("slots", "claim.place.map_or(ticket, Word::ticket)", "ticket")],
+        edits: &[edit("slots", "if claim.place == FREE { ticket } else { claim.place.ticket() }", "ticket")],
         caught_by: "the_newest_keeps_its_place",
         says: WRONG,
     },
