@@ -5,10 +5,10 @@
 //! replaced: the caller waits for the answer.
 
 use crate::full::OverflowPolicy;
+use crate::label::Label;
 use crate::layout::Shape;
 use crate::name::Name;
 use crate::package::Type;
-use crate::sender::Label;
 use crate::slots::{Posted, Slots};
 
 /// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word

@@ -208,10 +208,9 @@ impl Node {
         // Not to be read, only to find pipes by.
         let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
         let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
-        let mapping = Mapping::new(&file, bytes, Use::Share).map_err(failed)?;
+        let page = Mapping::new(&file, bytes, Use::Share).map_err(failed)?.locate(0);
         let there = file.metadata().map_err(failed)?;
-        let node =
-            Self { path: path.into(), page: mapping.locate(0), identity: (there.dev(), there.ino()), file, directory };
+        let node = Self { path: path.into(), page, identity: (there.dev(), there.ino()), file, directory };
         if maker.is_some() {
             node.check_in()?;
         }

@@ -144,7 +144,7 @@ impl Queue {
         self.collect(slots, horizon);
     }
 
-    #[inline]
+    #[inline(always)]
     fn collect(&mut self, slots: &Slots<'_>, horizon: u64) {
         for (i, hints) in slots.hot.ready.0[..slots.count().div_ceil(64)].iter().enumerate() {
             // Looked at before it is swapped, so that a hint word without hints is not written. SeqCst for (J): the

@@ -3,83 +3,21 @@
 use crate::counters::Loss;
 use crate::doorbell;
 use crate::full::NoSlot;
+use crate::label::Label;
 use crate::latest::Posts;
 use crate::name::{Name, Priority};
-use crate::package::{Head, Options, Type};
 use crate::participant::Participant;
 use crate::place::Place;
 use crate::routes;
 use crate::segment::{BadSegment, Segment};
+use crate::send_error::SendError;
 use crate::slots::{Claim, Published};
 use crate::step::step;
-use crate::traffic::{Key, Writer};
+use crate::traffic::Writer;
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.
 const REOPEN_MAX: usize = 3;
-
-/// Why a package could not be sent. It was not accepted; nothing is lost that its sender does not know of.
-#[derive(Debug, thiserror::Error)]
-pub enum SendError {
-    /// Nobody on this node has made such a mailbox, and no router takes it further.
-    #[error("mailbox {0}: not on this node, and no router leads to it; is its module launched?")]
-    NoMailbox(Name),
-    /// It is on another node, but the router that takes packages there has no mailbox here.
-    #[error("mailbox {name} is on another node, and the router that leads there, {router}, does not run; start it")]
-    NoRouter {
-        /// Where it should go.
-        name: Name,
-        /// The router's mailbox for such packages.
-        router: Name,
-    },
-    /// All slots are in use by packages as important or more.
-    #[error("mailbox {0} is full; its receiver is slow or stopped, or it has too few slots")]
-    Full(Name),
-    /// Larger than the mailbox's slots.
-    #[error(
-        "mailbox {name} takes bodies of at most {max} bytes, this one has {len}; raise its `size` in the configuration"
-    )]
-    TooLarge {
-        /// Where it should go.
-        name: Name,
-        /// Bytes of the body.
-        len: usize,
-        /// Bytes that fit.
-        max: usize,
-    },
-    /// This participant sends to that mailbox already and may not hold more claims there.
-    #[error("mailbox {0}: this participant has as many senders there as the mailbox's `claims` allows; share one")]
-    InUse(Name),
-    /// This process looked dead to the receiver, which took the slot back.
-    #[error("mailbox {0}: its receiver held this process for dead; was the node's directory removed?")]
-    Reclaimed(Name),
-    /// The segment cannot be used.
-    #[error("mailbox {0}: {1}")]
-    Bad(Name, String),
-}
-
-/// What a sender says of a package besides its body; the mailbox's name and the length are filled in.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Label {
-    /// Mailbox that answers go to.
-    pub from: Name,
-    /// What it is.
-    pub kind: Type,
-    /// Tells packages of one type apart.
-    pub id: u16,
-    /// How urgent.
-    pub priority: Priority,
-    /// Option bits.
-    pub options: Options,
-}
-
-impl Label {
-    #[inline]
-    fn head(&self, to: Name, len: usize) -> Head {
-        let Self { from, kind, id, priority, options } = *self;
-        Head { to, from, len: len as u16, kind, id, priority, options }
-    }
-}
 
 /// Why there is no slot in the mailbox as it is.
 enum NoClaim {
@@ -264,8 +202,8 @@ impl Sender {
         }
         let (me, full) = (self.participant.claimant(), self.segment.shape.full);
         let old = label.and_then(|label| self.posts.of(label));
-        let claim = slots.claim(me, self.place.first(), priority, full, old).map_err(NoClaim::NoSlot)?;
-        self.place.found(claim.slot(), &slots);
+        let claim = slots.claim(me, self.place.first(slots.count()), priority, full, old).map_err(NoClaim::NoSlot)?;
+        self.place.found(claim.slot(), slots.count());
         Ok(claim)
     }
 
@@ -353,13 +291,13 @@ impl Sender {
         }
         match slots.publish(claim, label.priority) {
             Published::Accepted { posted, wake } => {
-                slots.expect_to_fill(slots.slot_of(self.place.next()));
+                slots.expect_to_fill(self.place.next(slots.count()));
                 self.posts.remember(label, posted, &slots);
                 if wake {
                     self.wake();
                 }
                 step!("send: before count");
-                self.flows.accepted(self.participant.traffic(), key(label, self.to), len, published_ns, 0);
+                self.flows.accepted(self.participant.traffic(), label.key(self.to), len, published_ns, 0);
                 Ok(())
             }
             Published::Reclaimed => Err(NotHere::Reclaimed),
@@ -410,7 +348,7 @@ impl Sender {
     /// Counts what was not accepted; its sender is told.
     #[cold]
     fn refused(&mut self, label: &Label, error: SendError) -> SendError {
-        let key = key(label, self.name());
+        let key = label.key(self.name());
         self.flows.refused(self.participant.traffic(), key);
         error
     }
@@ -435,10 +373,6 @@ impl Drop for Sender {
         self.flows.leave(self.participant.traffic());
         count_out(&mut self.participant.sending(), &self.segment);
     }
-}
-
-fn key(label: &Label, to: Name) -> Key {
-    Key { to, from: label.from, kind: label.kind }
 }
 
 /// A slot to write a package in.

@@ -161,11 +161,6 @@ impl<'a> Slots<'a> {
         self.count
     }
 
-    /// A slot for any number. Most are slots already, and a division costs as much as all other steps of a search.
-    pub(crate) fn slot_of(&self, number: usize) -> usize {
-        if number < self.count { number } else { number % self.count }
-    }
-
     fn word(&self, slot: usize) -> &'a AtomicU64 {
         &self.words[slot * self.stride]
     }
@@ -205,7 +200,7 @@ impl<'a> Slots<'a> {
         }
         let word = Word::filling(by, None);
         for _ in 0..self.count {
-            let slot = self.slot_of(*cursor);
+            let slot = if *cursor < self.count { *cursor } else { 0 };
             *cursor = slot + 1;
             step!("claim: before");
             if Word(self.word(slot).load(Ordering::Relaxed)) == FREE && self.change(slot, FREE, word) {
@@ -225,7 +220,6 @@ impl<'a> Slots<'a> {
 
     /// Takes the slot of the newest of the least important packages, if `priority` outranks it, or one that was freed
     /// since the search for one: a sender that outranks all is not refused because the receiver is quick.
-    #[inline(never)]
     fn displace(self, by: Claimant, priority: Priority) -> Option<Claim> {
         for _ in 0..DISPLACE_LOOKS_MAX {
             let words = (0..self.count).map(|slot| (slot, self.load(slot)));
@@ -249,7 +243,6 @@ impl<'a> Slots<'a> {
 
     /// Takes the slot of one's own older package, if it still waits: there is no other. While the newer one is written,
     /// there is neither.
-    #[inline(never)]
     fn reuse(self, by: Claimant, old: Posted) -> Option<Claim> {
         let word = Word::filling(by, Some(old.as_victim()));
         step!("reuse: chosen");
@@ -264,7 +257,6 @@ impl<'a> Slots<'a> {
     /// no longer waits.
     ///
     /// If `claim` has a victim, its loss has been counted. That of the old one is to be counted after this.
-    #[inline(never)]
     pub(crate) fn replace(self, claim: &mut Claim, old: Posted) -> bool {
         self.is_of_this(claim.segment);
         // It has been replaced in its own slot already.
@@ -347,7 +339,6 @@ impl<'a> Slots<'a> {
     }
 
     /// Has the lines of a slot come here that its next filler writes first.
-    #[inline(always)]
     pub(crate) fn expect_to_fill(&self, slot: usize) {
         prefetch_to_write(self.word(slot));
         self.first_lines(slot).into_iter().for_each(prefetch_to_write);

@@ -289,7 +289,6 @@ impl Writer {
     }
 
     /// The row of another key than the last.
-    #[inline(never)]
     fn row_of_another(&mut self, table: &Table, key: Key) -> usize {
         let known = |recent: &Option<(Key, usize)>| recent.is_some_and(|(known, _)| known == key);
         if let Some(place) = self.recent.iter().position(known) {
