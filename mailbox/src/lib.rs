@@ -61,8 +61,8 @@
 //! 1. `word`, `slots`, `hot`: the protocol. `queue`: what the receiver knows. `latest`: what replaces what.
 //! 2. `bell`, `doorbell`, `waiting`, `watch`: sleeping and waking.
 //! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics and fences.
-//! 4. `label`, `sender`, `send_error`, `place`, `receiver`: what users hold; `routes`: what is on other nodes. `node`, `entry`,
-//!    `participant`, `lock`, `registry`, `unlink`: live processes and their names.
+//! 4. `label`, `sender`, `send_error`, `place`, `receiver`: what users hold; `routes`: what is on other nodes.
+//!    `node`, `entry`, `participant`, `lock`, `registry`, `unlink`: live processes and their names.
 //! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes

@@ -172,8 +172,10 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
                 "slots",
-                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { claim.place.ticket() });\n",
-                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { claim.place.ticket() });\n        \
+                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { \
+                 claim.place.ticket() });\n",
+                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { \
+                 claim.place.ticket() });\n        \
                  self.hint(slot);\n",
             ),
         ],
