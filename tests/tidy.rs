@@ -29,7 +29,6 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "mailbox/src/slots.rs",
         "what both sides say is a part of the slot core, which the proofs take whole",
     ),
-    ("mailbox/src/latest.rs", "mailbox/src/sender.rs", "a private list of a sender, by label"),
     (
         "modules/src/launch/child.rs",
         "modules/src/launch/child/ending.rs",

@@ -146,11 +146,14 @@ pub fn compare(settings: &Settings, subject: &Subject, contenders: &[Contender],
 
 type Turns = Vec<Result<Summary, Failure>>;
 
-/// The turns of each contender, one a round. A contender that failed or was skipped has no further turn.
+/// The turns of each contender, one a round; each round begins with the next contender, so that none always comes after
+/// the same one. A contender that failed or was skipped has no further turn.
 fn interleave(settings: &Settings, contenders: &[Contender]) -> Vec<Turns> {
     let mut turns: Vec<Turns> = contenders.iter().map(|_| Vec::new()).collect();
-    for _ in 0..settings.rounds.max(1) {
-        for (contender, turns) in contenders.iter().zip(&mut turns) {
+    for round in 0..settings.rounds.max(1) {
+        for step in 0..contenders.len() {
+            let at = (round + step) % contenders.len();
+            let (contender, turns) = (&contenders[at], &mut turns[at]);
             if !turns.iter().any(Result::is_err) && !interrupted() {
                 std::thread::sleep(PAUSE);
                 turns.push(alone().and_then(|_alone| (contender.turn)()));
@@ -180,4 +183,27 @@ fn over_rounds(turns: &[Result<Summary, Failure>]) -> Result<Summary, Failure> {
         p999: middle(|round| round.p999),
         max: rounds.iter().filter_map(|round| round.max).reduce(f64::max),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+
+    #[test]
+    fn each_round_begins_with_the_next_contender_and_one_that_failed_has_no_further_turn() {
+        let order = RefCell::new(String::new());
+        let contender = |name: &'static str| {
+            let order = &order;
+            let turn = move || {
+                order.borrow_mut().push_str(name);
+                if name == "c" { Err(Failure::Failed("once".into())) } else { Ok(Summary::single(1.0)) }
+            };
+            Contender { name, turn: Box::new(turn) }
+        };
+        let settings = Settings { rounds: 4, ..Settings::default() };
+        let turns = interleave(&settings, &["a", "b", "c"].map(contender));
+        assert_eq!(*order.borrow(), "abcbaabab");
+        assert_eq!(turns.iter().map(Vec::len).collect::<Vec<_>>(), [4, 4, 1]);
+    }
 }

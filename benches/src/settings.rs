@@ -18,7 +18,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { rounds: 5, only: Vec::new(), quick: false, rohrpost: None }
+        Self { rounds: 7, only: Vec::new(), quick: false, rohrpost: None }
     }
 }
 

@@ -13,7 +13,7 @@ use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, r
 const CASES: [(&str, &[u64], &[&str]); 8] = [
     ("blocking", &[64, 1024, 16_384, 62_000], &["futex", "posix-mq", "iceoryx2 listener"]),
     ("one-core", &[64], &["futex", "posix-mq", "iceoryx2 listener"]),
-    ("spinning", &[64, 1024, 16_384], &["spin", "iceoryx2 spinning", "crossbeam, 1 process"]),
+    ("spinning", &[64, 1024, 16_384], &["spin", "slot core", "iceoryx2 spinning", "crossbeam, 1 process"]),
     ("loaned", &[64, 1024, 16_384, 62_000], &["spin 64 B", "iceoryx2 loaned"]),
     ("blocking, default scheduler", &[64], &["futex", "posix-mq"]),
     ("spinning, default scheduler", &[64], &["spin"]),

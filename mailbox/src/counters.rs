@@ -102,6 +102,7 @@ impl Counters {
     }
 
     /// By the receiver alone, which may therefore load and store.
+    #[inline(always)]
     pub(crate) fn received(&self, priority: Priority, waited_ns: u64, bytes: usize) {
         let row = self.row(Class(priority.0));
         let bucket = &row.latency[bucket(waited_ns)];

@@ -5,10 +5,10 @@
 //! replaced: the caller waits for the answer.
 
 use crate::full::OverflowPolicy;
+use crate::label::Label;
 use crate::layout::Shape;
 use crate::name::Name;
 use crate::package::Type;
-use crate::sender::Label;
 use crate::slots::{Posted, Slots};
 
 /// The last package of each state that this sender sent. Private to it, and bounded: whether one still waits, its word
@@ -33,15 +33,26 @@ impl Posts {
     }
 
     /// The last of the same state as this one.
+    #[inline]
     pub(crate) fn of(&self, label: &Label) -> Option<Posted> {
+        if self.posts.is_empty() { None } else { self.find(label) }
+    }
+
+    #[inline(never)]
+    fn find(&self, label: &Label) -> Option<Posted> {
         self.posts.iter().find(|(of, _)| *of == state(label)).map(|(_, posted)| *posted)
     }
 
     /// Keeps what was just published.
+    #[inline]
     pub(crate) fn remember(&mut self, label: &Label, posted: Posted, slots: &Slots<'_>) {
-        if self.most == 0 {
-            return;
+        if self.most > 0 {
+            self.remember_latest(label, posted, *slots);
         }
+    }
+
+    #[inline(never)]
+    fn remember_latest(&mut self, label: &Label, posted: Posted, slots: Slots<'_>) {
         let of = state(label);
         let gone = |(_, old): &(LatestState, Posted)| slots.load(old.slot) != old.word;
         if let Some(same) = self.posts.iter_mut().find(|(there, _)| *there == of) {

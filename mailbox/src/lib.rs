@@ -61,8 +61,8 @@
 //! 1. `word`, `slots`, `hot`: the protocol. `queue`: what the receiver knows. `latest`: what replaces what.
 //! 2. `bell`, `doorbell`, `waiting`, `watch`: sleeping and waking.
 //! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics and fences.
-//! 4. `sender`, `place`, `receiver`: what users hold; `routes`: what is on other nodes. `node`, `entry`,
-//!    `participant`, `lock`, `registry`, `unlink`: live processes and their names.
+//! 4. `label`, `sender`, `send_error`, `place`, `receiver`: what users hold; `routes`: what is on other nodes.
+//!    `node`, `entry`, `participant`, `lock`, `registry`, `unlink`: live processes and their names.
 //! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes
@@ -97,6 +97,7 @@ mod flows;
 mod full;
 mod hot;
 mod inspect;
+mod label;
 mod latest;
 mod layout;
 mod lock;
@@ -112,6 +113,7 @@ mod receiver;
 mod registry;
 mod routes;
 mod segment;
+mod send_error;
 mod sender;
 mod slots;
 #[cfg_attr(not(feature = "crash-points"), allow(unused))]
@@ -135,6 +137,7 @@ pub use entry::{ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 pub use flows::{FlowInfo, FlowSecond, Publications};
 pub use full::OverflowPolicy;
 pub use inspect::{InspectError, MailboxDetail, MailboxInfo, Party, SlotInfo, VictimInfo, WaitingPackage};
+pub use label::Label;
 pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
 pub use node::{LaunchLock, Node, NodeError, base_directory, node_directory, remove_base_if_empty};
@@ -143,7 +146,8 @@ pub use participant::Participant;
 pub use receiver::{Package, Receiver};
 pub use registry::CreateError;
 pub use routes::ROUTES_MAX;
-pub use sender::{Label, Loan, SendError, Sender};
+pub use send_error::SendError;
+pub use sender::{Loan, Sender};
 pub use slots::SLOTS_MAX;
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
 pub use throttle::Throttle;

@@ -5,6 +5,7 @@ use nix::sys::mman::{MapFlags, ProtFlags, mmap, munmap};
 use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
+use std::ops::Deref;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 use std::sync::{Arc, Weak};
@@ -117,6 +118,86 @@ impl Mapping {
         assert!(offset.checked_add(count).is_some_and(|end| end <= self.bytes));
         // SAFETY: stays inside the mapping, as just asserted.
         unsafe { self.base.add(offset) }
+    }
+}
+
+/// A part of a mapping that was checked when it was made, and is reached without another look. Keeps the mapping.
+pub(crate) struct Located<T: ?Sized> {
+    at: NonNull<T>,
+    _mapping: Mapping,
+}
+
+// SAFETY: made of `Shared` values alone (`Mapping::locate`), which any thread may reach; it may go wherever the mapping
+// may.
+unsafe impl<T: ?Sized> Send for Located<T> {}
+// SAFETY: as above.
+unsafe impl<T: ?Sized> Sync for Located<T> {}
+
+impl Mapping {
+    /// [`Mapping::at`], to keep.
+    pub(crate) fn locate<T: Shared>(&self, offset: usize) -> Located<T> {
+        Located { at: NonNull::from(self.at::<T>(offset)), _mapping: self.clone() }
+    }
+
+    /// [`Mapping::slice`], to keep.
+    pub(crate) fn locate_slice<T: Shared>(&self, offset: usize, count: usize) -> Located<[T]> {
+        Located { at: NonNull::from(self.slice::<T>(offset, count)), _mapping: self.clone() }
+    }
+}
+
+/// Rooms of one size, one after the other, to be reached by their number. Keeps the mapping.
+pub(crate) struct Rooms {
+    first: NonNull<u8>,
+    bytes_each: usize,
+    count: usize,
+    _mapping: Mapping,
+}
+
+// SAFETY: as of `Mapping`: bodies come as raw pointers.
+unsafe impl Send for Rooms {}
+// SAFETY: as above.
+unsafe impl Sync for Rooms {}
+
+impl Rooms {
+    /// The address of a room.
+    ///
+    /// # Panics
+    /// When there is none of this number.
+    #[inline]
+    pub(crate) fn room(&self, number: usize) -> NonNull<u8> {
+        assert!(number < self.count);
+        // SAFETY: inside the mapping: all rooms are (`Mapping::rooms`).
+        unsafe { self.first.add(number * self.bytes_each) }
+    }
+
+    /// Where they begin: an address to prefetch from, also when there is no room.
+    #[inline]
+    pub(crate) fn first(&self) -> *const u8 {
+        self.first.as_ptr()
+    }
+
+    /// From one to the next.
+    #[inline]
+    pub(crate) fn bytes_each(&self) -> usize {
+        self.bytes_each
+    }
+}
+
+impl Mapping {
+    /// Panics as [`Mapping::at`] does.
+    pub(crate) fn rooms(&self, offset: usize, bytes_each: usize, count: usize) -> Rooms {
+        let first = self.bytes_at(offset, bytes_each * count);
+        Rooms { first, bytes_each, count, _mapping: self.clone() }
+    }
+}
+
+impl<T: ?Sized> Deref for Located<T> {
+    type Target = T;
+
+    #[inline]
+    fn deref(&self) -> &T {
+        // SAFETY: it was a reference into the mapping, which lives as long as this.
+        unsafe { self.at.as_ref() }
     }
 }
 

@@ -21,7 +21,7 @@ use crate::entry::{Entry, ModuleState, PARTICIPANTS_MAX, ParticipantInfo};
 use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
 use crate::layout::{MAGIC, VERSION};
 use crate::lock::{self, AllHeld, Held};
-use crate::memory::{Mapping, Shared, Use};
+use crate::memory::{Located, Mapping, Shared, Use};
 use crate::name::Name;
 use crate::step::step;
 use crate::word::Claimant;
@@ -145,7 +145,7 @@ pub struct Node {
     directory: File,
     /// Device and number of the file, by which it is known again.
     identity: (u64, u64),
-    mapping: Mapping,
+    page: Located<NodePage>,
 }
 
 impl NodeError {
@@ -208,9 +208,9 @@ impl Node {
         // Not to be read, only to find pipes by.
         let flags = libc::O_PATH | libc::O_DIRECTORY | libc::O_CLOEXEC;
         let directory = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
-        let mapping = Mapping::new(&file, bytes, Use::Share).map_err(failed)?;
+        let page = Mapping::new(&file, bytes, Use::Share).map_err(failed)?.locate(0);
         let there = file.metadata().map_err(failed)?;
-        let node = Self { path: path.into(), mapping, identity: (there.dev(), there.ino()), file, directory };
+        let node = Self { path: path.into(), page, identity: (there.dev(), there.ino()), file, directory };
         if maker.is_some() {
             node.check_in()?;
         }
@@ -246,7 +246,7 @@ impl Node {
     }
 
     pub(crate) fn page(&self) -> &NodePage {
-        self.mapping.at(0)
+        &self.page
     }
 
     pub(crate) fn entry(&self, index: u16) -> &Entry {

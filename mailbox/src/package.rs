@@ -160,16 +160,20 @@ impl Head {
     /// [`Short`] when there are fewer than 16 bytes. Any 16 bytes are a head; whether its length fits is the caller's
     /// to check.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Short> {
-        let Some(b) = bytes.first_chunk::<HEAD_BYTES>() else {
-            return Err(Short { have: bytes.len(), need: HEAD_BYTES });
-        };
-        Ok(if Options(b[15]).has(Options::BIG_ENDIAN) {
-            Self::parse(b, u32::from_be_bytes, u16::from_be_bytes)
-        } else {
-            Self::parse(b, u32::from_le_bytes, u16::from_le_bytes)
-        })
+        bytes.first_chunk().map(Self::of).ok_or(Short { have: bytes.len(), need: HEAD_BYTES })
     }
 
+    /// The same of as many bytes as a head has.
+    #[inline]
+    pub(crate) fn of(bytes: &[u8; HEAD_BYTES]) -> Self {
+        if Options(bytes[15]).has(Options::BIG_ENDIAN) {
+            Self::parse(bytes, u32::from_be_bytes, u16::from_be_bytes)
+        } else {
+            Self::parse(bytes, u32::from_le_bytes, u16::from_le_bytes)
+        }
+    }
+
+    #[inline]
     fn parse(b: &[u8; HEAD_BYTES], word: impl Fn([u8; 4]) -> u32, half: impl Fn([u8; 2]) -> u16) -> Self {
         Self {
             to: Name::from_raw(word([b[0], b[1], b[2], b[3]])),

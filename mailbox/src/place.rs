@@ -29,20 +29,22 @@ impl Place {
         Self { cursor: home, home, turn: 0, away: 0 }
     }
 
-    /// The slot that will be looked at first.
-    pub(crate) fn next(&self) -> usize {
-        if self.away == 0 { self.home + self.turn } else { self.cursor }
+    /// The slot that will be looked at first, of so many.
+    pub(crate) fn next(&self, count: usize) -> usize {
+        let number = if self.away == 0 { self.home + self.turn } else { self.cursor };
+        // Mostly it is a slot already, and a division costs as much as all other steps of a search.
+        if number < count { number } else { number % count }
     }
 
-    pub(crate) fn first(&mut self) -> &mut usize {
-        self.cursor = self.next();
+    pub(crate) fn first(&mut self, count: usize) -> &mut usize {
+        self.cursor = self.next(count);
         &mut self.cursor
     }
 
     pub(crate) fn found(&mut self, slot: usize, count: usize) {
         if self.away > 0 {
             self.away -= 1;
-        } else if slot == (self.home + self.turn) % count {
+        } else if slot == self.next(count) {
             self.turn = (self.turn + 1) % Self::HOME;
         } else {
             self.away = Self::AWAY;

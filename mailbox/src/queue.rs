@@ -53,6 +53,7 @@ impl Queue {
     }
 
     /// Takes the most important, then earliest, package.
+    #[inline(always)]
     pub(crate) fn take(&mut self, slots: &Slots<'_>) -> Option<Taken> {
         self.receives = self.receives.wrapping_add(1);
         if self.receives.is_multiple_of(RESCAN_EVERY) {
@@ -82,6 +83,7 @@ impl Queue {
     }
 
     /// Whether the first of the heap is the first of all: nobody has alerted, and it is of the level or above.
+    #[inline(always)]
     fn knows_the_first(&self, slots: &Slots<'_>) -> bool {
         let first = self.heap.first();
         first.is_some_and(|(word, _)| u16::from(word.priority().0) >= self.level) && !slots.is_alerted()
@@ -142,6 +144,7 @@ impl Queue {
         self.collect(slots, horizon);
     }
 
+    #[inline(always)]
     fn collect(&mut self, slots: &Slots<'_>, horizon: u64) {
         for (i, hints) in slots.hot.ready.0[..slots.count().div_ceil(64)].iter().enumerate() {
             // Looked at before it is swapped, so that a hint word without hints is not written. SeqCst for (J): the
@@ -165,7 +168,19 @@ impl Queue {
         }
     }
 
+    #[inline]
     fn insert(&mut self, word: Word, slot: usize) {
+        // Mostly the receiver keeps up, and knows of one package at a time.
+        if self.heap.is_empty() {
+            self.heap.push((word, slot as u16));
+            self.place[slot] = 0;
+            return;
+        }
+        self.insert_among(word, slot);
+    }
+
+    #[inline(never)]
+    fn insert_among(&mut self, word: Word, slot: usize) {
         let at = match self.place[slot] {
             ABSENT => {
                 self.heap.push((word, slot as u16));
@@ -180,14 +195,19 @@ impl Queue {
         self.sink(at);
     }
 
+    #[inline]
     fn pop(&mut self) -> Option<(Word, usize)> {
-        if self.heap.is_empty() {
-            return None;
-        }
-        let (word, slot) = self.heap.swap_remove(0);
-        self.place[slot as usize] = ABSENT;
-        self.sink(0);
-        Some((word, slot as usize))
+        let (last, last_slot) = self.heap.pop()?;
+        let (word, slot) = match self.heap.first_mut() {
+            None => (last, last_slot),
+            Some(first) => {
+                let first = std::mem::replace(first, (last, last_slot));
+                self.sink(0);
+                first
+            }
+        };
+        self.place[usize::from(slot)] = ABSENT;
+        Some((word, slot.into()))
     }
 
     fn rise(&mut self, mut at: usize) -> usize {
@@ -200,11 +220,13 @@ impl Queue {
         at
     }
 
+    #[inline(never)]
     fn sink(&mut self, mut at: usize) {
         loop {
-            let children = [2 * at + 1, 2 * at + 2].into_iter().filter(|child| *child < self.heap.len());
-            let Some(child) = children.max_by_key(|child| self.heap[*child].0.rank()) else { break };
-            if self.heap[child].0.rank() <= self.heap[at].0.rank() {
+            let rank = |at: usize| self.heap.get(at).map_or(0, |(word, _)| word.rank());
+            let (left, right) = (2 * at + 1, 2 * at + 2);
+            let child = if rank(right) > rank(left) { right } else { left };
+            if child >= self.heap.len() || rank(child) <= rank(at) {
                 break;
             }
             self.heap.swap(at, child);

@@ -79,6 +79,7 @@ impl Receiver {
         (self.queue.len(), self.queue.first())
     }
 
+    #[inline(always)]
     pub(crate) fn hand_out(&self, in_hand: TakenPackage) -> Package<'_> {
         let TakenPackage { taken, head, published_ns } = in_hand;
         Package { segment: &self.segment, queue: &self.queue, taken: Some(taken), head, published_ns }
@@ -112,20 +113,22 @@ impl Receiver {
     }
 
     /// Takes the next package that is not too old.
+    #[inline(always)]
     pub(crate) fn next(&mut self) -> Option<TakenPackage> {
         self.search_if_due();
         let slots = self.segment.slots();
         loop {
             let taken = self.queue.take(&slots)?;
             let depth = self.queue.len() as u32 + 1;
-            let depth_max = &self.segment.page().owner.depth_max;
+            let page = self.segment.page();
+            let depth_max = &page.owner.depth_max;
             if depth > depth_max.load(Ordering::Relaxed) {
                 depth_max.store(depth, Ordering::Relaxed);
             }
             let (published_ns, mut head) = self.segment.read_head(&taken);
             let waited_ns = monotonic_ns().saturating_sub(published_ns);
             if waited_ns <= self.max_age_ns {
-                self.segment.page().counters.received(taken.word().priority(), waited_ns, head.len.into());
+                page.counters.received(taken.word().priority(), waited_ns, head.len.into());
                 if taken.word().is_redelivered() {
                     head.options = head.options.with(Options::REDELIVERED);
                 }
@@ -136,6 +139,7 @@ impl Receiver {
         }
     }
 
+    #[inline(always)]
     fn search_if_due(&mut self) {
         let due = match &mut self.search_in {
             Some(0) => true,
@@ -151,6 +155,7 @@ impl Receiver {
     }
 
     /// Looks through all slots for what the dead left.
+    #[cold]
     fn search(&mut self) {
         let node = self.participant.node().clone();
         // Read before the search: a death after it raises the count once more.

@@ -2,9 +2,9 @@
 
 use crate::clock::monotonic_ns;
 use crate::files::{open_shared, open_to_read};
-use crate::layout::{Identity, Page, SLOT_PREFIX, Shape, VERSION};
+use crate::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape, VERSION};
 use crate::mapped;
-use crate::memory::{Mapping, Use};
+use crate::memory::{Located, Mapping, Rooms, Use};
 use crate::name::Name;
 use crate::package::{HEAD_BYTES, Head};
 use crate::slots::{Bodies, Claim, Slots, Taken};
@@ -20,15 +20,16 @@ static NEXT: AtomicU64 = AtomicU64::new(0);
 
 /// A mailbox's memory. What it is was checked when it was mapped and is not read again.
 pub(crate) struct Segment {
-    mapping: Mapping,
+    page: Located<Page>,
+    words: Located<[AtomicU64]>,
+    /// Prefix and body of each slot; none of a segment that is only looked at.
+    rooms: Rooms,
     /// No other segment of this process has this number, also no other of the same file.
     number: u64,
     pub(crate) name: Name,
     pub(crate) shape: Shape,
     /// What the shape says, worked out once.
     word_stride: usize,
-    slots_offset: usize,
-    slot_bytes: usize,
 }
 
 /// Why a file is not the mailbox it should be.
@@ -62,7 +63,7 @@ pub(crate) fn name_of(path: &Path) -> Option<Name> {
 impl Segment {
     /// Maps a file that was just made, and writes what it is.
     pub(crate) fn format(file: &File, name: Name, shape: Shape) -> io::Result<Self> {
-        let segment = Self::new(Mapping::new(file, shape.segment_bytes(), Use::Keep)?, name, shape);
+        let segment = Self::new(&Mapping::new(file, shape.segment_bytes(), Use::Keep)?, name, shape, true);
         segment.page().identity.write(name, &shape);
         Ok(segment)
     }
@@ -71,26 +72,28 @@ impl Segment {
     pub(crate) fn open(node: &Path, name: Name) -> Result<Self, BadSegment> {
         let file = open_shared(&path_of(node, name), false)?;
         let shape = Self::identify(&file, name)?;
-        Ok(Self::new(mapped::mapping(&file, shape.segment_bytes())?, name, shape))
+        Ok(Self::new(&mapped::mapping(&file, shape.segment_bytes())?, name, shape, true))
     }
 
     /// Maps its page and words, to look at: no body is read, and so none of its pages need be brought in.
     pub(crate) fn look_at(node: &Path, name: Name) -> Result<(Self, File), BadSegment> {
         let file = open_to_read(&path_of(node, name))?;
         let shape = Self::identify(&file, name)?;
-        Ok((Self::new(Mapping::new(&file, shape.slots_offset(), Use::Look)?, name, shape), file))
+        Ok((Self::new(&Mapping::new(&file, shape.slots_offset(), Use::Look)?, name, shape, false), file))
     }
 
     /// Maps a file and checks that it is this mailbox, whole.
     pub(crate) fn check(file: &File, name: Name, used: Use) -> Result<Self, BadSegment> {
         let shape = Self::identify(file, name)?;
-        Ok(Self::new(Mapping::new(file, shape.segment_bytes(), used)?, name, shape))
+        Ok(Self::new(&Mapping::new(file, shape.segment_bytes(), used)?, name, shape, true))
     }
 
-    fn new(mapping: Mapping, name: Name, shape: Shape) -> Self {
-        let (word_stride, slots_offset, slot_bytes) = (shape.word_stride(), shape.slots_offset(), shape.slot_bytes());
+    fn new(mapping: &Mapping, name: Name, shape: Shape, has_bodies: bool) -> Self {
+        let slots = if has_bodies { usize::from(shape.slots) } else { 0 };
+        let rooms = mapping.rooms(shape.slots_offset(), shape.slot_bytes(), slots);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        Self { mapping, number, name, shape, word_stride, slots_offset, slot_bytes }
+        let (page, words) = (mapping.locate(0), mapping.locate_slice(PAGE, shape.words()));
+        Self { page, words, rooms, number, name, shape, word_stride: shape.word_stride() }
     }
 
     /// What a file says that it is. Read, not mapped: a map costs more than all of the rest.
@@ -114,16 +117,13 @@ impl Segment {
 
     #[inline]
     pub(crate) fn page(&self) -> &Page {
-        self.mapping.at(0)
+        &self.page
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn slots(&self) -> Slots<'_> {
-        let slots = usize::from(self.shape.slots);
-        let words = self.mapping.slice(crate::layout::PAGE, slots * self.word_stride);
-        let first = self.mapping.bytes_at(self.slots_offset, 0).as_ptr();
-        let bodies = Bodies { first, bytes: self.slot_bytes, segment: self.number };
-        Slots::new(&self.page().hot, words, self.word_stride, slots, bodies)
+        let bodies = Bodies { first: self.rooms.first(), bytes: self.rooms.bytes_each(), segment: self.number };
+        Slots::new(&self.page.hot, &self.words, self.word_stride, usize::from(self.shape.slots), bodies)
     }
 
     /// A slot that this process has claimed or taken.
@@ -132,11 +132,12 @@ impl Segment {
     /// If it is a slot of another segment.
     #[inline]
     fn slot(&self, slot: usize, segment: u64) -> NonNull<u8> {
-        assert!(segment == self.number && slot < usize::from(self.shape.slots));
-        self.mapping.bytes_at(self.slots_offset + slot * self.slot_bytes, self.slot_bytes)
+        assert!(segment == self.number);
+        self.rooms.room(slot)
     }
 
     /// The body of a claimed slot, to write.
+    #[inline(always)]
     pub(crate) fn body_mut<'a>(&'a self, claim: &'a mut Claim) -> &'a mut [u8] {
         let (slot, len) = (self.slot(claim.slot(), claim.segment()), usize::from(self.shape.body_bytes_max));
         // SAFETY: `slot` gives room for prefix and body, and the borrow of `self` keeps the map. The claim is of this
@@ -145,7 +146,7 @@ impl Segment {
     }
 
     /// Writes the prefix of a claimed slot: the time (which is the result) and the head.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn write_head(&self, claim: &mut Claim, head: &Head) -> u64 {
         let (prefix, now_ns) = (self.slot(claim.slot(), claim.segment()), monotonic_ns());
         // SAFETY: inside the slot and aligned (slots start at multiples of 64); exclusive as in `body_mut`.
@@ -158,14 +159,14 @@ impl Segment {
 
     /// When a taken package was published (monotonic ns), and its head; the length in it is one that the slot has room
     /// for.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn read_head(&self, taken: &Taken) -> (u64, Head) {
         let prefix = self.slot(taken.slot(), taken.segment());
         // SAFETY: inside the slot and aligned; taken, and of this segment (`slot`), so nobody writes it.
         let (published_ns, head) =
             unsafe { (prefix.cast::<u64>().read(), prefix.add(8).cast::<[u8; HEAD_BYTES]>().read()) };
-        // Sixteen bytes are always a head; its length is only believed as far as the slot goes.
-        let head = Head::from_bytes(&head).unwrap_or_default();
+        // Its length is only believed as far as the slot goes.
+        let head = Head::of(&head);
         (published_ns, Head { len: head.len.min(self.shape.body_bytes_max), ..head })
     }
 

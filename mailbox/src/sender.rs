@@ -3,81 +3,34 @@
 use crate::counters::Loss;
 use crate::doorbell;
 use crate::full::NoSlot;
+use crate::label::Label;
 use crate::latest::Posts;
 use crate::name::{Name, Priority};
-use crate::package::{Head, Options, Type};
 use crate::participant::Participant;
 use crate::place::Place;
 use crate::routes;
 use crate::segment::{BadSegment, Segment};
+use crate::send_error::SendError;
 use crate::slots::{Claim, Published};
 use crate::step::step;
-use crate::traffic::{Key, Writer};
+use crate::traffic::Writer;
 use std::sync::Arc;
 
 /// A mailbox that is replaced over and over while one package is sent: give up after so many.
 const REOPEN_MAX: usize = 3;
 
-/// Why a package could not be sent. It was not accepted; nothing is lost that its sender does not know of.
-#[derive(Debug, thiserror::Error)]
-pub enum SendError {
-    /// Nobody on this node has made such a mailbox, and no router takes it further.
-    #[error("mailbox {0}: not on this node, and no router leads to it; is its module launched?")]
-    NoMailbox(Name),
-    /// It is on another node, but the router that takes packages there has no mailbox here.
-    #[error("mailbox {name} is on another node, and the router that leads there, {router}, does not run; start it")]
-    NoRouter {
-        /// Where it should go.
-        name: Name,
-        /// The router's mailbox for such packages.
-        router: Name,
-    },
-    /// All slots are in use by packages as important or more.
-    #[error("mailbox {0} is full; its receiver is slow or stopped, or it has too few slots")]
-    Full(Name),
-    /// Larger than the mailbox's slots.
-    #[error(
-        "mailbox {name} takes bodies of at most {max} bytes, this one has {len}; raise its `size` in the configuration"
-    )]
-    TooLarge {
-        /// Where it should go.
-        name: Name,
-        /// Bytes of the body.
-        len: usize,
-        /// Bytes that fit.
-        max: usize,
-    },
-    /// This participant sends to that mailbox already and may not hold more claims there.
-    #[error("mailbox {0}: this participant has as many senders there as the mailbox's `claims` allows; share one")]
-    InUse(Name),
-    /// This process looked dead to the receiver, which took the slot back.
-    #[error("mailbox {0}: its receiver held this process for dead; was the node's directory removed?")]
-    Reclaimed(Name),
-    /// The segment cannot be used.
-    #[error("mailbox {0}: {1}")]
-    Bad(Name, String),
+/// Why there is no slot in the mailbox as it is.
+enum NoClaim {
+    TooLarge,
+    NoSlot(NoSlot),
 }
 
-/// What a sender says of a package besides its body; the mailbox's name and the length are filled in.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Label {
-    /// Mailbox that answers go to.
-    pub from: Name,
-    /// What it is.
-    pub kind: Type,
-    /// Tells packages of one type apart.
-    pub id: u16,
-    /// How urgent.
-    pub priority: Priority,
-    /// Option bits.
-    pub options: Options,
-}
-
-impl Label {
-    fn head(&self, to: Name, len: usize) -> Head {
-        let Self { from, kind, id, priority, options } = *self;
-        Head { to, from, len: len as u16, kind, id, priority, options }
-    }
+/// Why a filled claim was not published in its mailbox.
+enum NotHere {
+    /// The mailbox was given up: the package is sent anew.
+    Retired(Claim),
+    /// This process looked dead to the receiver.
+    Reclaimed,
 }
 
 /// Where a sender may lead.
@@ -200,16 +153,21 @@ impl Sender {
     /// # Errors
     /// When it was not accepted.
     pub fn send(&mut self, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
-        let len: usize = parts.iter().map(|part| part.len()).sum();
-        let claim = self.claim(label.priority, Some(label), len).map_err(|error| self.refused(label, error))?;
-        let mut loan = Loan { sender: self, claim: Some(claim), priority: label.priority };
-        let mut body = loan.body();
+        let len = match parts {
+            [all] => all.len(),
+            parts => parts.iter().map(|part| part.len()).sum(),
+        };
+        let mut claim = match self.claim(label.priority, Some(label), len) {
+            Ok(claim) => claim,
+            Err(error) => return Err(self.refused(label, error)),
+        };
+        let mut body = self.segment.body_mut(&mut claim);
         for part in parts {
             let (here, rest) = body.split_at_mut(part.len());
             here.copy_from_slice(part);
             body = rest;
         }
-        loan.send(label, len)
+        self.publish(claim, label, len)
     }
 
     /// Borrows a slot to write a package in place. Dropped unsent, the slot is free again. What it will replace in a
@@ -223,35 +181,60 @@ impl Sender {
         Ok(Loan { sender: self, claim: Some(claim), priority })
     }
 
-    /// A slot for a body of `len` bytes. One too large is refused before it pushes anybody out.
+    /// A slot for a body of `len` bytes.
+    #[inline(always)]
     fn claim(&mut self, priority: Priority, label: Option<&Label>, len: usize) -> Result<Claim, SendError> {
         if self.is_routed() && self.participant.node().registry_epoch() != self.epoch {
             self.look_again()?;
         }
+        match self.claim_here(priority, label, len) {
+            Ok(claim) => Ok(claim),
+            Err(why) => self.claim_elsewhere(why, priority, label, len),
+        }
+    }
+
+    /// The same in the mailbox as it is. A body too large is refused before it pushes anybody out.
+    #[inline(always)]
+    fn claim_here(&mut self, priority: Priority, label: Option<&Label>, len: usize) -> Result<Claim, NoClaim> {
+        let slots = self.segment.slots();
+        if len > self.body_bytes_max() && !slots.is_retired() {
+            return Err(NoClaim::TooLarge);
+        }
+        let (me, full) = (self.participant.claimant(), self.segment.shape.full);
+        let old = label.and_then(|label| self.posts.of(label));
+        let claim = slots.claim(me, self.place.first(slots.count()), priority, full, old).map_err(NoClaim::NoSlot)?;
+        self.place.found(claim.slot(), slots.count());
+        Ok(claim)
+    }
+
+    /// A mailbox that was given up is followed by the one that took its place.
+    #[cold]
+    fn claim_elsewhere(
+        &mut self,
+        mut why: NoClaim,
+        priority: Priority,
+        label: Option<&Label>,
+        len: usize,
+    ) -> Result<Claim, SendError> {
         for _ in 0..REOPEN_MAX {
-            let me = self.participant.claimant();
-            let (max, retired) = (self.body_bytes_max(), self.segment.slots().is_retired());
-            if len > max && !retired {
-                return Err(SendError::TooLarge { name: self.segment.name, len, max });
-            }
-            let old = label.and_then(|label| self.posts.of(label));
-            let slots = self.segment.slots();
-            match slots.claim(me, self.place.first(), priority, self.segment.shape.full, old) {
-                Ok(claim) => {
-                    self.place.found(claim.slot(), slots.count());
-                    return Ok(claim);
-                }
-                Err(NoSlot::Full) => {
+            let name = self.segment.name;
+            match why {
+                NoClaim::TooLarge => return Err(SendError::TooLarge { name, len, max: self.body_bytes_max() }),
+                NoClaim::NoSlot(NoSlot::Full) => {
                     self.segment.page().counters.lost(priority, Loss::Refused, 1);
-                    return Err(SendError::Full(self.segment.name));
+                    return Err(SendError::Full(name));
                 }
-                Err(NoSlot::Retired) => {
+                NoClaim::NoSlot(NoSlot::Retired) => {
                     let successor = open(&self.participant, self.to, self.reach)?;
                     self.enter(successor)?;
                 }
             }
+            match self.claim_here(priority, label, len) {
+                Ok(claim) => return Ok(claim),
+                Err(next) => why = next,
+            }
         }
-        Err(SendError::NoMailbox(self.name()))
+        Err(SendError::NoMailbox(self.to))
     }
 
     /// Whether a router takes the packages further.
@@ -289,33 +272,55 @@ impl Sender {
     }
 
     /// Publishes a filled claim; on a retired mailbox moves it to the one that took its place.
-    fn publish(&mut self, mut claim: Claim, label: &Label, len: usize) -> Result<(), SendError> {
-        let name = self.name();
-        for _ in 0..REOPEN_MAX {
-            let published_ns = self.segment.write_head(&mut claim, &label.head(name, len));
+    #[inline(always)]
+    fn publish(&mut self, claim: Claim, label: &Label, len: usize) -> Result<(), SendError> {
+        match self.publish_here(claim, label, len) {
+            Ok(()) => Ok(()),
+            Err(NotHere::Retired(claim)) => self.publish_elsewhere(claim, label, len),
+            Err(NotHere::Reclaimed) => Err(self.refused(label, SendError::Reclaimed(self.to))),
+        }
+    }
+
+    #[inline(always)]
+    fn publish_here(&mut self, mut claim: Claim, label: &Label, len: usize) -> Result<(), NotHere> {
+        let published_ns = self.segment.write_head(&mut claim, &label.head(self.to, len));
+        self.count_victim(&claim);
+        let slots = self.segment.slots();
+        if self.posts.of(label).is_some_and(|old| slots.replace(&mut claim, old)) {
             self.count_victim(&claim);
-            let slots = self.segment.slots();
-            if self.posts.of(label).is_some_and(|old| slots.replace(&mut claim, old)) {
-                self.count_victim(&claim);
-            }
-            match slots.publish(claim, label.priority) {
-                Published::Accepted { posted, wake } => {
-                    slots.expect_to_fill(self.place.next());
-                    self.posts.remember(label, posted, &slots);
-                    if wake {
-                        self.wake();
-                    }
-                    step!("send: before count");
-                    self.flows.accepted(self.participant.traffic(), key(label, name), len, published_ns, 0);
-                    return Ok(());
+        }
+        match slots.publish(claim, label.priority) {
+            Published::Accepted { posted, wake } => {
+                slots.expect_to_fill(self.place.next(slots.count()));
+                self.posts.remember(label, posted, &slots);
+                if wake {
+                    self.wake();
                 }
-                Published::Reclaimed => return Err(SendError::Reclaimed(name)),
-                Published::Retired(old) => claim = self.move_on(old, label.priority, len)?,
+                step!("send: before count");
+                self.flows.accepted(self.participant.traffic(), label.key(self.to), len, published_ns, 0);
+                Ok(())
+            }
+            Published::Reclaimed => Err(NotHere::Reclaimed),
+            Published::Retired(claim) => Err(NotHere::Retired(claim)),
+        }
+    }
+
+    /// The mailbox was given up: follows it to the ones that took its place.
+    #[cold]
+    fn publish_elsewhere(&mut self, mut claim: Claim, label: &Label, len: usize) -> Result<(), SendError> {
+        let name = self.to;
+        for _ in 1..REOPEN_MAX {
+            let moved = self.move_on(claim, label.priority, len);
+            claim = moved.map_err(|error| self.refused(label, error))?;
+            match self.publish_here(claim, label, len) {
+                Ok(()) => return Ok(()),
+                Err(NotHere::Retired(old)) => claim = old,
+                Err(NotHere::Reclaimed) => return Err(self.refused(label, SendError::Reclaimed(name))),
             }
         }
         self.count_victim(&claim);
         self.segment.slots().abandon(claim);
-        Err(SendError::NoMailbox(name))
+        Err(self.refused(label, SendError::NoMailbox(name)))
     }
 
     /// Copies a claim of a retired mailbox into one of its successor.
@@ -341,8 +346,9 @@ impl Sender {
     }
 
     /// Counts what was not accepted; its sender is told.
+    #[cold]
     fn refused(&mut self, label: &Label, error: SendError) -> SendError {
-        let key = key(label, self.name());
+        let key = label.key(self.name());
         self.flows.refused(self.participant.traffic(), key);
         error
     }
@@ -367,10 +373,6 @@ impl Drop for Sender {
         self.flows.leave(self.participant.traffic());
         count_out(&mut self.participant.sending(), &self.segment);
     }
-}
-
-fn key(label: &Label, to: Name) -> Key {
-    Key { to, from: label.from, kind: label.kind }
 }
 
 /// A slot to write a package in.
@@ -401,10 +403,7 @@ impl Loan<'_> {
             return Err(self.sender.refused(label, error));
         }
         match self.claim.take() {
-            Some(claim) => {
-                let sent = self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len);
-                sent.map_err(|error| self.sender.refused(label, error))
-            }
+            Some(claim) => self.sender.publish(claim, &Label { priority: self.priority, ..*label }, len),
             None => Ok(()),
         }
     }

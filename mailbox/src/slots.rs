@@ -47,8 +47,8 @@ pub(crate) struct Claim {
     slot: usize,
     segment: u64,
     word: Word,
-    /// The package that this one replaces.
-    place: Option<Word>,
+    /// The package that this one replaces, or [`FREE`]. No `Option`: a claim is moved as plain numbers.
+    place: Word,
     /// It displaced a package when the mailbox had been given up: perhaps after its owner looked for the last time.
     late: bool,
 }
@@ -150,11 +150,10 @@ pub(crate) struct Bodies {
 }
 
 impl<'a> Slots<'a> {
-    /// # Panics
-    /// When `words` are too few for `count` at `stride`; both come from a checked layout.
-    #[inline]
+    /// `words` are enough for `count` at `stride`: both come from a checked layout, and each use is checked once more.
+    #[inline(always)]
     pub(crate) fn new(hot: &'a Hot, words: &'a [AtomicU64], stride: usize, count: usize, bodies: Bodies) -> Self {
-        assert!(count > 0 && count <= SLOTS_MAX && words.len() > (count - 1) * stride);
+        debug_assert!(count > 0 && count <= SLOTS_MAX && words.len() > (count - 1) * stride);
         Self { hot, words, stride, count, bodies }
     }
 
@@ -187,6 +186,7 @@ impl<'a> Slots<'a> {
 
     /// A slot to fill. `cursor` is the sender's own: the search goes on where the last one ended. `old` is what the
     /// package would replace, if it is known by now.
+    #[inline(always)]
     pub(crate) fn claim(
         &self,
         by: Claimant,
@@ -200,12 +200,12 @@ impl<'a> Slots<'a> {
         }
         let word = Word::filling(by, None);
         for _ in 0..self.count {
-            let slot = *cursor % self.count;
+            let slot = if *cursor < self.count { *cursor } else { 0 };
             *cursor = slot + 1;
             step!("claim: before");
             if Word(self.word(slot).load(Ordering::Relaxed)) == FREE && self.change(slot, FREE, word) {
                 step!("claim: claimed");
-                return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false });
+                return Ok(Claim { slot, segment: self.bodies.segment, word, place: FREE, late: false });
             }
         }
         match full {
@@ -220,7 +220,7 @@ impl<'a> Slots<'a> {
 
     /// Takes the slot of the newest of the least important packages, if `priority` outranks it, or one that was freed
     /// since the search for one: a sender that outranks all is not refused because the receiver is quick.
-    fn displace(&self, by: Claimant, priority: Priority) -> Option<Claim> {
+    fn displace(self, by: Claimant, priority: Priority) -> Option<Claim> {
         for _ in 0..DISPLACE_LOOKS_MAX {
             let words = (0..self.count).map(|slot| (slot, self.load(slot)));
             let usable =
@@ -235,7 +235,7 @@ impl<'a> Slots<'a> {
                 // up, and sees the victim, or this is seen here.
                 seq_cst_accesses();
                 let late = victim.is_some() && self.hot.receiver.0.retired.load(Ordering::SeqCst) != 0;
-                return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });
+                return Some(Claim { slot, segment: self.bodies.segment, word, place: FREE, late });
             }
         }
         None
@@ -243,13 +243,13 @@ impl<'a> Slots<'a> {
 
     /// Takes the slot of one's own older package, if it still waits: there is no other. While the newer one is written,
     /// there is neither.
-    fn reuse(&self, by: Claimant, old: Posted) -> Option<Claim> {
+    fn reuse(self, by: Claimant, old: Posted) -> Option<Claim> {
         let word = Word::filling(by, Some(old.as_victim()));
         step!("reuse: chosen");
         let reused = self.change(old.slot, old.word, word);
         step!("reuse: claimed");
         let segment = self.bodies.segment;
-        reused.then_some(Claim { slot: old.slot, segment, word, place: Some(old.word), late: false })
+        reused.then_some(Claim { slot: old.slot, segment, word, place: old.word, late: false })
     }
 
     /// Takes one's own older package out, if it still waits; a written claim then stands in its place, also in the
@@ -257,10 +257,10 @@ impl<'a> Slots<'a> {
     /// no longer waits.
     ///
     /// If `claim` has a victim, its loss has been counted. That of the old one is to be counted after this.
-    pub(crate) fn replace(&self, claim: &mut Claim, old: Posted) -> bool {
+    pub(crate) fn replace(self, claim: &mut Claim, old: Posted) -> bool {
         self.is_of_this(claim.segment);
         // It has been replaced in its own slot already.
-        if claim.place.is_some() {
+        if claim.place != FREE {
             return false;
         }
         let State::Filling { by, .. } = claim.word.state() else { return false };
@@ -276,7 +276,7 @@ impl<'a> Slots<'a> {
         if self.change(old.slot, old.word, FREE) {
             step!("replace: freed");
             claim.word = marked;
-            claim.place = Some(old.word);
+            claim.place = old.word;
             return true;
         }
         // It is being received, or was displaced.
@@ -286,6 +286,7 @@ impl<'a> Slots<'a> {
     }
 
     /// Makes a filled slot a package. The caller has counted the displaced one, if there was one.
+    #[inline(always)]
     pub(crate) fn publish(&self, claim: Claim, priority: Priority) -> Published {
         self.is_of_this(claim.segment);
         let slot = claim.slot;
@@ -295,7 +296,7 @@ impl<'a> Slots<'a> {
         step!("publish: ticket");
         // A ticket is taken in any case, since they count the packages. What replaces an older one stands where that
         // one stood.
-        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));
+        let word = Word::ready(priority, if claim.place == FREE { ticket } else { claim.place.ticket() });
         if !self.change(slot, claim.word, word) {
             // ORDERING: Acquire; pairs with the Release of the change that was in the way: if it was `settle`'s, then
             // `retired` is seen below.
@@ -318,7 +319,7 @@ impl<'a> Slots<'a> {
         // A retired mailbox, and the word is no longer ours: the package was received before, or displaced by a sender
         // that counts it. So it was accepted. With another priority than what it replaces, and of the level, it may
         // stand before what the receiver knows of the level.
-        let moved = claim.place.is_some_and(|old| old.priority() != priority);
+        let moved = claim.place != FREE && claim.place.priority() != priority;
         if u32::from(priority.0) + u32::from(moved) > receiver.level.load(Ordering::SeqCst) {
             // ORDERING: Release; pairs with the swap in `heed`, which then sees the hint. No plain store: that of one
             // sender would hide that of another, with the hint it was for.
@@ -339,7 +340,6 @@ impl<'a> Slots<'a> {
 
     /// Has the lines of a slot come here that its next filler writes first.
     pub(crate) fn expect_to_fill(&self, slot: usize) {
-        let slot = slot % self.count;
         prefetch_to_write(self.word(slot));
         self.first_lines(slot).into_iter().for_each(prefetch_to_write);
     }

@@ -15,7 +15,7 @@
 use crate::cell::SeqCount;
 use crate::files::{allocate, open_shared, open_to_read};
 use crate::layout::{MAGIC, VERSION};
-use crate::memory::{Mapping, Shared, Use};
+use crate::memory::{Located, Mapping, Shared, Use};
 use crate::name::Name;
 use crate::node::{Node, NodeError};
 use crate::package::Type;
@@ -115,7 +115,7 @@ impl Key {
 
 /// A participant's table, which only it writes.
 pub(crate) struct Table {
-    mapping: Mapping,
+    page: Located<TrafficPage>,
     path: PathBuf,
     /// Numbers its writers.
     writers: AtomicU32,
@@ -137,7 +137,8 @@ impl Table {
             step!("traffic: file");
             allocate(&file, size_of::<TrafficPage>())?;
             let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Keep)?;
-            let header = &mapping.at::<TrafficPage>(0).header;
+            let page = mapping.locate::<TrafficPage>(0);
+            let header = &page.header;
             header.version.store(VERSION, Ordering::Relaxed);
             header.participant.store(me.participant.into(), Ordering::Relaxed);
             header.incarnation.store(me.incarnation, Ordering::Relaxed);
@@ -146,10 +147,10 @@ impl Table {
             step!("traffic: formatted");
             fs::rename(&unfinished, &path)?;
             step!("traffic: named");
-            Ok(mapping)
+            Ok(page)
         };
         match made() {
-            Ok(mapping) => Ok(Self { mapping, path, writers: AtomicU32::new(0) }),
+            Ok(page) => Ok(Self { page, path, writers: AtomicU32::new(0) }),
             Err(error) => {
                 let _ = fs::remove_file(&unfinished);
                 Err(NodeError::of(&path, error))
@@ -163,7 +164,7 @@ impl Table {
     }
 
     fn rows(&self) -> &[FlowRow; FLOWS] {
-        &self.mapping.at::<TrafficPage>(0).rows
+        &self.page.rows
     }
 
     /// One that counts in rows of its own.
@@ -171,7 +172,7 @@ impl Table {
         // Neither of the two that mean something else; a number that comes round again finds its row's old writer long
         // gone.
         let me = self.writers.fetch_add(1, Ordering::Relaxed) % (IDLE - 1) + 1;
-        Writer { me, recent: [None; RECENT], next: 0 }
+        Writer { me, recent: [None; RECENT] }
     }
 
     /// A row for this key: the one that an earlier writer of the same left, a new one, the idlest of others, or the
@@ -222,36 +223,37 @@ impl Table {
 }
 
 /// A table as others read it.
-pub(crate) struct TableView(Mapping);
+pub(crate) struct TableView(Located<TrafficPage>);
 
 impl TableView {
     /// The table of this participant, if it is there, whole, and of this use of the index.
     pub(crate) fn open(node: &Path, claimant: Claimant) -> Option<Self> {
         let file = open_to_read(&path_of(node, claimant.participant)).ok()?;
         let mapping = Mapping::new(&file, size_of::<TrafficPage>(), Use::Look).ok()?;
-        let header = &mapping.at::<TrafficPage>(0).header;
+        let page = mapping.locate::<TrafficPage>(0);
+        let header = &page.header;
         let said = [&header.version, &header.participant, &header.incarnation, &header.rows];
         let expected = [VERSION, claimant.participant.into(), claimant.incarnation, FLOWS as u32];
         let same = header.magic.load(Ordering::Acquire) == MAGIC
             && said.iter().zip(expected).all(|(said, expected)| said.load(Ordering::Relaxed) == expected);
-        same.then_some(Self(mapping))
+        same.then_some(Self(page))
     }
 
     pub(crate) fn rows(&self) -> &[FlowRow; FLOWS] {
-        &self.0.at::<TrafficPage>(0).rows
+        &self.0.rows
     }
 }
 
 /// Counts in rows of its own.
 pub(crate) struct Writer {
     me: u32,
-    /// What it sent last, and where that is counted.
+    /// What it sent last, and where that is counted; the last first.
     recent: [Option<(Key, usize)>; RECENT],
-    next: usize,
 }
 
 impl Writer {
     /// A package was accepted, or a value published, at this moment of the monotonic clock.
+    #[inline(always)]
     pub(crate) fn accepted(&mut self, table: &Table, key: Key, bytes: usize, at_ns: u64, age_ns: u64) {
         let at = self.row(table, key);
         let row = &table.rows()[at];
@@ -278,15 +280,29 @@ impl Writer {
         }
     }
 
+    #[inline(always)]
     fn row(&mut self, table: &Table, key: Key) -> usize {
-        if let Some((_, at)) = self.recent.iter().flatten().find(|(known, _)| *known == key) {
-            return *at;
+        match self.recent[0] {
+            Some((last, at)) if last == key => at,
+            _ => self.row_of_another(table, key),
         }
+    }
+
+    /// The row of another key than the last.
+    fn row_of_another(&mut self, table: &Table, key: Key) -> usize {
+        let known = |recent: &Option<(Key, usize)>| recent.is_some_and(|(known, _)| known == key);
+        if let Some(place) = self.recent.iter().position(known) {
+            self.recent[..=place].rotate_right(1);
+        } else {
+            self.recent.rotate_right(1);
+            self.recent[0] = Some((key, self.row_in(table, key)));
+        }
+        self.recent[0].map_or(REST, |(_, at)| at)
+    }
+
+    fn row_in(&self, table: &Table, key: Key) -> usize {
         let own = |row: &FlowRow| row.writer() == self.me && row.key() == key;
-        let at = table.rows()[..REST].iter().position(own).unwrap_or_else(|| table.claim(self.me, key));
-        self.recent[self.next] = Some((key, at));
-        self.next = (self.next + 1) % RECENT;
-        at
+        table.rows()[..REST].iter().position(own).unwrap_or_else(|| table.claim(self.me, key))
     }
 
     /// Leaves its rows to others. Afterwards it has none.
@@ -341,6 +357,7 @@ impl FlowRow {
         high << 64 | low
     }
 
+    #[inline(always)]
     fn count(&self, bytes: usize, at_ns: u64, age_ns: u64) {
         let interval_ns = if self.packages.load(Ordering::Relaxed) == 0 {
             self.first_ns.store(at_ns, Ordering::Relaxed);
@@ -361,6 +378,7 @@ impl FlowRow {
 }
 
 impl Second {
+    #[inline(always)]
     fn count(&self, at_ns: u64, interval_ns: Option<u64>, bytes: u32) {
         let second = at_ns / 1_000_000_000;
         if self.second.load(Ordering::Relaxed) != second {

@@ -6,6 +6,7 @@
 use super::case::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::vyukov::{QueueMemory, Vyukov};
+use crate::floors::{SlotMemory, SlotReceiver, SlotSender};
 use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
 use crate::one_way::{OwnNode, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
@@ -50,8 +51,13 @@ impl Case for Cost {
         });
         let wakeable = Contender::sampled("Vyukov, wakeable", || vyukov::<true>(self.burst, bursts));
         let bare = Contender::sampled("Vyukov", || vyukov::<false>(self.burst, bursts));
+        let core = Contender::sampled("slot core", || {
+            let memory = Shared::<SlotMemory>::new()?;
+            let source = || Ok(SlotReceiver::new(&memory, BYTES));
+            cost(self.burst, bursts, || Ok(SlotSender::new(&memory, BYTES, 100)), source)
+        });
         let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "ns" };
-        Ok(compare(settings, &subject, &[ours, wakeable, bare], &[self.versus]))
+        Ok(compare(settings, &subject, &[ours, wakeable, bare, core], &[self.versus]))
     }
 }
 

@@ -101,7 +101,9 @@ fn one_core() -> Vec<Latency> {
 
 fn spinning() -> Vec<Latency> {
     let case = |(bytes, bound)| {
+        let core = if bytes == 64 { at_most(1.3) } else { None };
         let case = Latency::new("spinning", bytes, How::Spinning).beside(Rival::Spin, at_most(bound), None);
+        let case = case.beside(Rival::SlotCore, core, None);
         #[cfg(feature = "peers")]
         let case = case.beside_peer(Rival::IceoryxSpinning).beside_peer(Rival::Crossbeam);
         case

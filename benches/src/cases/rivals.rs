@@ -1,6 +1,6 @@
 //! Contenders of ping-pong beside ours.
 
-use crate::floors::{HandOver, Lanes, Queues, Wake};
+use crate::floors::{HandOver, Lanes, Queues, SlotEnd, SlotPair, Wake};
 use crate::harness::{Cell, Failure, Shared, time_two_processes};
 #[cfg(feature = "peers")]
 use crate::{
@@ -17,6 +17,8 @@ pub(super) enum Rival {
     Spin,
     /// The same with [`SMALL`] bytes, whatever the size of the case: the floor of messages that are not copied.
     SpinSmall,
+    /// The least that slots with priorities cost, polled.
+    SlotCore,
     /// The kernel's priority queue.
     PosixQueue,
     #[cfg(feature = "peers")]
@@ -40,6 +42,7 @@ impl Rival {
             Self::Futex => "futex",
             Self::Spin => "spin",
             Self::SpinSmall => "spin 64 B",
+            Self::SlotCore => "slot core",
             Self::PosixQueue => "posix-mq",
             #[cfg(feature = "peers")]
             Self::IceoryxListener => "iceoryx2 listener",
@@ -58,6 +61,10 @@ impl Rival {
             Self::Futex => hand_over(cell, Wake::Futex),
             Self::Spin => hand_over(cell, Wake::Spin),
             Self::SpinSmall => hand_over(&Cell { bytes: SMALL, ..*cell }, Wake::Spin),
+            Self::SlotCore => {
+                let pair = Shared::<SlotPair>::new()?;
+                time_two_processes(cell, |end, _| Ok(SlotEnd::new(&pair, end, cell.bytes)))
+            }
             Self::PosixQueue => {
                 let queues = Queues::new(cell.bytes)?;
                 time_two_processes(cell, |end, _| Ok(queues.end(end)))

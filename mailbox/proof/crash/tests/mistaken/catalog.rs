@@ -159,8 +159,8 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "the_last_goes_first",
         edits: &[edit(
             "slots",
-            "claim.place.map_or(ticket, Word::ticket));",
-            "if broken!(the_last_goes_first) { !ticket } else { claim.place.map_or(ticket, Word::ticket) });",
+            "if claim.place == FREE { ticket }",
+            "if broken!(the_last_goes_first) { !ticket } else if claim.place == FREE { ticket }",
         )],
         scene: SENDING,
         says: "check InOrder",

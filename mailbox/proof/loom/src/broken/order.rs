@@ -92,8 +92,10 @@ pub(crate) const BROKEN: &[Broken] = &[
             edit("slots", "        self.hint(slot);\n        step!(\"publish: hint\");\n", ""),
             edit(
                 "slots",
-                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n",
-                "        let word = Word::ready(priority, claim.place.map_or(ticket, Word::ticket));\n        \
+                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { \
+                 claim.place.ticket() });\n",
+                "        let word = Word::ready(priority, if claim.place == FREE { ticket } else { \
+                 claim.place.ticket() });\n        \
                  self.hint(slot);\n",
             ),
         ],
@@ -186,20 +188,20 @@ pub(crate) const BROKEN: &[Broken] = &[
             ),
             edit(
                 "slots",
-                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false });",
-                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: None, late: false, ticket: \
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: FREE, late: false });",
+                "return Ok(Claim { slot, segment: self.bodies.segment, word, place: FREE, late: false, ticket: \
                  self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late });",
-                "return Some(Claim { slot, segment: self.bodies.segment, word, place: None, late, ticket: \
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: FREE, late });",
+                "return Some(Claim { slot, segment: self.bodies.segment, word, place: FREE, late, ticket: \
                  self.hot.ticket.0.fetch_add(1, Ordering::AcqRel) });",
             ),
             edit(
                 "slots",
-                "slot: old.slot, segment, word, place: Some(old.word), late: false })",
-                "slot: old.slot, segment, word, place: Some(old.word), late: false, ticket: 0 })",
+                "slot: old.slot, segment, word, place: old.word, late: false })",
+                "slot: old.slot, segment, word, place: old.word, late: false, ticket: 0 })",
             ),
             edit(
                 "slots",

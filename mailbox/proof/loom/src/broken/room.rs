@@ -5,7 +5,7 @@ use super::variant::{Broken, Edit, RACE, WRONG, edit};
 const IN_PLACE_WITHOUT_RELEASE: Edit = edit(
     "slots",
     "if !self.change(slot, claim.word, word) {",
-    "let success = if claim.place.is_some() { Ordering::Relaxed } else { Ordering::SeqCst };\n        if \
+    "let success = if claim.place != FREE { Ordering::Relaxed } else { Ordering::SeqCst };\n        if \
      self.word(slot).compare_exchange(claim.word.0, word.0, success, Ordering::Relaxed).is_err() {",
 );
 
@@ -118,7 +118,7 @@ pub(crate) const BROKEN: &[Broken] = &[
                 "if self.last.is_some_and(|old| slots.replace(&mut claim, old)) {",
                 "let late = self.last;\n        if false {",
             ),
-            edit("slots", "claim.place.map_or(ticket, Word::ticket)", "claim.place.map_or(0, Word::ticket)"),
+            edit("slots", "{ ticket } else { claim.place.ticket() }", "{ 0 } else { claim.place.ticket() }"),
             edit(
                 "rig",
                 "                self.last = (self.full == OverflowPolicy::Latest).then_some(posted);",
@@ -135,7 +135,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     // Always last in the queue: with others that send as fast as the receiver receives, it is never received.
     Broken {
         name: "the_newest_goes_to_the_end",
-        edits: &[edit("slots", "claim.place.map_or(ticket, Word::ticket)", "ticket")],
+        edits: &[edit("slots", "if claim.place == FREE { ticket } else { claim.place.ticket() }", "ticket")],
         caught_by: "the_newest_keeps_its_place",
         says: WRONG,
     },
