@@ -93,12 +93,12 @@ pub(crate) const CAUGHT: &[Caught] = &[
     // What is rejected though nothing is wrong with it.
     caught(Mistake::RejectsAsDamaged, Promise::Rejection, Network::Free, 0),
     caught(Mistake::RejectsAsForeign, Promise::Rejection, Network::Free, 0),
-    caught(Mistake::RejectsAsOld, Promise::Rejection, Network::Free, 0),
+    caught(Mistake::RejectsAsOld, Promise::Rejection, Network::Free, 1),
     caught(Mistake::RejectsAsDuplicate, Promise::Rejection, Network::Free, 0),
     caught(Mistake::RejectsAsLate, Promise::Rejection, Network::Free, 0),
     caught(Mistake::RejectsAsOtherIncarnation, Promise::Rejection, Network::Intruded, 0),
     caught(Mistake::RejectsAsReplay, Promise::Rejection, Network::Intruded, 0),
-    caught(Mistake::RejectsAsForged, Promise::Rejection, Network::Intruded, 0),
+    caught(Mistake::RejectsAsForged, Promise::Rejection, Network::Intruded, 4),
     caught(Mistake::IgnoresSyncs, Promise::Rejection, Network::Free, 0),
     caught(Mistake::RejectsAddress, Promise::Rejection, Network::Free, 0),
     // Clocks.
