@@ -150,15 +150,12 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
     (Mistake::CountsPartsTwice, "a duplicate of a fragment is dropped as a datagram"),
     (Mistake::NeverInAdvance, "an urgent package that waits for the pace breaks no promise but that of speed"),
     (Mistake::WaitsForOne, "no socket is ever without room here"),
-    (Mistake::OpensTwice, "what is opened twice is dropped as a duplicate behind it"),
-    (
-        Mistake::BeginsUnproven,
-        "an incarnation that is over sends nothing, and the one that lives asks again within 20 ms",
-    ),
-    (Mistake::NeverUnheard, "no network of the first hundred cuts a link one way for so long"),
-    (Mistake::KeepsOwnTime, "no network of the first hundred has a node that turns while its master lives"),
-    (Mistake::WaitsForEver, "another node begins the time, or patience ends when a session begins"),
-    (Mistake::BelievesUnopened, "what is believed of a peer changes what callers are told, and loses nothing"),
+    (Mistake::OpensTwice, "120 networks kept all promises: what is opened twice is a duplicate behind it"),
+    (Mistake::BeginsUnproven, "120 networks kept all promises"),
+    (Mistake::NeverUnheard, "120 networks kept all promises: a link that is cut one way is fixed too soon"),
+    (Mistake::KeepsOwnTime, "10 networks kept all promises"),
+    (Mistake::WaitsForEver, "10 networks kept all promises"),
+    (Mistake::BelievesUnopened, "120 networks kept all promises: a belief changes what callers are told"),
 ];
 
 /// Groups of mistakes of sessions, which no simulated network has.
