@@ -1,7 +1,7 @@
 //! The demo in time slots with its master's router killed: it is reported, and no package of a declared flow is lost,
 //! but for what waited longer than it may while there was no router, or no slot.
 
-use crate::harness::{Place, Robot, lacks_namespaces, signal, wait};
+use crate::harness::{Place, Robot, lacks_namespaces, runs, signal, wait};
 use crate::process::{Running, Said};
 use nix::sys::signal::Signal;
 use rohrpost::common::GET_DATA;
@@ -11,6 +11,7 @@ use rohrpost::schema::Data;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_testbed::stalls::{Late, unless_stalled};
+use std::collections::BTreeMap;
 use std::panic::catch_unwind;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -42,12 +43,14 @@ const DATA: Duration = Duration::from_nanos(SOCKET_MAX_NS);
 ///
 /// A package that found no router, or no slot, for longer than it may wait is lost. How long that was at most the demo
 /// itself reports: for so long a router was away, and so many slots a node then left out. Nothing else may be lost, but
-/// for what a router had taken for a slot when it died: it holds that for less than a thousandth of the time.
-fn check_losses(said: &str, kills: usize, left_out: u64, began: Instant) -> Result<(), Late> {
+/// for what a router had taken for a slot when it died: it holds that for less than a thousandth of the time. Calls that
+/// were refused while the demo started are `before`.
+fn check_losses(said: &str, kills: usize, left_out: u64, before: &Before, began: Instant) -> Result<(), Late> {
     let away = away(said).into_iter().max().unwrap_or_default();
     let gap = away + CYCLE * left_out as u32;
     let mut unexplained = 0;
     for Loss { row, lost, is_data, .. } in losses(said) {
+        let lost = lost.saturating_sub(before.get(&counted_by(row)).copied().unwrap_or(0));
         let limit = if is_data { DATA } else { CALL };
         if gap <= limit {
             unexplained += lost;
@@ -100,6 +103,31 @@ fn slots(said: &str, counter: &str) -> Vec<u64> {
     let slots = said.split("In time slots").nth(1).unwrap_or_else(|| panic!("no slots:\n{said}"));
     let row = slots.lines().find_map(|line| line.strip_prefix(counter)?.strip_prefix(' '));
     row.unwrap_or_default().split_whitespace().map(|count| count.parse().unwrap()).collect()
+}
+
+/// Losses that modules have counted: by whom, of whom, and whether of data; so far.
+type Before = BTreeMap<(String, String, bool), u64>;
+
+/// The losses of the modules that call and subscribe; none while one does not answer.
+fn lost_so_far(robots: &[Robot; 3]) -> Option<Before> {
+    let (brain, mut all) = (&robots[1], Before::new());
+    let mut tool = brain.tool(SOON);
+    let told = ["pilot.0", "mapper.0"].map(|by| (by, tool.exchange(brain.name(by))));
+    tool.close();
+    for (by, told) in told {
+        for exchange in told.ok()? {
+            *all.entry((by.to_owned(), exchange.module, exchange.data.is_some())).or_default() += exchange.lost;
+        }
+    }
+    Some(all)
+}
+
+/// The module that counts a row of the table of losses, of which other one: the caller, or the receiver of data.
+fn counted_by(row: &str) -> (String, String, bool) {
+    let words: Vec<&str> = row.split_whitespace().collect();
+    let [from, _, to, what, ..] = words[..] else { panic!("{row}") };
+    let (by, of) = if what == "commands" { (from, to) } else { (to, from) };
+    (by.into(), of.into(), what == "data")
 }
 
 /// A row of the table of losses from end to end.
@@ -163,11 +191,13 @@ struct Killed {
     kills: Vec<[Instant; 2]>,
     /// Slots that one node left out from a kill until all was settled, at most.
     left_out: u64,
+    /// Before the first kill.
+    lost_before: Before,
 }
 
-fn killed_again(place: &Place) -> Option<Killed> {
-    let demo = ["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet", "-v"];
-    let mut demo = Running::start(place.command(&demo));
+/// A demo of which all nodes run; none where there are no namespaces.
+fn started(place: &Place, arguments: &[&str]) -> Option<(Running, [Robot; 3])> {
+    let mut demo = Running::start(place.command(arguments));
     wait("all nodes run, or cannot", || {
         let all = NODES.iter().all(|node| demo.out().contains(&format!("node {node} of demo-tdma runs")));
         (all || demo.ended().is_some()).then_some(())
@@ -175,9 +205,14 @@ fn killed_again(place: &Place) -> Option<Killed> {
     if lacks_namespaces(&demo.err()) {
         return None;
     }
-    let robots = NODES.map(|node| place.robot_at(Path::new(CONFIG), node));
+    Some((demo, NODES.map(|node| place.robot_at(Path::new(CONFIG), node))))
+}
+
+fn killed_again(place: &Place) -> Option<Killed> {
+    let (demo, robots) = started(place, &["demo", "--nodes", "3", "--tdma", "--no-gui", "--quiet", "-v"])?;
     let (mut kills, mut left_out) = (Vec::new(), 0);
     wait("one master", || settled(&robots));
+    let lost_before = wait("losses so far", || lost_so_far(&robots));
     for _ in 0..self::kills() {
         let mut before = left_out_so_far(&robots);
         let looked = Instant::now();
@@ -194,14 +229,14 @@ fn killed_again(place: &Place) -> Option<Killed> {
     }
     drop(robots);
     demo.signal(Signal::SIGINT);
-    Some(Killed { said: demo.said(), kills, left_out })
+    Some(Killed { said: demo.said(), kills, left_out, lost_before })
 }
 
 #[test]
 fn killed_again_and_again_the_master_costs_no_package_of_a_declared_flow() {
     unless_stalled(|_| {
         let (place, began) = (Place::new(), Instant::now());
-        let Some(Killed { said, kills, left_out }) = killed_again(&place) else { return Ok(()) };
+        let Some(Killed { said, kills, left_out, lost_before }) = killed_again(&place) else { return Ok(()) };
         assert_eq!(said.code, Some(0), "{said:?}");
         let said = said.out;
         assert!(said.contains("from before its death are lost") && said.contains("the accounts balance\n"), "{said}");
@@ -224,18 +259,29 @@ fn killed_again_and_again_the_master_costs_no_package_of_a_declared_flow() {
                 return Err(Late { what, since: looked, until: killed, by: REPLACED });
             }
         }
-        check_losses(&said, self::kills(), left_out, began)
+        check_losses(&said, self::kills(), left_out, &lost_before, began)
     });
 }
 
-/// A demo that ends without failure; none where there are no namespaces.
-fn ended_well(place: &Place, arguments: &[&str]) -> Option<Said> {
-    let said = place.say(arguments);
-    if lacks_namespaces(&said.err) {
-        return None;
-    }
+/// A demo that kills its master, and ends without failure; with what was lost before that. None where there are no
+/// namespaces.
+fn ended_well(place: &Place, arguments: &[&str]) -> Option<(Said, Before)> {
+    let (mut demo, robots) = started(place, arguments)?;
+    let pid = |node: usize| robots[node].process(&format!("router.{node}")).map(|router| router.pid);
+    let (pids, mut before) = ([0, 1, 2].map(pid), Before::new());
+    let all_run = || [0, 1, 2].map(pid) == pids && pids.iter().flatten().all(|pid| runs(*pid));
+    wait("a router dies", || {
+        let lost = lost_so_far(&robots);
+        if !all_run() || demo.ended().is_some() {
+            return Some(());
+        }
+        before = lost.unwrap_or_default();
+        None
+    });
+    drop(robots);
+    let said = demo.said();
     assert_eq!(said.code, Some(0), "{said:?}");
-    Some(said)
+    Some((said, before))
 }
 
 #[test]
@@ -244,7 +290,7 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
         let (place, began) = (Place::new(), Instant::now());
         let arguments =
             ["demo", "--nodes", "3", "--tdma", "--seconds", "6", "--no-gui", "--quiet", "-v", "--kill-master"];
-        let Some(Said { out: said, .. }) = ended_well(&place, &arguments) else { return Ok(()) };
+        let Some((Said { out: said, .. }, before)) = ended_well(&place, &arguments) else { return Ok(()) };
         for words in
             ["killed on purpose); there again ", "It was the master. ", " after its last.\n", "Master at the end: "]
         {
@@ -252,7 +298,7 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
         }
         assert!(said.contains("from before its death are lost") && said.contains("the accounts balance\n"), "{said}");
         place.assert_empty();
-        check_losses(&said, 1, left_out(&said), began)?;
+        check_losses(&said, 1, left_out(&said), &before, began)?;
         let next = said.lines().find_map(|line| line.split("from the sync on that came ").nth(1));
         let cycles = next.and_then(|cycles| cycles.split(' ').next()).unwrap_or_else(|| panic!("{said}"));
         let beyond = cycles.parse::<u64>().unwrap().saturating_sub(CYCLES_MAX) as u32;
@@ -268,7 +314,7 @@ fn the_demo_kills_its_master_if_it_is_to_and_tells_what_came_of_it() {
 fn a_master_that_seals_joins_again_and_so_did_all_at_the_beginning() {
     let place = Place::new();
     let arguments = ["demo", "--nodes", "3", "--tdma", "--secure", "--seconds", "8", "--no-gui", "-v", "--kill-master"];
-    let Some(Said { out, err, .. }) = ended_well(&place, &arguments) else { return };
+    let Some((Said { out, err, .. }, _)) = ended_well(&place, &arguments) else { return };
     assert!(err.contains("is sealed with") || out.contains("is sealed with"), "{out}{err}");
     for words in
         ["killed on purpose); there again ", "It was the master. ", "Master at the end: ", "the accounts balance\n"]
@@ -296,7 +342,8 @@ fn sample(away: &str, commands: u64, data: u64) -> String {
 fn a_loss_that_nothing_explains_is_found_however_many_slots_were_left_out() {
     let check = |away, commands, data, left_out| {
         let said = sample(away, commands, data);
-        catch_unwind(|| check_losses(&said, 1, left_out, Instant::now()).map_err(|late| late.by)).map_err(drop)
+        catch_unwind(|| check_losses(&said, 1, left_out, &Before::new(), Instant::now()).map_err(|late| late.by))
+            .map_err(drop)
     };
     assert_eq!(check("44 ms", 0, 0, 1000), Ok(Ok(())));
     assert_eq!(check("44 ms", 1, 0, 31), Err(()), "it was repeated in time");
@@ -304,6 +351,8 @@ fn a_loss_that_nothing_explains_is_found_however_many_slots_were_left_out() {
     assert_eq!(check("250 ms", 0, 1, 0), Err(()), "data wait for longer than that");
     assert_eq!(check("44 ms", 1, 0, 40), Ok(Err(REPLACED)), "a stall has to explain the slots");
     assert_eq!(check("44 ms", 0, 1, 80), Ok(Err(REPLACED)));
+    let before = Before::from([(("pilot.0".into(), "motor.0".into(), false), 1)]);
+    assert_eq!(check_losses(&sample("44 ms", 1, 0), 1, 0, &before, Instant::now()), Ok(()), "not by the kill");
     let sealed = |lost| catch_unwind(|| check_lost_of_sealed(&sample("44 ms", lost, 0), 0)).is_ok();
     assert_eq!([0, 8, 9].map(sealed), [true, true, false], "a second of eight");
 }
