@@ -143,7 +143,7 @@ fn a_module_that_ends_again_and_again_floods_neither_the_terminal_nor_the_log() 
         let ends = place.recorded("start");
         assert!(ends < 160, "{ends} ends, of which the last that is told is the eightieth at most");
         let told = out.lines().filter(|line| line.starts_with("probe.0 ") && line.contains("starts again in ")).count();
-        // Other last words are told in full, every ten seconds at most: a busy computer may end one before all are said.
+        // Other last words are told in full, every ten seconds at most: on a busy computer some are not said in time.
         let others = began.elapsed().as_secs() as usize / 10;
         assert!((8..=9 + others).contains(&told), "{told} of {ends} are told: {out}");
         let count = |text: &str| out.lines().filter(|line| line.contains(text)).count();

@@ -42,9 +42,9 @@ const DATA: Duration = Duration::from_nanos(SOCKET_MAX_NS);
 /// What came of the declared flows of a demo, of which one node left out so many slots at a kill.
 ///
 /// A package that found no router, or no slot, for longer than it may wait is lost. How long that was at most the demo
-/// itself reports: for so long a router was away, and so many slots a node then left out. Nothing else may be lost, but
-/// for what a router had taken for a slot when it died: it holds that for less than a thousandth of the time. Calls that
-/// were refused while the demo started are `before`.
+/// itself reports: for so long a router was away, and so many slots a node then left out. Nothing else may be lost,
+/// but for what a router had taken for a slot when it died: it holds that for less than a thousandth of the time.
+/// Calls that were refused while the demo started are `before`.
 fn check_losses(said: &str, kills: usize, left_out: u64, before: &Before, began: Instant) -> Result<(), Late> {
     let away = away(said).into_iter().max().unwrap_or_default();
     let gap = away + CYCLE * left_out as u32;
@@ -105,7 +105,7 @@ fn slots(said: &str, counter: &str) -> Vec<u64> {
     row.unwrap_or_default().split_whitespace().map(|count| count.parse().unwrap()).collect()
 }
 
-/// Losses that modules have counted: by whom, of whom, and whether of data; so far.
+/// Losses that modules have counted so far: the module that counts, the other one, and whether they are data.
 type Before = BTreeMap<(String, String, bool), u64>;
 
 /// The losses of the modules that call and subscribe; none while one does not answer.
