@@ -1,59 +1,19 @@
 //! A package of 64 bytes through the cores of two routers, one package a datagram.
 
 use super::Path;
-use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_network::{Network, Route, Security};
-use rohrpost_routers::admission::Admission;
+use rohrpost_mailbox::{Head, Priority, Type};
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::NodeIndex;
 use rohrpost_routers::inbound::{Datagram, Inbound};
 use rohrpost_routers::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, OutboundStep, Package};
 use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
-use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::stats::Stats;
-use std::net::{IpAddr, Ipv4Addr};
+use rohrpost_testbed::pair::{address, module, settings};
 
 const BODY: [u8; 64] = [7; 64];
 const START_NS: u64 = 1_000_000_000;
 /// From one package to the next: the wire is free by then.
 const PERIOD_NS: u64 = 10_000;
-
-fn address(node: NodeIndex) -> IpAddr {
-    Ipv4Addr::new(10, 0, 0, node + 1).into()
-}
-
-/// The module that a node has.
-fn module(node: NodeIndex) -> Name {
-    Name::new(1, 200, node, 0)
-}
-
-/// One of two nodes.
-fn settings(own: NodeIndex) -> Settings {
-    let other = 1 - own;
-    Settings {
-        system: 1,
-        own,
-        nodes: (0..2).map(|node| NodeSettings { name: format!("n{node}"), address: address(node) }).collect(),
-        digest: 7,
-        incarnation: 9,
-        network: Network {
-            security: Security::None,
-            port: 21117,
-            mtu: 1500,
-            datagram_bytes_max: 1472,
-            rate_bytes_s: 1 << 30,
-            quota_bytes: 128 << 10,
-            bulk_below: 16,
-        },
-        tdma: None,
-        routes: vec![Route { first: module(other), last: module(other).with_local(u8::MAX), node: other }],
-        senders: vec![vec![module(own)]],
-        hosts: Vec::new(),
-        admission: Admission::default(),
-        real_time_from: 0,
-        flows: Vec::new(),
-    }
-}
 
 /// Takes all that is delivered.
 #[derive(Default)]

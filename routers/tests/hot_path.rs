@@ -9,8 +9,6 @@ pub mod counting;
 
 use counting::{CountingHeap, heap_uses};
 use rohrpost_mailbox::{Head, Name, Priority, Type};
-use rohrpost_network::{Network, Route, Security};
-use rohrpost_routers::admission::Admission;
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::flows::Flow;
 use rohrpost_routers::frame::{FrameHead, NodeIndex};
@@ -19,10 +17,10 @@ use rohrpost_routers::outbound::{Accepted, Outbound, OutboundStep, Package};
 use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
 use rohrpost_routers::session::frame::Range;
 use rohrpost_routers::session::{ClientIndex, RoutingTable};
-use rohrpost_routers::settings::{NodeSettings, Settings};
+use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
 use rohrpost_routers::time::{Clock, Role, Stamp, Step, TIME_BYTES, TimeSettings};
-use std::net::{IpAddr, Ipv4Addr};
+use rohrpost_testbed::pair::{self, address, module};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,48 +29,18 @@ static HEAP: CountingHeap = CountingHeap;
 
 const MS: u64 = 1_000_000;
 
-fn address(node: NodeIndex) -> IpAddr {
-    Ipv4Addr::new(10, 0, 0, node + 1).into()
-}
-
-/// The module that a node has.
-fn module(node: NodeIndex) -> Name {
-    Name::new(1, 200, node, 0)
-}
-
+/// With a declared flow from each module to the other.
 fn settings(own: NodeIndex) -> Settings {
-    let other = 1 - own;
-    Settings {
-        system: 1,
-        own,
-        nodes: (0..2).map(|node| NodeSettings { name: format!("n{node}"), address: address(node) }).collect(),
-        digest: 7,
-        incarnation: 9,
-        network: Network {
-            security: Security::None,
-            port: 21117,
-            mtu: 1500,
-            datagram_bytes_max: 1472,
-            rate_bytes_s: 1 << 30,
-            quota_bytes: 128 << 10,
-            bulk_below: 16,
-        },
-        tdma: None,
-        routes: vec![Route { first: module(other), last: module(other).with_local(255), node: other }],
-        senders: vec![vec![module(own)]],
-        hosts: Vec::new(),
-        admission: Admission::default(),
-        real_time_from: 0,
-        flows: vec![Flow {
-            from: vec![module(own)],
-            to: vec![module(other)],
-            carries: None,
-            size: 9000,
-            period: Duration::from_millis(1),
-            deadline: Duration::from_millis(10),
-            bound: None,
-        }],
-    }
+    let flow = Flow {
+        from: vec![module(own)],
+        to: vec![module(1 - own)],
+        carries: None,
+        size: 9000,
+        period: Duration::from_millis(1),
+        deadline: Duration::from_millis(10),
+        bound: None,
+    };
+    Settings { flows: vec![flow], ..pair::settings(own) }
 }
 
 #[derive(Default)]
