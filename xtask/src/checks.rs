@@ -22,7 +22,7 @@ pub(crate) fn test(args: &[String]) -> Result<ExitCode, Failure> {
     match args {
         [] => Ok(stages::run_all([PRODUCT])),
         [all] if all == "--all" => Ok(stages::run_all(ALL)),
-        _ => Err("cargo xtask test [--all]: no other arguments".into()),
+        others => Err(format!("`{}`: cargo xtask test takes --all or nothing", others.join(" "))),
     }
 }
 

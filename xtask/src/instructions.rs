@@ -33,7 +33,7 @@ pub(crate) fn command(args: &[String]) -> Result<ExitCode, Failure> {
             fs::write(&path, Ceilings::of(&compiler, &counts).to_text())
                 .map_err(|error| format!("{}: {error}", path.display()))?;
         }
-        _ => return Err("cargo xtask instructions [--record]".into()),
+        others => return Err(format!("`{}`: cargo xtask instructions takes --record or nothing", others.join(" "))),
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -25,8 +25,9 @@ cargo xtask demo [--no-gui] [ARGS...]
     Builds `rohrpost` and, unless --no-gui is given, the GUI bridge; then runs `rohrpost demo ARGS...`.
 cargo xtask test [--all]
     All tests that a change to the product may break. With --all also those of the bench and of the GUI bridge, the slot
-    core under ThreadSanitizer, a short run of the fuzz targets, and drawings with Rerun's command line. Every stage
-    runs, even if one failed; a table of stages and their times, and what was skipped or repeated, comes last.
+    core under ThreadSanitizer, instructions of the hot paths, a short run of the fuzz targets, and drawings with
+    Rerun's command line. Every stage runs, even if one failed; a table of stages and their times, and what was skipped
+    or repeated, comes last.
 cargo xtask ci
     Format, clippy for both builds, then all tests.
 cargo xtask fuzz [TARGET...] [--seconds N] | --short
