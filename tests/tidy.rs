@@ -89,7 +89,7 @@ const LONG: &[(&str, usize)] = &[
     ("mailbox/proof/loom/src/models.rs", 642),
     ("mailbox/src/node.rs", 425),
     ("mailbox/src/sender.rs", 420),
-    ("mailbox/src/slots.rs", 430),
+    ("mailbox/src/slots.rs", 423),
     ("mailbox/src/system_time.rs", 422),
     ("modules/src/call/deduplicator_simulation.rs", 403),
     ("modules/src/output/way.rs", 438),

@@ -86,6 +86,7 @@
 
 mod about;
 mod bell;
+mod bodies;
 mod causes;
 mod cell;
 mod clock;

@@ -1,5 +1,6 @@
 //! A mailbox's segment: the file, mapped and checked, and the bodies of its slots.
 
+use crate::bodies::Bodies;
 use crate::clock::monotonic_ns;
 use crate::files::{open_shared, open_to_read};
 use crate::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape, VERSION};
@@ -7,7 +8,7 @@ use crate::mapped;
 use crate::memory::{Located, Mapping, Rooms, Use};
 use crate::name::Name;
 use crate::package::{HEAD_BYTES, Head};
-use crate::slots::{Bodies, Claim, Slots, Taken};
+use crate::slots::{Claim, Slots, Taken};
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;

@@ -25,22 +25,23 @@
 //! Release (C), claiming an Acquire (D). Hints against `sleeping`, `retired` and `level` are settled by (E), (F), (G)
 //! and (J).
 
+use crate::bodies::Bodies;
 use crate::full::{NoSlot, OverflowPolicy};
 use crate::hot::{Hot, rings};
 use crate::name::Priority;
 use crate::step::step;
-use crate::sync::{AtomicU64, Ordering, fence, prefetch_to_read, prefetch_to_write, seq_cst_accesses};
+use crate::sync::{AtomicU64, Ordering, fence, prefetch_to_write, seq_cst_accesses};
 use crate::word::{Claimant, FREE, State, Victim, Word};
 use std::hint::spin_loop;
 
 /// Most slots that a mailbox can have.
 pub const SLOTS_MAX: usize = 1024;
-/// A sender looks through a full mailbox this often for somebody to displace before it calls it full: each further look
-/// is owed to another process that was quicker, and n looks at n slots would be n².
+/// A sender looks through a full mailbox this often for somebody to displace before it calls it full: each further
+/// look is owed to another process that was quicker, and n looks at n slots would be n².
 const DISPLACE_LOOKS_MAX: usize = 4;
-/// A search for a free slot pauses after each of its first looks in vain. The mailbox is about to be full then, and only
-/// the receiver can make room: it may share the core with this sender, and owns the lines that are looked at. Without
-/// the pauses four senders lose a quarter of their rate. Few, so that a search in a large mailbox stays short.
+/// A search for a free slot pauses after each of its first looks in vain. The mailbox is about to be full then, and
+/// only the receiver can make room: it may share the core with this sender, and owns the lines that are looked at.
+/// Without the pauses four senders lose a quarter of their rate. Few, so that a search in a large mailbox stays short.
 const PAUSES: usize = 8;
 
 /// A slot being filled; its owner alone may write the body. It is the only one of its slot: it cannot be copied,
@@ -142,16 +143,6 @@ pub(crate) struct Slots<'a> {
     stride: usize,
     count: usize,
     bodies: Bodies,
-}
-
-/// Where the slots' prefixes and bodies lie, so that their lines can be asked for in time. Nothing here reads them.
-#[derive(Clone, Copy)]
-pub(crate) struct Bodies {
-    pub(crate) first: *const u8,
-    /// From one slot's to the next.
-    pub(crate) bytes: usize,
-    /// Number of the segment in this process: claims and taken packages are of one segment, and of no use in another.
-    pub(crate) segment: u64,
 }
 
 impl<'a> Slots<'a> {
@@ -349,13 +340,7 @@ impl<'a> Slots<'a> {
     /// Has the lines of a slot come here that its next filler writes first.
     pub(crate) fn expect_to_fill(&self, slot: usize) {
         prefetch_to_write(self.word(slot));
-        self.first_lines(slot).into_iter().for_each(prefetch_to_write);
-    }
-
-    /// The second is the first once more if the slot has no other.
-    fn first_lines(&self, slot: usize) -> [*const u8; 2] {
-        let second = if self.bodies.bytes > 64 { 64 } else { 0 };
-        [0, second].map(|line| self.bodies.first.wrapping_add(slot * self.bodies.bytes + line))
+        self.bodies.expect_to_fill(slot);
     }
 
     // ---- the receiver ----
@@ -381,7 +366,7 @@ impl<'a> Slots<'a> {
     /// Has the lines of a package come here before they are looked at, all at once; and its word as it will be needed.
     pub(crate) fn expect_package(&self, slot: usize) {
         prefetch_to_write(self.word(slot));
-        self.first_lines(slot).into_iter().for_each(prefetch_to_read);
+        self.bodies.expect_package(slot);
     }
 
     /// Frees the slots of dead fillers, and tells `lost` their victims.

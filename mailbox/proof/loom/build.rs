@@ -34,7 +34,7 @@ struct Proof {
 const PROOFS: [Proof; 2] = [
     Proof {
         real: "real",
-        parts: &["word", "full", "hot", "slots", "queue", "bell", "rig", "models"],
+        parts: &["word", "full", "hot", "bodies", "slots", "queue", "bell", "rig", "models"],
         models: broken::MODELS,
         broken: broken::BROKEN,
     },

@@ -14,7 +14,7 @@ mod caught;
 use broken::{BROKEN, Edit};
 use caught::CAUGHT;
 
-const CORE: [&str; 7] = ["word", "full", "hot", "slots", "queue", "bell", "cell"];
+const CORE: [&str; 8] = ["word", "full", "hot", "bodies", "slots", "queue", "bell", "cell"];
 const OURS: [&str; 2] = ["rig", "runs"];
 
 fn main() {

@@ -5,10 +5,11 @@
 
 use crate::name::Priority;
 use crate::bell::Bell;
+use crate::bodies::Bodies;
 use crate::full::{OverflowPolicy, NoSlot};
 use crate::queue::Queue;
 use crate::hot::Hot;
-use crate::slots::{Bodies, Posted, Published, Slots};
+use crate::slots::{Posted, Published, Slots};
 use crate::step::{dies_at, reached};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use crate::word::{Claimant, FREE, Victim, Word};

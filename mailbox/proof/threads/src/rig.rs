@@ -5,10 +5,11 @@
 //! does.
 
 use super::bell::Bell;
+use super::bodies::Bodies;
 use super::full::{NoSlot, OverflowPolicy};
 use super::hot::Hot;
 use super::queue::Queue;
-use super::slots::{Bodies, Posted, Published, Slots};
+use super::slots::{Posted, Published, Slots};
 use super::word::{Claimant, FREE, State, Victim};
 use crate::name::Priority;
 use crate::step::{dice, reached, shake};
