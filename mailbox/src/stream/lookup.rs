@@ -1,0 +1,144 @@
+//! Looking for records by stamp: the two around a time, whatever order they were written in.
+//!
+//! A stamp may be behind the newest one by `late_ns`. So entries are nearly in order, and the greatest stamp so far,
+//! which each entry tells, is exactly in order: a binary search finds the first record p that has reached the time.
+//! Before p the greatest stamp is the nearest from below. What is late may lie behind p, but not behind the record
+//! from which on nothing so late is taken any more:
+//!
+//! ```text
+//!  late_ns = 20       asked: 45                 p       end of the look
+//!  stamp     10   30   20   40   35        60   50   44   70   90
+//!  newest    10   30   30   40   40        60   60   60   70   90
+//!                           ▲ nearest before p     ▲ nearer ▲ before 44, after 50
+//! ```
+//!
+//! An answer is final when no record that is taken from now on could change it: the newest stamp is past the later of
+//! the two by `late_ns`, or another epoch has begun. A lost record could have been nearer unless the answer is past all
+//! lost ones. So answers depend on stamps, never on arrival.
+
+use crate::stream::ring::{Line, Look, Ring, Stamp, TRIES};
+
+/// The answer for a time.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Answer {
+    /// The nearest records; both are the same when it has this very stamp.
+    Around { before: Line, after: Line },
+    /// Nothing was written yet.
+    Empty,
+    /// The nearest before it is in the ring no more, or there never was one; how far it is to the first that is known
+    /// to be the nearest.
+    BeforeOldest { by_ns: u64 },
+    /// What is still to be written may be nearer; how far the newest stamp is from where that ends.
+    NotYet { by_ns: u64 },
+    /// No two records of the time's epoch are around it, and none will be: the newest record's epoch.
+    OtherEpoch { newest: u64 },
+}
+
+/// The two records around a time, in a stream that takes stamps so far behind the newest.
+pub(crate) fn around(ring: &Ring<'_>, at: Stamp, late_ns: u64) -> Answer {
+    let Some(newest) = ring.newest() else { return Answer::Empty };
+    let end = newest.sequence + 1;
+    let low = ring.oldest_before(end);
+    let reached = first(ring, low, end, at);
+    // Where this epoch's stamps are now.
+    let (newest_ns, is_over) = (newest.newest_ns(), newest.about.stamp.epoch > at.epoch);
+    let not_yet = |ns: u64| Answer::NotYet { by_ns: ns.saturating_add(late_ns).saturating_sub(newest_ns) };
+    let is_final = |ns: u64| is_over || newest_ns >= ns.saturating_add(late_ns);
+    let line = match ring.look(reached) {
+        Look::There(line) if reached < end => line,
+        Look::Gone => return lost(ring, at),
+        _ if newest.about.stamp.epoch == at.epoch => return not_yet(at.ns),
+        _ => return Answer::OtherEpoch { newest: newest.about.stamp.epoch },
+    };
+    if line.about.stamp.epoch != at.epoch {
+        return Answer::OtherEpoch { newest: newest.about.stamp.epoch };
+    }
+    if line.about.before_ns >= at.ns {
+        return lost(ring, at);
+    }
+    let Some((before, after)) = nearest(ring, line, end, at, late_ns) else { return lost(ring, at) };
+    let before = match (before, line.about.before_ns) {
+        (Some(before), before_ns) if before.about.stamp.ns >= before_ns => Some(before),
+        (_, 0) => None,
+        (_, before_ns) => has_stamp(ring, low, reached, Stamp { ns: before_ns, ..at }),
+    };
+    let before = before.filter(|before| floor_ns(ring, at.epoch).is_some_and(|ns| before.about.stamp.ns >= ns));
+    match before {
+        None if is_final(at.ns) => Answer::BeforeOldest { by_ns: after.about.stamp.ns - at.ns },
+        None => not_yet(at.ns),
+        Some(_) if !is_final(after.about.stamp.ns) => not_yet(after.about.stamp.ns),
+        Some(before) => Answer::Around { before, after },
+    }
+}
+
+/// The first record from `low` on that has reached this stamp; `end` if none has. What is gone has passed by.
+fn first(ring: &Ring<'_>, mut low: u64, mut end: u64, at: Stamp) -> u64 {
+    while low < end {
+        let middle = low + (end - low) / 2;
+        let is_before = match ring.look(middle) {
+            Look::There(line) => Stamp { ns: line.newest_ns(), ..line.about.stamp } < at,
+            Look::Gone => true,
+            Look::NotYet => false,
+        };
+        if is_before { low = middle + 1 } else { end = middle }
+    }
+    low
+}
+
+/// The record of exactly this stamp which was the newest when it was written.
+fn has_stamp(ring: &Ring<'_>, low: u64, end: u64, stamp: Stamp) -> Option<Line> {
+    match ring.look(first(ring, low, end, stamp)) {
+        Look::There(line) if line.about.stamp == stamp => Some(line),
+        _ => None,
+    }
+}
+
+/// From the first record that has reached the time on: the nearest that is late, if there is one, and the nearest after
+/// it. None when the writer has overtaken this.
+fn nearest(ring: &Ring<'_>, reached: Line, end: u64, at: Stamp, late_ns: u64) -> Option<(Option<Line>, Line)> {
+    let (mut before, mut after) = (None::<Line>, reached);
+    for sequence in reached.sequence..end {
+        let line = match ring.look(sequence) {
+            Look::There(line) => line,
+            Look::NotYet | Look::Gone => return None,
+        };
+        let (stamp, nearest_ns) = (line.about.stamp, after.about.stamp.ns);
+        let too_late = line.about.before_ns >= nearest_ns.saturating_add(late_ns);
+        if stamp.epoch != at.epoch || too_late && sequence > reached.sequence {
+            break;
+        }
+        if stamp.ns <= at.ns && before.is_none_or(|before| stamp.ns > before.about.stamp.ns) {
+            before = Some(line);
+        }
+        if stamp.ns >= at.ns && stamp.ns < nearest_ns {
+            after = line;
+        }
+    }
+    Some((before, after))
+}
+
+/// No record of this epoch that is in the ring no more had a stamp above this.
+fn floor_ns(ring: &Ring<'_>, epoch: u64) -> Option<u64> {
+    let oldest = oldest(ring)?;
+    match oldest.about.stamp.epoch {
+        of if of == epoch => Some(oldest.about.before_ns),
+        of => (of < epoch).then_some(0),
+    }
+}
+
+fn oldest(ring: &Ring<'_>) -> Option<Line> {
+    let first = ring.oldest_before(ring.written());
+    (first..first + TRIES as u64).find_map(|sequence| match ring.look(sequence) {
+        Look::There(line) => Some(line),
+        Look::NotYet | Look::Gone => None,
+    })
+}
+
+/// The records around the time are not all there any more.
+fn lost(ring: &Ring<'_>, at: Stamp) -> Answer {
+    match oldest(ring) {
+        Some(line) if line.about.stamp.epoch > at.epoch => Answer::OtherEpoch { newest: line.about.stamp.epoch },
+        Some(line) => Answer::BeforeOldest { by_ns: line.newest_ns().saturating_sub(at.ns) },
+        None => Answer::BeforeOldest { by_ns: 0 },
+    }
+}
