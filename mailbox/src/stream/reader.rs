@@ -271,10 +271,15 @@ impl StreamReader {
         let place = TakenSeat::take(&self.participant, self.id)?;
         self.registry_epoch = registry_epoch;
         let Some(place) = place else { return Ok(false) };
-        let ring = place.ring();
-        if self.next > ring.written() {
-            // It was removed and made anew.
-            self.next = ring.first();
+        if let Some(old) = &self.place {
+            // The same again, whose successor died before the new one had its name.
+            if place.segment.is_retired() {
+                return Ok(false);
+            }
+            // It was removed and made anew: what replaces a stream goes on with its sequence.
+            if place.ring().first() < old.ring().written() {
+                self.next = place.ring().first();
+            }
         }
         self.place = Some(place);
         Ok(true)
