@@ -1,9 +1,10 @@
-//! Rohrpost's mailboxes, measured beside the floors of this very computer and beside what else could be used.
+//! Rohrpost's mailboxes and streams, measured beside the floors of this very computer and beside what else could be
+//! used.
 //!
 //! ```text
 //!  cases ── which contenders, which sizes, which targets ──▶ rounds ── contenders in turn, round after round
 //!    │                                                         │
-//!    │   ours · floors · peers: how each sends and receives    ▼
+//!    │   ours · streams · floors · peers: how each sends       ▼
 //!    └────────────────────────────▶ harness ── two processes, pinned and scheduled, samples in shared memory
 //!                                                              │
 //!                             table (people, JSON) ◀── rows ◀── statistics: ratios within a round, medians over rounds
@@ -27,6 +28,7 @@ pub mod report;
 pub mod rounds;
 pub mod settings;
 pub mod statistics;
+pub mod streams;
 pub mod table;
 #[cfg(feature = "lan")]
 pub mod tcp;

@@ -1,4 +1,4 @@
-//! `cargo run --release -p rohrpost-bench -- local`, `lan`, `tdma` or `tcp`.
+//! `cargo run --release -p rohrpost-bench -- local`, `streams`, `lan`, `tdma` or `tcp`.
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::cases::Case;
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 #[global_allocator]
 static HEAP: CountingHeap = CountingHeap;
 
-/// Rohrpost's mailboxes beside the floors of this computer, and beside what else could be used.
+/// Rohrpost's mailboxes and streams beside the floors of this computer, and beside what else could be used.
 #[derive(Parser)]
 #[command(name = "rohrpost-bench")]
 struct Arguments {
@@ -23,6 +23,8 @@ struct Arguments {
 enum Command {
     /// Mailboxes between processes of one computer.
     Local(Run),
+    /// Streams between processes of one computer.
+    Streams(Run),
     /// Packages between nodes, over routers: two network namespaces of this computer.
     #[cfg(feature = "lan")]
     Lan(Run),
@@ -65,6 +67,7 @@ fn main() -> ExitCode {
     }
     let done = match Arguments::parse().command {
         Command::Local(run) => measure(&run, &cases::all()),
+        Command::Streams(run) => measure(&run, &cases::streams::all()),
         #[cfg(feature = "lan")]
         Command::Lan(run) => {
             rohrpost_bench::lan::prepare();

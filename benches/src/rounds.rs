@@ -22,6 +22,11 @@ impl<'a> Contender<'a> {
         let turn = move || Summary::of(&mut turn()?).ok_or_else(|| Failure::Failed("not one sample".into()));
         Self { name, turn: Box::new(turn) }
     }
+
+    /// A contender with turns of one figure each, a rate say.
+    pub fn single(name: &'static str, turn: impl Fn() -> Result<f64, Failure> + 'a) -> Self {
+        Self { name, turn: Box::new(move || Ok(Summary::single(turn()?))) }
+    }
 }
 
 /// The target, as a ratio to another contender.

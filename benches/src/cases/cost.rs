@@ -7,7 +7,9 @@ use super::case::Case;
 use crate::floors::ring::DEPTH;
 use crate::floors::vyukov::{QueueMemory, Vyukov};
 use crate::floors::{SlotMemory, SlotReceiver, SlotSender};
-use crate::harness::{Child, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle};
+use crate::harness::{
+    Child, CycleCounter, End, Failure, Gate, Placement, Samples, Scheduling, Shared, Zeroable, settle,
+};
 use crate::one_way::{OwnNode, Retry, Sink, Source};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
@@ -17,9 +19,9 @@ use std::time::{Duration, Instant};
 
 const BYTES: usize = 64;
 const WARM_UP: usize = 200;
-/// From the receiver's last message to the next burst: by then the receiver polls again.
 /// Bursts for one figure, each with its own clock readings: some processors count in steps of 10 ns.
 const GROUP: usize = 16;
+/// From the receiver's last message to the next burst: by then the receiver polls again.
 const PAUSE_NS: u64 = 400;
 const PATIENCE: Duration = Duration::from_secs(15);
 
@@ -104,7 +106,7 @@ fn cost<I: Sink, O: Source>(
         turn.gate.meet(2)?;
         let mut sink = sink()?;
         settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
-        let clock = CycleCounter::new();
+        let clock = CycleCounter::calibrate();
         turn.gate.meet(4)?;
         let (mut sent, mut group_ns) = (0, 0.0);
         for number in 0..WARM_UP + bursts {
@@ -141,46 +143,4 @@ fn await_received(received: &AtomicU64, sent: u64) -> Result<(), Failure> {
     let go_on = monotonic_ns() + PAUSE_NS;
     while monotonic_ns() < go_on {}
     Ok(())
-}
-
-/// Times spans of tens of nanoseconds: by the processor's counter if it can be read in order.
-struct CycleCounter {
-    ns_per_tick: f64,
-    /// Median of two readings with nothing in between.
-    own_ticks: f64,
-}
-
-impl CycleCounter {
-    fn new() -> Self {
-        let (began, began_ns) = (Self::now(), monotonic_ns());
-        while monotonic_ns() < began_ns + 10_000_000 {}
-        let (ended, ended_ns) = (Self::now(), monotonic_ns());
-        let spans = (0..1001).map(|_| {
-            let began = Self::now();
-            (Self::now() - began) as f64
-        });
-        let own_ticks = crate::statistics::median(spans).unwrap_or_default();
-        Self { ns_per_tick: (ended_ns - began_ns) as f64 / (ended - began).max(1) as f64, own_ticks }
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    fn now() -> u64 {
-        use std::arch::x86_64::{_mm_lfence, _rdtsc};
-        // SAFETY: any x86-64 has both; neither touches memory. The fences keep what is timed between two readings.
-        unsafe {
-            _mm_lfence();
-            let ticks = _rdtsc();
-            _mm_lfence();
-            ticks
-        }
-    }
-
-    #[cfg(not(target_arch = "x86_64"))]
-    fn now() -> u64 {
-        monotonic_ns()
-    }
-
-    fn ns(&self, began: u64, ended: u64) -> f64 {
-        ((ended - began) as f64 - self.own_ticks).max(0.0) * self.ns_per_tick
-    }
 }

@@ -12,6 +12,7 @@ mod proof;
 mod rates;
 mod rivals;
 mod startup;
+pub mod streams;
 #[cfg(feature = "lan")]
 pub mod tcp;
 #[cfg(feature = "lan")]

@@ -10,7 +10,6 @@ use crate::harness::{Failure, Scheduling, Shared};
 use crate::one_way::{OwnNode, QueueSink, Retry, Stream, rate};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
-use crate::statistics::Summary;
 use rohrpost_mailbox::OverflowPolicy;
 use std::time::Duration;
 
@@ -42,12 +41,12 @@ impl Case for OneSender {
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let stream = stream(settings, self.bytes, 1);
-        let ours = rated("rohrpost", || ours(&stream, self.spins, RETRY));
-        let futex = rated("futex ring", || {
+        let ours = Contender::single("rohrpost", || ours(&stream, self.spins, RETRY));
+        let futex = Contender::single("futex ring", || {
             let ring = Shared::<Ring>::new()?;
             rate(&stream, |_| Ok(Futex::<RingSender>::sender(&ring)), || Ok(Futex::<RingReceiver>::receiver(&ring)))
         });
-        let bare = rated("ring", || {
+        let bare = Contender::single("ring", || {
             let ring = Shared::<Ring>::new()?;
             rate(
                 &stream,
@@ -55,7 +54,7 @@ impl Case for OneSender {
                 || Ok(BareRing::<RingReceiver>::receiver(&ring)),
             )
         });
-        let queue = rated("posix-mq", || {
+        let queue = Contender::single("posix-mq", || {
             let queue = Queue::new(DEPTH, self.bytes)?;
             rate(&stream, |_| Ok(QueueSink::new(&queue, 0)), || Ok(&queue))
         });
@@ -76,11 +75,11 @@ impl OneSender {
         use crate::one_way::{channel_rate, iceoryx_rate};
         if self.spins {
             vec![
-                rated("iceoryx2 spinning", || iceoryx_rate(stream, false)),
-                rated("crossbeam, 1 process", || channel_rate(stream)),
+                Contender::single("iceoryx2 spinning", || iceoryx_rate(stream, false)),
+                Contender::single("crossbeam, 1 process", || channel_rate(stream)),
             ]
         } else {
-            vec![rated("iceoryx2 listener", || iceoryx_rate(stream, true))]
+            vec![Contender::single("iceoryx2 listener", || iceoryx_rate(stream, true))]
         }
     }
 }
@@ -95,8 +94,8 @@ impl Case for FourSenders {
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let (one, four) = (stream(settings, 64, 1), stream(settings, 64, PRIORITIES.len()));
         // All senders share a processor: a refused sender yields to the others.
-        let four = rated("rohrpost", move || ours(&four, true, Retry::Yield));
-        let one = rated("one sender", move || ours(&one, true, Retry::Yield));
+        let four = Contender::single("rohrpost", move || ours(&four, true, Retry::Yield));
+        let one = Contender::single("one sender", move || ours(&one, true, Retry::Yield));
         let subject = Subject { case: self.name(), bytes: Some(64), unit: "packages/s" };
         let versus = [Versus { name: one.name, p50: Some(Target::AtLeast(0.5)), p99: None }];
         Ok(compare(settings, &subject, &[four, one], &versus))
@@ -106,10 +105,6 @@ impl Case for FourSenders {
 fn stream(settings: &Settings, bytes: usize, senders: usize) -> Stream {
     let messages = if settings.quick { settings.count(usize::MAX) as u64 } else { u64::MAX };
     Stream { bytes, messages, senders, scheduling: Scheduling::Fifo, cap: TURN }
-}
-
-fn rated<'a>(name: &'static str, turn: impl Fn() -> Result<f64, Failure> + 'a) -> Contender<'a> {
-    Contender { name, turn: Box::new(move || Ok(Summary::single(turn()?))) }
 }
 
 fn ours(stream: &Stream, spins: bool, retry: Retry) -> Result<f64, Failure> {

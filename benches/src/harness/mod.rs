@@ -2,6 +2,7 @@
 
 mod alone;
 mod child;
+mod cycles;
 mod interrupt;
 mod machine;
 mod ping_pong;
@@ -12,6 +13,7 @@ mod shared;
 
 pub use alone::{Alone, alone};
 pub use child::Child;
+pub use cycles::CycleCounter;
 pub use interrupt::{heed, interrupted, rest};
 pub use machine::Machine;
 #[cfg(feature = "peers")]

@@ -10,6 +10,9 @@ pub(super) type Service = ipc::Service;
 
 /// Samples that may wait; in ping-pong more than one never does.
 const DEPTH: usize = 16;
+/// The same where samples are larger than this, of which the shared memory would have to hold forty.
+const DEPTH_OF_LARGE: usize = 2;
+const LARGE_BYTES: usize = 65_536;
 
 /// How messages are received, and whether they are copied.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -62,14 +65,15 @@ impl Iceoryx {
         set_log_level(LogLevel::Error);
         let node = NodeBuilder::new().config(&configuration(scratch)?).create::<Service>().map_err(failed)?;
         let (out, back) = if end == End::Ping { ("there", "back") } else { ("back", "there") };
-        let publisher = messages(&node, out, DEPTH)?
+        let depth = if bytes > LARGE_BYTES { DEPTH_OF_LARGE } else { DEPTH };
+        let publisher = messages(&node, out, depth)?
             .publisher_builder()
             .initial_max_slice_len(bytes)
             .max_loaned_samples(2)
             .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
             .create()
             .map_err(failed)?;
-        let subscriber = messages(&node, back, DEPTH)?.subscriber_builder().create().map_err(failed)?;
+        let subscriber = messages(&node, back, depth)?.subscriber_builder().create().map_err(failed)?;
         let bell = match waits {
             Waits::Listener => {
                 let notifier = events(&node, out)?.notifier_builder().create().map_err(failed)?;

@@ -111,10 +111,11 @@ pub(crate) fn check_row(row: &Map<String, Value>) {
         let can_be = |value: f64| value.is_finite() && (value > 0.0 || value == 0.0 && may_be_0);
         assert!(number(key).is_none_or(can_be), "{key} of {row:?}");
     }
-    // The limits of POSIX queues may be too small without root, a container may forbid tracing or namespaces, and the
-    // command may not have been built.
+    // The limits of POSIX queues may be too small without root, a container may forbid tracing or namespaces or have
+    // little shared memory, and the command may not have been built.
     let excuses = [
         "a POSIX queue of",
+        "bytes of shared memory",
         "no process may be traced here",
         "no namespaces here",
         "no real time for routers here",
