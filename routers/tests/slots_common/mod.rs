@@ -261,7 +261,7 @@ impl Segment {
     /// System time at a moment, as a node of this process knew it then.
     pub(crate) fn time_of(&self, node: u8) -> impl Fn(u64) -> u64 {
         let (log, skew) = (self.own_log(node), self.stations[usize::from(node)].skew);
-        move |at_ns| log.system_ns(at_ns, skew.local_ns(at_ns))
+        move |at_ns| log.system_ns(skew.local_ns(at_ns))
     }
 
     /// What is too late if a node followed another master since then, as it does when three Syncs of one are missing:
