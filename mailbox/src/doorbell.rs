@@ -48,16 +48,18 @@ pub(crate) fn timespec(time: Duration) -> libc::timespec {
     }
 }
 
-/// Wakes the threads that sleep on this participant's bell, and keeps those from sleeping that are about to.
-pub(crate) fn ring(node: &Node, participant: u16) {
+/// Wakes the threads that sleep on this participant's bell, and keeps those from sleeping that are about to. Says whether
+/// one slept there.
+pub(crate) fn ring(node: &Node, participant: u16) -> bool {
     let bell = node.entry(participant).bell();
     // The word changes before the wake, else a sleeper that is just about to sleep would miss both.
     let polling = bell.ring();
     // SAFETY: FUTEX_WAKE only uses the address of the word, which is mapped.
-    unsafe { libc::syscall(libc::SYS_futex, bell.rings.as_ptr(), libc::FUTEX_WAKE, i32::MAX) };
+    let woken = unsafe { libc::syscall(libc::SYS_futex, bell.rings.as_ptr(), libc::FUTEX_WAKE, i32::MAX) };
     if polling {
         write_to_pipe(node, participant);
     }
+    woken > 0
 }
 
 /// What can go wrong does no harm: the sleeper is dead, its pipe gone, or so full that it will not sleep. Or we, or the

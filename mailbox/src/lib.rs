@@ -63,7 +63,8 @@
 //! 3. `layout`, `segment`, `memory`: the bytes, and the only addresses. `sync`: atomics and fences.
 //! 4. `label`, `sender`, `send_error`, `place`, `receiver`: what users hold; `routes`: what is on other nodes.
 //!    `node`, `entry`, `participant`, `lock`, `registry`, `unlink`: live processes and their names.
-//! 5. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
+//! 5. `stream`: rings of stamped records. `owned`: what their files and those of mailboxes have in common.
+//! 6. `counters`, `traffic`, `flows`, `inspect`, `about`: what anyone may read. `system_time`: the node's time.
 //!
 //! An ordering that matters has a letter, and its partner says the same one: (A) to (J) in the slot core; `bell` goes
 //! on with (H) and (I); `cell` has letters of its own.
@@ -106,6 +107,7 @@ mod mapped;
 mod memory;
 mod name;
 mod node;
+mod owned;
 mod package;
 mod participant;
 mod place;
@@ -120,6 +122,7 @@ mod slots;
 #[cfg_attr(not(feature = "crash-points"), allow(unused))]
 #[doc(hidden)]
 pub mod step;
+mod stream;
 mod sync;
 pub mod sys;
 mod system_time;
@@ -150,8 +153,12 @@ pub use routes::ROUTES_MAX;
 pub use send_error::SendError;
 pub use sender::{Loan, Sender};
 pub use slots::SLOTS_MAX;
+pub use stream::{
+    Around, HeldRecord, Next, OpenRecord, RecordInfo, STREAM_READERS_MAX, Stamp, StreamError, StreamId, StreamReader,
+    StreamShape, StreamShapeError, StreamWriter, WriteError,
+};
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
 pub use throttle::Throttle;
-pub use waiting::{Waiting, wait_above, wait_any};
+pub use waiting::{Source, Waiting, wait_above, wait_any};
 pub use watch::{Interest, Ready, WATCHES_MAX, Watch, Watches};
 pub use work::{InHand, Work};

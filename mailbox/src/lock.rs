@@ -8,6 +8,7 @@ use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, fcntl};
 use std::fs::File;
 use std::io;
+use std::ops::Range;
 
 fn region(kind: i32, byte: u64) -> libc::flock {
     libc::flock {
@@ -46,6 +47,21 @@ impl Held {
     /// None when another open file holds it.
     pub(crate) fn try_take(file: File, byte: u64) -> io::Result<Option<Self>> {
         Ok(try_lock(&file, byte)?.then_some(Self { file, byte }))
+    }
+
+    /// The first of these bytes that no other open file holds; none when others hold all.
+    pub(crate) fn try_take_first(file: File, bytes: Range<u64>) -> io::Result<Option<Self>> {
+        for byte in bytes {
+            if try_lock(&file, byte)? {
+                return Ok(Some(Self { file, byte }));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Which byte.
+    pub(crate) fn byte(&self) -> u64 {
+        self.byte
     }
 }
 

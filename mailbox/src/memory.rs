@@ -21,7 +21,7 @@ unsafe impl Shared for AtomicU32 {}
 // SAFETY: an atomic; all bit patterns are numbers.
 unsafe impl Shared for AtomicU64 {}
 
-/// A shared mapping of a file's beginning, or one of several users of it in this process. Truncating the file
+/// A shared mapping of a part of a file, or one of several users of it in this process. Truncating the file
 /// afterwards is outside our contract: all processes of a user trust each other's memory.
 #[derive(Clone)]
 pub(crate) struct Mapping {
@@ -58,22 +58,39 @@ pub(crate) enum Use {
     Keep,
 }
 
+/// When the pages of a mapping come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Pages {
+    /// All, before it is used.
+    Present,
+    /// Each when it is touched. The file has its memory, so none fails.
+    WhenTouched,
+}
+
 impl Mapping {
     /// Maps the first `bytes` of a file that is at least so long, all pages present.
     pub(crate) fn new(file: &File, bytes: usize, used: Use) -> io::Result<Self> {
+        Self::part(file, 0, bytes, used, Pages::Present)
+    }
+
+    /// Maps `bytes` from `offset` on, which begins a page, of a file that is long enough.
+    pub(crate) fn part(file: &File, offset: usize, bytes: usize, used: Use, pages: Pages) -> io::Result<Self> {
         let length = NonZeroUsize::new(bytes).ok_or(io::ErrorKind::InvalidInput)?;
-        if file.metadata()?.len() < bytes as u64 {
-            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, format!("file is shorter than {bytes} bytes")));
+        let end = offset.checked_add(bytes).ok_or(io::ErrorKind::InvalidInput)?;
+        if file.metadata()?.len() < end as u64 {
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, format!("file is shorter than {end} bytes")));
         }
+        let offset = offset.try_into().map_err(|_| io::ErrorKind::InvalidInput)?;
+        let pages = if pages == Pages::Present { MapFlags::MAP_POPULATE } else { MapFlags::empty() };
         let (write, keep) = match used {
             Use::Look => (ProtFlags::empty(), MapFlags::empty()),
             Use::Share => (ProtFlags::PROT_WRITE, MapFlags::empty()),
             Use::Keep => (ProtFlags::PROT_WRITE, MapFlags::MAP_LOCKED),
         };
         let map = |keep| {
-            let flags = MapFlags::MAP_SHARED | MapFlags::MAP_POPULATE | keep;
+            let flags = MapFlags::MAP_SHARED | pages | keep;
             // SAFETY: a new mapping at an address of the kernel's choice touches nothing that exists.
-            unsafe { mmap(None, length, ProtFlags::PROT_READ | write, flags, file, 0) }
+            unsafe { mmap(None, length, ProtFlags::PROT_READ | write, flags, file, offset) }
         };
         let base = match map(keep) {
             Err(Errno::EAGAIN | Errno::EPERM) if used == Use::Keep => map(MapFlags::empty())?,

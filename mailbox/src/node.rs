@@ -11,6 +11,7 @@
 //!     bell.3         a pipe that wakes participant 3, while it watches descriptors (see `doorbell`)
 //!     01c80000.mbx   a mailbox: its name in hexadecimal (see `layout`)
 //!     01c80000.about what its owner says of it (see `about`)
+//!     01c80000.1.ring  a stream: the name of its writer's mailbox, and its number (see `stream`)
 //! ```
 //!
 //! A participant is one user of mailboxes, mostly a process. It lives as long as it holds the lock on its byte of the
@@ -275,8 +276,13 @@ impl Node {
     /// process that sees another end (launch, above all) calls this.
     pub fn announce_death(&self) {
         self.page().deaths.fetch_add(1, Ordering::AcqRel);
+        self.ring_all();
+    }
+
+    /// Wakes all participants.
+    pub(crate) fn ring_all(&self) {
         let there = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
-        (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| doorbell::ring(self, index));
+        (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| _ = doorbell::ring(self, index));
     }
 
     /// Changes with every new, taken over and gone mailbox. One that was not there when the number, read *before*

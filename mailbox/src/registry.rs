@@ -1,31 +1,25 @@
 //! Making, adopting, replacing and removing mailboxes (`inspect` looks at them): the files of a node's directory are
-//! the registry.
-//!
-//! All changes happen under the node's registry lock, and a mailbox is only changed by the holder of its owner's lock.
-//! A file gets its name last, whole; so nobody ever opens half a mailbox.
+//! the registry. `owned` has what mailboxes and streams have in common.
 
 use crate::counters::Loss;
-use crate::files::{allocate, is_lack_of_descriptors, is_lack_of_memory, open_shared};
+use crate::files::{is_lack_of_descriptors, is_lack_of_memory};
 use crate::layout::{Shape, ShapeError};
-use crate::lock::Held;
 use crate::memory::Use;
 use crate::name::Name;
 use crate::node::{Node, NodeError, REGISTRY_PATIENCE, RegistryLock};
+use crate::owned::{self, BadSegment, Owned, Refused};
 use crate::participant::Participant;
 use crate::queue::Queue;
 use crate::receiver::Receiver;
-use crate::segment::{BadSegment, Segment, path_of};
+use crate::segment::{Segment, WHAT, path_of};
 use crate::step::step;
 use crate::unlink::unlink;
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
-
-/// The byte of a segment's file that its owner locks.
-pub(crate) const OWNER_BYTE: u64 = 0;
 
 /// Why a mailbox could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -102,12 +96,14 @@ impl Participant {
         shape.check().map_err(|error| CreateError::Shape(name, error))?;
         let shape = shape.as_stored();
         let taken = RegistryLock::take(self.node().path());
-        let _registry = taken.map_err(|error| CreateError::of_node(name, error))?;
-        let (segment, lock) = match self.take_over(name, shape)? {
-            Predecessor::Same(segment, lock) => (segment, lock),
-            Predecessor::Other(old) => self.make(name, shape, Some(&old))?,
-            Predecessor::None => self.make(name, shape, None)?,
-        };
+        let registry = taken.map_err(|error| CreateError::of_node(name, error))?;
+        let (segment, lock) =
+            owned::obtain::<Segment>(self.node(), name, shape, &registry).map_err(|why| match why {
+                Refused::Owned(there) => {
+                    CreateError::Owned(name, there.map_or(0, |there| there.page().owner.pid.load(Ordering::Relaxed)))
+                }
+                Refused::File(path, source) => CreateError::of(&path, name, &shape, source),
+            })?;
         // Also of one that is taken over: its maker may have died before it could.
         self.node().raise_registry_epoch();
         step!("create: owned");
@@ -117,79 +113,50 @@ impl Participant {
         owner.participant.store(u32::from(self.claimant().participant), Ordering::Release);
         Ok(Receiver::new(self.clone(), segment, lock))
     }
-
-    /// Looks at what is there, as its owner, and adopts it if it is the same.
-    fn take_over(&self, name: Name, shape: Shape) -> Result<Predecessor, CreateError> {
-        let path = path_of(self.node().path(), name);
-        let failed = |source| CreateError::of(&path, name, &shape, source);
-        let file = match open_shared(&path, false) {
-            Ok(file) => file,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Predecessor::None),
-            Err(error) => return Err(failed(error)),
-        };
-        let old = match Segment::check(&file, name, Use::Keep) {
-            Ok(old) => Some(old),
-            Err(BadSegment::Foreign | BadSegment::Version(_)) => None,
-            Err(BadSegment::Io(error)) => return Err(failed(error)),
-        };
-        let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else {
-            let pid = old.map_or(0, |old| old.page().owner.pid.load(Ordering::Relaxed));
-            return Err(CreateError::Owned(name, pid));
-        };
-        let Some(old) = old else { return Ok(Predecessor::None) };
-        if old.shape != shape || old.slots().is_retired() {
-            return Ok(Predecessor::Other(old));
-        }
-        step!("adopt: before");
-        let page = old.page();
-        old.slots().adopt(|priority| page.counters.lost(priority, Loss::Poison, 1));
-        page.owner.adoptions.fetch_add(1, Ordering::Relaxed);
-        Ok(Predecessor::Same(old, lock))
-    }
-
-    /// Makes the file, whole, then gives it its name. The old mailbox is given up only when the new one is whole:
-    /// without memory for that, what the old one holds stays.
-    fn make(&self, name: Name, shape: Shape, old: Option<&Segment>) -> Result<(Segment, Held), CreateError> {
-        let node = self.node();
-        let path = path_of(node.path(), name);
-        // One maker at a time (the registry's lock), so one temporary name will do; a dead maker's leftover is
-        // overwritten.
-        let unfinished = node.path().join("unfinished");
-        let made = || {
-            let _ = fs::remove_file(&unfinished);
-            let file = open_shared(&unfinished, true)?;
-            step!("create: file");
-            allocate(&file, shape.segment_bytes())?;
-            step!("create: allocated");
-            let segment = Segment::format(&file, name, shape)?;
-            let lock = Held::try_take(file, OWNER_BYTE)?.ok_or(io::ErrorKind::WouldBlock)?;
-            step!("create: formatted");
-            if let Some(old) = old {
-                retire(old);
-                let counters = &segment.page().counters;
-                counters.carry_over(&old.page().counters);
-                // Not the old one's tickets: those of packages that their senders took back were never accepted.
-                segment.page().hot.ticket.0.store(counters.accepted(), Ordering::Relaxed);
-                step!("create: carried over");
-            }
-            fs::rename(&unfinished, &path)?;
-            step!("create: named");
-            Ok((segment, lock))
-        };
-        made().map_err(|source| {
-            let _ = fs::remove_file(&unfinished);
-            CreateError::of(&unfinished, name, &shape, source)
-        })
-    }
 }
 
-/// What stood under a name before.
-enum Predecessor {
-    None,
-    /// A mailbox of the same shape is adopted.
-    Same(Segment, Held),
-    /// To be given up; its counters go on in the next.
-    Other(Segment),
+impl Owned for Segment {
+    const WHAT: &'static str = WHAT;
+    type Id = Name;
+    type Shape = Shape;
+
+    fn path(node: &Path, name: Name) -> PathBuf {
+        path_of(node, name)
+    }
+
+    fn bytes(shape: &Shape) -> usize {
+        shape.segment_bytes()
+    }
+
+    fn check(file: &File, name: Name, used: Use) -> Result<Self, BadSegment> {
+        Self::check(file, name, used)
+    }
+
+    fn format(file: &File, name: Name, shape: Shape, _old: Option<&Self>) -> io::Result<Self> {
+        Self::format(file, name, shape)
+    }
+
+    fn goes_on_as(&self, shape: &Shape) -> bool {
+        self.shape == *shape && !self.slots().is_retired()
+    }
+
+    fn adopt(&self) {
+        let page = self.page();
+        self.slots().adopt(|priority| page.counters.lost(priority, Loss::Poison, 1));
+        page.owner.adoptions.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn replace(&self, old: &Self) {
+        retire(old);
+        let counters = &self.page().counters;
+        counters.carry_over(&old.page().counters);
+        // Not the old one's tickets: those of packages that their senders took back were never accepted.
+        self.page().hot.ticket.0.store(counters.accepted(), Ordering::Relaxed);
+    }
+
+    fn retire(&self) {
+        retire(self);
+    }
 }
 
 /// Gives a mailbox without owner up, and counts what it still held.
@@ -225,17 +192,8 @@ impl Node {
     }
 
     fn remove_orphan_within(&self, name: Name, patience: Duration) -> Result<bool, NodeError> {
-        let path = path_of(self.path(), name);
-        let failed = |error| NodeError::Io(path.clone(), error);
         let registry = RegistryLock::take_within(self.path(), patience)?;
-        let Ok(file) = open_shared(&path, false) else { return Ok(false) };
-        let old = Segment::check(&file, name, Use::Share);
-        let Some(_owner) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else { return Ok(false) };
-        if let Ok(old) = old {
-            retire(&old);
-        }
-        unlink(self, name, &registry)?;
-        Ok(true)
+        owned::remove_orphan::<Segment>(self, name, || unlink(self, name, &registry))
     }
 
     /// Removes the whole directory if nothing lives in it: no launch, no participant. Mailboxes without owner go first.

@@ -3,10 +3,11 @@
 use crate::bodies::Bodies;
 use crate::clock::monotonic_ns;
 use crate::files::{open_shared, open_to_read};
-use crate::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape, VERSION};
+use crate::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape};
 use crate::mapped;
 use crate::memory::{Located, Mapping, Rooms, Use};
 use crate::name::Name;
+use crate::owned::BadSegment;
 use crate::package::{HEAD_BYTES, Head};
 use crate::slots::{Claim, Slots, Taken};
 use std::fs::File;
@@ -33,18 +34,8 @@ pub(crate) struct Segment {
     word_stride: usize,
 }
 
-/// Why a file is not the mailbox it should be.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum BadSegment {
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// Foreign, or damaged.
-    #[error("its file is no mailbox, or damaged; end its owner, and remove the file with `rohrpost clean`")]
-    Foreign,
-    /// Another version's layout.
-    #[error("it was made by another version (layout {0}, this program {VERSION}); build both from the same version")]
-    Version(u32),
-}
+/// The word for what has a segment of this kind.
+pub(crate) const WHAT: &str = "mailbox";
 
 /// The file of a mailbox.
 pub(crate) fn path_of(node: &Path, name: Name) -> PathBuf {
@@ -101,7 +92,7 @@ impl Segment {
     fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
         let there = file.metadata()?;
         if !there.is_file() || there.len() < size_of::<Page>() as u64 {
-            return Err(BadSegment::Foreign);
+            return Err(BadSegment::Foreign(WHAT));
         }
         let mut first = [0; size_of::<Identity>()];
         file.read_exact_at(&mut first, 0)?;
@@ -109,9 +100,9 @@ impl Segment {
         if let Some(other) = identity.other_version() {
             return Err(BadSegment::Version(other));
         }
-        let (found, shape) = identity.read().ok_or(BadSegment::Foreign)?;
+        let (found, shape) = identity.read().ok_or(BadSegment::Foreign(WHAT))?;
         if found != name || there.len() < shape.segment_bytes() as u64 {
-            return Err(BadSegment::Foreign);
+            return Err(BadSegment::Foreign(WHAT));
         }
         Ok(shape)
     }

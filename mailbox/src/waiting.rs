@@ -1,7 +1,8 @@
-//! Waiting for mailboxes: how long, and whether awake for a moment before asleep.
+//! Waiting for mailboxes and streams: how long, and whether awake for a moment before asleep.
 
 use crate::doorbell::Slept;
 use crate::name::Priority;
+use crate::participant::Participant;
 use crate::receiver::{Package, Receiver};
 use crate::step::step;
 use crate::watch::Watches;
@@ -16,6 +17,71 @@ const LOOKS_A_CLOCK: usize = 16;
 /// Measured with packages of 4 KiB sent as fast as they go, against a ring with a futex (`rohrpost-bench local --only
 /// rate-blocking`): 0.8 times as many without, 2.5 times as many with it.
 const EAGER: Duration = Duration::from_micros(2);
+
+/// What [`wait_any`] waits for: mailboxes ([`Receiver`]) and streams ([`StreamReader`](crate::StreamReader)). Both at once
+/// are `&mut dyn Source`.
+pub trait Source: steps::Steps {}
+
+impl<S: steps::Steps> Source for S {}
+
+/// Nobody outside adds a kind of source.
+pub(crate) mod steps {
+    use super::{Arc, Participant};
+
+    /// The steps of waiting, in their order.
+    pub trait Steps {
+        /// Whose bell wakes.
+        fn participant(&self) -> &Arc<Participant>;
+        /// Works off what keeps it awake for nothing.
+        fn settle(&mut self);
+        /// Whether something may be there.
+        fn may_have(&self) -> bool;
+        /// Has the line that is looked at come here, and stay.
+        fn expect(&self);
+        /// Says that it is about to sleep.
+        fn drowsy(&self);
+        /// Says that it does not sleep.
+        fn awake(&self);
+        /// Whether the last thing came on the way to sleep.
+        fn is_eager(&self) -> bool;
+        /// Says so.
+        fn set_eager(&mut self, eager: bool);
+    }
+}
+
+impl steps::Steps for Receiver {
+    fn participant(&self) -> &Arc<Participant> {
+        self.participant()
+    }
+
+    fn settle(&mut self) {
+        self.settle();
+    }
+
+    fn may_have(&self) -> bool {
+        self.may_have()
+    }
+
+    fn expect(&self) {
+        self.expect();
+    }
+
+    fn drowsy(&self) {
+        self.drowsy();
+    }
+
+    fn awake(&self) {
+        self.awake();
+    }
+
+    fn is_eager(&self) -> bool {
+        self.eager
+    }
+
+    fn set_eager(&mut self, eager: bool) {
+        self.eager = eager;
+    }
+}
 
 /// How to wait. By default: asleep, for ever (after two microseconds awake when the last package came on the way to
 /// sleep). A [`Duration`] is a timeout from now on, an `Option<Instant>` a deadline.
@@ -52,7 +118,7 @@ impl Waiting {
         self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()))
     }
 
-    fn is_over(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         self.left() == Some(Duration::ZERO)
     }
 
@@ -75,7 +141,7 @@ impl Waiting {
     }
 }
 
-/// Waits until one of these mailboxes has a package, `other` says that there is something else to do, or the deadline
+/// Waits until one of these mailboxes has a package, one of these streams a record, `other` says that there is something else to do, or the deadline
 /// has passed. May return early for no reason. Says how long it slept, that is, left the processor to others. All must
 /// be of one participant: its bell wakes.
 ///
@@ -86,9 +152,13 @@ impl Waiting {
 ///
 /// # Panics
 /// When the mailboxes are of different participants: their bells are different words.
-pub fn wait_any(receivers: &mut [&mut Receiver], waiting: impl Into<Waiting>, other: impl Fn() -> bool) -> Duration {
+pub fn wait_any<S: Source + ?Sized>(
+    sources: &mut [&mut S],
+    waiting: impl Into<Waiting>,
+    other: impl Fn() -> bool,
+) -> Duration {
     let mut slept = Duration::ZERO;
-    wait(receivers, None, waiting.into(), other, |sleep| slept = timed(sleep));
+    wait(sources, None, waiting.into(), other, |sleep| slept = timed(sleep));
     slept
 }
 
@@ -159,14 +229,14 @@ impl Watches {
     ///
     /// # Panics
     /// When a mailbox is not of the participant that watches.
-    pub fn wait_any(
+    pub fn wait_any<S: Source + ?Sized>(
         &mut self,
-        receivers: &mut [&mut Receiver],
+        sources: &mut [&mut S],
         waiting: impl Into<Waiting>,
         other: impl Fn() -> bool,
     ) -> Duration {
         let mut slept = Duration::ZERO;
-        wait(receivers, Some(self), waiting.into(), other, |sleep| slept = timed(sleep));
+        wait(sources, Some(self), waiting.into(), other, |sleep| slept = timed(sleep));
         slept
     }
 }
@@ -180,20 +250,20 @@ fn timed(sleep: impl FnOnce()) -> Duration {
 
 /// Waits. To sleep it calls `asleep`, which calls what it is given; a caller that wants to know how long that was reads
 /// the clock.
-fn wait(
-    receivers: &mut [&mut Receiver],
+pub(crate) fn wait<S: Source + ?Sized>(
+    sources: &mut [&mut S],
     watches: Option<&mut Watches>,
     waiting: Waiting,
     other: impl Fn() -> bool,
     asleep: impl FnOnce(&mut dyn FnMut()),
 ) {
-    receivers.iter_mut().for_each(|receiver| receiver.settle());
-    let eager = receivers.iter().any(|receiver| receiver.eager);
+    sources.iter_mut().for_each(|source| source.settle());
+    let eager = sources.iter().any(|source| source.is_eager());
     let waiting = Waiting { spin: if eager { waiting.spin.max(EAGER) } else { waiting.spin }, ..waiting };
-    let came = settled(receivers, watches, waiting, other, asleep);
+    let came = settled(sources, watches, waiting, other, asleep);
     // Spun for nothing, or slept: the next package is not about to come.
     let eager = came == Came::TooSoonToSleep || eager && came == Came::WhileAwake;
-    receivers.iter_mut().for_each(|receiver| receiver.eager = eager);
+    sources.iter_mut().for_each(|source| source.set_eager(eager));
 }
 
 /// How waiting ended.
@@ -206,35 +276,35 @@ enum Came {
     Later,
 }
 
-fn settled(
-    receivers: &[&mut Receiver],
+fn settled<S: Source + ?Sized>(
+    sources: &[&mut S],
     watches: Option<&mut Watches>,
     waiting: Waiting,
     other: impl Fn() -> bool,
     asleep: impl FnOnce(&mut dyn FnMut()),
 ) -> Came {
     let of_watches = watches.as_ref().map(|watches| watches.participant().clone());
-    let of_first = receivers.first().map(|receiver| receiver.participant());
+    let of_first = sources.first().map(|source| source.participant());
     let Some(participant) = of_watches.as_ref().or(of_first) else { return Came::Later };
-    assert!(receivers.iter().all(|receiver| Arc::ptr_eq(receiver.participant(), participant)));
+    assert!(sources.iter().all(|receiver| Arc::ptr_eq(receiver.participant(), participant)));
     let watches = watches.filter(|watches| !watches.is_empty());
-    let found = || other() || receivers.iter().any(|receiver| receiver.may_have());
+    let found = || other() || sources.iter().any(|source| source.may_have());
     let polled = || {
-        receivers.iter().for_each(|receiver| receiver.expect());
+        sources.iter().for_each(|source| source.expect());
         found()
     };
     // Until here, and while it spins, nobody needs to ring.
-    if waiting.spin_until(receivers.len(), polled) {
+    if waiting.spin_until(sources.len(), polled) {
         watches.into_iter().for_each(Watches::look);
         return Came::WhileAwake;
     }
     let entry = participant.entry();
     // Before `drowsy`: whatever is published after the looks below rings, and so changes this value.
     let seen = entry.bell().seen();
-    receivers.iter().for_each(|receiver| receiver.drowsy());
+    sources.iter().for_each(|source| source.drowsy());
     step!("wait: drowsy");
     let idle = !found() && !waiting.is_over();
-    let is_there = || receivers.iter().any(|receiver| receiver.may_have());
+    let is_there = || sources.iter().any(|source| source.may_have());
     let mut came = if !idle && is_there() { Came::TooSoonToSleep } else { Came::Later };
     match watches {
         Some(watches) if idle => asleep(&mut || watches.sleep(entry.bell(), seen, waiting.left())),
@@ -246,6 +316,6 @@ fn settled(
         }),
         None => {}
     }
-    receivers.iter().for_each(|receiver| receiver.awake());
+    sources.iter().for_each(|source| source.awake());
     came
 }

@@ -1,4 +1,4 @@
-//! Writes the slot core and the cells once as they are and once per broken variant, each beside its models, with loom's
+//! Writes the slot core, the cells and the core of streams once as they are and once per broken variant, each beside its models, with loom's
 //! atomics.
 
 use std::fmt::Write;
@@ -11,13 +11,15 @@ mod broken;
 mod cell_broken;
 #[path = "src/mirrored.rs"]
 mod mirrored;
+#[path = "src/stream_broken.rs"]
+mod stream_broken;
 
 use broken::{Broken, Edit};
 use mirrored::MIRRORED;
 
 const MAILBOX: &str = "../../src";
 /// Files of this crate; the others are the mailbox's.
-const OURS: [&str; 3] = ["rig", "models", "cell_models"];
+const OURS: [&str; 4] = ["rig", "models", "cell_models", "stream_models"];
 
 /// A part of the mailbox that is proved by itself.
 struct Proof {
@@ -31,7 +33,7 @@ struct Proof {
     broken: &'static [&'static [Broken]],
 }
 
-const PROOFS: [Proof; 2] = [
+const PROOFS: [Proof; 3] = [
     Proof {
         real: "real",
         parts: &["word", "full", "hot", "bodies", "slots", "queue", "bell", "rig", "models"],
@@ -43,6 +45,12 @@ const PROOFS: [Proof; 2] = [
         parts: &["cell", "cell_models"],
         models: cell_broken::MODELS,
         broken: &[cell_broken::BROKEN],
+    },
+    Proof {
+        real: "real_stream",
+        parts: &["stream/ring", "stream/writing", "stream/lookup", "stream_models"],
+        models: stream_broken::MODELS,
+        broken: &[stream_broken::BROKEN],
     },
 ];
 
@@ -75,7 +83,7 @@ fn generate(out: &Path) {
 
 /// The modules of a proof's variants, with their tests.
 fn variants(out: &Path, proof: &Proof) -> String {
-    let models = proof.parts.last().expect("a proof has models");
+    let models = last(proof.parts.last().expect("a proof has models"));
     let mut tests = String::new();
     for (model, preemptions) in proof.models {
         let catches = proof.broken.iter().copied().flatten().any(|broken| broken.caught_by == *model);
@@ -108,14 +116,20 @@ fn variant(out: &Path, parts: &[&str], name: &str, edits: &[Edit], tests: &str) 
             text = text.replacen(edit.from, edit.to, 1);
         }
         for part in parts {
-            text = text.replace(&format!("crate::{part}::"), &format!("super::{part}::"));
+            text = text.replace(&format!("crate::{}::", part.replace('/', "::")), &format!("super::{}::", last(part)));
         }
+        let part = last(part);
         fs::write(out.join(name).join(part).with_extension("rs"), text).expect("OUT_DIR can be written");
         writeln!(module, "mod {part} {{ include!(concat!(env!(\"OUT_DIR\"), \"/{name}/{part}.rs\")); }}")
             .expect("a String takes all");
     }
     assert!(edits.iter().all(|edit| parts.contains(&edit.file)), "variant {name}: edits a file that is not its own");
     module + tests + "}\n"
+}
+
+/// The name of a part's module: that of its file.
+fn last(part: &str) -> &str {
+    part.rsplit('/').next().unwrap_or(part)
 }
 
 fn source(part: &str) -> String {

@@ -227,4 +227,27 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         scene: SENDING,
         says: "check Gone",
     },
+    // ---- streams ----
+    Mistake {
+        name: "a_finished_record_is_forgotten",
+        edits: &[edit(
+            "stream/writing",
+            "if let Look::There(_) = ring.look(next) {",
+            "if let Look::There(_) = ring.look(next)
+            && !broken!(a_finished_record_is_forgotten)
+        {",
+        )],
+        scene: "streams::a_writer_dies_writing",
+        says: "a finished record",
+    },
+    Mistake {
+        name: "the_sequence_begins_anew",
+        edits: &[edit(
+            "stream/segment",
+            "segment.first = old.map_or(0, ",
+            "segment.first = old.filter(|_| !broken!(the_sequence_begins_anew)).map_or(0, ",
+        )],
+        scene: "streams::a_writer_dies_replacing_a_stream_of_another_shape",
+        says: "the sequence goes on",
+    },
 ];

@@ -1,0 +1,23 @@
+//! Streams: rings of stamped records in shared memory, each with one writer and many readers. `ring` tells how.
+//!
+//! Reading order: `ring`, `writing`, `lookup` are the protocol; `shape`, `segment`, `bytes` the memory; `writer`,
+//! `reader`, `record`, `error` what users hold; `files` which there are.
+
+mod bytes;
+mod error;
+mod files;
+mod lookup;
+mod reader;
+mod record;
+mod ring;
+mod segment;
+mod shape;
+mod writer;
+mod writing;
+
+pub use error::{StreamError, WriteError};
+pub use reader::StreamReader;
+pub use record::{Around, HeldRecord, Next, RecordInfo};
+pub use ring::{STREAM_READERS_MAX, Stamp};
+pub use shape::{StreamId, StreamShape, StreamShapeError};
+pub use writer::{OpenRecord, StreamWriter};

@@ -1,0 +1,332 @@
+//! The core of a stream: how one writer and many readers share a ring of records, with atomics alone.
+//!
+//! Nothing here maps memory, sleeps or touches a record's bytes (see `segment`, `writer`, `reader`), so that loom can
+//! check it as it stands. `writing` has the writer's steps, `lookup` the search by stamp.
+//!
+//! ```text
+//!  index: keep entries                 frames: keep + readers + 1            seats: one a reader
+//!  ┌───────────────────────────┐       ┌─────────┐                          ┌───────────────┐
+//!  │ 8: frame 2 · stamp · len  │──────▶│ bytes   │◀── written by the writer │ hold: frame 5 │
+//!  │ 9: being written          │       ├─────────┤    alone, and never while│ hold: none    │
+//!  │ 6: frame 0 · stamp · len  │──────▶│ bytes   │    an entry or a seat    └───────────────┘
+//!  └───────────────────────────┘       └─────────┘    names the frame         written by the reader alone
+//! ```
+//!
+//! Record n has entry n modulo `keep`. The word of an entry is the only truth about it: sequence and frame, one store.
+//! A record is read in one of two ways:
+//!
+//! - *copied*: word, copy, word again. If it is the same, the writer had not turned to the frame. The copy races with
+//!   the writer, so it is made of atomics.
+//! - *held*: the reader writes the frame into its seat, then looks at the word again. If it is the same, the writer
+//!   goes round the frame until the seat names it no more. Nothing races, so the bytes are plain memory.
+//!
+//! A seat names one frame at most, and a frame that is neither in the index nor in a seat always exists: there are
+//! `keep + readers + 1`. So the writer waits for nobody, and a stopped reader costs one frame that was there for it.
+//!
+//! | died | left behind | what fixes it, and how |
+//! | --- | --- | --- |
+//! | writer, filling a frame | bytes that no entry names | nothing to fix: its successor counts the frame as free |
+//! | writer, entry begun | an entry without a frame, the record there before is gone | the successor writes it; readers of the old record are told that they lost it |
+//! | writer, entry named its frame | a record that `written` does not count | the record is finished: the successor counts it |
+//! | writer, counted | readers that were not woken | the successor wakes all when it begins |
+//! | reader, holding | a seat that names a frame | nothing to fix: the frame is the seat's own room, the next reader there clears it |
+//! | reader, asleep | a seat that says so | the writer rings for nobody once, asks whether it lives, and clears it |
+//!
+//! Orderings. A record is handed over by its word: (A) to (D), as in a cell of its own. (E) and (F) settle sleep
+//! against publishing, (G) and (H) holding against reuse.
+
+use crate::step::step;
+use crate::sync::{AtomicU32, AtomicU64, Ordering, fence};
+use std::cmp;
+
+/// Bits of a word that name the frame, plus one; 0: none yet.
+const FRAME_BITS: u32 = 20;
+const FRAME: u64 = (1 << FRAME_BITS) - 1;
+/// Most frames of a stream.
+pub(crate) const FRAMES_MAX: usize = FRAME as usize;
+/// Most readers of a stream at a time.
+pub const STREAM_READERS_MAX: usize = 64;
+
+/// When a record was produced.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct Stamp {
+    /// Of system time: times of different epochs cannot be compared, and the later epoch is the greater.
+    pub epoch: u64,
+    /// Nanoseconds of system time; never 0.
+    pub ns: u64,
+}
+
+/// A record's line in the index. Written by the writer alone.
+#[derive(Debug, Default)]
+#[repr(C, align(64))]
+pub(crate) struct IndexEntry {
+    word: AtomicU64,
+    stamp_ns: AtomicU64,
+    /// The greatest stamp of its epoch among all records before it; 0: there is none.
+    before_ns: AtomicU64,
+    epoch: AtomicU64,
+    written_ns: AtomicU64,
+    len_bytes: AtomicU64,
+    incarnation: AtomicU64,
+}
+
+/// A reader's line. Written by that reader; the writer clears what a dead one says of its sleep.
+#[derive(Debug, Default)]
+#[repr(C, align(128))]
+pub(crate) struct Seat {
+    /// The frame that the writer must go round, plus one; 0: none.
+    pub(crate) hold: AtomicU32,
+    /// Not 0: the reader sleeps, or is about to. Which bell to ring, as the reader chose to write it.
+    pub(crate) sleeper: AtomicU64,
+}
+
+/// What is said of a record, besides its sequence.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct About {
+    pub(crate) stamp: Stamp,
+    pub(crate) before_ns: u64,
+    pub(crate) written_ns: u64,
+    pub(crate) len_bytes: u64,
+    pub(crate) incarnation: u32,
+}
+
+/// An entry as it was read, whole.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Line {
+    word: u64,
+    pub(crate) sequence: u64,
+    pub(crate) frame: usize,
+    pub(crate) about: About,
+}
+
+impl Line {
+    /// The greatest stamp of its epoch up to this record.
+    pub(crate) fn newest_ns(&self) -> u64 {
+        self.about.before_ns.max(self.about.stamp.ns)
+    }
+}
+
+/// What there is of a record.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Look {
+    /// It is there.
+    There(Line),
+    /// It is not written yet.
+    NotYet,
+    /// A newer one has its place.
+    Gone,
+}
+
+/// The word of an entry.
+pub(crate) fn word(sequence: u64, frame: Option<usize>) -> u64 {
+    sequence << FRAME_BITS | frame.map_or(0, |frame| frame as u64 + 1)
+}
+
+/// How far the word's record is behind (negative) or before the one of this sequence. The word has the sequence's low
+/// 44 bits: at a million records a second two records 200 days apart look the same.
+fn ahead(word: u64, sequence: u64) -> i64 {
+    ((word >> FRAME_BITS).wrapping_sub(sequence) << FRAME_BITS) as i64 >> FRAME_BITS
+}
+
+/// The shared part of a stream, as every process sees it.
+#[derive(Clone, Copy)]
+pub(crate) struct Ring<'a> {
+    /// Records written: the sequence of the next one.
+    written: &'a AtomicU64,
+    /// The first sequence that was written here; those before it are in no ring any more.
+    first: u64,
+    entries: &'a [IndexEntry],
+    seats: &'a [Seat],
+}
+
+impl<'a> Ring<'a> {
+    /// There is at least one entry, and at most [`STREAM_READERS_MAX`] seats: both come from a checked shape.
+    #[inline]
+    pub(crate) fn new(written: &'a AtomicU64, first: u64, entries: &'a [IndexEntry], seats: &'a [Seat]) -> Self {
+        Self { written, first, entries, seats }
+    }
+
+    /// Makes each entry one of a record that is gone. For a ring that nobody else sees yet.
+    pub(crate) fn format(&self) {
+        self.written.store(self.first, Ordering::Relaxed);
+        for sequence in self.first.saturating_sub(self.keep())..self.first {
+            self.entry(sequence).word.store(word(sequence, None), Ordering::Relaxed);
+        }
+    }
+
+    /// Records that the ring keeps.
+    pub(crate) fn keep(&self) -> u64 {
+        self.entries.len() as u64
+    }
+
+    /// One for each record, one for each seat, and one to write.
+    pub(crate) fn frames(&self) -> usize {
+        self.entries.len() + self.seats.len() + 1
+    }
+
+    pub(crate) fn first(&self) -> u64 {
+        self.first
+    }
+
+    pub(crate) fn seats(&self) -> &'a [Seat] {
+        self.seats
+    }
+
+    pub(super) fn entry(&self, sequence: u64) -> &'a IndexEntry {
+        &self.entries[(sequence % self.keep()) as usize]
+    }
+
+    /// Records ever written, in all rings of this stream. May be late by the one that is being written.
+    pub(crate) fn written(&self) -> u64 {
+        // ORDERING: Acquire; pairs with the store after publishing: the records that are counted are seen.
+        self.written.load(Ordering::Acquire)
+    }
+
+    pub(super) fn count(&self, written: u64) {
+        self.written.store(written, Ordering::Release);
+    }
+
+    // ---- readers ----
+
+    /// What there is of a record.
+    #[inline]
+    pub(crate) fn look(&self, sequence: u64) -> Look {
+        let entry = self.entry(sequence);
+        // ORDERING: Acquire (B); pairs with (A): the entry, and the frame that it names, are whole.
+        let word = entry.word.load(Ordering::Acquire);
+        let frame = (word & FRAME) as usize;
+        if sequence < self.first {
+            return Look::Gone;
+        }
+        match ahead(word, sequence).cmp(&0) {
+            cmp::Ordering::Less => return Look::NotYet,
+            cmp::Ordering::Equal if frame == 0 => return Look::NotYet,
+            // No writer names a frame that there is not.
+            cmp::Ordering::Equal if frame > self.frames() => return Look::Gone,
+            cmp::Ordering::Equal => {}
+            cmp::Ordering::Greater => return Look::Gone,
+        }
+        let long = |word: &AtomicU64| word.load(Ordering::Relaxed);
+        let about = About {
+            stamp: Stamp { epoch: long(&entry.epoch), ns: long(&entry.stamp_ns) },
+            before_ns: long(&entry.before_ns),
+            written_ns: long(&entry.written_ns),
+            len_bytes: long(&entry.len_bytes),
+            incarnation: long(&entry.incarnation) as u32,
+        };
+        let line = Line { word, sequence, frame: frame - 1, about };
+        if self.is_there(&line) { Look::There(line) } else { Look::Gone }
+    }
+
+    /// Whether the record has not been overtaken since it was looked at: what was copied since then is whole.
+    #[inline]
+    pub(crate) fn is_there(&self, line: &Line) -> bool {
+        // ORDERING (D): what was read of entry and frame before the second look at the word. Pairs with (C) for the
+        // entry, with (E) for the frame.
+        fence(Ordering::Acquire);
+        self.entry(line.sequence).word.load(Ordering::Relaxed) == line.word
+    }
+
+    /// Whether there is anything to say of a record but that it is not written yet.
+    #[inline]
+    pub(crate) fn is_due(&self, sequence: u64) -> bool {
+        let word = self.entry(sequence).word.load(Ordering::Relaxed);
+        let ahead = ahead(word, sequence);
+        ahead > 0 || ahead == 0 && word & FRAME != 0 || sequence < self.first
+    }
+
+    /// The newest record; none before the first. A writer that overtakes this at each try has none to show either.
+    pub(crate) fn newest(&self) -> Option<Line> {
+        (0..TRIES).find_map(|_| match self.look(self.written().checked_sub(1)?) {
+            Look::There(line) => Some(line),
+            Look::NotYet | Look::Gone => None,
+        })
+    }
+
+    /// Where a reader goes on that has found this record gone: the oldest that may still be there.
+    pub(crate) fn oldest_after(&self, gone: u64) -> u64 {
+        // The place of the gone record is the newer one's at least from when that was begun.
+        let newer = ahead(self.entry(gone).word.load(Ordering::Relaxed), gone).max(0) as u64;
+        let end = gone.saturating_add(newer).saturating_add(1).max(self.written());
+        self.oldest_before(end).max(gone.saturating_add(1))
+    }
+
+    /// The oldest record when this one is the next to be written.
+    pub(crate) fn oldest_before(&self, end: u64) -> u64 {
+        end.saturating_sub(self.keep()).max(self.first)
+    }
+
+    /// Keeps the writer from a record's frame, until [`Ring::release`]; false when the record was overtaken before. The
+    /// seat is the caller's, and names no frame.
+    #[inline]
+    pub(crate) fn hold(&self, seat: usize, line: &Line) -> bool {
+        // ORDERING: Release (H), since this may hide the release before it from the writer.
+        self.seats[seat].hold.store(line.frame as u32 + 1, Ordering::Release);
+        // ORDERING (G): the seat before the second look at the word. Pairs with (E): the writer sees the seat, or the
+        // word has changed.
+        fence(Ordering::SeqCst);
+        step!("hold: said");
+        let held = self.entry(line.sequence).word.load(Ordering::Relaxed) == line.word;
+        if !held {
+            self.release(seat);
+        }
+        held
+    }
+
+    /// Lets the writer have the frame again.
+    #[inline]
+    pub(crate) fn release(&self, seat: usize) {
+        step!("release: before seat");
+        // ORDERING: Release (H); what was read of the frame comes before what the writer writes there. Pairs with (I).
+        self.seats[seat].hold.store(0, Ordering::Release);
+        step!("release: seat");
+    }
+
+    /// Says that the reader of a seat is about to sleep. Look for records after this, then sleep, then [`Ring::awake`].
+    pub(crate) fn drowsy(&self, seat: usize, sleeper: u64) {
+        self.seats[seat].sleeper.store(sleeper, Ordering::Relaxed);
+        // ORDERING (F): `sleeper` before the last look at the word. Pairs with (E): the writer sees the sleeper, or the
+        // record is seen.
+        fence(Ordering::SeqCst);
+    }
+
+    /// Says that it does not sleep.
+    pub(crate) fn awake(&self, seat: usize) {
+        self.seats[seat].sleeper.store(0, Ordering::Relaxed);
+    }
+
+    /// Clears what the dead reader before said. For the new owner of a seat.
+    pub(crate) fn sit_down(&self, seat: usize) {
+        self.awake(seat);
+        step!("seat: awake");
+        self.release(seat);
+    }
+}
+
+/// A reader that is overtaken as often as this has met a writer that turns its whole ring in the meantime.
+pub(super) const TRIES: usize = 8;
+
+impl IndexEntry {
+    /// Makes this the entry of a record; the writer alone. The word is the last to be written.
+    pub(super) fn write(&self, sequence: u64, frame: usize, about: &About) {
+        self.word.store(word(sequence, None), Ordering::Relaxed);
+        // ORDERING (C): a reader that sees what follows sees that the record before is gone. Pairs with (D).
+        fence(Ordering::Release);
+        step!("entry: begun");
+        let fields = [
+            (&self.stamp_ns, about.stamp.ns),
+            (&self.before_ns, about.before_ns),
+            (&self.epoch, about.stamp.epoch),
+            (&self.written_ns, about.written_ns),
+            (&self.len_bytes, about.len_bytes),
+            (&self.incarnation, u64::from(about.incarnation)),
+        ];
+        for (field, value) in fields {
+            field.store(value, Ordering::Relaxed);
+        }
+        step!("entry: filled");
+        // ORDERING: Release (A); the entry and the frame are whole. Pairs with (B).
+        self.word.store(word(sequence, Some(frame)), Ordering::Release);
+        step!("entry: published");
+    }
+}

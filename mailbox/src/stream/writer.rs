@@ -1,0 +1,225 @@
+//! The writing side of a stream: a record copied in, or filled in place.
+
+use crate::clock::monotonic_ns;
+use crate::doorbell;
+use crate::lock::Held;
+use crate::name::Name;
+use crate::node::{NodeError, RegistryLock};
+use crate::owned::{self, Refused};
+use crate::participant::Participant;
+use crate::step::step;
+use crate::stream::error::{StreamError, WriteError};
+use crate::stream::ring::{About, Seat, Stamp};
+use crate::stream::segment::StreamSegment;
+use crate::stream::shape::{StreamId, StreamShape};
+use crate::stream::writing::{Frame, Progress};
+use crate::word::Claimant;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// The one writer of a stream. Dropped, the stream stays, and with it its records: the next writer goes on.
+///
+/// ```
+/// use rohrpost_mailbox::{Name, Next, Node, Participant, Stamp, StreamId, StreamShape};
+/// # let dir = tempfile::tempdir()?;
+/// let node = Node::create(&dir.path().join("node"), 0o700)?;
+/// let participant = Participant::join(&node, Name::new(1, 200, 0, 0))?;
+/// let id = StreamId { name: Name::new(1, 200, 0, 0), number: 1 };
+/// let mut writer = participant.stream_writer(id, StreamShape::default())?;
+/// let mut reader = participant.stream_reader(id)?;
+/// writer.write(Stamp { epoch: 1, ns: 1_000 }, b"a picture")?;
+/// let Next::Record(record) = reader.try_next()? else { panic!("it is there") };
+/// assert_eq!((record.body(), record.info().stamp.ns), (&b"a picture"[..], 1_000));
+/// // A record is never refused because readers are slow, but it must not be behind.
+/// assert!(writer.write(Stamp { epoch: 1, ns: 999 }, b"too late").is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct StreamWriter {
+    participant: Arc<Participant>,
+    segment: StreamSegment,
+    progress: Progress,
+    /// Tells this writer's records from those of earlier ones.
+    incarnation: u32,
+    late_ns: u64,
+    /// Where a record is filled in place that may be copied while it is written.
+    draft: Vec<u8>,
+    /// Holds the writer's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
+    _lock: Held,
+}
+
+impl Participant {
+    /// Makes this participant the writer of a stream. What an earlier writer left there goes on if the shape is the
+    /// same; else the old stream is given up and replaced, and readers follow. The sequence goes on in both cases.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    pub fn stream_writer(self: &Arc<Self>, id: StreamId, shape: StreamShape) -> Result<StreamWriter, StreamError> {
+        if !id.name.is_mailbox() {
+            return Err(StreamError::Reserved(id));
+        }
+        shape.check().map_err(|error| StreamError::Shape(id, error))?;
+        let (node, shape) = (self.node(), shape.as_stored());
+        let registry = RegistryLock::take(node.path()).map_err(|error| match error {
+            NodeError::Descriptors(_) => StreamError::Descriptors(id),
+            error => StreamError::Node(error),
+        })?;
+        let obtained = owned::obtain::<StreamSegment>(node, id, shape, &registry);
+        let (segment, lock) = obtained.map_err(|why| match why {
+            Refused::Owned(there) => {
+                let load = |word: &std::sync::atomic::AtomicU32| word.load(Ordering::Relaxed);
+                let says = there.as_ref().map(|there| &there.page().writer);
+                let module = says.map_or(Name::NONE, |says| Name::from_raw(load(&says.module)));
+                StreamError::Owned { id, module, pid: says.map_or(0, |says| load(&says.pid)) }
+            }
+            Refused::File(path, source) => StreamError::of(&path, id, shape.segment_bytes(), source),
+        })?;
+        step!("stream: owned");
+        let says = &segment.page().writer;
+        says.pid.store(std::process::id(), Ordering::Relaxed);
+        says.module.store(self.module().raw(), Ordering::Relaxed);
+        says.participant.store(self.claimant().participant.into(), Ordering::Relaxed);
+        let progress = Progress::resume(&segment.ring());
+        // Readers wait for a stream that is new, and perhaps for records whose writer died before it could wake them.
+        node.raise_registry_epoch();
+        step!("stream: told");
+        node.ring_all();
+        let draft = vec![0; if shape.is_racing() { shape.record_bytes as usize } else { 0 }];
+        let (participant, incarnation, late_ns) = (self.clone(), node.next_incarnation(), shape.late_ns());
+        Ok(StreamWriter { participant, segment, progress, incarnation, late_ns, draft, _lock: lock })
+    }
+}
+
+impl StreamWriter {
+    /// Which stream.
+    pub fn id(&self) -> StreamId {
+        self.segment.id
+    }
+
+    /// What it was made as.
+    pub fn shape(&self) -> &StreamShape {
+        &self.segment.shape
+    }
+
+    /// Sequence of the next record: how many were ever written.
+    pub fn written(&self) -> u64 {
+        self.progress.next()
+    }
+
+    /// Records that were ever refused since their stamps were too far behind.
+    pub fn refused(&self) -> u64 {
+        self.segment.page().writer.refused.load(Ordering::Relaxed)
+    }
+
+    /// Writes a record; its sequence. A number of steps bounded by the number of readers, and no system call unless a
+    /// reader sleeps.
+    ///
+    /// # Errors
+    /// See [`WriteError`]. A slow or stopped reader is none.
+    pub fn write(&mut self, stamp: Stamp, bytes: &[u8]) -> Result<u64, WriteError> {
+        self.check(stamp, bytes.len())?;
+        let mut frame = self.claim()?;
+        self.segment.fill(&mut frame, bytes);
+        Ok(self.publish(frame, stamp, bytes.len()))
+    }
+
+    /// A record to be filled in place. Dropped unfinished, nothing happened.
+    ///
+    /// # Errors
+    /// See [`WriteError`].
+    pub fn begin(&mut self, stamp: Stamp) -> Result<OpenRecord<'_>, WriteError> {
+        self.check(stamp, 0)?;
+        let frame = self.claim()?;
+        Ok(OpenRecord { writer: self, frame: Some(frame), stamp })
+    }
+
+    fn check(&self, stamp: Stamp, len: usize) -> Result<(), WriteError> {
+        let (id, max, late_ns) = (self.id(), self.segment.shape.record_bytes as usize, self.late_ns);
+        if len > max {
+            return Err(WriteError::TooLarge { id, len, max });
+        }
+        if stamp.ns == 0 {
+            return Err(WriteError::Unstamped(id));
+        }
+        let Some(newest) = self.progress.newest() else { return Ok(()) };
+        let behind_ns = newest.ns.saturating_sub(stamp.ns);
+        let refused = match stamp.epoch.cmp(&newest.epoch) {
+            std::cmp::Ordering::Less => WriteError::OldEpoch { id, epoch: stamp.epoch, newest: newest.epoch },
+            std::cmp::Ordering::Equal if behind_ns > late_ns => WriteError::Late { id, behind_ns, late_ns },
+            _ => return Ok(()),
+        };
+        self.segment.page().writer.refused.fetch_add(1, Ordering::Relaxed);
+        Err(refused)
+    }
+
+    fn claim(&mut self) -> Result<Frame, WriteError> {
+        self.progress.claim(&self.segment.ring()).ok_or(WriteError::Damaged(self.segment.id))
+    }
+
+    fn publish(&mut self, frame: Frame, stamp: Stamp, len: usize) -> u64 {
+        let about = About {
+            stamp,
+            before_ns: 0,
+            written_ns: monotonic_ns(),
+            len_bytes: len as u64,
+            incarnation: self.incarnation,
+        };
+        let participant = &self.participant;
+        let wake = |seat: &Seat, sleeper| wake(participant, seat, sleeper);
+        self.progress.publish(&self.segment.ring(), frame, about, wake)
+    }
+}
+
+/// Rings for a sleeping reader; what a dead one said of its sleep is cleared, so that it costs one call.
+#[cold]
+fn wake(participant: &Participant, seat: &Seat, sleeper: u64) {
+    let by = Claimant { participant: (sleeper >> 32) as u16, incarnation: sleeper as u32 };
+    let node = participant.node();
+    let woken = doorbell::ring(node, by.participant);
+    step!("wake: rung");
+    if !woken && node.is_dead(by) {
+        seat.forget(sleeper);
+    }
+}
+
+/// A record that is being filled in place; readers do not see it. Dropped, nothing happened.
+pub struct OpenRecord<'a> {
+    writer: &'a mut StreamWriter,
+    /// None once it is finished or given back.
+    frame: Option<Frame>,
+    stamp: Stamp,
+}
+
+impl OpenRecord<'_> {
+    /// The bytes to fill, as many as a record may have. What they are at first is not told.
+    pub fn body_mut(&mut self) -> &mut [u8] {
+        match &mut self.frame {
+            Some(frame) if !self.writer.segment.shape.is_racing() => self.writer.segment.body_mut(frame),
+            _ => &mut self.writer.draft,
+        }
+    }
+
+    /// Makes the first `len` bytes the next record; its sequence.
+    ///
+    /// # Errors
+    /// [`WriteError::TooLarge`] when a record has not so many.
+    pub fn finish(mut self, len: usize) -> Result<u64, WriteError> {
+        let (id, max) = (self.writer.id(), self.writer.segment.shape.record_bytes as usize);
+        if len > max {
+            return Err(WriteError::TooLarge { id, len, max });
+        }
+        let Some(mut frame) = self.frame.take() else { return Err(WriteError::Damaged(id)) };
+        let writer = &mut *self.writer;
+        if writer.segment.shape.is_racing() {
+            writer.segment.fill(&mut frame, &writer.draft[..len]);
+        }
+        Ok(writer.publish(frame, self.stamp, len))
+    }
+}
+
+impl Drop for OpenRecord<'_> {
+    fn drop(&mut self) {
+        if let Some(frame) = self.frame.take() {
+            self.writer.progress.give_back(frame);
+        }
+    }
+}

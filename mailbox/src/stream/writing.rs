@@ -1,0 +1,133 @@
+//! The writer's side of a ring: which frame it fills, how a record becomes one, and whom it wakes.
+//!
+//! ```text
+//! frame = one that no entry and no seat names │ fill │ entry: word without frame │ (C) │ fields │ (A) word │ count │ (E)
+//!                                                                                          sleepers? ──▶ ring each
+//! ```
+//! Each of these takes a number of steps bounded by the number of readers. What the writer knows by itself is not
+//! shared: a successor works it out from the index.
+
+use crate::step::step;
+use crate::stream::ring::{About, Look, Ring, STREAM_READERS_MAX, Seat, Stamp};
+use crate::sync::{Ordering, fence};
+
+/// What the writer knows.
+#[derive(Debug)]
+pub(crate) struct Progress {
+    /// Sequence of the next record.
+    next: u64,
+    /// Frames that no entry names: at least one more than there are seats.
+    free: Vec<u32>,
+    /// The greatest stamp of the newest epoch; none before the first record.
+    newest: Option<Stamp>,
+}
+
+/// A frame to be filled: in no entry and no seat, so the writer alone reaches it. The only one of its frame.
+#[must_use = "the frame is lost to this writer unless it is published or given back"]
+#[derive(Debug)]
+pub(crate) struct Frame(u32);
+
+impl Frame {
+    pub(crate) fn number(&self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl Progress {
+    /// Goes on where the writer before ended, whichever step that was. For the one writer, before it writes.
+    pub(crate) fn resume(ring: &Ring<'_>) -> Self {
+        let mut next = ring.written().max(ring.first());
+        if let Look::There(_) = ring.look(next) {
+            // Its writer died before it could count it.
+            next += 1;
+            ring.count(next);
+            step!("resume: counted");
+        }
+        let mut used = vec![false; ring.frames()];
+        let mut newest = None;
+        for sequence in ring.oldest_before(next)..next {
+            if let Look::There(line) = ring.look(sequence) {
+                used[line.frame] = true;
+                newest = Some(Stamp { epoch: line.about.stamp.epoch, ns: line.newest_ns() });
+            }
+        }
+        // For every frame, once: later ones only come back.
+        let mut free = Vec::with_capacity(ring.frames());
+        free.extend((0..ring.frames() as u32).filter(|frame| !used[*frame as usize]));
+        // ORDERING (E): what the writer before did to the index, before the looks at the seats. Pairs with (G).
+        fence(Ordering::SeqCst);
+        Self { next, free, newest }
+    }
+
+    /// Sequence of the next record.
+    pub(crate) fn next(&self) -> u64 {
+        self.next
+    }
+
+    /// The greatest stamp of the newest epoch.
+    pub(crate) fn newest(&self) -> Option<Stamp> {
+        self.newest
+    }
+
+    /// A frame to fill. There always is one: a seat names one frame at most, and is looked at once.
+    pub(crate) fn claim(&mut self, ring: &Ring<'_>) -> Option<Frame> {
+        let mut held = [0; STREAM_READERS_MAX];
+        for (held, seat) in held.iter_mut().zip(ring.seats()) {
+            // ORDERING: Acquire (I); pairs with (H): whoever held a frame has read it.
+            *held = seat.hold.load(Ordering::Acquire);
+        }
+        let held = &held[..ring.seats().len()];
+        // The last to become free is the nearest in the caches.
+        let at = self.free.iter().rposition(|frame| !held.contains(&(frame + 1)))?;
+        Some(Frame(self.free.swap_remove(at)))
+    }
+
+    /// Gives a frame back that does not become a record.
+    pub(crate) fn give_back(&mut self, frame: Frame) {
+        self.free.push(frame.0);
+    }
+
+    /// Makes a filled frame the next record, and calls `wake` for each seat that says that its reader sleeps.
+    /// `about.before_ns` is written here.
+    pub(crate) fn publish(
+        &mut self,
+        ring: &Ring<'_>,
+        frame: Frame,
+        about: About,
+        mut wake: impl FnMut(&Seat, u64),
+    ) -> u64 {
+        let sequence = self.next;
+        let before_ns = self.newest.filter(|newest| newest.epoch == about.stamp.epoch).map_or(0, |newest| newest.ns);
+        // The record that loses its entry, unless its writer died over it.
+        let old = match sequence.checked_sub(ring.keep()).map(|old| ring.look(old)) {
+            Some(Look::There(line)) => Some(line.frame as u32),
+            _ => None,
+        };
+        step!("publish: filled");
+        ring.entry(sequence).write(sequence, frame.number(), &About { before_ns, ..about });
+        self.next = sequence + 1;
+        ring.count(self.next);
+        step!("publish: counted");
+        self.newest = Some(Stamp { epoch: about.stamp.epoch, ns: before_ns.max(about.stamp.ns) });
+        self.free.extend(old);
+        // ORDERING (E): the new word before the looks at the seats: at their sleepers now, at their holds when the next
+        // frame is claimed. Pairs with (F) and (G). And before what is written into the old record's frame: a reader
+        // that copied any of it sees the new word. Pairs with (D).
+        fence(Ordering::SeqCst);
+        for seat in ring.seats() {
+            let sleeper = seat.sleeper.load(Ordering::Relaxed);
+            if sleeper != 0 {
+                step!("publish: before wake");
+                wake(seat, sleeper);
+            }
+        }
+        sequence
+    }
+}
+
+impl Seat {
+    /// Clears what a dead reader said of its sleep, unless another reader has said something since.
+    pub(crate) fn forget(&self, sleeper: u64) {
+        let _ = self.sleeper.compare_exchange(sleeper, 0, Ordering::Relaxed, Ordering::Relaxed);
+    }
+}
