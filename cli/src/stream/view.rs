@@ -195,10 +195,10 @@ mod tests {
         assert_eq!(
             print_streams(&[view(&info(true)), view(&info(false)), view(&empty)]),
             "\
-stream    number      records  readers  writer                  written     newest   memory
-camera.0       7  64 x 1024 B   2 of 8  camera.0, process 4711      100  30 ms ago  86.02 kB
-camera.0       7  64 x 1024 B   2 of 8  nobody                      100  30 ms ago  86.02 kB
-camera.0       8  64 x 1024 B   0 of 8  nobody                        0       none  86.02 kB
+stream    number      records  readers  writer                  written     newest    memory
+camera.0       7  64 x 1024 B   2 of 8  camera.0, process 4711      100  30 ms ago  90.11 kB
+camera.0       7  64 x 1024 B   2 of 8  nobody                      100  30 ms ago  90.11 kB
+camera.0       8  64 x 1024 B   0 of 8  nobody                        0       none  90.11 kB
 "
         );
     }
@@ -212,7 +212,7 @@ camera.0       8  64 x 1024 B   0 of 8  nobody                        0       no
   writer      nobody; the last was camera.0, process 4711
   readers     2 of 8 seats in use; 1 hold a record, 1 sleep
   keeps       64 records of at most 1024 B
-  memory      86016 B
+  memory      90112 B
   late        a stamp may be 50 ms behind the newest
   written     100
   refused     2
