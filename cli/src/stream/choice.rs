@@ -73,8 +73,8 @@ impl StreamChoice {
         let node = running.node_of(name);
         if node != running.node_name {
             return Err(format!(
-                "{} is a module of node {node}, and a stream lies in the memory of its node; use `--node {node}` on the \
-                 computer where that runs",
+                "{} is a module of node {node}, and a stream lies in the memory of its node; use `--node {node}` on \
+                 its computer",
                 self.stream
             )
             .into());
