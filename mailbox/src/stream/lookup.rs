@@ -126,7 +126,8 @@ fn floor_ns(ring: &Ring<'_>, epoch: u64) -> Option<u64> {
     }
 }
 
-fn oldest(ring: &Ring<'_>) -> Option<Line> {
+/// The oldest record that is there.
+pub(super) fn oldest(ring: &Ring<'_>) -> Option<Line> {
     let first = ring.oldest_before(ring.written());
     (first..first + TRIES as u64).find_map(|sequence| match ring.look(sequence) {
         Look::There(line) => Some(line),

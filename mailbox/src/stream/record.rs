@@ -25,6 +25,14 @@ pub struct RecordInfo {
     pub incarnation: u32,
 }
 
+impl RecordInfo {
+    pub(super) fn of(segment: &StreamSegment, line: &Line) -> Self {
+        let (about, len_bytes) = (&line.about, segment.len(line));
+        let (stamp, written_ns, incarnation) = (about.stamp, about.written_ns, about.incarnation);
+        Self { sequence: line.sequence, stamp, written_ns, len_bytes, incarnation }
+    }
+}
+
 /// What comes next for a reader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next<T> {
@@ -111,9 +119,7 @@ impl TakenSeat {
     }
 
     pub(super) fn info(&self, line: &Line) -> RecordInfo {
-        let (about, len_bytes) = (&line.about, self.segment.len(line));
-        let (stamp, written_ns, incarnation) = (about.stamp, about.written_ns, about.incarnation);
-        RecordInfo { sequence: line.sequence, stamp, written_ns, len_bytes, incarnation }
+        RecordInfo::of(&self.segment, line)
     }
 }
 
