@@ -233,14 +233,13 @@ impl Sender {
 
     /// Why a mailbox that was not given up takes no package; a full one counts it.
     fn refusal(&self, why: &NoClaim, priority: Priority, len: usize) -> Option<SendError> {
-        let name = self.segment.name;
+        let (name, max) = (self.segment.name, self.body_bytes_max());
+        if let NoClaim::NoSlot(NoSlot::Full) = why {
+            self.segment.page().counters.lost(priority, Loss::Refused, 1);
+        }
         match why {
-            NoClaim::TooLarge => Some(SendError::TooLarge { name, len, max: self.body_bytes_max() }),
-            NoClaim::NoSlot(NoSlot::Full) => {
-                self.segment.page().counters.lost(priority, Loss::Refused, 1);
-                Some(SendError::Full(name))
-            }
-            NoClaim::NoSlot(NoSlot::Retired) => None,
+            NoClaim::TooLarge => Some(SendError::TooLarge { name, len, max }),
+            NoClaim::NoSlot(why) => (*why == NoSlot::Full).then_some(SendError::Full(name)),
         }
     }
 

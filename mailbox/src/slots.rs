@@ -39,8 +39,8 @@ pub const SLOTS_MAX: usize = 1024;
 /// A sender looks through a full mailbox this often for somebody to displace before it calls it full: each further
 /// look is owed to another process that was quicker, and n looks at n slots would be n².
 const DISPLACE_LOOKS_MAX: usize = 4;
-/// A search for a free slot pauses after each of its first looks in vain. A slot in use is one that the receiver has not
-/// come to: it may share the core with this sender, and owns the lines that are looked at. Without the pauses four
+/// A search for a free slot pauses after each of its first looks in vain. A slot in use is one that the receiver has
+/// not come to: it may share the core with this sender, and owns the lines that are looked at. Without the pauses four
 /// senders lose a quarter of their rate. Few, so that a search in a large mailbox stays short.
 const PAUSES: usize = 8;
 

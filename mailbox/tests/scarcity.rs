@@ -36,7 +36,7 @@ fn role() {
 }
 
 /// A mailbox, made as soon as it is this process's turn: on a busy computer others may change the registry for longer
-/// than anybody waits, and are said to. Who started this process kills it when none of them gets on.
+/// than anybody waits, and are said to. The test kills this process when none of them gets on.
 fn made(me: &Arc<Participant>, name: Name) -> Receiver {
     loop {
         match me.receiver(name, SMALL) {

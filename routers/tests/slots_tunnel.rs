@@ -198,8 +198,8 @@ fn tell(ways: &[Way], flow: usize, bound_ns: u64) {
     );
 }
 
-/// What is later than its bound is explained by a stall: by one that kept the package up itself, or that made its router
-/// leave a slot out.
+/// What is later than its bound is explained by a stall: by one that kept the package up itself, or that made its
+/// router leave a slot out.
 fn are_excused(segment: &Segment, stalls: &Stalls, ways: &[Way], bounds_ns: &[u64]) -> Result<(), Late> {
     let (mut left_out, mut unseen) = (0, Vec::new());
     for way in ways {

@@ -93,8 +93,8 @@ fn until_next_slot(pair: &Pair) -> Duration {
     Duration::from_nanos(next_ns.saturating_sub(now_ns)).saturating_sub(SPINS)
 }
 
-/// Waits until the router's slots have begun, and one has just taken what there was: the moment then, and how long it is
-/// from there until the next, [`LEFT`] at least.
+/// Waits until the router's slots have begun, and one has just taken what there was: the moment then, and how long it
+/// is from there until the next, [`LEFT`] at least.
 fn wait_for_a_slot(pair: &Pair, sender: &mut Sender, receiver: &mut Receiver) -> (Instant, Duration) {
     let began = Instant::now();
     let waiting = || pair.sides[0].node.look_at(transit()).map_or(0, |mailbox| mailbox.depth);

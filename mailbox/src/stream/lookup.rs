@@ -94,7 +94,7 @@ fn has_stamp(ring: &Ring<'_>, low: u64, end: u64, stamp: Stamp) -> Option<Line> 
 }
 
 /// From the first record that has reached the time on: the nearest that is late, if there is one, and the nearest after
-/// it. None when the writer has overtaken this.
+/// it. None when the writer has overwritten this.
 fn nearest(ring: &Ring<'_>, reached: Line, end: u64, at: Stamp, late_ns: u64) -> Option<(Option<Line>, Line)> {
     let (mut before, mut after) = (None::<Line>, reached);
     for sequence in reached.sequence..end {

@@ -38,7 +38,7 @@ impl RecordInfo {
 pub enum Next<T> {
     /// The next record.
     Record(T),
-    /// The writer has overtaken this reader, which lost so many records. It stands at the oldest still there.
+    /// The writer has passed this reader, which lost so many records. It stands at the oldest still there.
     Lost(u64),
     /// Nothing was written since.
     Nothing,
@@ -58,7 +58,8 @@ impl<T> Next<T> {
 /// The records around a time, or exactly why not.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Around {
-    /// The nearest ones; both are the same when it has this very stamp. Final: nothing that is written later changes it.
+    /// The nearest ones; both are the same when it has this very stamp. Final: nothing that is written later changes
+    /// it.
     Records {
         /// The nearest that is not after.
         before: RecordInfo,

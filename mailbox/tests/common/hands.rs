@@ -261,7 +261,7 @@ struct Hands {
     transit: Receiver,
     far_sender: Sender,
     watches: Watches,
-    /// One whose records are copied while it is written, and one of plain memory.
+    /// One with records that are copied while it is written, and one of plain memory.
     streams: [Stream; 2],
     _far: UnixStream,
 }

@@ -1,4 +1,4 @@
-//! What a demo whose router was killed says of it: how long the router was away, and what was lost by that.
+//! What a demo with a killed router says of it: how long the router was away, and what was lost by that.
 
 use rohrpost_routers::inbound::SOCKET_MAX_NS;
 use rohrpost_testbed::stalls::Late;

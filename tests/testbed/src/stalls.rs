@@ -219,8 +219,8 @@ mod tests {
 
     const BY: Duration = Duration::from_millis(5);
 
-    /// Attempts of a test that is late so many times, on a computer that stood still for so long each time, how often it
-    /// was said that it is repeated, and whether it was tested; the attempts alone if it fails.
+    /// Attempts of a test that is late so many times, on a computer that stood still for so long each time, how often
+    /// it was said that it is repeated, and whether it was tested; the attempts alone if it fails.
     fn attempts_of(late: usize, stood: Duration) -> Result<(usize, usize, bool), usize> {
         let (times, repeated) = (Cell::new(0), Cell::new(0));
         let test = |_: &Stalls| {

@@ -5,7 +5,7 @@ use super::broken::{Broken, Edit};
 /// Each model and the bound on its preemptions.
 pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_new_record_is_copied_whole", 3),
-    ("an_overtaken_copy_is_thrown_away", 2),
+    ("an_overwritten_copy_is_thrown_away", 2),
     ("the_writer_goes_round_what_is_held", 3),
     ("what_was_released_was_read", 3),
     ("there_always_is_a_free_frame", 2),
@@ -16,7 +16,7 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_dead_holder_costs_nothing", 2),
     ("no_wake_up_is_lost", 3),
     ("a_final_answer_stays", 2),
-    ("an_overtaken_look_says_so", 2),
+    ("an_overwritten_look_says_so", 2),
     ("a_dead_sleeper_is_forgotten_alone", 3),
 ];
 
@@ -67,25 +67,25 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "stream_entry_without_fence_c",
         &[ring("        fence(Ordering::Release);\n        step!(\"entry: begun\");", "step!(\"entry: begun\");")],
-        "an_overtaken_copy_is_thrown_away",
+        "an_overwritten_copy_is_thrown_away",
         TORN,
     ),
     broken(
         "stream_copy_without_fence_d",
         &[ring(LOOKED_TWICE, "self.entry(line.sequence).word.load(Ordering::Relaxed) == line.word")],
-        "an_overtaken_copy_is_thrown_away",
+        "an_overwritten_copy_is_thrown_away",
         TORN,
     ),
     broken(
         "stream_copy_looks_once",
         &[ring(LOOKED_TWICE, "fence(Ordering::Acquire);\n        true")],
-        "an_overtaken_copy_is_thrown_away",
+        "an_overwritten_copy_is_thrown_away",
         TORN,
     ),
     broken(
         "stream_entry_is_changed_in_public",
         &[ring(BEGUN, "        // ORDERING (C)")],
-        "an_overtaken_copy_is_thrown_away",
+        "an_overwritten_copy_is_thrown_away",
         TORN,
     ),
     broken(
@@ -108,7 +108,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "stream_no_fence_e_for_copies",
         &[writing(FENCE_E, "Pairs with (D).")],
-        "an_overtaken_copy_is_thrown_away",
+        "an_overwritten_copy_is_thrown_away",
         TORN,
     ),
     broken(
@@ -237,7 +237,7 @@ pub(crate) const BROKEN: &[Broken] = &[
     broken(
         "stream_any_record_before_will_do",
         &[edit("stream/lookup", "if line.about.stamp == stamp => Some(line)", "=> Some(line)")],
-        "an_overtaken_look_says_so",
+        "an_overwritten_look_says_so",
         "not the nearest",
     ),
 ];

@@ -9,7 +9,7 @@ use loom::cell::UnsafeCell;
 use loom::thread;
 use std::sync::{Arc, Mutex};
 
-/// A stream whose records are one number each. Each of its words follows from its sequence, and none is 0.
+/// A stream with records of one number each. Each of its words follows from its sequence, and none is 0.
 struct Stream {
     written: AtomicU64,
     entries: Vec<IndexEntry>,
@@ -18,7 +18,7 @@ struct Stream {
     words: Vec<[AtomicU64; 2]>,
     /// The same as plain memory, watched by loom for races.
     plain: Vec<UnsafeCell<u64>>,
-    /// The bell of whoever sleeps.
+    /// The bell of all that sleep.
     rings: AtomicU32,
 }
 
@@ -131,7 +131,7 @@ impl Reader {
             }
             Look::There(_) | Look::Gone => {
                 let oldest = ring.oldest_after(self.next);
-                assert!(oldest > self.next, "overtaken, and not told so");
+                assert!(oldest > self.next, "overwritten, and not told so");
                 self.lost += oldest - self.next;
                 self.next = oldest;
             }
@@ -170,8 +170,8 @@ pub(crate) fn a_new_record_is_copied_whole() {
     is_copied_whole(0, 1);
 }
 
-/// The reader is at a record that the writer overtakes, and whose frame it uses again.
-pub(crate) fn an_overtaken_copy_is_thrown_away() {
+/// The reader is at a record that the writer replaces, and it uses the frame again.
+pub(crate) fn an_overwritten_copy_is_thrown_away() {
     is_copied_whole(2, 2);
 }
 
@@ -187,7 +187,7 @@ fn looked_at(readers: usize, bytes: Bytes) -> (Arc<Stream>, Progress, [Line; 2])
     (stream, progress, lines)
 }
 
-/// A record is held in plain memory while the writer overtakes it: loom reports a race of the two.
+/// A record is held in plain memory while the writer passes it: loom reports a race of the two.
 pub(crate) fn the_writer_goes_round_what_is_held() {
     let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
     let writer = {
@@ -261,7 +261,7 @@ pub(crate) fn a_successor_goes_round_what_is_held() {
     a_writer_dies("entry: filled", 2, Bytes::Plain);
 }
 
-/// A reader that found a stream whose writer died in the middle does not see its half entry.
+/// A reader of a stream with a writer that died in the middle does not see its half entry.
 pub(crate) fn no_half_record_is_left() {
     let stream = Stream::new(2, 1);
     let mut progress = Progress::resume(&stream.ring());
@@ -273,8 +273,8 @@ pub(crate) fn no_half_record_is_left() {
     assert_eq!(stream.ring().newest().map(|line| line.sequence), Some(1));
 }
 
-/// A dead reader's seat names a frame: the writer finds another each time, and the next reader there holds as if nothing
-/// had been.
+/// A dead reader's seat names a frame: the writer finds another each time, and the next reader there holds as if
+/// nothing had been.
 pub(crate) fn a_dead_holder_costs_nothing() {
     let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
     assert!(dies_at("release: before seat", || _ = stream.read(0, &lines[0], Bytes::Plain)));
@@ -337,8 +337,8 @@ pub(crate) fn a_final_answer_stays() {
     assert_eq!(ask(), Some((10, 20)));
 }
 
-/// The writer overtakes a reader that looks for the two around a time: they are the right two, or are gone.
-pub(crate) fn an_overtaken_look_says_so() {
+/// The writer passes a reader that looks for the two around a time: they are the right two, or are gone.
+pub(crate) fn an_overwritten_look_says_so() {
     let stream = Stream::new(2, 1);
     let mut progress = Progress::resume(&stream.ring());
     stream.writes(&mut progress, 2, Bytes::Racing);

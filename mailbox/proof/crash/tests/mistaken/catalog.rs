@@ -105,8 +105,8 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "a_death_rings_nobody",
         edits: &[edit(
             "node",
-            "(0..PARTICIPANTS_MAX as u16).filter(there)",
-            "(0..PARTICIPANTS_MAX as u16).filter(there).filter(|_| !broken!(a_death_rings_nobody))",
+            "doorbell::ring_all(self);",
+            "if !broken!(a_death_rings_nobody) { doorbell::ring_all(self); }",
         )],
         scene: "sending::a_sender_dies_beside_a_sleeping_receiver",
         says: "left: None",
