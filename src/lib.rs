@@ -65,8 +65,8 @@ pub use rohrpost_modules::runtime::{
 };
 pub use rohrpost_modules::serde;
 pub use rohrpost_modules::{
-    Module, ModuleError, choice, common, data, description, interface, interfaces, launch, launcher, output, parameter,
-    parameters, run, schema, survey, types, wire,
+    Module, ModuleError, choice, common, data, description, fusion, interface, interfaces, launch, launcher, output,
+    parameter, parameters, run, schema, survey, types, wire,
 };
 
 /// What a module says: events become lines of output.

@@ -88,7 +88,7 @@ const LONG: &[(&str, usize)] = &[
     ("config/src/reader.rs", 403),
     ("mailbox/proof/loom/src/models.rs", 642),
     ("mailbox/src/node.rs", 425),
-    ("mailbox/src/sender.rs", 420),
+    ("mailbox/src/sender.rs", 425),
     ("mailbox/src/slots.rs", 423),
     ("mailbox/src/system_time.rs", 422),
     ("modules/src/call/deduplicator_simulation.rs", 403),

@@ -1,5 +1,5 @@
-//! The cases of streams, run small: every contender delivers what it should, every line says what it has to, and nothing
-//! is left behind.
+//! The cases of streams, run small: every contender delivers what it should, every line says what it has to, and
+//! nothing is left behind.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -9,7 +9,9 @@ use nix::sys::signal::Signal;
 use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
 
 /// Case, bytes of a record, contenders that ours is compared with, and others.
-const CASES: [(&str, Option<u64>, &[&str], &[&str]); 10] = [
+type Rows = (&'static str, Option<u64>, &'static [&'static str], &'static [&'static str]);
+
+const CASES: [Rows; 10] = [
     ("spinning", Some(64), &["spin"], &[]),
     ("blocking", Some(64), &["futex"], &[]),
     ("in-place", Some(65_536), &["rohrpost, 64 B", "iceoryx2 loaned"], &[]),

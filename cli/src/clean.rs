@@ -49,27 +49,37 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 enum Cleaned {
     /// No process lived in it.
     Removed,
-    /// It is in use; this many of its mailboxes had no owner.
-    InUse(usize),
+    /// It is in use; this many of its mailboxes had no owner, and this many of its streams no writer.
+    InUse { mailboxes: usize, streams: usize },
 }
 
 fn text(path: &Path, outcome: &Result<Cleaned, NodeError>) -> String {
     match outcome {
         Ok(Cleaned::Removed) => format!("removed {}", path.display()),
-        Ok(Cleaned::InUse(1)) => format!("{} is in use; removed 1 mailbox without owner", path.display()),
-        Ok(Cleaned::InUse(removed)) => {
-            format!("{} is in use; removed {removed} mailboxes without owner", path.display())
+        Ok(Cleaned::InUse { mailboxes, streams }) => {
+            let mut text =
+                format!("{} is in use; removed {} without owner", path.display(), mailboxes_text(*mailboxes));
+            match streams {
+                0 => {}
+                1 => text += ", 1 stream without writer",
+                several => text += &format!(", {several} streams without writer"),
+            }
+            text
         }
         Err(error) => format!("left alone: {error}"),
     }
 }
 
+fn mailboxes_text(count: usize) -> String {
+    if count == 1 { "1 mailbox".into() } else { format!("{count} mailboxes") }
+}
+
 fn json(path: &Path, outcome: &Result<Cleaned, NodeError>) -> serde_json::Value {
     match outcome {
         Ok(Cleaned::Removed) => serde_json::json!({ "path": path, "removed": true }),
-        Ok(Cleaned::InUse(mailboxes)) => {
-            serde_json::json!({ "path": path, "removed": false, "mailboxes_removed": mailboxes })
-        }
+        Ok(Cleaned::InUse { mailboxes, streams }) => serde_json::json!({
+            "path": path, "removed": false, "mailboxes_removed": mailboxes, "streams_removed": streams,
+        }),
         Err(error) => serde_json::json!({ "path": path, "removed": false, "error": error.to_string() }),
     }
 }
@@ -80,12 +90,32 @@ fn clean(path: &Path) -> Result<Cleaned, NodeError> {
     if node.remove_if_dead()? {
         return Ok(Cleaned::Removed);
     }
-    let mut removed = 0;
-    // A module that its launch is about to start again has no owner for a moment; its packages must stay.
+    let (mut mailboxes, mut streams) = (0, 0);
+    // A module that its launch is about to start again has no owner for a moment; its packages and records must stay.
     if node.launcher().is_none() {
         for name in node.mailboxes()? {
-            removed += usize::from(node.remove_orphan(name)?);
+            mailboxes += usize::from(node.remove_orphan(name)?);
+        }
+        for id in node.streams()? {
+            streams += usize::from(node.remove_orphan_stream(id)?);
         }
     }
-    Ok(Cleaned::InUse(removed))
+    Ok(Cleaned::InUse { mailboxes, streams })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_removed_of_a_node_in_use_is_counted() {
+        for (mailboxes, streams, words) in [
+            (0, 0, "removed 0 mailboxes without owner"),
+            (1, 1, "removed 1 mailbox without owner, 1 stream without writer"),
+            (2, 3, "removed 2 mailboxes without owner, 3 streams without writer"),
+        ] {
+            let told = text(Path::new("/node"), &Ok(Cleaned::InUse { mailboxes, streams }));
+            assert_eq!(told, format!("/node is in use; {words}"));
+        }
+    }
 }

@@ -5,6 +5,7 @@
 //! their mailboxes. A module is asked only for its parameters, when one of them is to be completed.
 
 use super::call::COMMON;
+use super::stream;
 use super::target::{Running, Target};
 use crate::terminal::{Failure, say};
 use clap::builder::StyledStr;
@@ -77,6 +78,9 @@ fn completed(command: &str, arg: Arg) -> Arg {
         // A new name: there is nothing to complete.
         ("new", _) => arg,
         ("mailbox", "name") => from(arg, mailboxes),
+        ("write", "stream") => from(arg, modules),
+        (_, "stream") => from(arg, streams),
+        (_, "number") => from(arg, stream_numbers),
         (_, "name" | "names" | "module" | "modules") => from(arg, modules),
         (_, "node") => from(arg, nodes),
         ("send", "function") => from(arg, own_functions),
@@ -144,6 +148,14 @@ fn mailboxes() -> Vec<CompletionCandidate> {
     let Ok(running) = target().find() else { return Vec::new() };
     let all = running.node.mailboxes().unwrap_or_default();
     all.into_iter().map(|name| candidate(running.text(name), purpose(name.local()))).collect()
+}
+
+fn streams() -> Vec<CompletionCandidate> {
+    stream::completed_names(&target()).iter().map(|name| candidate(name, "")).collect()
+}
+
+fn stream_numbers() -> Vec<CompletionCandidate> {
+    stream::completed_numbers(&target(), &words()).iter().map(|number| candidate(number, "")).collect()
 }
 
 fn nodes() -> Vec<CompletionCandidate> {

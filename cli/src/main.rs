@@ -47,6 +47,7 @@ mod send;
 mod slots;
 mod speech;
 mod status;
+mod stream;
 mod summary;
 mod table;
 mod target;
@@ -90,6 +91,8 @@ enum Command {
     List(list::Arguments),
     /// Show one mailbox: its slots, losses and waits; disturbs nobody.
     Mailbox(mailbox::Arguments),
+    /// List, show, read and write streams of records.
+    Stream(stream::Arguments),
     /// Watch modules, and switch them on and off.
     Top(top::Arguments),
     /// Ask modules how they are.
@@ -155,6 +158,7 @@ fn main() -> ExitCode {
         Command::Start(arguments) => control::run(&arguments, control::Order::Start),
         Command::List(arguments) => list::run(&arguments),
         Command::Mailbox(arguments) => mailbox::run(&arguments),
+        Command::Stream(arguments) => stream::run(&arguments),
         Command::Top(arguments) => top::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Call(arguments) => call::run(&arguments),

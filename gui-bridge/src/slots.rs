@@ -31,7 +31,7 @@ const ROWS: usize = 16;
 /// Parts of the cycle that are marked.
 const MARKS: u32 = 5;
 /// Counters that grow where slots are not kept.
-const WRONG: [&str; 6] = ["late", "skipped", "silent", "held", "overran", "synchronisations_missed"];
+const WRONG: [&str; 7] = ["late", "skipped", "silent", "held", "overran", "behind", "synchronisations_missed"];
 const FRAME: palette::Rgb = palette::ROBOT;
 
 /// The tab of both views.

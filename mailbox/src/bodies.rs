@@ -1,4 +1,4 @@
-//! Where the slots' prefixes and bodies lie, so that their lines can be asked for in time. Nothing here reads them.
+//! Where the slots' prefixes and bodies lie, so that their cache lines can be prefetched. Nothing here reads them.
 
 use crate::sync::{prefetch_to_read, prefetch_to_write};
 
@@ -12,12 +12,12 @@ pub(crate) struct Bodies {
 }
 
 impl Bodies {
-    /// Has the lines come here that the next filler of the slot writes first.
+    /// Prefetches the cache lines that the next filler of the slot writes first.
     pub(crate) fn expect_to_fill(&self, slot: usize) {
         self.first_lines(slot).into_iter().for_each(prefetch_to_write);
     }
 
-    /// Has the lines of a package come here before they are looked at, all at once.
+    /// Prefetches the cache lines of a package, all at once, before they are looked at.
     pub(crate) fn expect_package(&self, slot: usize) {
         self.first_lines(slot).into_iter().for_each(prefetch_to_read);
     }

@@ -10,6 +10,7 @@
 //! A participant that waits for file descriptors too sleeps in `poll` and has a named pipe `bell.N` in the node's
 //! directory; N is its place in the table. Ringers open it only while it sleeps there (see `bell`).
 
+use crate::entry::PARTICIPANTS_MAX;
 use crate::node::Node;
 use crate::step::step;
 use nix::errno::Errno;
@@ -19,7 +20,7 @@ use nix::unistd::{UnlinkatFlags, mkfifo, unlinkat, write};
 use std::ffi::CStr;
 use std::io::{self, Write};
 use std::os::fd::{AsFd, OwnedFd};
-use std::sync::atomic::AtomicU32;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 /// Whether a sleep was one.
@@ -48,8 +49,14 @@ pub(crate) fn timespec(time: Duration) -> libc::timespec {
     }
 }
 
-/// Wakes the threads that sleep on this participant's bell, and keeps those from sleeping that are about to. Says whether
-/// one slept there.
+/// Wakes all participants.
+pub(crate) fn ring_all(node: &Node) {
+    let there = |index: &u16| node.entry(*index).pid.load(Ordering::Relaxed) != 0;
+    (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| _ = ring(node, index));
+}
+
+/// Wakes the threads that sleep on this participant's bell, and keeps those from sleeping that are about to. Says
+/// whether one slept there.
 pub(crate) fn ring(node: &Node, participant: u16) -> bool {
     let bell = node.entry(participant).bell();
     // The word changes before the wake, else a sleeper that is just about to sleep would miss both.

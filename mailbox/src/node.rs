@@ -276,13 +276,7 @@ impl Node {
     /// process that sees another end (launch, above all) calls this.
     pub fn announce_death(&self) {
         self.page().deaths.fetch_add(1, Ordering::AcqRel);
-        self.ring_all();
-    }
-
-    /// Wakes all participants.
-    pub(crate) fn ring_all(&self) {
-        let there = |index: &u16| self.entry(*index).pid.load(Ordering::Relaxed) != 0;
-        (0..PARTICIPANTS_MAX as u16).filter(there).for_each(|index| _ = doorbell::ring(self, index));
+        doorbell::ring_all(self);
     }
 
     /// Changes with every new, taken over and gone mailbox. One that was not there when the number, read *before*

@@ -218,24 +218,29 @@ impl Sender {
         len: usize,
     ) -> Result<Claim, SendError> {
         for _ in 0..REOPEN_MAX {
-            let name = self.segment.name;
-            match why {
-                NoClaim::TooLarge => return Err(SendError::TooLarge { name, len, max: self.body_bytes_max() }),
-                NoClaim::NoSlot(NoSlot::Full) => {
-                    self.segment.page().counters.lost(priority, Loss::Refused, 1);
-                    return Err(SendError::Full(name));
-                }
-                NoClaim::NoSlot(NoSlot::Retired) => {
-                    let successor = open(&self.participant, self.to, self.reach)?;
-                    self.enter(successor)?;
-                }
+            if let Some(refused) = self.refusal(&why, priority, len) {
+                return Err(refused);
             }
+            let successor = open(&self.participant, self.to, self.reach)?;
+            self.enter(successor)?;
             match self.claim_here(priority, label, len) {
                 Ok(claim) => return Ok(claim),
                 Err(next) => why = next,
             }
         }
-        Err(SendError::NoMailbox(self.to))
+        Err(self.refusal(&why, priority, len).unwrap_or(SendError::NoMailbox(self.to)))
+    }
+
+    /// Why a mailbox that was not given up takes no package; a full one counts it.
+    fn refusal(&self, why: &NoClaim, priority: Priority, len: usize) -> Option<SendError> {
+        let (name, max) = (self.segment.name, self.body_bytes_max());
+        if let NoClaim::NoSlot(NoSlot::Full) = why {
+            self.segment.page().counters.lost(priority, Loss::Refused, 1);
+        }
+        match why {
+            NoClaim::TooLarge => Some(SendError::TooLarge { name, len, max }),
+            NoClaim::NoSlot(why) => (*why == NoSlot::Full).then_some(SendError::Full(name)),
+        }
     }
 
     /// Whether a router takes the packages further.
@@ -319,7 +324,7 @@ impl Sender {
                 Err(NotHere::Reclaimed) => return Err(self.refused(label, SendError::Reclaimed(name))),
             }
         }
-        self.count_victim(&claim);
+        // Its victim is counted: `publish_here` does so first.
         self.segment.slots().abandon(claim);
         Err(self.refused(label, SendError::NoMailbox(name)))
     }

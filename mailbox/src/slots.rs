@@ -39,9 +39,9 @@ pub const SLOTS_MAX: usize = 1024;
 /// A sender looks through a full mailbox this often for somebody to displace before it calls it full: each further
 /// look is owed to another process that was quicker, and n looks at n slots would be n².
 const DISPLACE_LOOKS_MAX: usize = 4;
-/// A search for a free slot pauses after each of its first looks in vain. The mailbox is about to be full then, and
-/// only the receiver can make room: it may share the core with this sender, and owns the lines that are looked at.
-/// Without the pauses four senders lose a quarter of their rate. Few, so that a search in a large mailbox stays short.
+/// A search for a free slot pauses after each of its first looks in vain. A slot in use is one that the receiver has
+/// not come to: it may share the core with this sender, and owns the lines that are looked at. Without the pauses four
+/// senders lose a quarter of their rate. Few, so that a search in a large mailbox stays short.
 const PAUSES: usize = 8;
 
 /// A slot being filled; its owner alone may write the body. It is the only one of its slot: it cannot be copied,
@@ -337,7 +337,7 @@ impl<'a> Slots<'a> {
         step!("abandon: freed");
     }
 
-    /// Has the lines of a slot come here that its next filler writes first.
+    /// Prefetches the cache lines that the next filler of a slot writes first.
     pub(crate) fn expect_to_fill(&self, slot: usize) {
         prefetch_to_write(self.word(slot));
         self.bodies.expect_to_fill(slot);
@@ -363,7 +363,7 @@ impl<'a> Slots<'a> {
         step!("release: freed");
     }
 
-    /// Has the lines of a package come here before they are looked at, all at once; and its word as it will be needed.
+    /// Prefetches the cache lines of a package, all at once, before they are looked at; its word as it will be needed.
     pub(crate) fn expect_package(&self, slot: usize) {
         prefetch_to_write(self.word(slot));
         self.bodies.expect_package(slot);

@@ -18,8 +18,8 @@ const LOOKS_A_CLOCK: usize = 16;
 /// rate-blocking`): 0.8 times as many without, 2.5 times as many with it.
 const EAGER: Duration = Duration::from_micros(2);
 
-/// What [`wait_any`] waits for: mailboxes ([`Receiver`]) and streams ([`StreamReader`](crate::StreamReader)). Both at once
-/// are `&mut dyn Source`.
+/// What [`wait_any`] waits for: mailboxes ([`Receiver`]) and streams ([`StreamReader`](crate::StreamReader)). Both at
+/// once are `&mut dyn Source`.
 pub trait Source: steps::Steps {}
 
 impl<S: steps::Steps> Source for S {}
@@ -30,7 +30,7 @@ pub(crate) mod steps {
 
     /// The steps of waiting, in their order.
     pub trait Steps {
-        /// Whose bell wakes.
+        /// The participant with the bell that wakes.
         fn participant(&self) -> &Arc<Participant>;
         /// Works off what keeps it awake for nothing.
         fn settle(&mut self);
@@ -141,9 +141,9 @@ impl Waiting {
     }
 }
 
-/// Waits until one of these mailboxes has a package, one of these streams a record, `other` says that there is something else to do, or the deadline
-/// has passed. May return early for no reason. Says how long it slept, that is, left the processor to others. All must
-/// be of one participant: its bell wakes.
+/// Waits until one of these mailboxes has a package, one of these streams a record, `other` says that there is
+/// something else to do, or the deadline has passed. May return early for no reason. Says how long it slept, that is,
+/// left the processor to others. All must be of one participant: its bell wakes.
 ///
 /// A thread that makes `other` true from outside calls [`Participant::ring`](crate::Participant::ring) afterwards.
 ///

@@ -7,8 +7,8 @@ mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, label};
 use rohrpost_mailbox::{
-    Class, Interest, ModuleState, Name, OverflowPolicy, Participant, ROUTES_MAX, Shape, TimeKeeper, TimeSource,
-    Watches, Work, local,
+    Class, Interest, ModuleState, Name, OverflowPolicy, Participant, ROUTES_MAX, Shape, Stamp, StreamId, StreamShape,
+    TimeKeeper, TimeSource, Watches, Work, local,
 };
 use std::os::unix::fs::{FileExt, FileTypeExt};
 use std::time::Duration;
@@ -337,4 +337,49 @@ fn routes_are_as_documented() {
     assert_eq!(fields, [VERSION, 0x01fa_0203, 2]);
     assert_eq!([20, 24, 28, 32, 36].map(|at| there.u32(at)), [0, 0x01c8_0000, 0x01c8_00ff, 0x01c9_0000, 0x01c9_0009]);
     assert!(PAGE.contains("`router.I`, local id 3") && PAGE.contains("at most 65 536") && ROUTES_MAX == 65_536);
+}
+
+#[test]
+fn a_stream_is_as_documented() {
+    const STREAM: &str = "## A stream";
+    const STREAM_FIELDS: &str = "### Fields of a stream";
+    const ENTRY: &str = "### An entry of the index";
+    const SEAT: &str = "### A seat";
+    let ground = Ground::new();
+    let participant = Participant::join(&ground.node(), Name::new(1, 200, 7, 0)).unwrap();
+    let id = StreamId { name: MAILBOX, number: 5 };
+    let late = Duration::from_millis(3);
+    let shape = StreamShape { record_bytes: 100, keep: 70, readers: 33, late };
+    let mut writer = participant.stream_writer(id, shape).unwrap();
+    let mut reader = participant.stream_reader(id).unwrap();
+    for number in 0..75_u64 {
+        writer.write(Stamp { epoch: 9, ns: 1_000_000 + number }, &number.to_ne_bytes()).unwrap();
+    }
+    assert!(writer.write(Stamp { epoch: 8, ns: 1 }, b"refused").is_err());
+    let held = reader.record(74).unwrap();
+    let there = file(&ground, &format!("{:08x}.5.ring", MAILBOX.raw()));
+    assert!(there.0.starts_with(b"rohrring"));
+    let short = |field| there.u32(at(STREAM_FIELDS, field));
+    let long = |field| there.u64(at(STREAM_FIELDS, field));
+    let identity = ["version", "name", "number", "largest record", "keep", "readers"].map(short);
+    assert_eq!(identity, [VERSION, MAILBOX.raw(), 5, 100, 70, 33]);
+    let writer_says = ["its pid", "module", "adoptions", "retired"].map(short);
+    assert_eq!(writer_says, [std::process::id(), Name::new(1, 200, 7, 0).raw(), 0, 0]);
+    assert_eq!(["late", "first", "refused"].map(long), [3_000_000, 0, 1]);
+    assert_eq!(there.u64(at(STREAM, "written")), 75);
+    let seats = at(STREAM, "seats");
+    let index = seats + (33 * 128_usize).next_multiple_of(4096);
+    let frames = index + (70 * 64_usize).next_multiple_of(4096);
+    let entry = index + 74 % 70 * 64;
+    let word = there.u64(entry + at(ENTRY, "word"));
+    assert_eq!(word >> 20, 74);
+    let frame = (word & 0xf_ffff) - 1;
+    assert_eq!(there.u64(frames + frame as usize * 128), 74, "the bytes of the record");
+    let fields = ["stamp", "the greatest", "epoch", "written", "length", "incarnation"];
+    let fields = fields.map(|field| there.u64(entry + at(ENTRY, field)));
+    let info = held.info();
+    assert_eq!(fields, [1_000_074, 1_000_073, 9, info.written_ns, 8, u64::from(info.incarnation)]);
+    assert_eq!(u64::from(there.u32(seats + at(SEAT, "hold"))), frame + 1);
+    assert_eq!(there.u64(seats + at(SEAT, "sleeper")), 0);
+    assert_eq!(there.0.len(), shape.segment_bytes());
 }

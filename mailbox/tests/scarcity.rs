@@ -16,7 +16,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 #[test]
 fn role() {
@@ -35,15 +35,27 @@ fn role() {
     }
 }
 
-/// A mailbox, made as soon as it is this process's turn: on a busy computer another one may change the registry for
-/// longer than anybody waits, and is said to.
+/// A mailbox, made as soon as it is this process's turn: on a busy computer others may change the registry for longer
+/// than anybody waits, and are said to. The test kills this process when none of them gets on.
 fn made(me: &Arc<Participant>, name: Name) -> Receiver {
-    let give_up = Instant::now() + common::PATIENCE;
     loop {
         match me.receiver(name, SMALL) {
-            Err(CreateError::Node(NodeError::Busy(_))) if Instant::now() < give_up => {}
+            Err(CreateError::Node(NodeError::Busy(_))) => {}
             made => return made.unwrap(),
         }
+    }
+}
+
+/// Waits until a node has so many mailboxes, for as long as there are ever more.
+fn wait_for_mailboxes(node: &Node, wanted: usize) {
+    let (mut count, mut since) = (0, Instant::now());
+    while count < wanted {
+        let there = node.mailboxes().unwrap().len();
+        if there > count {
+            (count, since) = (there, Instant::now());
+        }
+        assert!(since.elapsed() < common::PATIENCE, "no more than {count} mailboxes of {wanted}");
+        std::thread::sleep(Duration::from_millis(10));
     }
 }
 
@@ -283,6 +295,7 @@ fn ten_thousand_mailboxes_are_made_listed_used_and_removed() {
     };
     // All at once: they wait for each other at the registry.
     let owners: Vec<_> = (0..PROCESSES).map(|number| ground.start_with(&format!("own {number}"), enough)).collect();
+    wait_for_mailboxes(&node, 10_000);
     owners.iter().for_each(|owner| assert_eq!(owner.hear(), "there"));
     let all = node.mailboxes().unwrap();
     let expected: Vec<Name> = (0..PROCESSES).flat_map(names).collect();

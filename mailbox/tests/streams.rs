@@ -1,4 +1,5 @@
-//! Streams between processes: accounts, order, deaths of writers, replacing, waiting. Checksummed records are never torn.
+//! Streams between processes: accounts, order, deaths of writers, replacing, waiting. Checksummed records are never
+//! torn.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

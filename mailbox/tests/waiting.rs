@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Ground, HIGH, LOW, MAILBOX, OTHER, PATIENCE, label, shape, tell};
-use rohrpost_mailbox::{wait_above, wait_any};
+use rohrpost_mailbox::{Receiver, wait_above, wait_any};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -192,5 +192,5 @@ fn mailboxes_of_two_participants_cannot_be_waited_for_at_once() {
     let mut second = ground.join().receiver(OTHER, shape(4)).unwrap();
     let both = std::panic::AssertUnwindSafe(|| wait_any(&mut [&mut first, &mut second], None, || true));
     assert!(std::panic::catch_unwind(both).is_err());
-    wait_any(&mut [], None, || false);
+    wait_any::<Receiver>(&mut [], None, || false);
 }

@@ -35,6 +35,7 @@ pub mod types;
 pub mod wire;
 
 pub use module::{Module, ModuleError};
+pub use rohrpost_fusion as fusion;
 pub use rohrpost_macros::{choice, data, interface, parameters};
 pub use rohrpost_schema as schema;
 pub use runtime::run;

@@ -8,7 +8,7 @@ mod common;
 
 use common::kept::{assert_kept_by, validate};
 use common::process::{Router, be_a_router};
-use common::talk::{Listeners, talk};
+use common::talk::{Listeners, talk, talkers};
 use common::{Capture, Crossed, MASTERS, Segment, instant, name, table};
 use rohrpost_mailbox::{Node, SystemClock, TimeRecord, TimeSource, monotonic_ns};
 use rohrpost_routers::link::PeerLinkState;
@@ -131,11 +131,24 @@ fn of_two_masters_one_is_left_and_nobody_sends_by_the_time_that_was_given_up() {
             lonely.slots().silent.is_none() && OTHERS.iter().all(is_heard)
         });
         segment.wait_until("it yields to the followed master", |segment| lonely(segment).master == Some(OTHERS[0]));
-        talk(&segment, &mut listeners, &ALL, 100);
+        all_talk(&segment, &mut listeners)?;
         drop(held);
         reader.join().unwrap();
         check(&segment, &capture.end(), united_ns)
     });
+}
+
+/// All nodes speak to each other and lose nothing, unless a master that stood still is replaced meanwhile: then a node
+/// is silent until it knows the time of the next, and loses what has waited too long.
+fn all_talk(segment: &Segment, listeners: &mut Listeners) -> Result<(), Late> {
+    const ROUNDS: u16 = 100;
+    let since_ns = monotonic_ns();
+    let mut talkers = talkers(segment, &ALL);
+    listeners.acquaint(&mut talkers);
+    listeners.say_all(&mut talkers, ROUNDS);
+    let replaced = || ALL.into_iter().find_map(|node| segment.replaced(node, since_ns));
+    listeners.hear_all_unless(segment, &ALL, &(0..ROUNDS).collect::<Vec<_>>(), || replaced().is_some());
+    replaced().map_or(Ok(()), Err)
 }
 
 /// `united_ns`: when the parts were one again.

@@ -108,7 +108,7 @@ fn goes_on_behind_a_slow_bridge(segment: &Segment, listeners: &mut Listeners) ->
     let silent = segment.stations[2].slots().silent;
     let replaced = || ALL.into_iter().find_map(|node| segment.replaced(node, since_ns));
     // What the relay holds when it ends is lost.
-    listeners.hear_all_unless(&ALL, &(0..ROUNDS).collect::<Vec<_>>(), || replaced().is_some());
+    listeners.hear_all_unless(segment, &ALL, &(0..ROUNDS).collect::<Vec<_>>(), || replaced().is_some());
     assert!(relay.end() > 300, "data and time take that way");
     let crossed = capture.end();
     if let Some(late) = replaced() {

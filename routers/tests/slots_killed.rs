@@ -108,7 +108,7 @@ impl Scene {
         self.talk(&mut mouths_of_others, 20..120);
         ends(self, master);
         self.talk(&mut mouths_of_others, 120..160);
-        self.listeners.hear_all(&others, &(0..160).collect::<Vec<_>>());
+        self.listeners.hear_all(&self.segment, &others, &(0..160).collect::<Vec<_>>());
         assert_kept(what, &self.segment, WITNESS, &capture.end());
     }
 
@@ -119,7 +119,7 @@ impl Scene {
         let mut talkers = talkers(&self.segment, &all);
         self.listeners.acquaint(&mut talkers);
         self.talk(&mut talkers, 0..20);
-        self.listeners.hear_all(&all, &(0..20).collect::<Vec<_>>());
+        self.listeners.hear_all(&self.segment, &all, &(0..20).collect::<Vec<_>>());
     }
 }
 

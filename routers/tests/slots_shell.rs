@@ -27,7 +27,7 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
         listeners.listen();
         std::thread::sleep(PAUSE);
     }
-    listeners.hear_all(&all, &(0..ROUNDS).collect::<Vec<_>>());
+    listeners.hear_all(&segment, &all, &(0..ROUNDS).collect::<Vec<_>>());
     let crossed = capture.end();
     for kind in [FrameKind::Packages, FrameKind::Sync, FrameKind::Request, FrameKind::Reply] {
         assert!(crossed.iter().any(|frame| frame.kind == kind), "{kind:?} crossed the bridge");
@@ -56,7 +56,7 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
         listeners.listen();
         std::thread::sleep(PAUSE);
     }
-    listeners.hear_all(&others, &(0..2 * ROUNDS).collect::<Vec<_>>());
+    listeners.hear_all(&segment, &others, &(0..2 * ROUNDS).collect::<Vec<_>>());
     segment.wait_until("the next is the master", |segment| {
         segment.stations[usize::from(next)].clock().role == Role::Master
     });
@@ -79,7 +79,7 @@ fn each_node_sends_in_its_slots_and_all_arrives_also_when_the_master_dies() {
     listeners.acquaint(&mut mouths_of_all);
     let numbers: Vec<_> = (0..20).collect();
     numbers.iter().for_each(|id| mouths_of_all.iter_mut().for_each(|talker| talker.say(*id)));
-    listeners.hear_all(&all, &numbers);
+    listeners.hear_all(&segment, &all, &numbers);
 }
 
 #[test]

@@ -6,8 +6,10 @@
 //! wakes up is in it. On a computer with much to do the thread of the time slots comes too late now and then, and
 //! leaves a slot out, or loses its processor in the middle of one; a bound holds for slots that are kept. The router
 //! counts those that are not. So a package that is later than its bound is right only if its router counted one of
-//! these in that time; all others keep their bounds. If the tunnel's traffic went before packages, a third of them
-//! would be later (it fills the slots of one node at a time).
+//! these in that time, and a processor was seen to stand still then: a router that leaves slots out by itself is wrong.
+//! A stall shorter than a millisecond may be over before a thread that watches for stalls wakes up; so the counters
+//! alone excuse one package of a hundred. All others keep their bounds. If the tunnel's traffic went before packages, a
+//! third of them would be later (it fills the slots of one node at a time).
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -20,8 +22,9 @@ use rohrpost_config::{Installation, bounds};
 use rohrpost_mailbox::{Receiver, Sender, monotonic_ns};
 use rohrpost_network::{Tdma, Tunnel};
 use rohrpost_routers::flows::Flow;
+use rohrpost_routers::tdma::GATE_NS;
 use rohrpost_testbed::report;
-use rohrpost_testbed::stalls::{Late, unless_stalled};
+use rohrpost_testbed::stalls::{Late, Stalls, unless_stalled};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{Read, Write};
@@ -40,6 +43,8 @@ const FILE_BYTES: usize = 3_000_000;
 const TYPED_MIN: usize = 40;
 /// Declared flows: from, to, bytes.
 const FLOWS: [(u8, u8, usize); 4] = [(0, 1, 900), (0, 2, 60), (1, 0, 300), (2, 1, 200)];
+/// One package in so many may be late since its router left a slot out, without a stall that was seen.
+const UNSEEN: usize = 100;
 /// No multiple of the cycle: so packages come at all moments of it.
 const PERIOD: Duration = Duration::from_millis(23);
 /// What a file would say of the segment, and of the flows.
@@ -137,7 +142,7 @@ struct Way {
 
 /// Declared flows, until something is done: none of their packages is lost, and each keeps its bound if its router kept
 /// its slots.
-fn flows_keep_their_bounds(segment: &Segment, mut is_done: impl FnMut() -> bool) -> Result<(), Late> {
+fn flows_keep_their_bounds(segment: &Segment, stalls: &Stalls, mut is_done: impl FnMut() -> bool) -> Result<(), Late> {
     let bounds_ns = bounds_ns(segment);
     let receivers = segment.stations.iter().map(Station::receiver).collect();
     let mut come = Come { receivers, packages: [0; FLOWS.len()] };
@@ -161,8 +166,7 @@ fn flows_keep_their_bounds(segment: &Segment, mut is_done: impl FnMut() -> bool)
     assert_inside("beside a tunnel in use", segment, &validate(&crossed, segment.time_of(0)));
     let ways = ways(&crossed, &published);
     bounds_ns.iter().enumerate().for_each(|(flow, bound_ns)| tell(&ways, flow, *bound_ns));
-    let mut late = ways.iter().filter(|way| way.crossed_ns.saturating_sub(way.published_ns) > bounds_ns[way.flow]);
-    late.try_for_each(|way| is_left_out(segment, way, bounds_ns[way.flow]))
+    are_excused(segment, stalls, &ways, &bounds_ns)
 }
 
 /// Each package, as the bridge saw it.
@@ -194,15 +198,31 @@ fn tell(ways: &[Way], flow: usize, bound_ns: u64) {
     );
 }
 
-/// A package is later than its bound: its router says that it did not keep its slots then, or a stall explains it.
-fn is_left_out(segment: &Segment, way: &Way, bound_ns: u64) -> Result<(), Late> {
-    let log = told(segment, FLOWS[way.flow].0, way.crossed_ns);
-    if log.has_left_out(way.published_ns, way.crossed_ns) {
-        return Ok(());
+/// What is later than its bound is explained by a stall: by one that kept the package up itself, or that made its
+/// router leave a slot out.
+fn are_excused(segment: &Segment, stalls: &Stalls, ways: &[Way], bounds_ns: &[u64]) -> Result<(), Late> {
+    let (mut left_out, mut unseen) = (0, Vec::new());
+    for way in ways {
+        let took_ns = way.crossed_ns.saturating_sub(way.published_ns);
+        let Some(by_ns) = took_ns.checked_sub(bounds_ns[way.flow]).filter(|by_ns| *by_ns > 0) else { continue };
+        let (flow, by) = (way.flow, Duration::from_nanos(by_ns));
+        let (since, until) = (instant(way.published_ns), instant(way.crossed_ns));
+        let log = told(segment, FLOWS[flow].0, way.crossed_ns);
+        if !log.has_left_out(way.published_ns, way.crossed_ns) {
+            let what = format!("a package of flow {flow} was {by:?} later than its bound, and no slot was left out");
+            return Err(Late { what, since, until, by });
+        }
+        left_out += 1;
+        // A slot is left out by a stall of so much at least.
+        let by_least = Duration::from_nanos(GATE_NS);
+        if stalls.stalled(since, until) < by_least {
+            let what = format!("a package of flow {flow} was {by:?} later than its bound, and a slot was left out");
+            unseen.push(Late { what, since, until, by: by_least });
+        }
     }
-    let by = Duration::from_nanos(way.crossed_ns - way.published_ns - bound_ns);
-    let what = format!("a package of flow {} was {by:?} later than its bound, and no slot was left out", way.flow);
-    Err(Late { what, since: instant(way.published_ns), until: instant(way.crossed_ns), by })
+    println!("of {} packages {left_out} were late by slots left out, {} without a stall", ways.len(), unseen.len());
+    let is_much = unseen.len() * UNSEEN > ways.len();
+    unseen.pop().filter(|_| is_much).map_or(Ok(()), Err)
 }
 
 /// Listens in the tunnel of node 1, and connects there from node 0: both ends, and from where the second was seen to
@@ -285,7 +305,7 @@ fn segment() -> Option<Segment> {
 
 #[test]
 fn somebody_types_and_copies_a_file_and_declared_flows_keep_their_bounds() {
-    unless_stalled(|_| {
+    unless_stalled(|stalls| {
         let Some(segment) = segment() else { return Ok(()) };
         if segment.stations[0].shell().tunnel().is_none() {
             report::skipped("TUN devices");
@@ -300,7 +320,7 @@ fn somebody_types_and_copies_a_file_and_declared_flows_keep_their_bounds() {
             typed(near, far, move || copied.load(Ordering::Relaxed))
         };
         let file = copy_file(near, far);
-        let kept = flows_keep_their_bounds(&segment, || {
+        let kept = flows_keep_their_bounds(&segment, stalls, || {
             copied.store(file.is_finished(), Ordering::Relaxed);
             typed.is_finished()
         });

@@ -30,6 +30,7 @@ const HELLO: u16 = u16::MAX;
 const SPINS: Duration = Duration::from_millis(1);
 /// From the first package to the end of the router; a slot is further away than that before it begins.
 const LEFT: Duration = Duration::from_millis(30);
+const _: () = assert!(AWHILE.as_nanos() < LEFT.as_nanos(), "a router that ends in time ends before its slot");
 
 /// A slot each, far apart.
 fn seldom() -> Tdma {
@@ -92,15 +93,22 @@ fn until_next_slot(pair: &Pair) -> Duration {
     Duration::from_nanos(next_ns.saturating_sub(now_ns)).saturating_sub(SPINS)
 }
 
-/// Waits until the router's slots have begun, and one has just taken what there was.
-fn wait_for_a_slot(pair: &Pair, sender: &mut Sender, receiver: &mut Receiver) {
+/// Waits until the router's slots have begun, and one has just taken what there was: the moment then, and how long it
+/// is from there until the next, [`LEFT`] at least.
+fn wait_for_a_slot(pair: &Pair, sender: &mut Sender, receiver: &mut Receiver) -> (Instant, Duration) {
     let began = Instant::now();
     let waiting = || pair.sides[0].node.look_at(transit()).map_or(0, |mailbox| mailbox.depth);
     let mut hello = || {
         let _ = sender.send(&label(module(0), 100, HELLO), &[b"hello"]);
         receiver.receive_timeout(Duration::from_millis(100)).is_some()
     };
-    while !hello() || waiting() > 0 || until_next_slot(pair) < LEFT {
+    loop {
+        if hello() && waiting() == 0 {
+            let (now, left) = (Instant::now(), until_next_slot(pair));
+            if left >= LEFT {
+                return (now, left);
+            }
+        }
         assert!(began.elapsed() < PATIENCE, "nothing comes");
     }
 }
@@ -109,8 +117,7 @@ fn wait_for_a_slot(pair: &Pair, sender: &mut Sender, receiver: &mut Receiver) {
 fn round(pair: &Pair, sender: &mut Sender, receiver: &mut Receiver, mut killed: Killed) -> Result<(), Late> {
     // Load that is not in real time must not keep this from what is to happen before the slot.
     let _ = schedule(Scheduling::Fifo(1));
-    wait_for_a_slot(pair, sender, receiver);
-    let (began, left) = (Instant::now(), until_next_slot(pair));
+    let (began, left) = wait_for_a_slot(pair, sender, receiver);
     for id in 0..PACKAGES {
         sender.send(&label(module(0), 100, id), &[b"waits for a slot"]).unwrap();
     }

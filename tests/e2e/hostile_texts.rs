@@ -228,6 +228,8 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["list", "--mailboxes"],
         &["top", "--once"],
         &["mailbox", "probe.0"],
+        &["stream", "list"],
+        &["stream", "info", "probe.0", "1"],
         &["ping", "probe.0", "-c", "1"],
         &["ping", "probe.1", "-c", "1"],
         &["send", "probe.0", "fails", "-c", "2", "--rate", "100"],

@@ -48,6 +48,7 @@ mod readme;
 mod restart;
 mod screen;
 mod start;
+mod streams;
 mod stuck;
 mod subscribe;
 mod systems;

@@ -26,7 +26,7 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "call" | "mailbox" | "hz" | "bw" | "delay" | "ping" | "restart" | "stop" | "start" => &["probe.0"],
         "echo" => &["probe.0", "beat"],
         "send" => &["probe.0", "count", "1", "--count", "1"],
-        "param" => &["list"],
+        "param" | "stream" => &["list"],
         "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run"
         | "keys" => {
             return None;

@@ -87,7 +87,7 @@ const ALL: [Stage; 6] = [
         name: "tests of the GUI bridge",
         budget: 5,
         run: || {
-            let bridge = ["test", "--profile", BRIDGE_PROFILE, "--package", BRIDGE];
+            let bridge = ["test", "--profile", BRIDGE_PROFILE, "--package", BRIDGE, "--no-fail-fast"];
             parts::run("testing the GUI bridge", tests(&bridge))
         },
     },

@@ -2,12 +2,17 @@
 
 use crate::cargo;
 use crate::failure::Failure;
-use std::io::{BufRead, BufReader, Write};
-use std::process::{Command, ExitStatus};
+use std::io::{self, BufRead, BufReader, PipeReader, Write};
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 /// A part of a stage takes this long to have a row of its own.
 const OWN_ROW: Duration = Duration::from_secs(5);
+/// While nothing is printed, the command is looked at so often.
+const LOOK: Duration = Duration::from_millis(100);
+/// What comes for so long after the command's end is still shown.
+const LAST_WORDS: Duration = Duration::from_secs(3);
 
 /// A part of a stage: what Cargo builds, a test program, or a crate's doc tests.
 pub(crate) struct Part {
@@ -29,18 +34,51 @@ pub(crate) fn run(why: &str, mut command: Command) -> (Vec<Part>, Result<(), Fai
 }
 
 /// Both outputs are one, so that what Cargo says of a program comes before what that prints.
-fn follow(command: &mut Command, mut see: impl FnMut(&str)) -> std::io::Result<ExitStatus> {
-    let (reader, writer) = std::io::pipe()?;
+///
+/// A process that a killed test leaves behind holds the pipe for as long as it lives: only the command is waited for.
+fn follow(command: &mut Command, mut see: impl FnMut(&str)) -> io::Result<ExitStatus> {
+    let (reader, writer) = io::pipe()?;
     let mut child = command.stdout(writer.try_clone()?).stderr(writer).spawn()?;
     // The command holds the writing ends; the pipe ends with the last of them.
-    command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null());
-    let (mut reader, mut line, mut out) = (BufReader::new(reader), Vec::new(), std::io::stdout());
-    while reader.read_until(b'\n', &mut line)? > 0 {
-        see(&String::from_utf8_lossy(&line));
-        out.write_all(&line)?;
-        line.clear();
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let (lines, mut out, mut ended) = (lines_of(reader), io::stdout(), None);
+    loop {
+        let next = lines.recv_timeout(LOOK);
+        if ended.is_none() {
+            ended = child.try_wait()?.map(|status| (status, Instant::now() + LAST_WORDS));
+        }
+        let came = match &next {
+            Ok((came, _)) => *came,
+            Err(RecvTimeoutError::Timeout) => Instant::now(),
+            Err(RecvTimeoutError::Disconnected) => return child.wait(),
+        };
+        if let Some((status, _)) = ended.filter(|(_, until)| came > *until) {
+            eprintln!("xtask: a process that `{}` has left behind still holds its output", cargo::shown(command));
+            return Ok(status);
+        }
+        if let Ok((_, line)) = next {
+            let line = line?;
+            see(&String::from_utf8_lossy(&line));
+            out.write_all(&line)?;
+        }
     }
-    child.wait()
+}
+
+/// Lines, each with the moment when it was read; they end with the pipe, or with an error.
+fn lines_of(reader: PipeReader) -> Receiver<(Instant, io::Result<Vec<u8>>)> {
+    let (lines, received) = channel();
+    std::thread::spawn(move || {
+        let mut reader = BufReader::new(reader);
+        loop {
+            let mut line = Vec::new();
+            let read = reader.read_until(b'\n', &mut line);
+            let is_last = !matches!(read, Ok(1..));
+            if matches!(read, Ok(0)) || lines.send((Instant::now(), read.map(|_| line))).is_err() || is_last {
+                return;
+            }
+        }
+    });
+    received
 }
 
 /// Ends a part where the next begins.
@@ -89,6 +127,7 @@ fn program(line: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::process::ExitStatusExt;
 
     #[test]
     fn a_part_lasts_from_its_line_to_the_next() {
@@ -114,5 +153,17 @@ mod tests {
         command.args(["-c", "echo one; echo two >&2; printf three; exit 3"]);
         let status = follow(&mut command, |line| lines.push(line.trim().to_owned())).expect("sh runs");
         assert_eq!((lines.join(" "), status.code()), ("one two three".to_owned(), Some(3)));
+    }
+
+    /// As a test that is killed leaves a process behind.
+    #[test]
+    fn a_process_that_is_left_behind_with_the_output_is_not_waited_for() {
+        let mut lines = Vec::new();
+        let mut command = Command::new("sh");
+        command.args(["-c", "sleep 60 & echo $!; kill -9 $$"]);
+        let status = follow(&mut command, |line| lines.push(line.trim().to_owned())).expect("sh runs");
+        assert_eq!((lines.len(), status.signal()), (1, Some(9)), "{lines:?}");
+        let killed = Command::new("kill").arg(&lines[0]).status().expect("kill runs");
+        assert!(killed.success(), "it was waited for");
     }
 }

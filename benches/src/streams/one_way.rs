@@ -1,7 +1,7 @@
 //! A stream, one way, with nothing lost: its writer waits before it would take a record from its reader.
 //!
-//! A stream's writer waits for nobody by itself. Beside a ring whose sender waits for room, that would compare a rate
-//! with losses to one without; so here the reader tells how far it is, in a word that is not the stream's.
+//! A stream's writer waits for nobody by itself. Beside a ring with a sender that waits for room, that would compare
+//! a rate with losses to one without; so here the reader tells how far it is, in a word that is not of the stream.
 
 use super::node::{StreamNode, came, stamp};
 use crate::Failure;

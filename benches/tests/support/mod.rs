@@ -2,7 +2,9 @@
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use rohrpost_testbed::report;
 use serde_json::{Map, Value};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -21,7 +23,8 @@ pub(crate) fn bench(subcommand: &str, arguments: &[&str]) -> Command {
 }
 
 /// The rows of a run, each checked, after an end without failure: a message that is damaged, missing or out of order
-/// would be one.
+/// would be one. What could not run here is reported as skipped.
+#[track_caller]
 pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
     let text = String::from_utf8_lossy(&output.stdout);
     // Failures come last in long output.
@@ -32,7 +35,31 @@ pub(crate) fn rows(output: &Output) -> Vec<Map<String, Value>> {
     assert_eq!((&head["case"], &tail["case"]), (&"environment".into(), &"environment-after".into()));
     assert!(head["refused"].is_array() && head["kernel"].is_string());
     lines.iter().for_each(check_row);
+    let skipped: BTreeSet<&str> = lines.iter().filter_map(excuse).collect();
+    // A loop, since a closure would be the place that is reported.
+    for what in skipped {
+        report::skipped(what);
+    }
     lines
+}
+
+/// What a contender may lack here, by words of its note, and what is not tested then. The limits of POSIX queues may be
+/// too small without root, a container may forbid tracing or namespaces or have little shared memory, and commands may
+/// not have been built.
+const EXCUSES: [(&str, &str); 7] = [
+    ("bytes of shared memory", "benches: streams of half a gigabyte (shared memory)"),
+    ("a POSIX queue of", "benches: POSIX queues that are large enough"),
+    ("no process may be traced here", "benches: system calls of a send (ptrace)"),
+    ("no namespaces here", "benches: cases on a network (network namespaces)"),
+    ("no real time for routers here", "benches: routers with real time"),
+    ("name it with --rohrpost", "benches: cases that need the `rohrpost` command"),
+    ("--manifest-path benches/zenoh", "benches: zenoh, which is built by hand"),
+];
+
+/// What is not tested, if this row says that its contender could not run here.
+fn excuse(row: &Map<String, Value>) -> Option<&'static str> {
+    let note = row["note"].as_str()?.strip_prefix("skipped: ")?;
+    EXCUSES.iter().find(|(words, _)| note.contains(words)).map(|(_, what)| *what)
 }
 
 /// Its lines of contenders that failed.
@@ -111,18 +138,7 @@ pub(crate) fn check_row(row: &Map<String, Value>) {
         let can_be = |value: f64| value.is_finite() && (value > 0.0 || value == 0.0 && may_be_0);
         assert!(number(key).is_none_or(can_be), "{key} of {row:?}");
     }
-    // The limits of POSIX queues may be too small without root, a container may forbid tracing or namespaces or have
-    // little shared memory, and the command may not have been built.
-    let excuses = [
-        "a POSIX queue of",
-        "bytes of shared memory",
-        "no process may be traced here",
-        "no namespaces here",
-        "no real time for routers here",
-        "name it with --rohrpost",
-        "--manifest-path benches/zenoh",
-    ];
-    let is_skipped = row["note"].as_str().is_some_and(|note| excuses.iter().any(|excuse| note.contains(excuse)));
+    let is_skipped = excuse(row).is_some();
     assert_eq!(number("p50").is_none(), is_skipped, "{row:?}");
     let figures: Vec<f64> = ["p50", "p99", "p999", "max"].into_iter().filter_map(number).collect();
     if row["unit"] == "us" {

@@ -56,21 +56,29 @@ fn generate(out: &Path) -> Result<String, String> {
     Ok(text)
 }
 
-/// Copies a folder's files, changed; returns their names without `.rs`.
+/// Copies the files of a folder and of those in it, changed; returns their names without `.rs`.
 fn copied(
     folder: &str,
     to: &Path,
     change: impl Fn(&str, String) -> Result<String, String>,
 ) -> Result<Vec<String>, String> {
     let failed = |error: std::io::Error| format!("{folder}: {error}");
-    fs::create_dir_all(to).map_err(failed)?;
     let mut names = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let Some(name) = path.file_stem().and_then(|name| name.to_str()) else { continue };
-        let text = change(name, fs::read_to_string(&path).map_err(failed)?)?;
-        fs::write(to.join(name).with_extension("rs"), text).map_err(failed)?;
-        names.push(name.to_owned());
+    let mut folders = vec![String::new()];
+    while let Some(inner) = folders.pop() {
+        fs::create_dir_all(to.join(&inner)).map_err(failed)?;
+        for entry in fs::read_dir(Path::new(folder).join(&inner)).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            let Some(name) = path.file_stem().and_then(|name| name.to_str()) else { continue };
+            let name = format!("{inner}{name}");
+            if path.is_dir() {
+                folders.push(name + "/");
+                continue;
+            }
+            let text = change(&name, fs::read_to_string(&path).map_err(failed)?)?;
+            fs::write(to.join(&name).with_extension("rs"), text).map_err(failed)?;
+            names.push(name);
+        }
     }
     names.sort();
     Ok(names)

@@ -1,5 +1,5 @@
-//! Writes the slot core, the cells and the core of streams once as they are and once per broken variant, each beside its models, with loom's
-//! atomics.
+//! Writes the slot core, the cells and the core of streams once as they are and once per broken variant, each beside
+//! its models, with loom's atomics.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -20,8 +20,8 @@ impl Node {
         Ok(streams)
     }
 
-    /// Removes a stream that nobody writes; false when somebody does, or it is gone. Who reads it keeps what is there,
-    /// and follows when it is made anew.
+    /// Removes a stream that nobody writes; false when somebody does, or it is gone. Its readers keep what is there,
+    /// and follow when it is made anew.
     ///
     /// # Errors
     /// When the node's directory cannot be changed.

@@ -94,7 +94,7 @@ fn has_stamp(ring: &Ring<'_>, low: u64, end: u64, stamp: Stamp) -> Option<Line> 
 }
 
 /// From the first record that has reached the time on: the nearest that is late, if there is one, and the nearest after
-/// it. None when the writer has overtaken this.
+/// it. None when the writer has overwritten this.
 fn nearest(ring: &Ring<'_>, reached: Line, end: u64, at: Stamp, late_ns: u64) -> Option<(Option<Line>, Line)> {
     let (mut before, mut after) = (None::<Line>, reached);
     for sequence in reached.sequence..end {
@@ -126,7 +126,8 @@ fn floor_ns(ring: &Ring<'_>, epoch: u64) -> Option<u64> {
     }
 }
 
-fn oldest(ring: &Ring<'_>) -> Option<Line> {
+/// The oldest record that is there.
+pub(super) fn oldest(ring: &Ring<'_>) -> Option<Line> {
     let first = ring.oldest_before(ring.written());
     (first..first + TRIES as u64).find_map(|sequence| match ring.look(sequence) {
         Look::There(line) => Some(line),
@@ -140,5 +141,74 @@ fn lost(ring: &Ring<'_>, at: Stamp) -> Answer {
         Some(line) if line.about.stamp.epoch > at.epoch => Answer::OtherEpoch { newest: line.about.stamp.epoch },
         Some(line) => Answer::BeforeOldest { by_ns: line.newest_ns().saturating_sub(at.ns) },
         None => Answer::BeforeOldest { by_ns: 0 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::ring::{About, IndexEntry, Seat};
+    use crate::stream::writing::Progress;
+    use proptest::prelude::*;
+    use std::sync::atomic::AtomicU64;
+
+    const KEEP: usize = 8;
+
+    /// Writes those that a stream takes, each by its step from the newest before it, and asks after each for each time;
+    /// in the end all that were taken are known.
+    fn check(steps: &[i64], late_ns: u64, epoch_every: usize) {
+        let (written, entries) = (AtomicU64::new(0), std::array::from_fn::<_, KEEP, _>(|_| IndexEntry::default()));
+        let seats = [Seat::default()];
+        let ring = Ring::new(&written, 0, &entries, &seats);
+        let mut progress = Progress::resume(&ring);
+        let (mut taken, mut answers) = (Vec::<Stamp>::new(), Vec::new());
+        for (at, step) in steps.iter().enumerate() {
+            let epoch = (at / epoch_every) as u64;
+            let newest_ns = progress.newest().filter(|newest| newest.epoch == epoch).map_or(100, |newest| newest.ns);
+            let stamp = Stamp { epoch, ns: newest_ns.saturating_add_signed(*step).max(newest_ns - late_ns) };
+            let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: 0, incarnation: 0 };
+            let frame = progress.claim(&ring).unwrap();
+            progress.publish(&ring, frame, about, |_, _| ());
+            taken.push(stamp);
+            for asked in (stamp.ns.saturating_sub(60)..stamp.ns + 30).step_by(3) {
+                let asked = Stamp { epoch, ns: asked };
+                answers.push((taken.len(), asked, around(&ring, asked, late_ns)));
+            }
+        }
+        for (written, asked, answer) in answers {
+            let of = |taken: &[Stamp]| {
+                let same = taken.iter().filter(|stamp| stamp.epoch == asked.epoch).map(|stamp| stamp.ns);
+                let before = same.clone().filter(|ns| *ns <= asked.ns).max();
+                (before, same.clone().filter(|ns| *ns >= asked.ns).min(), same.max().unwrap_or(0))
+            };
+            let (lost, there) = taken[..written].split_at(written.saturating_sub(KEEP));
+            let (before, after, newest_ns) = of(&taken[..written]);
+            let is_final = after.is_some_and(|after| newest_ns >= after + late_ns);
+            let lost_ns = lost.iter().filter(|stamp| stamp.epoch == asked.epoch).map(|stamp| stamp.ns).max();
+            match answer {
+                Answer::Around { before, after } => {
+                    let told = (Some(before.about.stamp.ns), Some(after.about.stamp.ns));
+                    let (before, after, _) = of(&taken);
+                    assert_eq!(told, (before, after), "of {asked:?}: final, and then another");
+                }
+                Answer::NotYet { .. } => assert!(!is_final, "of {asked:?}: it never comes"),
+                Answer::BeforeOldest { .. } => {
+                    let is_there = before.is_some_and(|before| lost_ns.is_none_or(|lost| before > lost));
+                    assert!(!is_there, "of {asked:?}: {before:?} is there");
+                }
+                Answer::Empty | Answer::OtherEpoch { .. } => panic!("of {asked:?}: {answer:?} of {there:?}"),
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn answers_are_final_and_given_as_soon_as_they_are(
+            steps in proptest::collection::vec(-20_i64..25, 1..40),
+            late_ns in prop_oneof![Just(0_u64), 1..30_u64],
+            epoch_every in 5..60_usize,
+        ) {
+            check(&steps, late_ns, epoch_every);
+        }
     }
 }

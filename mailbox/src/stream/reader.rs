@@ -173,7 +173,7 @@ impl StreamReader {
         self.place.as_ref().map(TakenSeat::ring)
     }
 
-    /// Takes the next record by `take`, which fails when it was overtaken.
+    /// Takes the next record by `take`, which fails when it was overwritten.
     fn advance(&mut self, mut take: impl FnMut(&TakenSeat, &Line) -> bool) -> Result<Next<Line>, StreamError> {
         // Once more if it was replaced: then the first record of the new one may be there.
         for _ in 0..2 {
@@ -272,7 +272,7 @@ impl StreamReader {
         self.registry_epoch = registry_epoch;
         let Some(place) = place else { return Ok(false) };
         if let Some(old) = &self.place {
-            // The same again, whose successor died before the new one had its name.
+            // The same again: its successor died before the new one had its name.
             if place.segment.is_retired() {
                 return Ok(false);
             }

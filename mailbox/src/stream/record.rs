@@ -25,12 +25,20 @@ pub struct RecordInfo {
     pub incarnation: u32,
 }
 
+impl RecordInfo {
+    pub(super) fn of(segment: &StreamSegment, line: &Line) -> Self {
+        let (about, len_bytes) = (&line.about, segment.len(line));
+        let (stamp, written_ns, incarnation) = (about.stamp, about.written_ns, about.incarnation);
+        Self { sequence: line.sequence, stamp, written_ns, len_bytes, incarnation }
+    }
+}
+
 /// What comes next for a reader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next<T> {
     /// The next record.
     Record(T),
-    /// The writer has overtaken this reader, which lost so many records. It stands at the oldest still there.
+    /// The writer has passed this reader, which lost so many records. It stands at the oldest still there.
     Lost(u64),
     /// Nothing was written since.
     Nothing,
@@ -50,7 +58,8 @@ impl<T> Next<T> {
 /// The records around a time, or exactly why not.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Around {
-    /// The nearest ones; both are the same when it has this very stamp. Final: nothing that is written later changes it.
+    /// The nearest ones; both are the same when it has this very stamp. Final: nothing that is written later changes
+    /// it.
     Records {
         /// The nearest that is not after.
         before: RecordInfo,
@@ -111,9 +120,7 @@ impl TakenSeat {
     }
 
     pub(super) fn info(&self, line: &Line) -> RecordInfo {
-        let (about, len_bytes) = (&line.about, self.segment.len(line));
-        let (stamp, written_ns, incarnation) = (about.stamp, about.written_ns, about.incarnation);
-        RecordInfo { sequence: line.sequence, stamp, written_ns, len_bytes, incarnation }
+        RecordInfo::of(&self.segment, line)
     }
 }
 

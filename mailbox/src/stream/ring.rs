@@ -218,7 +218,7 @@ impl<'a> Ring<'a> {
         if self.is_there(&line) { Look::There(line) } else { Look::Gone }
     }
 
-    /// Whether the record has not been overtaken since it was looked at: what was copied since then is whole.
+    /// Whether the record has not been overwritten since it was looked at: what was copied since then is whole.
     #[inline]
     pub(crate) fn is_there(&self, line: &Line) -> bool {
         // ORDERING (D): what was read of entry and frame before the second look at the word. Pairs with (C) for the
@@ -235,7 +235,7 @@ impl<'a> Ring<'a> {
         ahead > 0 || ahead == 0 && word & FRAME != 0 || sequence < self.first
     }
 
-    /// The newest record; none before the first. A writer that overtakes this at each try has none to show either.
+    /// The newest record; none before the first. A writer that overwrites it at each try has none to show either.
     pub(crate) fn newest(&self) -> Option<Line> {
         (0..TRIES).find_map(|_| match self.look(self.written().checked_sub(1)?) {
             Look::There(line) => Some(line),
@@ -256,7 +256,7 @@ impl<'a> Ring<'a> {
         end.saturating_sub(self.keep()).max(self.first)
     }
 
-    /// Keeps the writer from a record's frame, until [`Ring::release`]; false when the record was overtaken before. The
+    /// Keeps the writer from a record's frame, until [`Ring::release`]; false when it was overwritten before. The
     /// seat is the caller's, and names no frame.
     #[inline]
     pub(crate) fn hold(&self, seat: usize, line: &Line) -> bool {
@@ -303,7 +303,7 @@ impl<'a> Ring<'a> {
     }
 }
 
-/// A reader that is overtaken as often as this has met a writer that turns its whole ring in the meantime.
+/// A reader that is passed as often as this has met a writer that turns its whole ring in the meantime.
 pub(super) const TRIES: usize = 8;
 
 impl IndexEntry {

@@ -21,7 +21,7 @@ pub(crate) struct StreamSegment {
     page: Located<StreamPage>,
     seats: Located<[Seat]>,
     entries: Located<[IndexEntry]>,
-    /// All frames as words; none of a stream whose records are plain memory.
+    /// All frames as words; none of a stream with records of plain memory.
     words: Located<[AtomicU64]>,
     frames: Rooms,
     first: u64,
@@ -139,7 +139,7 @@ impl StreamSegment {
     pub(crate) fn body_mut<'a>(&'a self, frame: &'a mut Frame) -> &'a mut [u8] {
         assert!(!self.shape.is_racing());
         let body = self.frames.room(frame.number());
-        // SAFETY: a room of so many bytes, whose map the borrow of `self` keeps. The frame is the only one of its number,
+        // SAFETY: a room of so many bytes; the borrow of `self` keeps its map. The frame is the only one of its number,
         // borrowed, and named by no entry and no seat (`Progress::claim`): nothing else reaches these bytes, since
         // records of this size are only read held (`copy`).
         unsafe { std::slice::from_raw_parts_mut(body.as_ptr(), self.shape.record_bytes as usize) }
@@ -147,7 +147,7 @@ impl StreamSegment {
 
     // ---- readers ----
 
-    /// Copies a record's bytes; false when it was overtaken, and then there are none. The seat is the caller's, and
+    /// Copies a record's bytes; false when it was overwritten, and then there are none. The seat is the caller's, and
     /// names no frame.
     pub(crate) fn copy(&self, seat: usize, line: &Line, into: &mut Vec<u8>) -> bool {
         into.clear();
@@ -173,9 +173,9 @@ impl StreamSegment {
     /// The bytes of a record that the caller holds.
     pub(crate) fn body(&self, line: &Line) -> &[u8] {
         let body = self.frames.room(line.frame);
-        // SAFETY: `len` stays inside the room, and the borrow of `self` keeps the map. The caller's seat names the frame
-        // since before the entry was seen to name it still (`Ring::hold`), so the writer goes round it: nobody writes
-        // these bytes. All bits are bytes.
+        // SAFETY: `len` stays inside the room, and the borrow of `self` keeps the map. The caller's seat names the
+        // frame since before the entry was seen to name it still (`Ring::hold`), so the writer goes round it: nobody
+        // writes these bytes. All bits are bytes.
         unsafe { std::slice::from_raw_parts(body.as_ptr(), self.len(line)) }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!     0  Identity    what this is: written once, before the file gets its name; then only read
-//!    64  Writer      who writes, and what it refused
+//!    64  Writer      its owner, and what it refused
 //!   128  written     records ever written
 //!  4096  seats       one a reader, 128 B each, in pages of their own: readers write these alone
 //!     …  index       one entry a record that is kept, 64 B each; begins a page
@@ -212,7 +212,7 @@ impl StreamIdentity {
     }
 }
 
-/// Who writes.
+/// The writer.
 #[repr(C, align(64))]
 pub(crate) struct WriterSays {
     pub(crate) participant: AtomicU32,

@@ -79,10 +79,10 @@ impl Participant {
         says.module.store(self.module().raw(), Ordering::Relaxed);
         says.participant.store(self.claimant().participant.into(), Ordering::Relaxed);
         let progress = Progress::resume(&segment.ring());
-        // Readers wait for a stream that is new, and perhaps for records whose writer died before it could wake them.
+        // Readers wait for a stream that is new, and perhaps for records of a writer that died before it woke them.
         node.raise_registry_epoch();
         step!("stream: told");
-        node.ring_all();
+        doorbell::ring_all(node);
         let draft = vec![0; if shape.is_racing() { shape.record_bytes as usize } else { 0 }];
         let (participant, incarnation, late_ns) = (self.clone(), node.next_incarnation(), shape.late_ns());
         Ok(StreamWriter { participant, segment, progress, incarnation, late_ns, draft, _lock: lock })

@@ -1,8 +1,8 @@
-//! The writer's side of a ring: which frame it fills, how a record becomes one, and whom it wakes.
+//! The writer's side of a ring: which frame it fills, how a record becomes one, and which readers it wakes.
 //!
 //! ```text
-//! frame = one that no entry and no seat names │ fill │ entry: word without frame │ (C) │ fields │ (A) word │ count │ (E)
-//!                                                                                          sleepers? ──▶ ring each
+//! frame = one that no entry and no seat names │ fill │ entry: word without frame │ (C) │ fields │ (A) word │ count
+//!                                                                                  (E) sleepers? ──▶ ring each
 //! ```
 //! Each of these takes a number of steps bounded by the number of readers. What the writer knows by itself is not
 //! shared: a successor works it out from the index.
@@ -73,7 +73,7 @@ impl Progress {
     pub(crate) fn claim(&mut self, ring: &Ring<'_>) -> Option<Frame> {
         let mut held = [0; STREAM_READERS_MAX];
         for (held, seat) in held.iter_mut().zip(ring.seats()) {
-            // ORDERING: Acquire (I); pairs with (H): whoever held a frame has read it.
+            // ORDERING: Acquire (I); pairs with (H): a reader that held a frame has read it.
             *held = seat.hold.load(Ordering::Acquire);
         }
         let held = &held[..ring.seats().len()];

@@ -6,10 +6,11 @@ use super::crew::{Actor, is_asleep};
 use super::{Ground, HIGH, LOW, MAILBOX, OTHER, PATIENCE, label, shape, until};
 use nix::unistd::Pid;
 use rohrpost_mailbox::{
-    Interest, Name, OverflowPolicy, Priority, Receiver, SendError, Sender, Shape, Waiting, Watches, local,
-    monotonic_ns, wait_any,
+    Around, Interest, Name, Next, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape, Stamp,
+    StreamId, StreamReader, StreamShape, StreamWriter, Waiting, Watches, local, monotonic_ns, wait_any,
 };
 use std::os::unix::net::UnixStream;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
 use std::time::{Duration, Instant};
 
@@ -104,6 +105,52 @@ pub(crate) const OPERATIONS: &[Operation] = &[
         |hands| hands.ask(WHEN_ASLEEP),
         |hands| hands.wait_for_both(Waiting::default()),
     ),
+    operation("write a record", OFTEN, nothing, |hands| hands.streams.iter_mut().for_each(Stream::write)),
+    operation("fill a record in place", OFTEN, nothing, |hands| {
+        for stream in &mut hands.streams {
+            let mut open = stream.writer.begin(stream.next_stamp()).unwrap();
+            open.body_mut()[..40].fill(7);
+            open.finish(40).unwrap();
+        }
+    }),
+    operation("begin a record and drop it", OFTEN, nothing, |hands| {
+        hands.streams.iter_mut().for_each(|stream| drop(stream.writer.begin(stream.next_stamp()).unwrap()));
+    }),
+    operation("write a record that is late", OFTEN, Hands::write, |hands| {
+        for stream in &mut hands.streams {
+            assert!(stream.writer.write(Stamp { epoch: 1, ns: 1 }, b"").is_err());
+        }
+    }),
+    operation("copy the next record", OFTEN, Hands::write, |hands| {
+        for stream in &mut hands.streams {
+            while !matches!(stream.reader.try_next_into(&mut stream.copy).unwrap(), Next::Nothing) {}
+        }
+    }),
+    operation("hold the next record", OFTEN, Hands::write, |hands| {
+        for stream in &mut hands.streams {
+            while !matches!(stream.reader.try_next().unwrap(), Next::Nothing) {}
+        }
+    }),
+    operation("read the newest record", OFTEN, Hands::write, |hands| {
+        for stream in &mut hands.streams {
+            assert!(stream.reader.newest().unwrap().is_some_and(|record| !record.body().is_empty()));
+            assert!(stream.reader.newest_into(&mut stream.copy).unwrap().is_some());
+        }
+    }),
+    operation("look for the two around a time", OFTEN, Hands::write, |hands| {
+        for stream in &mut hands.streams {
+            let ns = stream.writer.written() - 1;
+            let Ok(Around::Records { before, .. }) = stream.reader.around(Stamp { epoch: 1, ns }) else {
+                panic!("they are there");
+            };
+            assert!(stream.reader.record_into(before.sequence, &mut stream.copy).is_some());
+        }
+    }),
+    operation("wait for a record that is there", OFTEN, Hands::write, |hands| {
+        for stream in &mut hands.streams {
+            while !matches!(stream.reader.next_timeout(Duration::ZERO).unwrap(), Next::Nothing) {}
+        }
+    }),
     // So long that it is not over before the sleep begins, even on a busy computer.
     operation("sleep until a time has passed", SLEEPS, nothing, |hands| {
         assert!(hands.receiver.receive_timeout(Duration::from_millis(20)).is_none());
@@ -214,7 +261,32 @@ struct Hands {
     transit: Receiver,
     far_sender: Sender,
     watches: Watches,
+    /// One with records that are copied while it is written, and one of plain memory.
+    streams: [Stream; 2],
     _far: UnixStream,
+}
+
+/// Both ends of a stream, and what is copied from it.
+struct Stream {
+    writer: StreamWriter,
+    reader: StreamReader,
+    copy: Vec<u8>,
+}
+
+impl Stream {
+    fn new(me: &Arc<Participant>, number: u16, record_bytes: u32) -> Self {
+        let id = StreamId { name: MAILBOX, number };
+        let writer = me.stream_writer(id, StreamShape { record_bytes, keep: 4, ..StreamShape::default() }).unwrap();
+        Self { writer, reader: me.stream_reader(id).unwrap(), copy: Vec::with_capacity(record_bytes as usize) }
+    }
+
+    fn next_stamp(&self) -> Stamp {
+        Stamp { epoch: 1, ns: self.writer.written() + 1 }
+    }
+
+    fn write(&mut self) {
+        self.writer.write(self.next_stamp(), b"a record").unwrap();
+    }
 }
 
 impl Hands {
@@ -243,6 +315,7 @@ impl Hands {
             transit,
             far_sender,
             watches,
+            streams: [Stream::new(&me, 1, 100), Stream::new(&me, 2, 5000)],
             _far: far,
         }
     }
@@ -253,6 +326,11 @@ impl Hands {
 
     fn send_as(&mut self, priority: Priority) {
         self.sender.send(&label(priority, 1), &[b"a", b" body"]).unwrap();
+    }
+
+    /// Two, so that there is one before and one after.
+    fn write(&mut self) {
+        self.streams.iter_mut().for_each(|stream| (0..2).for_each(|_| stream.write()));
     }
 
     fn take(&mut self) {

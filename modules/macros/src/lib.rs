@@ -1,9 +1,10 @@
-//! The `interface`, `data`, `parameters` and `choice` attributes, and the derive `Schema`. Use them through the crate
-//! `rohrpost`.
+//! The `interface`, `data`, `parameters` and `choice` attributes, and the derives `Schema` and `Interpolate`. Use them
+//! through the crate `rohrpost`.
 
 #![forbid(unsafe_code)]
 
 mod interface;
+mod interpolate;
 mod parameters;
 mod said;
 mod schema;
@@ -81,6 +82,30 @@ pub fn data(_attributes: TokenStream, item: TokenStream) -> TokenStream {
 #[proc_macro_derive(Schema, attributes(schema))]
 pub fn schema(item: TokenStream) -> TokenStream {
     schema::expand(item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
+}
+
+/// Gives a struct values in between two others, field by field, so that a stream of it can be asked for any time.
+///
+/// * A field's type has values in between itself: numbers with a fraction go in a straight line, so do vectors and
+///   points; rotations turn the short way; a struct may have this derive.
+/// * `#[interpolate(heading)]`: an `f64` or `f32` in radians, which goes the short way round.
+/// * `#[interpolate(earlier)]`, `#[interpolate(nearer)]`: a field of any type that is `Clone`, taken from the earlier
+///   record, or from the one that is nearer in time. Whole numbers, enums and texts need one of these.
+///
+/// ```text
+/// #[rohrpost::data]
+/// #[derive(rohrpost::fusion::Interpolate)]
+/// struct Crane {
+///     height_m: f64,
+///     #[interpolate(heading)]
+///     arm_rad: f64,
+///     #[interpolate(earlier)]
+///     holds: bool,
+/// }
+/// ```
+#[proc_macro_derive(Interpolate, attributes(interpolate))]
+pub fn interpolate(item: TokenStream) -> TokenStream {
+    interpolate::expand(item.into()).unwrap_or_else(syn::Error::into_compile_error).into()
 }
 
 /// Makes a struct a module's settings, of which some may change while it runs: its parameters.

@@ -5,9 +5,9 @@ use crate::interface::Interface;
 use crate::interfaces::{Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::robot::grid::{Mapper, Settings as GridSettings, TileIndex};
-use crate::robot::track::{NoPose, Track};
 use crate::runtime::{Context, Rate, Received, Subscription};
 use crate::types::{LaserScan, Odometry, Pose};
+use rohrpost_fusion::{History, NoValue, Records as _, Refused, Stamp};
 use serde::Deserialize;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -17,6 +17,8 @@ const TICK: Duration = Duration::from_millis(500);
 const PATCHES_AT_ONCE: usize = 16;
 /// Odometry that is kept to find a scan's pose in.
 const POSES: usize = 256;
+/// Between two poses further apart than this, nobody knows where the robot was.
+const GAP_MAX_NS: u64 = 5_000_000_000;
 /// Scans that wait for odometry younger than themselves.
 const WAITING_MAX: usize = 32;
 
@@ -54,8 +56,10 @@ pub(super) struct MapModule {
     odometry: Subscription<Odometry>,
     settings: GridSettings,
     map: Mapper,
-    track: Track,
-    waiting: VecDeque<(u64, LaserScan)>,
+    poses: History<Pose>,
+    /// Counts the times that odometry's stamps went back: time was set, or the base was restarted.
+    epoch: u64,
+    waiting: VecDeque<(Stamp, LaserScan)>,
     unpublished: BTreeSet<TileIndex>,
     counts: MapCounts,
 }
@@ -75,7 +79,8 @@ impl Module for MapModule {
             odometry,
             settings,
             map: Mapper::new(settings),
-            track: Track::new(POSES),
+            poses: History::new(POSES, 0),
+            epoch: 0,
             waiting: VecDeque::with_capacity(WAITING_MAX),
             unpublished: BTreeSet::new(),
             counts: MapCounts::default(),
@@ -85,14 +90,10 @@ impl Module for MapModule {
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
         if let Some(odometry) = data.read(&self.odometry)? {
             self.counts.odometries += 1;
-            if self.track.push(data.head.stamp_ns, odometry.pose).is_err() {
-                // Time went back: a new epoch, or the base was restarted. Old poses are of no use then.
-                self.track.clear();
-                let _ = self.track.push(data.head.stamp_ns, odometry.pose);
-            }
+            self.remember(data.head.stamp_ns, odometry.pose);
         } else if let Some(scan) = data.read(&self.laser)? {
             self.counts.scans += 1;
-            self.waiting.push_back((data.head.stamp_ns, scan));
+            self.waiting.push_back((Stamp::new(self.epoch, data.head.stamp_ns), scan));
         }
         self.work_off(context)
     }
@@ -110,19 +111,30 @@ impl Module for MapModule {
 }
 
 impl MapModule {
+    fn remember(&mut self, stamp_ns: u64, pose: Pose) {
+        let sequence = self.counts.odometries;
+        let taken = self.poses.push(Stamp::new(self.epoch, stamp_ns), sequence, pose);
+        if let Err(Refused::Late { .. }) = taken {
+            // Earlier poses, and scans that wait for one of them, are of no use now.
+            self.epoch += 1;
+            let first = self.poses.push(Stamp::new(self.epoch, stamp_ns), sequence, pose);
+            debug_assert_eq!(first, Ok(()), "an epoch takes its first record");
+        }
+    }
+
     /// Maps the scans with known poses.
     fn work_off(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        while let Some((stamp_ns, scan)) = self.waiting.front() {
+        while let Some((stamp, scan)) = self.waiting.front() {
             let pose = match scan.pose {
                 Some(pose) => Ok(pose),
-                None => self.track.at(*stamp_ns),
+                None => self.poses.at(*stamp, GAP_MAX_NS),
             };
             match pose {
-                Err(NoPose::After { .. } | NoPose::Empty) if self.waiting.len() < WAITING_MAX => break,
+                Err(NoValue::NotYet { .. } | NoValue::Empty) if self.waiting.len() < WAITING_MAX => break,
                 Err(_) => self.counts.without_pose += 1,
                 Ok(pose) => {
                     self.counts.mapped += u64::from(self.map.integrate(scan, &pose).is_ok());
-                    let stamp_ns = *stamp_ns;
+                    let stamp_ns = stamp.ns;
                     context.publish::<Pose>(CartographerInterface::POSE, stamp_ns, &pose)?;
                 }
             }

@@ -9,6 +9,7 @@ use crate::types::{LaserScan, Odometry, Pose, Twist};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+use rohrpost_fusion::wrap_rad;
 use std::f64::consts::TAU;
 use thiserror::Error;
 
@@ -304,7 +305,7 @@ fn advanced(pose: Pose, way_m: f64, turn_rad: f64) -> Pose {
     Pose {
         x_m: pose.x_m + way_m * cos,
         y_m: pose.y_m + way_m * sin,
-        heading_rad: super::wrap_rad(pose.heading_rad + turn_rad),
+        heading_rad: wrap_rad(pose.heading_rad + turn_rad),
     }
 }
 

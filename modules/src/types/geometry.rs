@@ -1,11 +1,13 @@
 //! Where a robot is and how it moves, in the plane.
 
 use nalgebra::{Isometry2, Vector2};
+use rohrpost_fusion::Interpolate;
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// A place and a heading in the plane.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema, Interpolate)]
+#[interpolate(crate = rohrpost_fusion)]
 #[schema(name = "rohrpost.Pose")]
 pub struct Pose {
     /// Metres along x.
@@ -16,6 +18,7 @@ pub struct Pose {
     pub y_m: f64,
     /// Radians, counter-clockwise from x; any multiple of a turn may be added.
     #[schema(unit = "rad")]
+    #[interpolate(heading)]
     pub heading_rad: f64,
 }
 
@@ -33,7 +36,8 @@ impl From<Isometry2<f64>> for Pose {
 }
 
 /// How fast a body moves in its own frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema, Interpolate)]
+#[interpolate(crate = rohrpost_fusion)]
 #[schema(name = "rohrpost.Twist")]
 pub struct Twist {
     /// Metres a second, forward.
@@ -45,7 +49,8 @@ pub struct Twist {
 }
 
 /// What a base says of its own motion: counted from where it started, and drifting.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema, Interpolate)]
+#[interpolate(crate = rohrpost_fusion)]
 #[schema(name = "rohrpost.Odometry")]
 pub struct Odometry {
     /// Where the base believes to be, in the frame in which it started.

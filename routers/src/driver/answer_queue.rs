@@ -70,7 +70,7 @@ impl AnswerQueue {
     fn send_next(
         &mut self,
         on: &mut impl Platform,
-        tx_window: &TransmitWindow,
+        tx_window: &mut TransmitWindow,
         first: Option<NodeIndex>,
     ) -> Option<(u64, usize)> {
         let now_ns = on.monotonic_ns();
@@ -81,12 +81,14 @@ impl AnswerQueue {
         if let Some(hellos) = &mut self.hellos {
             let (said, datagram) = if fits(HELLO_SLOT_BYTES) { hellos.take(now_ns, first) } else { None }?;
             on.send_answer(self.settings.nodes[usize::from(said.to)].address, &datagram);
+            tx_window.returns(on.local_ns());
             hellos.left(said);
             return Some((local_ns, HELLO_SLOT_BYTES));
         }
         match self.refusal.take()? {
             Answer::Refusal { to, bytes, datagram } if tx_window.carries_refusal() && fits(bytes) => {
                 on.send_answer(to, &datagram[..bytes]);
+                tx_window.returns(on.local_ns());
                 Some((local_ns, bytes))
             }
             refusal => {

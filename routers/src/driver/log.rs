@@ -22,7 +22,7 @@ pub struct Used {
     pub wire_bytes: u64,
     /// The last one was decided on when it would still be off the wire so long before the end, ns. Never less than 0.
     pub spare_ns: i64,
-    /// The call for the last one came back so long after the end, ns; 0: before it.
+    /// The call for the last one came back so long after the end, ns; 0: not after it.
     pub over_ns: u64,
 }
 
@@ -41,13 +41,13 @@ pub struct WindowLog {
 
 impl WindowLog {
     /// A window is over. If there were datagrams, the first was handed over so that it was on the wire at `first_ns`,
-    /// local, by the usual lead; the call for the last one was back at `back_ns`.
-    pub(super) fn closed(&mut self, tx_window: &TransmitWindow, first_ns: u64, back_ns: u64) {
+    /// local, by the usual lead.
+    pub(super) fn closed(&mut self, tx_window: &TransmitWindow, first_ns: u64) {
         self.behind += u64::from(tx_window.fell_behind);
         if tx_window.datagrams() == 0 {
             return;
         }
-        let over_ns = back_ns.saturating_sub(tx_window.end_ns);
+        let over_ns = tx_window.over_ns();
         self.overran += u64::from(over_ns > 0);
         self.windows.rotate_left(1);
         self.windows[WINDOWS - 1] = Some(Used {
@@ -88,14 +88,15 @@ mod tests {
         for (back_ns, over_ns, overran) in [(900, 0, 0), (1000, 0, 0), (1001, 1, 1), (5000, 4000, 2)] {
             let mut tx_window = TransmitWindow::new(window, 100, 1000, Carries::All, 0, wire);
             tx_window.takes(500, 0);
-            log.closed(&tx_window, 500, back_ns);
+            tx_window.returns(back_ns);
+            log.closed(&tx_window, 500);
             let used = log.windows[WINDOWS - 1].unwrap();
             assert_eq!((used.over_ns, log.overran), (over_ns, overran), "back at {back_ns} ns");
             assert_eq!(used.spare_ns, tx_window.spare_ns(), "as it was decided");
         }
         let mut unused = TransmitWindow::new(window, 100, 1000, Carries::All, 0, wire);
         unused.fell_behind = true;
-        log.closed(&unused, 500, 5000);
+        log.closed(&unused, 500);
         assert_eq!((log.overran, log.behind), (2, 1), "nothing left in it, and nothing outside");
     }
 }

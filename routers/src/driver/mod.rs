@@ -23,6 +23,8 @@ mod platform;
 mod rest;
 mod rx;
 mod slots;
+#[cfg(test)]
+mod tests;
 mod time_platform;
 mod timing;
 

@@ -264,7 +264,7 @@ impl SlotDriver {
         }
         self.scheduler.close(&tx_window);
         let (_, lead_ns) = self.scheduler.lead_ns();
-        self.log.closed(&tx_window, called_ns + lead_ns, on.local_ns());
+        self.log.closed(&tx_window, called_ns + lead_ns);
         on.happened(SlotEvent::Closed(&tx_window));
         self.look(on);
     }
@@ -272,19 +272,18 @@ impl SlotDriver {
     /// `called_ns`: when the window was asked for. From there on it counts how long the first frame takes to the wire.
     fn send_time(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow, called_ns: u64) {
         let mut datagram = [0; TIME_BYTES];
-        loop {
-            let now_ns = on.local_ns();
-            if !tx_window.fits(now_ns, TIME_BYTES) {
-                return;
-            }
+        let mut now_ns = on.local_ns();
+        while tx_window.fits(now_ns, TIME_BYTES) {
             let Step::Send { to, .. } = on.time().0.poll_in(now_ns, tx_window.allowed(), &mut datagram) else { return };
-            let now_ns = on.local_ns();
+            now_ns = on.local_ns();
             if !tx_window.fits(now_ns, TIME_BYTES) {
                 // The thread stood still: better lost than in another's slot.
                 return;
             }
             tx_window.takes(now_ns, TIME_BYTES);
             on.send_time(to, &datagram);
+            now_ns = on.local_ns();
+            tx_window.returns(now_ns);
             if tx_window.datagrams() == 1 {
                 let id = FrameHead::parse(&datagram).ok().map(|(head, _)| SentId { to, sequence: head.sequence });
                 self.first = id.map(|id| First { id, called_ns, begin_ns: tx_window.begin_ns });
@@ -362,7 +361,9 @@ impl SlotDriver {
         bytes: usize,
     ) {
         let handed_ns = on.monotonic_ns();
-        if let Err(NotSent) = on.send(handed_ns, to, &mut self.datagram, bytes) {
+        let sent = on.send(handed_ns, to, &mut self.datagram, bytes);
+        tx_window.returns(on.local_ns());
+        if let Err(NotSent) = sent {
             lose(on, &self.datagram[..bytes]);
         } else if on.queue().0.is_measured() {
             // The usual way to the wire; where the call took longer it was perhaps kept up before that.

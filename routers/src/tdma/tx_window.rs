@@ -37,6 +37,8 @@ pub struct TransmitWindow {
     planned_ns: u64,
     datagrams: u64,
     wire_bytes: u64,
+    /// When the last send call came back, local ns; 0: there was none.
+    returned_ns: u64,
     /// It began too late, or took too long, for what bounds assume.
     pub(crate) fell_behind: bool,
 }
@@ -54,6 +56,7 @@ impl TransmitWindow {
             planned_ns: 0,
             datagrams: 0,
             wire_bytes: 0,
+            returned_ns: 0,
             fell_behind: false,
         }
     }
@@ -77,6 +80,16 @@ impl TransmitWindow {
         self.planned_ns += reckoned_ns(wire_ns);
         self.datagrams += 1;
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
+    }
+
+    /// The send call of a datagram came back now.
+    pub fn returns(&mut self, now_ns: u64) {
+        self.returned_ns = now_ns;
+    }
+
+    /// The last send call came back so long after the end, ns; 0: not after it.
+    pub fn over_ns(&self) -> u64 {
+        self.returned_ns.saturating_sub(self.end_ns)
     }
 
     /// Time from the handover of a datagram now until its last bit is at the other computer, behind a store-and-forward

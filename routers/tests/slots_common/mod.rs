@@ -18,12 +18,14 @@ use rohrpost_mailbox::{
 };
 use rohrpost_network::{Network, Route, Security, Tdma, TimeSlot, Tunnel};
 use rohrpost_routers::admission::Admission;
+use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{Alive, FrameHead, FrameKind};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered, slots};
+use rohrpost_routers::stats::Stats;
 use rohrpost_routers::time::TimeSettings;
 use rohrpost_testbed::report;
 use rohrpost_testbed::stalls::Late;
@@ -259,7 +261,7 @@ impl Segment {
     /// System time at a moment, as a node of this process knew it then.
     pub(crate) fn time_of(&self, node: u8) -> impl Fn(u64) -> u64 {
         let (log, skew) = (self.own_log(node), self.stations[usize::from(node)].skew);
-        move |at_ns| log.system_ns(at_ns, skew.local_ns(at_ns))
+        move |at_ns| log.system_ns(skew.local_ns(at_ns))
     }
 
     /// What is too late if a node followed another master since then, as it does when three Syncs of one are missing:
@@ -284,6 +286,17 @@ impl Segment {
         let socket = UdpSocket::bind(at(node)).unwrap();
         socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
         socket
+    }
+
+    /// What the routers of this process have lost: node, cause, packages.
+    pub(crate) fn lost(&self) -> Vec<(u8, Cause, u64)> {
+        let running = self.stations.iter().filter_map(|station| Some((station.own, station.shell.as_ref()?.stats())));
+        let of = |(own, stats): (u8, &Stats)| {
+            let classes: Vec<_> = stats.out.classes().chain(stats.inn.classes()).collect();
+            let lost = move |cause: Cause| classes.iter().map(|(_, class)| class.lost(cause)).sum::<u64>();
+            Cause::ALL.map(|cause| (own, cause, lost(cause))).into_iter().filter(|(.., lost)| *lost > 0)
+        };
+        running.flat_map(|(own, stats)| of((own, stats))).collect()
     }
 
     pub(crate) fn wait_until(&self, what: &str, done: impl Fn(&Self) -> bool) {

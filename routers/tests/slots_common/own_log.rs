@@ -185,9 +185,10 @@ impl OwnLog {
         self.looks().filter(|look| look.is_gap || look.windows.iter().any(is_near)).collect()
     }
 
-    /// System time at a moment, as this node knew it then; `local_ns`: the same moment by its own clock.
-    pub(crate) fn system_ns(&self, at_ns: u64, local_ns: u64) -> u64 {
-        let before = self.looks().take_while(|look| look.at_ns <= at_ns).last();
-        before.or_else(|| self.looks().next()).map_or(0, |look| look.time.at(local_ns).ns)
+    /// System time at a moment of this node's own clock, as it knew it then: by the last record that had begun. On a
+    /// busy computer a later look may be the first that saw it.
+    pub(crate) fn system_ns(&self, local_ns: u64) -> u64 {
+        let begun = self.looks().filter(|look| look.time.monotonic_ns <= local_ns).last();
+        begun.or_else(|| self.looks().next()).map_or(0, |look| look.time.at(local_ns).ns)
     }
 }

@@ -15,7 +15,7 @@ pub(crate) fn talk(segment: &Segment, listeners: &mut Listeners, nodes: &[u8], r
     let mut talkers = talkers(segment, nodes);
     listeners.acquaint(&mut talkers);
     listeners.say_all(&mut talkers, rounds);
-    listeners.hear_all(nodes, &(0..rounds).collect::<Vec<_>>());
+    listeners.hear_all(segment, nodes, &(0..rounds).collect::<Vec<_>>());
 }
 
 /// Speaks from one node to another.
@@ -102,12 +102,18 @@ impl Listeners {
 
     /// Waits until all these numbers have come from each of the nodes to each other. That one does not come is known
     /// once a later number has: between two nodes nothing changes its order.
-    pub(crate) fn hear_all(&mut self, nodes: &[u8], numbers: &[u16]) {
-        self.hear_all_unless(nodes, numbers, || false);
+    pub(crate) fn hear_all(&mut self, segment: &Segment, nodes: &[u8], numbers: &[u16]) {
+        self.hear_all_unless(segment, nodes, numbers, || false);
     }
 
     /// The same, unless something happens that may keep them up.
-    pub(crate) fn hear_all_unless(&mut self, nodes: &[u8], numbers: &[u16], has_happened: impl Fn() -> bool) {
+    pub(crate) fn hear_all_unless(
+        &mut self,
+        segment: &Segment,
+        nodes: &[u8],
+        numbers: &[u16],
+        has_happened: impl Fn() -> bool,
+    ) {
         let began = Instant::now();
         for (from, to) in nodes.iter().flat_map(|from| nodes.iter().map(move |to| (*from, *to))) {
             while from != to && self.heard[usize::from(to)][usize::from(from)] != numbers {
@@ -115,7 +121,8 @@ impl Listeners {
                     return;
                 }
                 let heard = &self.heard[usize::from(to)][usize::from(from)];
-                assert!(numbers.starts_with(heard) && began.elapsed() < PATIENCE, "{from} to {to}: {heard:?}");
+                let is_whole = numbers.starts_with(heard) && began.elapsed() < PATIENCE;
+                assert!(is_whole, "{from} to {to}: {heard:?}; lost: {:?}", segment.lost());
                 std::thread::sleep(Duration::from_millis(1));
                 self.listen();
             }

@@ -1,9 +1,9 @@
 //! Logs of CARMEN, as the demonstration plays them: read, believed or not, played, and drawn into a map.
 
+use rohrpost_modules::fusion::{History, Records, Stamp};
 use rohrpost_modules::robot::carmen::{LogError, Reader, Record, Settings};
 use rohrpost_modules::robot::grid::{Mapper, Settings as GridSettings};
 use rohrpost_modules::robot::playback::Playback;
-use rohrpost_modules::robot::track::Track;
 
 /// Scans that are drawn of one input: each may touch some thousand cells.
 const SCANS: usize = 4;
@@ -27,17 +27,21 @@ pub(crate) fn run(data: &[u8]) {
 fn play(data: &[u8]) {
     let speed = 1.0 + data.len() as f64;
     let playback = Playback::new(Reader::new(data, Settings::default()), speed).unwrap_or_else(|e| panic!("{e}"));
-    let (mut last_ns, mut scans) = (0, 0);
-    let (mut map, mut track) = (Mapper::new(GridSettings::default()), Track::new(8));
+    let (mut last_ns, mut scans, mut sequence) = (0, 0, 0);
+    let (mut map, mut poses) = (Mapper::new(GridSettings::default()), History::new(8, 0));
     for due in playback {
         let due = due.unwrap_or_else(|error| panic!("bytes can be read: {error}"));
         assert!(due.due_ns >= last_ns, "due times never go back");
         last_ns = due.due_ns;
         match due.record {
-            Record::Odometry { odometry, .. } => drop(track.push(due.due_ns, odometry.pose)),
+            Record::Odometry { odometry, .. } => {
+                sequence += 1;
+                let taken = poses.push(Stamp::new(0, due.due_ns), sequence, odometry.pose);
+                assert_eq!(taken, Ok(()), "due times never go back");
+            }
             Record::Scan { scan, odometry, .. } if scans < SCANS => {
                 scans += 1;
-                let pose = track.at(due.due_ns).ok().or(scan.pose).unwrap_or(odometry);
+                let pose = poses.at(Stamp::new(0, due.due_ns), u64::MAX).ok().or(scan.pose).unwrap_or(odometry);
                 let _ = map.integrate(&scan, &pose);
             }
             Record::Scan { .. } | Record::Param { .. } => {}

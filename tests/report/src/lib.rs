@@ -6,17 +6,12 @@
 
 #![forbid(unsafe_code)]
 
-use std::cell::Cell;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::panic::Location;
 
 /// Environment variable with the file's path.
 pub const FILE: &str = "ROHRPOST_TEST_REPORT";
-
-thread_local! {
-    static IS_OFF: Cell<bool> = const { Cell::new(false) };
-}
 
 /// A test cannot test this here: something is missing, or not allowed.
 #[track_caller]
@@ -34,24 +29,7 @@ pub fn repeated(place: &Location<'_>, why: &str) {
     say("repeated", place, why);
 }
 
-/// What this thread reports meanwhile is lost: for tests of what reports.
-pub fn unreported<R>(run: impl FnOnce() -> R) -> R {
-    /// Also if it panics.
-    struct On;
-    impl Drop for On {
-        fn drop(&mut self) {
-            IS_OFF.set(false);
-        }
-    }
-    let _on = On;
-    IS_OFF.set(true);
-    run()
-}
-
 fn say(kind: &str, place: &Location<'_>, text: &str) {
-    if IS_OFF.get() {
-        return;
-    }
     let text = text.replace(['\n', '\t'], " ");
     let _ = writeln!(std::io::stderr(), "{}, {}:{}: {text}", kind.to_uppercase(), place.file(), place.line());
     let Some(path) = std::env::var_os(FILE) else { return };
@@ -60,16 +38,4 @@ fn say(kind: &str, place: &Location<'_>, text: &str) {
     let written =
         OpenOptions::new().create(true).append(true).open(&path).and_then(|mut file| file.write_all(line.as_bytes()));
     assert!(written.is_ok(), "the report of the tests cannot be written to {}: {written:?}", path.display());
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_told_while_it_is_off_is_lost_and_a_panic_turns_it_on_again() {
-        let panics = std::panic::catch_unwind(|| unreported(|| panic!("on purpose")));
-        assert!(panics.is_err() && !IS_OFF.get());
-        assert!(unreported(|| IS_OFF.get()));
-    }
 }

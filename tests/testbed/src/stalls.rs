@@ -11,7 +11,7 @@
 //!  what came too late        Err(Late { what, since, until, by })            excused by a stall of `by` in that time
 //! ```
 
-use nix::sched::{CpuSet, sched_setaffinity};
+use nix::sched::{CpuSet, sched_getaffinity, sched_setaffinity};
 use nix::unistd::Pid;
 use rohrpost_mailbox::sys::{Scheduling, schedule};
 use rohrpost_test_report as report;
@@ -58,17 +58,21 @@ impl Late {
 /// Panics if the test does, and if something is late without a stall that explains it.
 #[track_caller]
 pub fn unless_stalled(test: impl Fn(&Stalls) -> Result<(), Late>) {
-    attempts(Location::caller(), test, Stalls::stalled);
+    let place = Location::caller();
+    if !attempts(test, Stalls::stalled, |why| report::repeated(place, why)) {
+        report::skipped_at(place, "what has to come in time, on a computer that stands still again and again");
+    }
 }
 
+/// Whether it was tested at last. `repeats` is told why it begins again.
 fn attempts(
-    place: &Location<'_>,
     test: impl Fn(&Stalls) -> Result<(), Late>,
     stalled: impl Fn(&Stalls, Instant, Instant) -> Duration,
-) {
+    repeats: impl Fn(&str),
+) -> bool {
     let stalls = Stalls::watch();
-    for _ in 0..ATTEMPTS {
-        let Err(late) = test(&stalls) else { return };
+    for attempt in 1..=ATTEMPTS {
+        let Err(late) = test(&stalls) else { return true };
         let stood = stalled(&stalls, late.since, late.until);
         assert!(
             stood >= late.by,
@@ -76,9 +80,11 @@ fn attempts(
             late.what,
             late.by
         );
-        report::repeated(place, &format!("{} (a processor stood still for {stood:?} then)", late.what));
+        if attempt < ATTEMPTS {
+            repeats(&format!("{} (a processor stood still for {stood:?} then)", late.what));
+        }
     }
-    report::skipped_at(place, "what has to come in time, on a computer that stands still again and again");
+    false
 }
 
 /// Watches the processors until it is dropped.
@@ -99,10 +105,10 @@ struct Processor {
 }
 
 impl Stalls {
-    /// Begins to watch. Where no thread may have the highest priority nothing is seen, and nothing excused.
+    /// Begins to watch the processors that the calling thread may use. Where no thread may have the highest priority
+    /// nothing is seen, and nothing excused.
     pub fn watch() -> Self {
         let (end, began) = (Arc::new(AtomicBool::new(false)), Instant::now());
-        let count = std::thread::available_parallelism().map_or(1, usize::from);
         let begin = |number| {
             let (processor, end) = (Arc::new(Processor::default()), end.clone());
             let (is_granted, granted) = std::sync::mpsc::channel();
@@ -118,7 +124,7 @@ impl Stalls {
             });
             granted.recv().unwrap_or(false).then_some(processor)
         };
-        Self { processors: (0..count).filter_map(begin).collect(), end, began }
+        Self { processors: processors().into_iter().filter_map(begin).collect(), end, began }
     }
 
     /// For how long a processor stood still between these moments, all stalls together. The longest
@@ -184,11 +190,21 @@ impl Processor {
     }
 }
 
+/// Numbers of the processors that the calling thread may use.
+fn processors() -> Vec<usize> {
+    let allowed = sched_getaffinity(Pid::from_raw(0)).unwrap_or_default();
+    (0..CpuSet::count()).filter(|number| allowed.is_set(*number) == Ok(true)).collect()
+}
+
 /// This thread runs on this processor, before all others there.
 fn may_watch(number: usize) -> bool {
+    runs_on(number) && schedule(Scheduling::Fifo(PRIORITY)).is_ok()
+}
+
+/// This thread runs on this processor alone.
+fn runs_on(number: usize) -> bool {
     let mut set = CpuSet::new();
     set.set(number).and_then(|()| sched_setaffinity(Pid::from_raw(0), &set)).is_ok()
-        && schedule(Scheduling::Fifo(PRIORITY)).is_ok()
 }
 
 fn ns(duration: Duration) -> u64 {
@@ -203,29 +219,31 @@ mod tests {
 
     const BY: Duration = Duration::from_millis(5);
 
-    /// Attempts of a test that is late so many times, on a computer that stood still for so long each time; an error if
-    /// it fails.
-    fn attempts_of(late: usize, stood: Duration) -> Result<usize, usize> {
-        let times = Cell::new(0);
+    /// Attempts of a test that is late so many times, on a computer that stood still for so long each time, how often
+    /// it was said that it is repeated, and whether it was tested; the attempts alone if it fails.
+    fn attempts_of(late: usize, stood: Duration) -> Result<(usize, usize, bool), usize> {
+        let (times, repeated) = (Cell::new(0), Cell::new(0));
         let test = |_: &Stalls| {
             times.set(times.get() + 1);
             if times.get() <= late { Err(Late::now("on purpose", Instant::now(), BY)) } else { Ok(()) }
         };
-        let run = || report::unreported(|| attempts(Location::caller(), test, |_, _, _| stood));
-        catch_unwind(AssertUnwindSafe(run)).map(|()| times.get()).map_err(|_| times.get())
+        let run = || attempts(test, |_, _, _| stood, |_| repeated.set(repeated.get() + 1));
+        let tested = catch_unwind(AssertUnwindSafe(run));
+        tested.map(|tested| (times.get(), repeated.get(), tested)).map_err(|_| times.get())
     }
 
     #[test]
     fn what_is_late_without_a_stall_fails_at_once() {
-        assert_eq!(attempts_of(0, Duration::ZERO), Ok(1));
+        assert_eq!(attempts_of(0, Duration::ZERO), Ok((1, 0, true)));
         assert_eq!(attempts_of(1, Duration::ZERO), Err(1));
         assert_eq!(attempts_of(1, BY - Duration::from_nanos(1)), Err(1), "too short a stall");
     }
 
     #[test]
     fn what_a_stall_explains_is_tried_again_but_not_for_ever() {
-        assert_eq!(attempts_of(2, BY), Ok(3));
-        assert_eq!(attempts_of(usize::MAX, BY), Ok(ATTEMPTS));
+        assert_eq!(attempts_of(2, BY), Ok((3, 2, true)));
+        assert_eq!(attempts_of(ATTEMPTS - 1, BY), Ok((ATTEMPTS, ATTEMPTS - 1, true)));
+        assert_eq!(attempts_of(usize::MAX, BY), Ok((ATTEMPTS, ATTEMPTS - 1, false)), "the last is not repeated");
     }
 
     #[test]
@@ -235,7 +253,7 @@ mod tests {
             times.set(times.get() + 1);
             panic!("a package came twice")
         };
-        let run = || attempts(Location::caller(), test, |_, _, _| Duration::from_secs(1));
+        let run = || attempts(test, |_, _, _| Duration::from_secs(1), |_| ());
         assert!(catch_unwind(AssertUnwindSafe(run)).is_err());
         assert_eq!(times.get(), 1);
     }
@@ -247,6 +265,15 @@ mod tests {
             [(0, 100), (15, 50), (20, 40)].map(|(since, until)| processor.stalled_ns(since, until)),
             [40, 15, 0]
         );
+    }
+
+    #[test]
+    fn the_processors_that_are_watched_are_those_of_the_thread() {
+        for number in processors() {
+            let alone = std::thread::spawn(move || (runs_on(number), processors(), Stalls::watch().processors.len()));
+            let (is_alone, its, watched) = alone.join().expect("it ends");
+            assert!(is_alone && its == [number] && watched <= 1, "{number}: {its:?}, {watched} watched");
+        }
     }
 
     #[test]
@@ -276,7 +303,7 @@ mod tests {
     #[test]
     fn a_thread_that_spins_before_all_others_is_seen() {
         let stalls = Stalls::watch();
-        let Some(last) = stalls.processors.len().checked_sub(1) else {
+        let Some(last) = processors().pop().filter(|_| !stalls.processors.is_empty()) else {
             return report::skipped("a thread of the highest priority");
         };
         let since = Instant::now();

@@ -74,7 +74,8 @@ fn in_vector(records: usize, times: usize, samples: &Samples) -> Result<(), Fail
     time_lookups(&stamps, times, samples, |ns| Ok(search(black_box(&stamps), ns)))
 }
 
-/// The stamps around a time that is neither before the first nor after the last; both are the same if there is this one.
+/// The stamps around a time that is neither before the first nor after the last; both are the same if there is this
+/// one.
 fn search(stamps: &[u64], ns: u64) -> (u64, u64) {
     let after = stamps.partition_point(|stamp_ns| *stamp_ns < ns);
     let after_ns = stamps[after];

@@ -12,7 +12,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         file: "waiting",
         what: "models::Receiver::wait does the same, change both",
         lines: &[
-            "fn settled(",
+            "fn settled<",
             "let seen = entry.bell().seen();",
             ".drowsy());",
             "let idle = !found()",
@@ -53,7 +53,7 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         file: "registry",
         what: "models::a_retired_mailbox_keeps_nothing does the same, change both",
         lines: &[
-            "fn retire(",
+            "fn retire(old: &Segment)",
             "slots.retire();",
             "slots.adopt(",
             "queue.rescan(&slots);",

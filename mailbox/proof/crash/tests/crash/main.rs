@@ -14,5 +14,6 @@ mod ground;
 mod making;
 mod receiving;
 mod sending;
+mod streams;
 mod time;
 mod victim;

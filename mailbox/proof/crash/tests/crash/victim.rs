@@ -1,6 +1,7 @@
 //! What the victims do: each sets its scene, arms the step that will kill it, and does one operation.
 
 use crate::ground::{Ground, HIGH, LATEST, LOW, MAILBOX, OTHER_SHAPE, SHAPE, send};
+use crate::streams;
 use nix::sys::resource::{Resource, setrlimit};
 use rohrpost_mailbox_crash::{
     Interest, Label, Loan, Name, Node, Participant, Priority, TimeKeeper, TimeSource, Type, Watches, step,
@@ -21,6 +22,9 @@ fn victim() {
 }
 
 fn act(role: &str, ground: &Ground, arm: impl Fn()) {
+    if let Some(role) = role.strip_prefix("stream: ") {
+        return streams::act(role, ground, arm);
+    }
     match role {
         "create node" => {
             arm();
@@ -184,7 +188,7 @@ fn act(role: &str, ground: &Ground, arm: impl Fn()) {
 }
 
 /// Leaves without dropping, as if killed right after the operation.
-fn die_with<T>(what: T) {
+pub(crate) fn die_with<T>(what: T) {
     std::mem::forget(what);
 }
 

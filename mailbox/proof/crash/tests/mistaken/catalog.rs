@@ -105,8 +105,8 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "a_death_rings_nobody",
         edits: &[edit(
             "node",
-            "(0..PARTICIPANTS_MAX as u16).filter(there)",
-            "(0..PARTICIPANTS_MAX as u16).filter(there).filter(|_| !broken!(a_death_rings_nobody))",
+            "doorbell::ring_all(self);",
+            "if !broken!(a_death_rings_nobody) { doorbell::ring_all(self); }",
         )],
         scene: "sending::a_sender_dies_beside_a_sleeping_receiver",
         says: "left: None",
@@ -226,5 +226,28 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         )],
         scene: SENDING,
         says: "check Gone",
+    },
+    // ---- streams ----
+    Mistake {
+        name: "a_finished_record_is_forgotten",
+        edits: &[edit(
+            "stream/writing",
+            "if let Look::There(_) = ring.look(next) {",
+            "if let Look::There(_) = ring.look(next)
+            && !broken!(a_finished_record_is_forgotten)
+        {",
+        )],
+        scene: "streams::a_writer_dies_writing",
+        says: "a finished record",
+    },
+    Mistake {
+        name: "the_sequence_begins_anew",
+        edits: &[edit(
+            "stream/segment",
+            "segment.first = old.map_or(0, ",
+            "segment.first = old.filter(|_| !broken!(the_sequence_begins_anew)).map_or(0, ",
+        )],
+        scene: "streams::a_writer_dies_replacing_a_stream_of_another_shape",
+        says: "the sequence goes on",
     },
 ];

@@ -2,7 +2,7 @@
 
 use crate::catalog::MISTAKES;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
@@ -43,15 +43,22 @@ fn survived(file: &str, source: &str, died: &BTreeSet<&str>) -> Vec<String> {
     survived.map(|(line, step)| format!("mailbox/src/{file}:{line}: {step}")).collect()
 }
 
+/// The files of a folder, and of those in it.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    paths.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
+
 #[test]
 fn without_a_mistake_all_scenes_pass_and_die_at_every_step() {
     let (output, text) = scenes(&[], "");
     assert!(output.status.success(), "{text}");
     let died: BTreeSet<&str> = text.lines().filter_map(|line| Some(line.split_once("died at ")?.1)).collect();
     let (mut written, mut named, mut missed) = (0, BTreeSet::new(), Vec::new());
-    for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src")).unwrap() {
-        let path = entry.unwrap().path();
-        let (file, source) = (path.file_name().unwrap().to_str().unwrap(), std::fs::read_to_string(&path).unwrap());
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src");
+    for path in files(&folder) {
+        let file = path.strip_prefix(&folder).unwrap().to_str().unwrap();
+        let source = std::fs::read_to_string(&path).unwrap();
         written += source.matches("step!(").count();
         named.extend(steps(&source).map(|(_, step)| step.to_owned()));
         missed.extend(survived(file, &source, &died));

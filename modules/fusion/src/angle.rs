@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 /// The same direction within (-π, π].
 ///
 /// ```
-/// use rohrpost_modules::robot::wrap_rad;
+/// use rohrpost_fusion::wrap_rad;
 /// assert!((wrap_rad(1.5 * std::f64::consts::PI) + 0.5 * std::f64::consts::PI).abs() < 1e-12);
 /// ```
 pub fn wrap_rad(angle_rad: f64) -> f64 {

@@ -1,0 +1,383 @@
+//! The models of the core of streams. This file is compiled beside the real `stream/*.rs` and beside each broken one.
+
+use crate::step::{dies_at, reached};
+use crate::stream::lookup::{Answer, around};
+use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
+use crate::stream::writing::Progress;
+use crate::sync::{AtomicU32, AtomicU64, Ordering};
+use loom::cell::UnsafeCell;
+use loom::thread;
+use std::sync::{Arc, Mutex};
+
+/// A stream with records of one number each. Each of its words follows from its sequence, and none is 0.
+struct Stream {
+    written: AtomicU64,
+    entries: Vec<IndexEntry>,
+    seats: Vec<Seat>,
+    /// Two words a frame, that may be copied while they are written.
+    words: Vec<[AtomicU64; 2]>,
+    /// The same as plain memory, watched by loom for races.
+    plain: Vec<UnsafeCell<u64>>,
+    /// The bell of all that sleep.
+    rings: AtomicU32,
+}
+
+// SAFETY: the plain memory is the only part that is not Sync by itself, and loom reports every race on it.
+unsafe impl Sync for Stream {}
+
+/// How records are written, and read.
+#[derive(Clone, Copy, PartialEq)]
+enum Bytes {
+    Racing,
+    Plain,
+}
+
+impl Stream {
+    fn new(keep: usize, readers: usize) -> Arc<Self> {
+        let frames = keep + readers + 1;
+        let stream = Self {
+            written: AtomicU64::new(0),
+            entries: (0..keep).map(|_| IndexEntry::default()).collect(),
+            seats: (0..readers).map(|_| Seat::default()).collect(),
+            words: (0..frames).map(|_| Default::default()).collect(),
+            plain: (0..frames).map(|_| UnsafeCell::new(0)).collect(),
+            rings: AtomicU32::new(0),
+        };
+        stream.ring().format();
+        Arc::new(stream)
+    }
+
+    fn ring(&self) -> Ring<'_> {
+        Ring::new(&self.written, 0, &self.entries, &self.seats)
+    }
+
+    /// As `StreamWriter::write`.
+    fn write(&self, progress: &mut Progress, stamp_ns: u64, bytes: Bytes) {
+        let ring = self.ring();
+        let sequence = progress.next();
+        let frame = progress.claim(&ring).expect("there always is a free frame");
+        match bytes {
+            Bytes::Racing => {
+                for word in &self.words[frame.number()] {
+                    reached("words: before store");
+                    word.store(sequence + 1, Ordering::Relaxed);
+                }
+            }
+            // SAFETY: loom reports a race.
+            Bytes::Plain => self.plain[frame.number()].with_mut(|plain| unsafe { *plain = sequence + 1 }),
+        }
+        let stamp = Stamp { epoch: 1, ns: stamp_ns };
+        let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: sequence + 1, incarnation: 0 };
+        progress.publish(&ring, frame, about, |_, _| {
+            self.rings.fetch_add(1, Ordering::Release);
+        });
+    }
+
+    fn writes(&self, progress: &mut Progress, count: u64, bytes: Bytes) {
+        (0..count).for_each(|_| self.write(progress, 10 * (progress.next() + 1), bytes));
+    }
+
+    /// As `StreamSegment::copy` and `HeldRecord`: whether it was there to the end.
+    fn read(&self, seat: usize, line: &Line, bytes: Bytes) -> bool {
+        let ring = self.ring();
+        assert_eq!(line.about.len_bytes, line.sequence + 1, "torn: the entry is another record's");
+        match bytes {
+            Bytes::Racing => {
+                let copy = self.words[line.frame].each_ref().map(|word| {
+                    reached("words: before load");
+                    word.load(Ordering::Relaxed)
+                });
+                let whole = ring.is_there(line);
+                assert!(!whole || copy == [line.sequence + 1; 2], "torn: {copy:?} of {}", line.sequence);
+                whole
+            }
+            Bytes::Plain => {
+                let held = ring.hold(seat, line);
+                if held {
+                    // SAFETY: loom reports a race.
+                    let plain = self.plain[line.frame].with(|plain| unsafe { *plain });
+                    assert_eq!(plain, line.sequence + 1, "torn");
+                    ring.release(seat);
+                }
+                held
+            }
+        }
+    }
+}
+
+/// As `StreamReader`.
+struct Reader {
+    stream: Arc<Stream>,
+    seat: usize,
+    next: u64,
+    read: u64,
+    lost: u64,
+}
+
+impl Reader {
+    fn new(stream: &Arc<Stream>, seat: usize) -> Self {
+        Self { stream: stream.clone(), seat, next: 0, read: 0, lost: 0 }
+    }
+
+    /// As `StreamReader::advance`; false when there is nothing.
+    fn advance(&mut self, bytes: Bytes) -> bool {
+        reached("advance: before");
+        let ring = self.stream.ring();
+        match ring.look(self.next) {
+            Look::There(line) if self.stream.read(self.seat, &line, bytes) => {
+                assert_eq!(line.sequence, self.next);
+                self.next += 1;
+                self.read += 1;
+            }
+            Look::There(_) | Look::Gone => {
+                let oldest = ring.oldest_after(self.next);
+                assert!(oldest > self.next, "overwritten, and not told so");
+                self.lost += oldest - self.next;
+                self.next = oldest;
+            }
+            Look::NotYet => return false,
+        }
+        true
+    }
+
+    fn catch_up(&mut self, bytes: Bytes) {
+        while self.advance(bytes) {}
+    }
+
+    /// Everything that was written was read or lost.
+    fn settle(mut self, written: u64, bytes: Bytes) {
+        self.catch_up(bytes);
+        assert_eq!((self.read + self.lost, self.next), (written, written), "the accounts are wrong");
+    }
+}
+
+/// The writer writes on while a reader copies: each record that it gets is whole, and the accounts are exact.
+fn is_copied_whole(before: u64, during: u64) {
+    let stream = Stream::new(2, 1);
+    let mut progress = Progress::resume(&stream.ring());
+    stream.writes(&mut progress, before, Bytes::Racing);
+    let mut reader = Reader::new(&stream, 0);
+    let writer = {
+        let stream = stream.clone();
+        thread::spawn(move || stream.writes(&mut progress, during, Bytes::Racing))
+    };
+    reader.advance(Bytes::Racing);
+    writer.join().unwrap();
+    reader.settle(before + during, Bytes::Racing);
+}
+
+pub(crate) fn a_new_record_is_copied_whole() {
+    is_copied_whole(0, 1);
+}
+
+/// The reader is at a record that the writer replaces, and it uses the frame again.
+pub(crate) fn an_overwritten_copy_is_thrown_away() {
+    is_copied_whole(2, 2);
+}
+
+/// A stream with two records, and their entries: what races from here on is not the look, but what comes after it.
+fn looked_at(readers: usize, bytes: Bytes) -> (Arc<Stream>, Progress, [Line; 2]) {
+    let stream = Stream::new(2, readers);
+    let mut progress = Progress::resume(&stream.ring());
+    stream.writes(&mut progress, 2, bytes);
+    let lines = [0, 1].map(|sequence| match stream.ring().look(sequence) {
+        Look::There(line) => line,
+        other => panic!("{other:?}"),
+    });
+    (stream, progress, lines)
+}
+
+/// A record is held in plain memory while the writer passes it: loom reports a race of the two.
+pub(crate) fn the_writer_goes_round_what_is_held() {
+    let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
+    let writer = {
+        let stream = stream.clone();
+        thread::spawn(move || stream.writes(&mut progress, 2, Bytes::Plain))
+    };
+    stream.read(0, &lines[0], Bytes::Plain);
+    writer.join().unwrap();
+}
+
+/// One record after the other is held, so that the seat names another frame right after a release.
+pub(crate) fn what_was_released_was_read() {
+    let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
+    let writer = {
+        let stream = stream.clone();
+        thread::spawn(move || stream.writes(&mut progress, 2, Bytes::Plain))
+    };
+    lines.iter().for_each(|line| _ = stream.read(0, line, Bytes::Plain));
+    writer.join().unwrap();
+}
+
+/// All seats are held: there still is a frame to write, and all that are kept are there.
+pub(crate) fn there_always_is_a_free_frame() {
+    let (stream, mut progress, lines) = looked_at(2, Bytes::Plain);
+    let holder = {
+        let stream = stream.clone();
+        thread::spawn(move || lines.iter().enumerate().for_each(|(seat, line)| _ = stream.ring().hold(seat, line)))
+    };
+    stream.writes(&mut progress, 3, Bytes::Plain);
+    holder.join().unwrap();
+    for sequence in 3..5 {
+        assert!(matches!(stream.ring().look(sequence), Look::There(_)), "a kept record is missing");
+    }
+}
+
+/// The writer dies at a step of its third record, and a successor goes on in front of a reader that copies or holds the
+/// first.
+fn a_writer_dies(fatal: &'static str, finished: u64, bytes: Bytes) {
+    let (stream, mut progress, lines) = looked_at(1, bytes);
+    let successor = {
+        let stream = stream.clone();
+        thread::spawn(move || {
+            assert!(dies_at(fatal, || stream.writes(&mut progress, 1, bytes)));
+            let mut progress = Progress::resume(&stream.ring());
+            assert_eq!(progress.next(), finished, "a finished record is lost, or an unfinished one is none");
+            stream.writes(&mut progress, 1, bytes);
+        })
+    };
+    match bytes {
+        Bytes::Plain => _ = stream.read(0, &lines[0], Bytes::Plain),
+        Bytes::Racing => {
+            let mut reader = Reader::new(&stream, 0);
+            reader.next = 2;
+            reader.advance(Bytes::Racing);
+        }
+    }
+    successor.join().unwrap();
+    Reader::new(&stream, 0).settle(finished + 1, bytes);
+}
+
+pub(crate) fn a_successor_writes_what_was_begun() {
+    a_writer_dies("entry: filled", 2, Bytes::Racing);
+}
+
+pub(crate) fn a_successor_counts_what_was_finished() {
+    a_writer_dies("entry: published", 3, Bytes::Racing);
+}
+
+/// The dead one had taken the record's entry away, and the successor uses its frame.
+pub(crate) fn a_successor_goes_round_what_is_held() {
+    a_writer_dies("entry: filled", 2, Bytes::Plain);
+}
+
+/// A reader of a stream with a writer that died in the middle does not see its half entry.
+pub(crate) fn no_half_record_is_left() {
+    let stream = Stream::new(2, 1);
+    let mut progress = Progress::resume(&stream.ring());
+    stream.writes(&mut progress, 2, Bytes::Racing);
+    assert!(dies_at("entry: begun", || stream.writes(&mut progress, 1, Bytes::Racing)));
+    let mut reader = Reader::new(&stream, 0);
+    reader.catch_up(Bytes::Racing);
+    assert_eq!((reader.read, reader.lost, reader.next), (1, 1, 2));
+    assert_eq!(stream.ring().newest().map(|line| line.sequence), Some(1));
+}
+
+/// A dead reader's seat names a frame: the writer finds another each time, and the next reader there holds as if
+/// nothing had been.
+pub(crate) fn a_dead_holder_costs_nothing() {
+    let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
+    assert!(dies_at("release: before seat", || _ = stream.read(0, &lines[0], Bytes::Plain)));
+    let next = {
+        let stream = stream.clone();
+        thread::spawn(move || {
+            stream.ring().sit_down(0);
+            stream.read(0, &lines[1], Bytes::Plain);
+        })
+    };
+    stream.writes(&mut progress, 2, Bytes::Plain);
+    next.join().unwrap();
+}
+
+/// As `wait_any`: the reader sleeps until the record is there.
+pub(crate) fn no_wake_up_is_lost() {
+    let stream = Stream::new(2, 1);
+    let writer = {
+        let stream = stream.clone();
+        thread::spawn(move || stream.writes(&mut Progress::resume(&stream.ring()), 1, Bytes::Racing))
+    };
+    let mut reader = Reader::new(&stream, 0);
+    while !reader.advance(Bytes::Racing) {
+        let seen = stream.rings.load(Ordering::Acquire);
+        stream.ring().drowsy(0, 1);
+        reached("wait: drowsy");
+        if !stream.ring().is_due(reader.next) {
+            // As the kernel: sleeps while nobody has rung since.
+            while stream.rings.load(Ordering::Acquire) == seen {
+                thread::yield_now();
+            }
+        }
+        stream.ring().awake(0);
+    }
+    writer.join().unwrap();
+    assert_eq!((reader.read, reader.lost), (1, 0));
+}
+
+/// A record that is late comes while a reader looks for the two around a time: a final answer is the same before and
+/// after.
+pub(crate) fn a_final_answer_stays() {
+    let stream = Stream::new(4, 1);
+    let mut progress = Progress::resume(&stream.ring());
+    for ns in [10, 30] {
+        stream.write(&mut progress, ns, Bytes::Racing);
+    }
+    let writer = {
+        let stream = stream.clone();
+        thread::spawn(move || [20, 40].map(|ns| stream.write(&mut progress, ns, Bytes::Racing)))
+    };
+    // Of 18, 20 is the nearest after, and may come as long as 30 is the newest.
+    let ask = || match around(&stream.ring(), Stamp { epoch: 1, ns: 18 }, 10) {
+        Answer::Around { before, after } => Some((before.about.stamp.ns, after.about.stamp.ns)),
+        Answer::NotYet { .. } => None,
+        other => panic!("no answer for a time in the ring: {other:?}"),
+    };
+    let early = ask();
+    assert!(early.is_none_or(|early| early == (10, 20)), "{early:?} was said to be final");
+    writer.join().unwrap();
+    assert_eq!(ask(), Some((10, 20)));
+}
+
+/// The writer passes a reader that looks for the two around a time: they are the right two, or are gone.
+pub(crate) fn an_overwritten_look_says_so() {
+    let stream = Stream::new(2, 1);
+    let mut progress = Progress::resume(&stream.ring());
+    stream.writes(&mut progress, 2, Bytes::Racing);
+    let writer = {
+        let stream = stream.clone();
+        thread::spawn(move || stream.writes(&mut progress, 1, Bytes::Racing))
+    };
+    match around(&stream.ring(), Stamp { epoch: 1, ns: 15 }, 0) {
+        Answer::Around { before, after } => {
+            assert_eq!((before.about.stamp.ns, after.about.stamp.ns), (10, 20), "not the nearest");
+        }
+        Answer::BeforeOldest { .. } => {}
+        other => panic!("no answer for a time in the ring: {other:?}"),
+    }
+    writer.join().unwrap();
+}
+
+/// What a dead sleeper said is cleared, unless the next reader of the seat has said something since.
+pub(crate) fn a_dead_sleeper_is_forgotten_alone() {
+    let stream = Stream::new(2, 1);
+    stream.ring().drowsy(0, 7);
+    let next = {
+        let stream = stream.clone();
+        thread::spawn(move || {
+            stream.ring().sit_down(0);
+            stream.ring().drowsy(0, 8);
+        })
+    };
+    let wakes = Mutex::new(0);
+    stream.seats[0].forget(7);
+    reached("sleeper: forgotten");
+    next.join().unwrap();
+    let mut progress = Progress::resume(&stream.ring());
+    let frame = progress.claim(&stream.ring()).unwrap();
+    let stamp = Stamp { epoch: 1, ns: 1 };
+    let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: 0, incarnation: 0 };
+    progress.publish(&stream.ring(), frame, about, |_, sleeper| {
+        assert_eq!(sleeper, 8);
+        *wakes.lock().unwrap() += 1;
+    });
+    assert_eq!(*wakes.lock().unwrap(), 1, "the living sleeper is not woken");
+}

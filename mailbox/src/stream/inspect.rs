@@ -1,0 +1,104 @@
+//! A stream seen from outside: its shape, its writer, its readers, and the ends of what it keeps. Looking takes no
+//! seat, changes nothing and asks nobody; so what is seen is a moment, and its parts are of moments that lie a little
+//! apart.
+
+use crate::inspect::Party;
+use crate::lock;
+use crate::name::Name;
+use crate::node::Node;
+use crate::owned::{BadSegment, OWNER_BYTE};
+use crate::stream::error::StreamError;
+use crate::stream::lookup;
+use crate::stream::record::RecordInfo;
+use crate::stream::segment::{StreamSegment, path_of};
+use crate::stream::shape::{StreamId, StreamShape};
+use std::fs::File;
+use std::io;
+use std::sync::atomic::Ordering;
+
+/// A stream seen from outside.
+#[derive(Clone, Debug)]
+pub struct StreamInfo {
+    /// Which stream.
+    pub id: StreamId,
+    /// What it was made as.
+    pub shape: StreamShape,
+    /// The writer, or the last one; none when there never was one.
+    pub writer: Option<Party>,
+    /// Times a new writer took over.
+    pub adoptions: u32,
+    /// Records ever written: the sequence of the next one.
+    pub written: u64,
+    /// Records ever refused since their stamps were too far behind.
+    pub refused: u64,
+    /// The oldest record that is kept.
+    pub oldest: Option<RecordInfo>,
+    /// The newest record; none also if the writer turns the whole ring during each of some looks.
+    pub newest: Option<RecordInfo>,
+    /// Readers now.
+    pub readers: u16,
+    /// Readers that read a record in place now.
+    pub holding: u16,
+    /// Readers that sleep until the next record.
+    pub sleeping: u16,
+}
+
+impl Node {
+    /// A stream as it is now; none when there is no such stream.
+    ///
+    /// ```
+    /// use rohrpost_mailbox::{Name, Node, Participant, Stamp, StreamId, StreamShape};
+    /// # let dir = tempfile::tempdir()?;
+    /// let node = Node::create(&dir.path().join("node"), 0o700)?;
+    /// let participant = Participant::join(&node, Name::new(1, 200, 0, 0))?;
+    /// let id = StreamId { name: Name::new(1, 200, 0, 0), number: 1 };
+    /// assert!(node.inspect_stream(id)?.is_none());
+    /// let mut writer = participant.stream_writer(id, StreamShape::default())?;
+    /// writer.write(Stamp { epoch: 1, ns: 1_000 }, b"a picture")?;
+    /// let info = node.inspect_stream(id)?.expect("it was made");
+    /// assert_eq!((info.written, info.readers), (1, 0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When its file cannot be used, or is something else.
+    pub fn inspect_stream(&self, id: StreamId) -> Result<Option<StreamInfo>, StreamError> {
+        let (segment, file) = match StreamSegment::open(self.path(), id) {
+            Ok(opened) => opened,
+            Err(BadSegment::Io(error)) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(why) => return Err(StreamError::of_bad(&path_of(self.path(), id), id, why)),
+        };
+        let (says, ring) = (&segment.page().writer, segment.ring());
+        // The first byte is the writer's. What a dead reader left in its seat says nothing any more.
+        let taken: Vec<_> = (OWNER_BYTE + 1..).zip(ring.seats()).filter(|(byte, _)| is_taken(&file, *byte)).collect();
+        Ok(Some(StreamInfo {
+            id,
+            shape: segment.shape,
+            writer: writer_of(&segment, is_taken(&file, OWNER_BYTE)),
+            adoptions: says.adoptions.load(Ordering::Relaxed),
+            written: ring.written(),
+            refused: says.refused.load(Ordering::Relaxed),
+            oldest: lookup::oldest(&ring).map(|line| RecordInfo::of(&segment, &line)),
+            newest: ring.newest().map(|line| RecordInfo::of(&segment, &line)),
+            readers: taken.len() as u16,
+            holding: taken.iter().filter(|(_, seat)| seat.hold.load(Ordering::Relaxed) != 0).count() as u16,
+            sleeping: taken.iter().filter(|(_, seat)| seat.sleeper.load(Ordering::Relaxed) != 0).count() as u16,
+        }))
+    }
+}
+
+/// Whether somebody holds the lock of this byte. When that cannot be asked, nobody does.
+fn is_taken(file: &File, byte: u64) -> bool {
+    lock::is_locked(file, byte).unwrap_or(false)
+}
+
+fn writer_of(segment: &StreamSegment, is_alive: bool) -> Option<Party> {
+    let says = &segment.page().writer;
+    let pid = says.pid.load(Ordering::Relaxed);
+    (pid != 0).then(|| Party {
+        participant: says.participant.load(Ordering::Relaxed) as u16,
+        pid: Some(pid),
+        module: Name::from_raw(says.module.load(Ordering::Relaxed)),
+        is_alive,
+    })
+}
