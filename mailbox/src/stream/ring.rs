@@ -221,8 +221,8 @@ impl<'a> Ring<'a> {
     /// Whether the record has not been overwritten since it was looked at: what was copied since then is whole.
     #[inline]
     pub(crate) fn is_there(&self, line: &Line) -> bool {
-        // ORDERING (D): what was read of entry and frame before the second look at the word. Pairs with (C) for the
-        // entry, with (E) for the frame.
+        // ORDERING (D): what was read of entry and frame before the second look at the word. Pairs with (C): the writer
+        // begins the entry anew before it uses the frame again.
         fence(Ordering::Acquire);
         self.entry(line.sequence).word.load(Ordering::Relaxed) == line.word
     }
