@@ -111,7 +111,8 @@ impl Progress {
         self.newest = Some(Stamp { epoch: about.stamp.epoch, ns: before_ns.max(about.stamp.ns) });
         self.free.extend(old);
         // ORDERING (E): the new word before the looks at the seats: at their sleepers now, at their holds when the next
-        // frame is claimed. Pairs with (F) and (G). What is written into the old record's frame comes after (C) already.
+        // frame is claimed. Pairs with (F) and (G). What is written into the old record's frame from here on
+        // comes after (C) already.
         fence(Ordering::SeqCst);
         for seat in ring.seats() {
             let sleeper = seat.sleeper.load(Ordering::Relaxed);
