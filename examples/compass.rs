@@ -32,7 +32,7 @@ impl Module for WheelCompass {
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         context.set_period(std::time::Duration::try_from_secs_f64(1.0 / settings.rate_hz.unwrap_or(5.0))?);
-        let wheels = context.subscribe(interfaces::WheelsInterface::ODOMETRY, "odometry.0", Rate::Each)?;
+        let wheels = context.subscribe(interfaces::WheelsInterface::ODOMETRY.data(), "odometry.0", Rate::Each)?;
         Ok(Self { wheels, turned_deg: 0.0, correction_deg: 0.0 })
     }
 

@@ -53,15 +53,16 @@
 
 pub use rohrpost_config::Installation;
 pub use rohrpost_mailbox::{
-    Class, CreateError, Interest, ModuleState, Name, Node, OverflowPolicy, ParticipantInfo, Priority, Ready, Shape,
-    SystemTime, Watch,
+    Class, CreateError, Interest, ModuleState, Name, Next, Node, OverflowPolicy, ParticipantInfo, Priority, Ready,
+    RecordInfo, Shape, SystemTime, Watch,
 };
 pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::runtime::{
-    BadRate, ClientError, Context, ContextError, Rate, Received, Start, StartError, Subscription, ToolLink, Unreadable,
-    describe, find_other_versions, find_running,
+    BadRate, ClientError, Context, ContextError, Moment, OpenValue, Rate, Received, Record, RecordError, Start,
+    StartError, Stream, StreamReadError, StreamSubscription, Subscription, ToolLink, Unreadable, describe,
+    find_other_versions, find_running,
 };
 pub use rohrpost_modules::serde;
 pub use rohrpost_modules::{

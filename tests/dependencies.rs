@@ -21,15 +21,30 @@ const LICENCES: [&str; 9] = [
 ];
 
 /// Crates in two versions, with the reason.
-const DOUBLED: [(&str, &str); 3] = [
+const DOUBLED: [(&str, &str); 6] = [
+    ("darling", "mcap's enumset stays at 0.21, ratatui's macros take 0.24; only the compiler runs them"),
+    ("darling_core", "the same"),
+    ("darling_macro", "the same"),
     ("getrandom", "ring 0.17 stays at 0.2, tempfile takes 0.4"),
     ("signal-hook", "crossterm 0.29, the terminal of `top`, stays at 0.3"),
     ("syn", "clap_derive takes 3, all other macros 2; only the compiler runs them"),
 ];
 
 /// Our tools, or crates that only tools need.
-const NOT_FOR_MODULES: [&str; 10] =
-    ["clap", "comfy-table", "flate2", "rand", "ratatui", "rcgen", "rerun", "rohrpost-bench", "rustls", "serde_json"];
+const NOT_FOR_MODULES: [&str; 12] = [
+    "clap",
+    "comfy-table",
+    "flate2",
+    "mcap",
+    "rand",
+    "ratatui",
+    "rcgen",
+    "rerun",
+    "rohrpost-bench",
+    "rohrpost-recording",
+    "rustls",
+    "serde_json",
+];
 /// Peers that only benches need, and the GUI bridge's own dependencies.
 const NOT_FOR_THE_COMMAND: [&str; 3] = ["iceoryx2", "rerun", "zenoh"];
 

@@ -8,6 +8,7 @@
 mod mailboxes;
 mod routers;
 mod seals;
+mod streams;
 
 use std::process::ExitCode;
 
@@ -29,7 +30,7 @@ trait Path {
 /// A name, and how its path begins.
 type Entry = (&'static str, fn() -> Box<dyn Path>);
 
-const PATHS: [Entry; 11] = [
+const PATHS: [Entry; 15] = [
     ("send", || Box::new(mailboxes::Send::default())),
     ("send-slower-by-a-third", || Box::new(mailboxes::Send::slower_by_a_third())),
     ("send-in-place", || Box::new(mailboxes::SendInPlace::default())),
@@ -39,6 +40,10 @@ const PATHS: [Entry; 11] = [
     ("decode", || Box::new(mailboxes::Decode::default())),
     ("outbound-accept", || Box::new(routers::Accept::default())),
     ("inbound-handle", || Box::new(routers::Handle::default())),
+    ("stream-write", || Box::new(streams::Write::default())),
+    ("stream-copy", || Box::new(streams::Copy::default())),
+    ("stream-hold", || Box::new(streams::Hold::default())),
+    ("stream-around", || Box::new(streams::AroundTime::default())),
     ("seal", || Box::new(seals::Seal::default())),
     ("open", || Box::new(seals::Open::default())),
 ];

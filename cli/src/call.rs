@@ -5,7 +5,9 @@ use super::units::seconds;
 use crate::terminal::{Failure, say};
 use rohrpost::common::{self, OutputLevel};
 use rohrpost::output::plain;
-use rohrpost::schema::{Description, Function, Value, decode, describe_field, describe_result, encode, parse_argument};
+use rohrpost::schema::{
+    DataKind, Description, Function, Value, decode, describe_field, describe_result, encode, parse_argument,
+};
 use rohrpost::{Name, ToolLink};
 use std::process::ExitCode;
 
@@ -186,11 +188,14 @@ fn listing(description: &Description) -> String {
             plain::line(&function.text)
         ));
     }
-    if !description.data.is_empty() {
-        text.push_str("\ndata\n");
-    }
-    for item in &description.data {
-        text.push_str(&format!("  {}\n      {}\n", describe_field(&item.field), plain::line(&item.field.text)));
+    for (title, kind) in [("data", DataKind::Data), ("streams", DataKind::Stream)] {
+        let items: Vec<_> = description.data.iter().filter(|item| item.kind == kind).collect();
+        if !items.is_empty() {
+            text.push_str(&format!("\n{title}\n"));
+        }
+        for item in items {
+            text.push_str(&format!("  {}\n      {}\n", describe_field(&item.field), plain::line(&item.field.text)));
+        }
     }
     text.push_str("\nevery module: on, off, status, get DATA, output-level LEVEL");
     text

@@ -80,7 +80,7 @@ fn completed(command: &str, arg: Arg) -> Arg {
         ("mailbox", "name") => from(arg, mailboxes),
         ("write", "stream") => from(arg, modules),
         (_, "stream") => from(arg, streams),
-        (_, "number") => from(arg, stream_numbers),
+        (_, "item") => from(arg, stream_items),
         (_, "name" | "names" | "module" | "modules") => from(arg, modules),
         (_, "node") => from(arg, nodes),
         ("send", "function") => from(arg, own_functions),
@@ -154,8 +154,8 @@ fn streams() -> Vec<CompletionCandidate> {
     stream::completed_names(&target()).iter().map(|name| candidate(name, "")).collect()
 }
 
-fn stream_numbers() -> Vec<CompletionCandidate> {
-    stream::completed_numbers(&target(), &words()).iter().map(|number| candidate(number, "")).collect()
+fn stream_items() -> Vec<CompletionCandidate> {
+    stream::completed_items(&target(), &words()).iter().map(|(item, text)| candidate(item, text)).collect()
 }
 
 fn nodes() -> Vec<CompletionCandidate> {

@@ -1,6 +1,7 @@
 //! `rohrpost list`.
 
 use super::observer::Silence;
+use super::stream::{StreamView, name_items, print_streams, stream_views};
 use super::summary::{Losses, ModuleLine, losses, module_lines, print_modules};
 use super::table::table;
 use super::target::{Running, Target};
@@ -23,6 +24,9 @@ pub(super) struct Arguments {
     /// List mailboxes too.
     #[arg(long, short)]
     mailboxes: bool,
+    /// List streams too.
+    #[arg(long, short)]
+    streams: bool,
     /// One JSON object.
     #[arg(long)]
     json: bool,
@@ -51,7 +55,7 @@ pub(super) struct MailboxLine {
 
 /// A node, and whether it answers.
 #[derive(Serialize)]
-struct NodeLine {
+pub(super) struct NodeLine {
     node: String,
     /// Why not, if it does not answer.
     silent: Option<String>,
@@ -59,13 +63,17 @@ struct NodeLine {
     silent_s: Option<f64>,
 }
 
-fn node_line(node: &str, silent: &[Silence]) -> NodeLine {
-    let silence = silent.iter().find(|silence| silence.node == node);
-    NodeLine {
-        node: node.into(),
-        silent: silence.map(|silence| silence.why.clone()),
-        silent_s: silence.and_then(|silence| silence.silent_s),
-    }
+/// These nodes, and those of them that do not answer.
+pub(super) fn node_lines(nodes: &[&str], silent: &[Silence]) -> Vec<NodeLine> {
+    let line = |node: &&str| {
+        let silence = silent.iter().find(|silence| silence.node == *node);
+        NodeLine {
+            node: (*node).into(),
+            silent: silence.map(|silence| silence.why.clone()),
+            silent_s: silence.and_then(|silence| silence.silent_s),
+        }
+    };
+    nodes.iter().map(line).collect()
 }
 
 /// A name that is registered at the TCP router and in no configuration here.
@@ -85,6 +93,7 @@ struct Listing<'a> {
     nodes: Vec<NodeLine>,
     modules: Vec<ModuleLine>,
     mailboxes: Vec<MailboxLine>,
+    streams: Vec<StreamView>,
     beyond: Vec<BeyondLine>,
     /// Ranges of names that the TCP router did not list, for lack of room.
     beyond_more: u64,
@@ -94,7 +103,8 @@ struct Listing<'a> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let running = arguments.target.find()?;
-    let scope = if arguments.mailboxes || arguments.json { Scope::Mailboxes } else { Scope::Modules };
+    let all = arguments.mailboxes || arguments.streams || arguments.json;
+    let scope = if all { Scope::Mailboxes } else { Scope::Modules };
     let (survey, silent) = running.survey(scope)?;
     let nodes = running.shown();
     let (beyond, beyond_more, beyond_silent) = match running.hosts_beyond() {
@@ -102,12 +112,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Ok(hosts)) => (beyond(&running, &hosts), hosts.more, None),
         Some(Err(why)) => (Vec::new(), 0, Some(why.to_string())),
     };
+    let mut streams = stream_views(&running.installation, &survey.streams);
+    name_items(&running, &mut streams);
     let listing = Listing {
         installation: &running.installation.name,
         node: &running.node_name,
-        nodes: nodes.iter().map(|node| node_line(node, &silent)).collect(),
+        nodes: node_lines(&nodes, &silent),
         modules: module_lines(&running.installation, &survey, None),
         mailboxes: mailbox_lines(&running.installation, &survey.mailboxes),
+        streams,
         beyond,
         beyond_more,
         beyond_silent,
@@ -143,6 +156,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     if arguments.mailboxes {
         say(format_args!("\n{}", print_mailboxes(&listing.mailboxes).trim_end()));
+    }
+    if arguments.streams {
+        let streams = print_streams(&listing.streams, several);
+        say(format_args!("\n{}", if listing.streams.is_empty() { "no streams" } else { streams.trim_end() }));
     }
     Ok(ExitCode::SUCCESS)
 }

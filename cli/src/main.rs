@@ -39,6 +39,7 @@ mod param;
 mod ping;
 mod published;
 mod quantities;
+mod record;
 mod resolved;
 mod round;
 mod router;
@@ -119,6 +120,8 @@ enum Command {
     Send(send::Arguments),
     /// Show, set, save and load the parameters of modules.
     Param(param::Arguments),
+    /// Describe, recover, cut and merge files of recordings.
+    Record(record::Arguments),
     /// Show how well each node knows the common time.
     Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
@@ -172,6 +175,7 @@ fn main() -> ExitCode {
         Command::Net(arguments) => net::run(&arguments),
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
+        Command::Record(arguments) => record::run(&arguments),
         Command::Time(arguments) => time::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

@@ -4,7 +4,7 @@
 
 use rohrpost::Name;
 use rohrpost_config::{
-    Installation, MailboxSpec, Module, Program, Reach, RestartPolicy, Scheduling, Start, TimeSource, bounds,
+    Installation, MailboxSpec, Module, Program, Reach, RestartPolicy, Scheduling, Start, StreamSpec, TimeSource, bounds,
 };
 use rohrpost_mailbox::LAYOUT_VERSION;
 use rohrpost_network::{Bound, FlowBound, Network, Tdma};
@@ -106,6 +106,7 @@ fn module(installation: &Installation, module: &Module) -> Value {
         RestartPolicy::Always => "always",
     };
     let mailboxes = module.mailboxes.each().into_iter().map(|(key, spec)| (key.into(), mailbox(spec)));
+    let streams = module.streams.iter().map(|(name, spec)| (name.clone(), stream(spec)));
     json!({
         "name": text(&module.name),
         "number": module.name.raw(),
@@ -127,6 +128,7 @@ fn module(installation: &Installation, module: &Module) -> Value {
         "ready_within_ms": ms(module.ready_within),
         "stop_within_ms": ms(module.stop_within),
         "mailboxes": mailboxes.collect::<serde_json::Map<_, _>>(),
+        "streams": streams.collect::<serde_json::Map<_, _>>(),
     })
 }
 
@@ -134,6 +136,14 @@ fn mailbox(spec: &MailboxSpec) -> Value {
     json!({
         "slots": spec.slots, "size": spec.size, "full": spec.full.name(), "max_age_ms": spec.max_age.map(ms),
         "claims": spec.claims, "memory": spec.memory(),
+    })
+}
+
+/// `late_ms`: 0 where a record behind the newest is refused.
+fn stream(spec: &StreamSpec) -> Value {
+    json!({
+        "record": spec.record_bytes, "keep": spec.keep, "readers": spec.readers, "late_ms": ms(spec.late),
+        "memory": spec.memory(),
     })
 }
 

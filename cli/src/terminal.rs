@@ -18,3 +18,8 @@ pub(crate) fn complain(line: impl std::fmt::Display) {
     // The reader may be gone.
     let _ = writeln!(std::io::stderr(), "{}", Lines(line));
 }
+
+/// Prints a line to the standard error in place of the one that was printed so before.
+pub(crate) fn complain_in_place(line: impl std::fmt::Display) {
+    let _ = write!(std::io::stderr(), "\r\x1b[K{}", Lines(line));
+}

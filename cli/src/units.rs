@@ -3,9 +3,12 @@
 use super::table::time;
 use crate::terminal::Failure;
 use rohrpost::launch::{Event, events};
+use rohrpost_config::size_text;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
+/// Longest sleep without a check for Ctrl-C.
+pub(super) const LOOK: Duration = Duration::from_millis(50);
 /// Upper limit of a time; clocks can add it without an overflow.
 const SECONDS_MAX: f64 = 365.0 * 86_400.0;
 /// Lowest rate: packages carry the period as whole microseconds in 32 bits, at most 71 minutes.
@@ -71,6 +74,15 @@ pub(super) fn bytes(bytes: f64) -> String {
         b if b < 999_500.0 => format!("{:.2} kB", b / 1e3),
         b => format!("{:.2} MB", b / 1e6),
     }
+}
+
+/// A size in its largest unit, with at most one decimal: powers of 1024, as memory is given.
+pub(crate) fn size(bytes: u64) -> String {
+    let (unit, one) = [("GiB", 1u64 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)]
+        .into_iter()
+        .find(|(_, one)| bytes >= *one)
+        .unwrap_or(("B", 1));
+    if bytes.is_multiple_of(one) { size_text(bytes) } else { format!("{:.1} {unit}", bytes as f64 / one as f64) }
 }
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
 //! Explains an installation in words: the page that `rohrpost check` prints, readable at 100 columns.
 
+mod memory;
 mod slots;
 mod timeline;
 
-use crate::OverflowPolicy;
 use crate::installation::Installation;
-use crate::mailbox::{MailboxSpec, TRANSIT};
+use crate::mailbox::TRANSIT;
 use crate::module::{BUSY_AFTER, Module, Program, Restart, RestartPolicy, Start, TCP_CLIENT, TCP_ROUTER};
 use crate::node::{Node, Reach};
 use crate::output::LineFormat;
 use crate::saved::SavedValue;
 use crate::time::TimeSource;
-use crate::units::{duration_text, size_text};
+use crate::units::{count_text, duration_text, size_text};
 use rohrpost_mailbox::Name;
 use rohrpost_network::LEVEL_NOT_REAL_TIME;
 use std::fmt::Write;
@@ -21,8 +21,8 @@ const COLUMNS: usize = 100;
 /// Where the right-hand sides under a module begin.
 const INDENT: usize = 16;
 
-/// Explains an installation, or one node of it: what runs where, how urgent it is, what its mailboxes hold and do when
-/// full, and what happens when it ends.
+/// Explains an installation, or one node of it: what runs where, how urgent it is, what its mailboxes and streams hold,
+/// what happens when a mailbox is full, and when a module ends.
 pub fn explain(installation: &Installation, node: Option<&str>) -> String {
     let mut page = Page { installation, text: String::new() };
     page.head();
@@ -147,7 +147,7 @@ impl Page<'_> {
         let Some(tcp) = &self.installation.tcp else { return };
         let runs = match &tcp.server {
             Some(node) => {
-                format!("it runs on node {node}, takes {}", count(tcp.clients.into(), "client"))
+                format!("it runs on node {node}, takes {}", count_text(tcp.clients.into(), "client"))
             }
             None => "another installation runs it".into(),
         };
@@ -191,9 +191,9 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let memory = modules.iter().map(|module| module.memory()).sum();
+        let (number, memory) = (count_text(modules.len(), "module"), memory::of_node(&modules));
         self.line("");
-        self.line(format!("Node `{}`: {}, {} of mailboxes", node.name, count(modules.len(), "module"), about(memory)));
+        self.line(format!("Node `{}`: {number}, {memory}", node.name));
         self.line("");
         if let Some(address) = &node.address {
             self.entry("address", &address.to_string());
@@ -238,10 +238,13 @@ impl Page<'_> {
             self.entry("saved", &values.iter().map(text).collect::<Vec<_>>().join(", "));
         }
         for (key, spec) in module.mailboxes.each() {
-            self.entry(key, &mailbox(spec));
+            self.entry(key, &memory::mailbox(spec));
         }
         if module.has_transit() {
-            self.entry("transit", &mailbox(&TRANSIT));
+            self.entry("transit", &memory::mailbox(&TRANSIT));
+        }
+        for (index, words) in memory::streams(&module.streams).iter().enumerate() {
+            self.entry(if index == 0 { "streams" } else { "" }, words);
         }
     }
 
@@ -265,7 +268,7 @@ impl Page<'_> {
                 LineFormat::Json => "JSON",
             };
             let size = size_text(output.file_size);
-            let kept = count(output.files as usize, "full file");
+            let kept = count_text(output.files as usize, "full file");
             self.entry("writes", &format!("{} as {format}; a new one after {size}, {kept} kept", file.display()));
         }
         if output.journal {
@@ -359,34 +362,4 @@ fn restart(restart: &Restart) -> String {
         RestartPolicy::OnFailure => format!("{again}; stays ended when it meant to end"),
         RestartPolicy::Always => again,
     }
-}
-
-fn mailbox(spec: &MailboxSpec) -> String {
-    let full = match spec.full {
-        OverflowPolicy::Displace => "full: the least important gives way",
-        OverflowPolicy::Latest => "latest: the newer replaces the older",
-        OverflowPolicy::Reject => "full: new ones are refused",
-    };
-    let (size, memory) = (size_text(spec.size.into()), about(spec.memory()));
-    let mut words = format!("{:>4} x {size:<7} = {memory:<9} {full}", spec.slots);
-    if let Some(age) = spec.max_age {
-        let _ = write!(words, "; stale after {}", duration_text(age));
-    }
-    if spec.claims > 1 {
-        let _ = write!(words, "; {} claims a sender", spec.claims);
-    }
-    words
-}
-
-/// A size in at most four digits.
-fn about(bytes: u64) -> String {
-    if bytes < 10 << 20 {
-        format!("{} KiB", bytes.div_ceil(1 << 10))
-    } else {
-        format!("{} MiB", bytes.div_ceil(1 << 20))
-    }
-}
-
-fn count(number: usize, noun: &str) -> String {
-    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
 }

@@ -11,7 +11,7 @@ use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tcp::Tcp;
 use crate::time::TimeSource;
-use rohrpost_mailbox::{Class, Name};
+use rohrpost_mailbox::{Class, Name, saturating_sum};
 use rohrpost_network::{Network, Tdma};
 use std::path::{Path, PathBuf};
 
@@ -71,6 +71,11 @@ impl Installation {
     /// The modules of a node, in the order of their start.
     pub fn modules_on(&self, node: &str) -> impl Iterator<Item = &Module> {
         self.modules.iter().filter(move |module| module.node == node)
+    }
+
+    /// Bytes of shared memory that the mailboxes and streams of a node take, as far as the file names them.
+    pub fn memory_on(&self, node: &str) -> u64 {
+        saturating_sum(self.modules_on(node).map(Module::memory))
     }
 
     /// The nodes that are on the LAN, or the only one; they come first in [`nodes`](Self::nodes).

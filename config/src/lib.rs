@@ -63,6 +63,7 @@ mod reader;
 mod saved;
 mod scheduling;
 mod settings;
+mod stream;
 mod tcp;
 mod tdma;
 mod time;
@@ -89,6 +90,7 @@ pub use reader::{is_word as is_class_name, nearest};
 pub use rohrpost_mailbox::OverflowPolicy;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};
+pub use stream::{RECORD_BYTES_MAX, StreamSpec};
 pub use tcp::{TCP_SERVER, Tcp};
 pub use time::TimeSource;
 pub use units::{

@@ -5,9 +5,11 @@ use crate::directory::Directory;
 use crate::mailbox::{MailboxLines, Mailboxes, TRANSIT, lines_at};
 use crate::node::Node;
 use crate::reader::{Item, Section, nearest};
+use crate::stream::StreamSpec;
 use crate::units::duration_text;
-use rohrpost_mailbox::Name;
+use rohrpost_mailbox::{Name, saturating_sum};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// The built-in module that is a node's client of the TCP router.
@@ -112,6 +114,9 @@ pub struct Module {
     pub spin: Duration,
     /// Its mailboxes.
     pub mailboxes: Mailboxes,
+    /// Its streams with a section in the file, by the names of their items in its interfaces. Any other stream of it
+    /// is the default.
+    pub streams: BTreeMap<String, StreamSpec>,
     /// Line of its `[[module]]` in the file.
     pub line: usize,
     /// The index of its `[[module]]` in the file, from 0; none for an implicit one.
@@ -150,6 +155,7 @@ impl Module {
             busy_after: BUSY_AFTER,
             spin: Duration::ZERO,
             mailboxes: Mailboxes::default(),
+            streams: BTreeMap::new(),
             line: node.line,
             index: None,
         };
@@ -161,11 +167,21 @@ impl Module {
         !self.is_in_file() && self.program != Program::Builtin(TCP_ROUTER.into())
     }
 
-    /// Bytes of its mailboxes; each alias has a command mailbox like the module's.
+    /// Bytes of its mailboxes and of [`streams`](Self::streams).
     pub fn memory(&self) -> u64 {
+        self.mailbox_memory().saturating_add(self.stream_memory())
+    }
+
+    /// Bytes of its mailboxes; each alias has a command mailbox like the module's.
+    pub fn mailbox_memory(&self) -> u64 {
         let [commands, replies, data] = self.mailboxes.each().map(|(_, spec)| spec.memory());
         let transit = if self.has_transit() { TRANSIT.memory() } else { 0 };
         commands * (1 + self.aliases.len() as u64) + replies + data + transit
+    }
+
+    /// Bytes of [`streams`](Self::streams). Which further streams its interfaces have is not known here.
+    pub fn stream_memory(&self) -> u64 {
+        saturating_sum(self.streams.values().map(StreamSpec::memory))
     }
 }
 
@@ -204,6 +220,7 @@ impl Context<'_> {
         let spin = section.get("spin").and_then(|item| spin(&item)).unwrap_or_default();
         let boxes = section.section("mailbox", &format!("{what}, mailbox"));
         let (mailboxes, mailbox_lines) = Mailboxes::read(boxes, &what, section.line);
+        let streams = StreamSpec::read_all(section.section("stream", &format!("{what}, stream")), &what);
         let line = section.line;
         section.finish();
         let module = Module {
@@ -223,6 +240,7 @@ impl Context<'_> {
             busy_after: busy_after.unwrap_or(BUSY_AFTER),
             spin,
             mailboxes,
+            streams,
             line,
             index: Some(index),
         };

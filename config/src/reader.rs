@@ -201,7 +201,7 @@ impl<'d> Item<'d> {
     }
 
     /// Reports a value of the wrong kind or out of its range; returns nothing, for `?` and tails.
-    fn wrong<T>(&self, right: &str) -> Option<T> {
+    pub(crate) fn wrong<T>(&self, right: &str) -> Option<T> {
         self.report(format!("`{}` is {}; write {right}", self.key, shown(self.value.get_ref())));
         None
     }

@@ -1,4 +1,4 @@
-//! The free settings of a module, given a type.
+//! The free settings of a module, given a type; and the lines of what a module is given.
 
 use crate::errors::SettingsError;
 use crate::installation::Installation;
@@ -42,9 +42,19 @@ impl Installation {
 
     /// Line of one of a module's settings; of the module, if the setting is not there.
     pub fn settings_line(&self, module: &Module, key: &str) -> usize {
+        self.line_below(module, "settings", key)
+    }
+
+    /// Line of the section of one of a module's streams; of the module, if the stream has none.
+    pub fn stream_line(&self, module: &Module, stream: &str) -> usize {
+        self.line_below(module, "stream", stream)
+    }
+
+    /// Line of a key in a table of a module; of the module, if it is not there.
+    fn line_below(&self, module: &Module, table: &str, key: &str) -> usize {
         let document = self.document();
-        let settings = entry(&document, module).and_then(|entry| entry.get_ref().get("settings"));
-        let table = settings.and_then(|settings| settings.get_ref().as_table());
+        let table = entry(&document, module).and_then(|entry| entry.get_ref().get(table));
+        let table = table.and_then(|table| table.get_ref().as_table());
         let place = table.and_then(|table| Some(table.get_key_value(key)?.0.span()));
         place.map_or(module.line, |place| line_of(&self.text, place.start))
     }

@@ -116,6 +116,11 @@ pub fn rate_text(bits_s: u64) -> String {
     if bits_s == 0 { "0 bit/s".into() } else { whole(bits_s, &RATE) }
 }
 
+/// A number of things, such as "1 module" and "3 modules".
+pub(crate) fn count_text(number: usize, noun: &str) -> String {
+    if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
+}
+
 fn whole(value: u64, units: &[(&str, u64)]) -> String {
     let (unit, one) = units.iter().find(|(_, one)| value.is_multiple_of(*one)).unwrap_or(&("", 1));
     format!("{} {unit}", value / one)

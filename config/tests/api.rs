@@ -2,10 +2,11 @@
 
 use rohrpost_config::{
     Installation, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RestartPolicy, Scheduling, Start,
-    TimeSource, explain,
+    StreamSpec, TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -47,11 +48,27 @@ fn every_key_arrives() {
     let commands = motor.mailboxes.commands;
     assert_eq!((commands.slots, commands.size, commands.full, commands.claims), (16, 200, OverflowPolicy::Reject, 2));
     assert_eq!(commands.max_age, Some(Duration::from_millis(300)));
+    let scan = StreamSpec { record_bytes: 2048, keep: 256, readers: 4, late: Duration::from_millis(50) };
+    let image = StreamSpec { record_bytes: 8 << 20, keep: 8, ..StreamSpec::default() };
+    assert_eq!(motor.streams, BTreeMap::from([("image".into(), image), ("scan".into(), scan)]));
+    let line = |text: &str| 1 + FULL.lines().position(|line| line == text).unwrap();
+    assert_eq!(full.stream_line(motor, "image"), line("[module.stream.image]"));
+    assert_eq!(full.stream_line(motor, "points"), motor.line, "it has no section");
 
     assert_eq!(full.flows[0].deadline, Duration::from_millis(50));
     assert_eq!(full.flows[1].deadline, full.flows[1].period, "without a deadline, the next package's time");
     assert_eq!(full.gui.show[0].rate, None);
     assert_eq!(full.gui.show[1].rate, Some(0.5));
+}
+
+#[test]
+fn memory_of_a_node_is_that_of_its_mailboxes_and_streams() {
+    let full = parse(FULL);
+    let without = FULL.replace("stream.scan", "settings.scan").replace("stream.image", "settings.image");
+    let streams: u64 = full.modules.iter().flat_map(|module| module.streams.values()).map(StreamSpec::memory).sum();
+    assert!(streams > 17 * (8 << 20), "8 records, 8 readers, and one that is being written: {streams}");
+    assert_eq!(full.memory_on("base"), parse(&without).memory_on("base") + streams);
+    assert_eq!(full.memory_on("desk"), parse(&without).memory_on("desk"));
 }
 
 #[test]
@@ -126,6 +143,7 @@ fn digest_counts_what_must_be_equal_and_nothing_else() {
         ("Drives the wheels", "Turns the wheels", true, true, "a text"),
         ("stop-within = \"500 ms\"", "stop-within = \"0.5 s\"", true, true, "a spelling"),
         ("size = \"60 KiB\"", "size = \"50 KiB\"", true, true, "a node's own mailbox"),
+        ("record = \"8 MiB\"", "record = \"6 MiB\"", true, true, "a node's own stream"),
         ("id = 150", "id = 151", false, false, "another priority, and with it other names"),
         ("10.0.0.2", "10.0.0.3", true, false, "another address"),
         ("tools = [16, 31]", "tools = [16, 32]", true, false, "other tool instances"),

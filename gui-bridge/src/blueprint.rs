@@ -1,4 +1,4 @@
-//! The layout that a viewer opens with.
+//! The layout that a viewer opens with: without sensors that give pictures or points, and with them.
 //!
 //! ```text
 //!   ┌──────────────────────────┬───────────────┐
@@ -10,6 +10,16 @@
 //!   │ Modules          │ now   ├───────────────┤
 //!   │                  │       │ Output        │
 //!   └──────────────────────────┴───────────────┘
+//!
+//!   ┌──────────────────────┬─────────┬─────────┐
+//!   │ World │ tabs of      │ picture │ packages│
+//!   │         views        │         ├─────────┤
+//!   │                      ├─────────┤ latency │
+//!   │                      │ Points  ├─────────┤
+//!   │                      │         │ losses  │
+//!   ├───────────────┬──────┴┬────────┴─────────┤
+//!   │ Modules       │ now   │ Output           │
+//!   └───────────────┴───────┴──────────────────┘
 //! ```
 
 use crate::palette;
@@ -17,67 +27,97 @@ use crate::timelines::ROBOT_TIME;
 use rerun::blueprint::components::{BackgroundKind, Corner2D, PanelState, PlayState};
 use rerun::blueprint::{
     Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial2DView,
-    StateTimelineView, Tabs, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
+    Spatial3DView, StateTimelineView, Tabs, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
 };
 use rerun::external::re_log_types::StoreId;
-use rerun::external::re_sdk_types::blueprint::archetypes::{Background, PlotLegend, TextLogColumns};
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    Background, EyeControls3D, LineGrid3D, PlotLegend, TextLogColumns,
+};
 use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::log::LogMsg;
 use rerun::sink::CallbackSink;
 use rerun::{ApplicationId, AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
+use std::collections::HashSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A tab beside the world: what one view draws.
+/// Where the eye of [`Tab::space`] is, and what it looks at: metres ahead, to the left and up. So it sees what a sensor
+/// sees, and a little of it from the side.
+const EYE_M: [f32; 3] = [-1.4, 0.8, 1.6];
+/// See [`EYE_M`].
+const EYE_TARGET_M: [f32; 3] = [3.0, 0.0, 0.2];
+
+/// Cells of the column beside the world: in more of them nothing is large enough to be seen.
+const CELLS_MAX: usize = 3;
+
+/// What one view draws: a tab in the place of the world, or in a column beside it, see [`Tab::beside`].
 #[derive(Clone)]
 pub struct Tab {
     name: String,
     panel: Panel,
+    is_beside: bool,
 }
 
 #[derive(Clone)]
 enum Panel {
     Plane(Vec<String>),
+    Space { origin: EntityPath, contents: Vec<String> },
     Curves(String),
     CurvesAndLines(String),
     Own(Arc<dyn Fn() -> ContainerLike + Send + Sync>),
 }
 
 impl Tab {
+    fn new(name: &str, panel: Panel) -> Self {
+        Self { name: name.into(), panel, is_beside: false }
+    }
+
     /// The world from above, with these entities only, such as `/world/scan/**`.
     pub fn plane(name: &str, contents: &[&str]) -> Self {
-        Self { name: name.into(), panel: Panel::Plane(contents.iter().map(|entity| (*entity).into()).collect()) }
+        Self::new(name, Panel::Plane(contents.iter().map(|entity| (*entity).into()).collect()))
+    }
+
+    /// These entities in space, seen from behind the sensor `origin`: in its frame, with x ahead, y to the left and z
+    /// up.
+    pub fn space(name: &str, origin: impl Into<EntityPath>, contents: &[&str]) -> Self {
+        let contents = contents.iter().map(|entity| (*entity).into()).collect();
+        Self::new(name, Panel::Space { origin: origin.into(), contents })
     }
 
     /// Curves of all numbers below an entity.
     pub fn curves(name: &str, origin: &str) -> Self {
-        Self { name: name.into(), panel: Panel::Curves(origin.into()) }
+        Self::new(name, Panel::Curves(origin.into()))
     }
 
     /// The same, with all lines of text below.
     pub fn curves_and_lines(name: &str, origin: &str) -> Self {
-        Self { name: name.into(), panel: Panel::CurvesAndLines(origin.into()) }
-    }
-
-    pub(crate) fn name(&self) -> &str {
-        &self.name
+        Self::new(name, Panel::CurvesAndLines(origin.into()))
     }
 
     /// Anything that Rerun's blueprints offer, see [`rerun::blueprint`]. Give the view the same name.
     pub fn own<T: Into<ContainerLike>>(name: &str, view: impl Fn() -> T + Send + Sync + 'static) -> Self {
-        Self { name: name.into(), panel: Panel::Own(Arc::new(move || view().into())) }
+        Self::new(name, Panel::Own(Arc::new(move || view().into())))
+    }
+
+    /// The same in the column beside the world, where it is seen at once. Of more than three there, the first share the
+    /// uppermost cell, as its tabs.
+    #[must_use]
+    pub fn beside(self) -> Self {
+        Self { is_beside: true, ..self }
     }
 }
 
-/// What a viewer shows: the world, the states, the traffic and the output always, and a tab for each view.
+/// What a viewer shows: the world, the states, the traffic and the output always, and the tabs of all views.
 #[derive(Clone, Default)]
 pub struct Layout {
     tabs: Vec<Tab>,
 }
 
 impl Layout {
-    /// With these tabs.
-    pub fn new(tabs: Vec<Tab>) -> Self {
+    /// With these tabs; of those with one name, the first.
+    pub fn new(mut tabs: Vec<Tab>) -> Self {
+        let mut names = HashSet::new();
+        tabs.retain(|tab| names.insert(tab.name.clone()));
         Self { tabs }
     }
 }
@@ -110,11 +150,19 @@ impl Draft {
     }
 
     fn plane(&mut self, name: &str, contents: &[String]) -> ContainerLike {
-        let [red, green, blue] = palette::GROUND;
-        let ground = Background::new(BackgroundKind::SolidColor).with_color([red, green, blue, 255]);
         // The view's origin lies above `world`, which has a transform that turns y up.
         let view = Spatial2DView::new(name).with_origin("/").with_contents(contents.iter().map(String::as_str));
-        self.property(view, "Background", ground)
+        self.property(view, "Background", ground())
+    }
+
+    fn space(&mut self, name: &str, origin: &EntityPath, contents: &[String]) -> ContainerLike {
+        let view = Spatial3DView::new(name).with_origin(origin.clone());
+        let view = view.with_contents(contents.iter().map(String::as_str));
+        let eye = EyeControls3D::new().with_position(EYE_M).with_look_target(EYE_TARGET_M).with_eye_up([0.0, 0.0, 1.0]);
+        let view = self.property(view, "Background", ground());
+        let view = self.property(view, "EyeControls3D", eye);
+        // Its plane would be at the sensor's height, which is no floor.
+        self.property(view, "LineGrid3D", LineGrid3D::new().with_visible(false))
     }
 
     /// A chart of all classes. A class has one colour in all of them, so one legend does.
@@ -131,9 +179,10 @@ impl Draft {
         self.property(TextLogView::new(name).with_origin(origin), "TextLogColumns", columns)
     }
 
-    fn tab(&mut self, Tab { name, panel }: &Tab) -> ContainerLike {
+    fn tab(&mut self, Tab { name, panel, .. }: &Tab) -> ContainerLike {
         match panel {
             Panel::Plane(contents) => self.plane(name, contents),
+            Panel::Space { origin, contents } => self.space(name, origin, contents),
             Panel::Curves(origin) => self.chart(name, origin, true),
             Panel::CurvesAndLines(origin) => Vertical::new([
                 self.chart(&format!("{name}: numbers"), origin, true),
@@ -145,28 +194,53 @@ impl Draft {
         }
     }
 
-    fn all(&mut self, layout: &Layout) -> Blueprint {
-        let world = self.plane("World", &["/world/**".into()]);
-        let tabs: Vec<ContainerLike> =
-            std::iter::once(world).chain(layout.tabs.iter().map(|tab| self.tab(tab))).collect();
-        let left = Vertical::new([
-            Tabs::new(tabs).into(),
-            Horizontal::new([
-                StateTimelineView::new("Modules").with_origin("modules").into(),
-                TextDocumentView::new("Modules now").with_origin(EntityPath::from(vec!["modules now".into()])).into(),
-            ])
-            .with_column_shares([3.0, 1.0])
-            .into(),
-        ])
-        .with_row_shares([7.0, 3.0]);
-        let right = Vertical::new([
+    fn tabs<'a>(&mut self, tabs: impl IntoIterator<Item = &'a Tab>) -> Vec<ContainerLike> {
+        tabs.into_iter().map(|tab| self.tab(tab)).collect()
+    }
+
+    fn charts(&mut self) -> [ContainerLike; 3] {
+        [
             self.chart("Packages per second, by class", "packages", true),
-            self.chart("Latency, µs: 99 of 100 packages, and median (dim)", "latency", false),
+            self.chart("Latency, µs: p99, and median (dim)", "latency", false),
             self.chart("Packages lost since start", "losses", false),
-            self.lines("Output", "output"),
-        ])
-        .with_row_shares([4.0, 5.0, 3.0, 4.0]);
-        Blueprint::new(Horizontal::new([left.into(), right.into()]).with_column_shares([3.0, 2.0]))
+        ]
+    }
+
+    fn without_sensors(&mut self, world: Tabs) -> Horizontal {
+        let states = Horizontal::new(states()).with_column_shares([3.0, 1.0]);
+        let left = Vertical::new([world.into(), states.into()]).with_row_shares([7.0, 3.0]);
+        let [packages, latency, losses] = self.charts();
+        let right = Vertical::new([packages, latency, losses, self.lines("Output", "output")])
+            .with_row_shares([4.0, 5.0, 3.0, 4.0]);
+        Horizontal::new([left.into(), right.into()]).with_column_shares([3.0, 2.0])
+    }
+
+    fn with_sensors(&mut self, world: Tabs, beside: &[&Tab]) -> Vertical {
+        let charts = Vertical::new(self.charts()).with_row_shares([4.0, 5.0, 3.0]);
+        let upper = Horizontal::new([world.into(), self.column(beside).into(), charts.into()])
+            .with_column_shares([5.0, 3.0, 3.0]);
+        let [all, now] = states();
+        let lower = Horizontal::new([all, now, self.lines("Output", "output")]).with_column_shares([4.0, 2.0, 5.0]);
+        Vertical::new([upper.into(), lower.into()]).with_row_shares([7.0, 3.0])
+    }
+
+    fn column(&mut self, beside: &[&Tab]) -> Vertical {
+        let (first, others) = beside.split_at((beside.len() + 1).saturating_sub(CELLS_MAX).max(1));
+        let mut cells: Vec<ContainerLike> = vec![Tabs::new(self.tabs(first.iter().copied())).into()];
+        cells.extend(self.tabs(others.iter().copied()));
+        Vertical::new(cells)
+    }
+
+    fn all(&mut self, layout: &Layout) -> Blueprint {
+        let (beside, others): (Vec<&Tab>, Vec<&Tab>) = layout.tabs.iter().partition(|tab| tab.is_beside);
+        let mut world = vec![self.plane("World", &["/world/**".into()])];
+        world.extend(self.tabs(others));
+        let world = Tabs::new(world);
+        let root: ContainerLike = match &beside[..] {
+            [] => self.without_sensors(world).into(),
+            beside => self.with_sensors(world, beside).into(),
+        };
+        Blueprint::new(root)
             .with_auto_views(false)
             .with_auto_layout(false)
             .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
@@ -178,6 +252,19 @@ impl Draft {
                     .with_play_state(PlayState::Following),
             )
     }
+}
+
+fn ground() -> Background {
+    let [red, green, blue] = palette::GROUND;
+    Background::new(BackgroundKind::SolidColor).with_color([red, green, blue, 255])
+}
+
+/// The modules' states over time, and now.
+fn states() -> [ContainerLike; 2] {
+    [
+        StateTimelineView::new("Modules").with_origin("modules").into(),
+        TextDocumentView::new("Modules now").with_origin(EntityPath::from(vec!["modules now".into()])).into(),
+    ]
 }
 
 /// Sends the layout and makes it the active one. As a mere default it would lose against the layout that a viewer
@@ -224,3 +311,6 @@ fn written(
     drop(stream);
     Ok(std::mem::take(&mut *messages.lock().unwrap_or_else(PoisonError::into_inner)))
 }
+
+#[cfg(test)]
+mod tests;

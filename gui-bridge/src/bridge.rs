@@ -7,10 +7,10 @@
 use crate::nodes::Nodes;
 use crate::sink::CloseError;
 use crate::store::DrawingCounts;
-use crate::subjects::{NEWEST, Subjects};
+use crate::subjects::{Intake, NEWEST, Subjects};
 use crate::supervisor::{self, StreamSupervisor, Turn};
 use crate::view::Views;
-use crate::{RATE_HZ, RATE_HZ_MIN, Scene, Sink, views};
+use crate::{RATE_HZ, RATE_HZ_MIN, Scene, Sink, scene, views};
 use rohrpost::interface::{Interface, Proxy};
 use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
 use rohrpost::survey::{Standing, Survey};
@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 
 /// States and charts are drawn so often.
 const SURVEY_PERIOD: Duration = Duration::from_millis(500);
-/// What comes of other nodes, page by page, is taken so often.
+/// What comes of other nodes, page by page, is taken so often; large streams are looked at no more often.
 const COLLECT_PERIOD: Duration = Duration::from_millis(25);
 /// Data with a newest value that may wait while the bridge is stopped. Of more data, the least important are lost.
 const NEWEST_SLOTS: u16 = 64;
@@ -117,8 +117,9 @@ impl<V: Views> Module for Bridge<V> {
         let node_name = me.node.clone();
         let newest = newest(&me.mailboxes.data);
         let node = context.link().borrow().participant().node().clone();
+        let intake = Intake { body_bytes_max: newest.body_bytes_max.into(), period: scene::period(rate_hz) };
         context.open_mailbox(NEWEST, newest)?;
-        let subjects = Subjects::new(V::make(), context);
+        let subjects = Subjects::new(V::make(), context, intake);
         let nodes = Nodes::new(node.clone(), &node_name, context.installation());
         context.set_period(if nodes.are_several() { COLLECT_PERIOD } else { SURVEY_PERIOD });
         Ok(Self {
@@ -158,6 +159,9 @@ impl<V: Views> Module for Bridge<V> {
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         self.nodes.collect(context);
+        if let Some(scene) = &mut self.scene {
+            self.subjects.look(scene, context);
+        }
         let now = Instant::now();
         if now < self.survey_at {
             return Ok(());
@@ -220,6 +224,9 @@ impl<V> Bridge<V> {
                 self.collector = Some(name);
             }
         })?;
+        if more && self.subjects.have_rings() {
+            context.set_period(COLLECT_PERIOD);
+        }
         let Some(scene) = self.scene.as_mut() else { return Ok(()) };
         if more {
             scene.arrange(self.subjects.layout());

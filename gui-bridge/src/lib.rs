@@ -2,8 +2,11 @@
 //!
 //! ```text
 //!   packages ──▶ Bridge ──▶ View ──▶ Scene ──▶ Store ──▶ Feeder ──▶ Rerun ──▶ a file, or a ViewerProxy
-//!   (a module's thread, which never waits)           │   (a separate thread; the StreamSupervisor can stop it)
+//!   records  ──▶ (a module's thread, never waits)    │   (a separate thread; the StreamSupervisor can stop it)
 //! ```
+//!
+//! Records are those of large streams, pictures say: they are too large for packages, and are read where they lie. Each
+//! is copied into the store and released at once.
 //!
 //! A [`View`] says what is drawn of modules of a class; [`run_with`] makes a bridge with views of one's own. A
 //! [`Scene`] does not use mailboxes: its caller receives packages and calls one method for each. Only this crate uses
@@ -31,6 +34,9 @@ pub mod generic;
 mod network;
 mod nodes;
 mod palette;
+mod pictures;
+mod points;
+mod ring;
 mod scene;
 mod sink;
 mod slots;
@@ -49,7 +55,7 @@ mod world;
 
 pub use blueprint::{Layout, Tab};
 pub use bridge::{Bridge, Drawing, DrawingInterface, DrawingProxy};
-pub use error::{DrawError, TILES_MAX};
+pub use error::{DrawError, LARGE_BYTES_MAX, TILES_MAX};
 /// The version of Rerun that the bridge is made with: archetypes for [`Scene::log`], and blueprints for [`Tab::own`].
 pub use rerun;
 pub use scene::{RATE_HZ, RATE_HZ_MIN, Scene, entity};

@@ -149,7 +149,15 @@ mod tests {
 
     fn look(at_ms: u64) -> Survey {
         let (modules, mailboxes, classes, flows) = Default::default();
-        Survey { node: "main".into(), at_ns: at_ms * 1_000_000, modules, mailboxes, classes, flows }
+        Survey {
+            node: "main".into(),
+            at_ns: at_ms * 1_000_000,
+            modules,
+            mailboxes,
+            streams: Vec::new(),
+            classes,
+            flows,
+        }
     }
 
     #[test]

@@ -9,6 +9,8 @@ pub(crate) const ROBOT: Rgb = [255, 150, 40];
 pub(crate) const ODOMETRY: Rgb = [122, 138, 158];
 /// What the scanner sees.
 pub(crate) const SCAN: Rgb = [255, 64, 96];
+/// The least of what a cloud's points tell, and the most.
+const SHADES: [Rgb; 2] = [[70, 60, 160], [255, 214, 120]];
 /// Ground of the world's view; unknown parts of the map show it.
 pub(crate) const GROUND: Rgb = [38, 42, 50];
 /// Lines that help to read, such as the map's scale.
@@ -38,6 +40,13 @@ pub(crate) fn series(index: usize) -> Rgb {
 /// The same hue, nearer to the ground: for what stands beside the main thing.
 pub(crate) fn muted(colour: Rgb) -> Rgb {
     colour.map(|part| (u16::from(part) * 11 / 20) as u8)
+}
+
+/// Colour of a point of a cloud, by its share from the least to the most, 0 to 1.
+pub(crate) fn shaded(share: f32) -> Rgb {
+    let share = share.clamp(0.0, 1.0);
+    let [least, most] = SHADES.map(|shade| shade.map(f32::from));
+    std::array::from_fn(|part| (least[part] + (most[part] - least[part]) * share) as u8)
 }
 
 /// Colour of a map's square, 0..=100 percent occupied.

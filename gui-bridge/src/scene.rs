@@ -89,9 +89,7 @@ impl Scene {
     ) -> Result<Self, OpenError> {
         // Viewers keep a layout for each application: what somebody arranged for one installation stays with it.
         let application = ApplicationId::new_or_unknown(format!("rohrpost-{installation}"));
-        let limit = rate_hz > 0.0;
-        let period = if limit { Duration::from_secs_f64(1.0 / rate_hz.max(RATE_HZ_MIN)) } else { Duration::ZERO };
-        let store = Arc::new(Store::new(period));
+        let store = Arc::new(Store::new(period(rate_hz)));
         let supervisor = StreamSupervisor::begin(sink, application, store.clone(), turn)?;
         let mut scene = Self::over(store.clone(), system_time_ns);
         scene.drawing = Some((store, supervisor));
@@ -187,6 +185,12 @@ impl Scene {
     pub fn log_event(&mut self, entity: EntityPath, what: &dyn AsComponents) {
         self.rows.line(entity, Row { time: Some(self.time.clone()), components: what.as_serialized_batches() });
     }
+}
+
+/// Least time between two rows of an entity; 0 is no limit.
+pub(crate) fn period(rate_hz: f64) -> Duration {
+    let limit = rate_hz > 0.0;
+    if limit { Duration::from_secs_f64(1.0 / rate_hz.max(RATE_HZ_MIN)) } else { Duration::ZERO }
 }
 
 impl Drop for Scene {

@@ -15,6 +15,7 @@
 //! be drawn, so it can always change. Entities that are new find less room than those that are known.
 
 use crate::blueprint::Layout;
+use crate::error::LARGE_BYTES_MAX;
 use rerun::EntityPath;
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -39,6 +40,8 @@ const ENTITIES_BYTES_MAX: usize = BYTES_MAX - LINES_BYTES_MAX;
 const RESERVE: usize = 8 * 1024 * 1024;
 /// A line is no longer than this.
 pub const LINE_BYTES_MAX: usize = 16 * 1024;
+// A point of 12 bytes is drawn with 4 bytes of colour.
+const _: () = assert!(LARGE_BYTES_MAX / 12 * 16 < ENTITIES_BYTES_MAX - RESERVE, "the largest cloud has room");
 
 /// What the feeder does next.
 pub(crate) enum Order {

@@ -1,17 +1,19 @@
 //! What the bridge draws of which module: wanted by the configuration, described by the module, drawn by a view.
 
-use crate::blueprint::{Layout, Tab};
+use crate::blueprint::Layout;
 use crate::description_request::DescriptionRequest;
-use crate::view::{Datum, View};
+use crate::ring::Ring;
+use crate::view::{Datum, View, Wish};
 use crate::{Scene, views};
+use rohrpost::common::DataHead;
 use rohrpost::description::noted;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
-use rohrpost::schema::{DataItem, Description};
+use rohrpost::schema::{DataItem, DataKind, Description};
 use rohrpost::survey::node_of;
 use rohrpost::{Context, ContextError, Name, Rate, Received, Subscription};
-use rohrpost_config::Show;
-use rohrpost_mailbox::{Node, local};
+use rohrpost_config::{Installation, Show};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Node, local};
 use std::time::{Duration, Instant};
 
 /// The mailbox for what tells how things are now: while the bridge stands still, a newer package takes an older one's
@@ -33,17 +35,36 @@ struct Entry {
     asking: Option<DescriptionRequest>,
 }
 
-/// Data that are subscribed to.
+/// Data that are drawn.
 struct Subject {
     from: Name,
     module: String,
     item: DataItem,
-    subscription: Subscription<()>,
+    source: Source,
     /// Which view draws it.
     view: usize,
     /// Number that the next package should have.
     expected: u32,
     repair: Option<Repair>,
+}
+
+/// How data come to the bridge.
+enum Source {
+    /// As packages, near and far alike.
+    Data(Subscription<()>),
+    /// From a stream of this node with records that do not fit into the bridge's mailbox. What fits comes as packages,
+    /// also from a stream: it comes so from each node, costs none of the stream's seats, and a bridge that is asleep is
+    /// woken for it.
+    Ring(Box<Ring>),
+}
+
+/// What the bridge has for what comes.
+#[derive(Clone, Copy)]
+pub(crate) struct Intake {
+    /// Longest body that its mailboxes for data take.
+    pub(crate) body_bytes_max: usize,
+    /// Least time between two drawings of the same.
+    pub(crate) period: Duration,
 }
 
 /// How to ask for everything once more.
@@ -59,11 +80,12 @@ pub(crate) struct Subjects {
     views: Vec<Box<dyn View>>,
     entries: Vec<Entry>,
     subjects: Vec<Subject>,
+    intake: Intake,
 }
 
 impl Subjects {
     /// What the configuration wants to be shown, and what modules say. `own` views are asked before those built in.
-    pub(crate) fn new(own: Vec<Box<dyn View>>, context: &Context) -> Self {
+    pub(crate) fn new(own: Vec<Box<dyn View>>, context: &Context, intake: Intake) -> Self {
         let installation = context.installation();
         let text = |name| installation.classes.format(name);
         let entry = |show: &Show| Entry {
@@ -107,7 +129,7 @@ impl Subjects {
             entries.push(Entry { from: client, module, data, rate: None, answered: false, asking: None });
         }
         let views = own.into_iter().chain(views::built_in()).collect();
-        Self { views, entries, subjects: Vec::new() }
+        Self { views, entries, subjects: Vec::new(), intake }
     }
 
     /// Reads the descriptions that are missing of modules that run, and subscribes to what they tell; whether there is
@@ -139,15 +161,25 @@ impl Subjects {
                 }
                 found(entry.from);
                 let wish = self.views[view].wish();
-                let mailbox = if wish.each { local::DATA } else { NEWEST };
-                let rate = entry.rate.unwrap_or(wish.rate);
+                let wish = wish.at(entry.rate.unwrap_or(wish.rate));
                 let interface = description.hash();
-                let subscription = context.subscribe_untyped(mailbox, entry.from, item.number, interface, rate)?;
+                let source = match way(context.installation(), is_own, entry.from, &item, wish, self.intake) {
+                    Way::Data => {
+                        let mailbox = if wish.each { local::DATA } else { NEWEST };
+                        let (from, number) = (entry.from, item.number);
+                        Source::Data(context.subscribe_untyped(mailbox, from, number, interface, wish.rate)?)
+                    }
+                    Way::Ring => Source::Ring(Box::new(Ring::new(interface, self.intake.period_of(wish.rate)))),
+                    Way::Unseen { why } => {
+                        tracing::warn!("{why}");
+                        continue;
+                    }
+                };
                 let repair = self.views[view].repair(&description).filter(|_| wish.each);
                 // It may have sent much before anybody listened.
                 let repair = repair.map(|function| Repair { function, interface, wanted: true, asked: None });
                 let (from, module) = (entry.from, entry.module.clone());
-                self.subjects.push(Subject { from, module, item, subscription, view, expected: 0, repair });
+                self.subjects.push(Subject { from, module, item, source, view, expected: 0, repair });
             }
         }
         Ok(self.subjects.len() > before)
@@ -155,36 +187,56 @@ impl Subjects {
 
     /// The tabs of all views that have something to draw, in the order of the views.
     pub(crate) fn layout(&self) -> Layout {
-        let used = (0..self.views.len()).filter(|view| self.subjects.iter().any(|subject| subject.view == *view));
-        let mut tabs: Vec<Tab> = Vec::new();
-        for tab in used.flat_map(|view| self.views[view].tabs()) {
-            if tabs.iter().all(|known| known.name() != tab.name()) {
-                tabs.push(tab);
-            }
-        }
-        Layout::new(tabs)
+        let subjects = |view: usize| self.subjects.iter().filter(move |subject| subject.view == view);
+        let used = (0..self.views.len()).filter(|view| subjects(*view).next().is_some());
+        let own = (0..self.views.len()).flat_map(subjects);
+        let own = own.filter_map(|of| self.views[of.view].tab_of(&of.module, &of.item));
+        Layout::new(used.flat_map(|view| self.views[view].tabs()).chain(own).collect())
     }
 
     /// Draws what came, if somebody wants it.
     pub(crate) fn draw(&mut self, scene: &mut Scene, context: &Context, data: &Received<'_>) {
-        let is_it = |subject: &&mut Subject| data.is_of(&subject.subscription);
+        let is_it = |subject: &&mut Subject| matches!(&subject.source, Source::Data(of) if data.is_of(of));
         let Some(subject) = self.subjects.iter_mut().find(is_it) else { return };
         // A number left out is a package lost; the first, or one after a restart, is 0.
         if let Some(repair) = subject.repair.as_mut().filter(|_| data.head.sequence != subject.expected) {
             repair.wanted = true;
         }
         subject.expected = data.head.sequence.wrapping_add(1);
-        scene.set_time(data.head.stamp_ns);
         let Subject { from, module, item, view, .. } = subject;
         let installation = context.installation();
         let datum = Datum { from: *from, module, item, installation, bytes: data.value };
-        if let Err(error) = self.views[*view].draw(scene, &datum) {
-            tracing::warn!("{error}");
+        draw(self.views[*view].as_mut(), scene, data.head.stamp_ns, &datum);
+    }
+
+    /// Whether there are streams to look at.
+    pub(crate) fn have_rings(&self) -> bool {
+        self.subjects.iter().any(|subject| matches!(subject.source, Source::Ring(_)))
+    }
+
+    /// Draws what is new in streams that are due.
+    pub(crate) fn look(&mut self, scene: &mut Scene, context: &mut Context) {
+        let (now, views) = (Instant::now(), &mut self.views);
+        for Subject { from, module, item, source, view, .. } in &mut self.subjects {
+            let Source::Ring(ring) = source else { continue };
+            if !ring.is_due(context, *from, item, now) {
+                continue;
+            }
+            let installation = context.installation();
+            ring.look(|stamp_ns, bytes| {
+                let datum = Datum { from: *from, module, item, installation, bytes };
+                draw(views[*view].as_mut(), scene, stamp_ns, &datum);
+            });
         }
     }
 
-    /// Nothing is known of what was sent before: all have to send everything once more.
+    /// Nothing is known of what was sent before: all have to send everything once more, and streams are read again.
     pub(crate) fn want_repair(&mut self) {
+        for subject in &mut self.subjects {
+            if let Source::Ring(ring) = &mut subject.source {
+                ring.forget();
+            }
+        }
         for repair in self.subjects.iter_mut().filter_map(|subject| subject.repair.as_mut()) {
             (repair.wanted, repair.asked) = (true, None);
         }
@@ -207,6 +259,56 @@ impl Subjects {
     }
 }
 
+fn draw(view: &mut dyn View, scene: &mut Scene, stamp_ns: u64, datum: &Datum<'_>) {
+    scene.set_time(stamp_ns);
+    if let Err(error) = view.draw(scene, datum) {
+        tracing::warn!("{error}");
+    }
+}
+
+impl Intake {
+    /// Least time between two looks at a stream that is wanted so often.
+    fn period_of(self, rate: Rate) -> Duration {
+        match rate {
+            Rate::Each => self.period,
+            Rate::Every(period) => period.max(self.period),
+        }
+    }
+}
+
+/// How a datum can come.
+#[derive(Debug, PartialEq)]
+enum Way {
+    Data,
+    Ring,
+    Unseen {
+        /// What to do about it.
+        why: String,
+    },
+}
+
+/// How this datum comes. What a view wants each of comes as packages: they are counted and asked for once more.
+fn way(installation: &Installation, is_own: bool, from: Name, item: &DataItem, wish: Wish, intake: Intake) -> Way {
+    let spec = installation.module(from).and_then(|module| module.streams.get(&item.field.name));
+    let record_bytes = spec.copied().unwrap_or_default().record_bytes as usize;
+    let fits = |bytes_max: usize| DataHead::BYTES + record_bytes <= bytes_max;
+    if item.kind == DataKind::Data || wish.each || fits(if is_own { intake.body_bytes_max } else { BODY_BYTES_MAX }) {
+        return Way::Data;
+    }
+    if is_own {
+        return Way::Ring;
+    }
+    let (stream, module) = (&item.field.name, installation.classes.format(from));
+    let node = node_of(installation, from).unwrap_or("?");
+    let most = BODY_BYTES_MAX - DataHead::BYTES;
+    let why = format!(
+        "stream `{stream}` of {module} is not shown: it is on node `{node}`, and its records of up to {record_bytes} \
+         bytes fit no package; draw it with a bridge on that node, or lower `record` in [module.stream.{stream}] of \
+         {module} to {most} if its values have no more"
+    );
+    Way::Unseen { why }
+}
+
 impl Entry {
     /// The data of a module that are wanted; those that only the last view, which wants all, would draw are not worth
     /// it unless they are all that there is.
@@ -225,3 +327,6 @@ impl Entry {
         item.into_iter().collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

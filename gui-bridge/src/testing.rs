@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 #[derive(Default)]
-struct List(Mutex<Vec<EntityPath>>);
+struct List(Mutex<Vec<(EntityPath, Row)>>);
 
 impl RowSink for List {
-    fn put(&self, entity: EntityPath, _: Row) {
-        self.0.lock().unwrap().push(entity);
+    fn put(&self, entity: EntityPath, row: Row) {
+        self.0.lock().unwrap().push((entity, row));
     }
 
     fn line(&self, entity: EntityPath, row: Row) {
@@ -41,9 +41,23 @@ impl TestScene {
     /// How many rows each entity got since the last call.
     pub(crate) fn rows(&self) -> BTreeMap<String, usize> {
         let mut rows = BTreeMap::new();
-        for entity in self.list.0.lock().unwrap().drain(..) {
+        for (entity, _) in self.list.0.lock().unwrap().drain(..) {
             *rows.entry(entity.to_string()).or_default() += 1;
         }
         rows
+    }
+
+    /// The components that each entity got since the last call, and how many numbers: of a blob, its bytes.
+    pub(crate) fn components(&self) -> BTreeMap<String, BTreeMap<String, usize>> {
+        let mut all: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+        for (entity, row) in self.list.0.lock().unwrap().drain(..) {
+            let components = all.entry(entity.to_string()).or_default();
+            for batch in row.components {
+                let array = batch.array.to_data();
+                let numbers = array.child_data().first().map_or(array.len(), |numbers| numbers.len());
+                components.insert(batch.descriptor.component.to_string(), numbers);
+            }
+        }
+        all
     }
 }

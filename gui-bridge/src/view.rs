@@ -3,7 +3,7 @@
 use crate::blueprint::Tab;
 use crate::error::DrawError;
 use crate::scene::{RATE_HZ, Scene};
-use rohrpost::schema::{Data, DataItem, Description, Schema, Value, decode};
+use rohrpost::schema::{self, Data, DataItem, Description, Schema, Value, decode};
 use rohrpost::{Name, Rate};
 use rohrpost_config::Installation;
 use std::time::Duration;
@@ -31,6 +31,11 @@ pub trait View {
         Vec::new()
     }
 
+    /// A tab for one datum that it draws, besides [`View::tabs`]. Of tabs with one name the first is there.
+    fn tab_of(&self, _module: &str, _item: &DataItem) -> Option<Tab> {
+        None
+    }
+
     /// The number of a function without arguments by which a module sends everything once more: it is called when a
     /// part was lost on the way, if the view wants each.
     fn repair(&self, _module: &Description) -> Option<u16> {
@@ -52,7 +57,8 @@ pub struct Wish {
 
 impl Wish {
     /// The newest, [`RATE_HZ`] times a second: for all that tells how things are now, such as a pose, a scan, a number.
-    /// A bridge that stood still for a while goes on with what is true then.
+    /// A bridge that stood still for a while goes on with what is true then. A stream of its own node with records that
+    /// may be larger than its data mailbox takes is read where it lies, at most 40 times a second.
     pub fn newest() -> Self {
         Self { rate: Rate::Every(Duration::from_secs_f64(1.0 / RATE_HZ)), each: false }
     }
@@ -89,6 +95,14 @@ impl Datum<'_> {
     /// # Errors
     /// When the sender does not keep to its description.
     pub fn read<T: Data>(&self) -> Result<T, DrawError> {
+        rohrpost::wire::from_bytes(self.bytes).map_err(|error| self.unreadable(&error))
+    }
+
+    /// The same with its bytes where they lie, which copies none of them.
+    ///
+    /// # Errors
+    /// When the sender does not keep to its description.
+    pub fn view<T: schema::View>(&self) -> Result<T::View<'_>, DrawError> {
         rohrpost::wire::from_bytes(self.bytes).map_err(|error| self.unreadable(&error))
     }
 

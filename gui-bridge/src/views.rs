@@ -4,6 +4,8 @@
 use crate::blueprint::Tab;
 use crate::error::DrawError;
 use crate::network::{Clocks, Network};
+use crate::pictures::Pictures;
+use crate::points::Clouds;
 use crate::scene::Scene;
 use crate::slots::{Flows, Slots};
 use crate::states::Level;
@@ -22,6 +24,8 @@ pub(crate) fn built_in() -> Vec<Box<dyn View>> {
         Box::new(Wheels),
         Box::new(Mapper),
         Box::new(Localisation),
+        Box::new(Pictures),
+        Box::new(Clouds),
         Box::new(Output),
         Box::new(Network::default()),
         Box::new(Clocks),

@@ -115,13 +115,15 @@ impl Scene {
         &self.world.carrier
     }
 
+    /// The last pose drawn for a module.
+    pub(crate) fn pose_of(&self, module: &str) -> Pose {
+        self.world.robots.get(module).map(|robot| robot.pose).unwrap_or_default()
+    }
+
     /// A sweep of the scanner `module`. It is drawn where the scan says that its scanner stood; else `mount` on the
     /// robot, at the last pose drawn for `carrier`.
     pub fn scan(&mut self, module: &str, scan: &LaserScan, carrier: &str, mount: &Pose) {
-        let carried = || {
-            let robot = self.world.robots.get(carrier).map(|robot| robot.pose).unwrap_or_default();
-            robot.isometry() * mount.isometry()
-        };
+        let carried = || self.pose_of(carrier).isometry() * mount.isometry();
         let stand = scan.pose.map_or_else(carried, |pose| pose.isometry());
         let points = hits(scan, &stand, &mut self.world.extent);
         let cloud = Points2D::new(points)
@@ -167,7 +169,7 @@ impl Scene {
 }
 
 /// The transform that puts a flat thing at `pose`.
-fn placed(pose: &Pose, scale: f32) -> Transform3D {
+pub(crate) fn placed(pose: &Pose, scale: f32) -> Transform3D {
     let turn = RotationAxisAngle::new([0.0, 0.0, 1.0], rerun::Angle::from_radians(pose.heading_rad as f32));
     let at = [pose.x_m as f32, pose.y_m as f32, 0.0];
     Transform3D::from_translation_rotation_scale(at, turn, [scale, scale, 1.0])

@@ -145,6 +145,7 @@ pub use label::Label;
 pub use layout::{Shape, ShapeError, VERSION as LAYOUT_VERSION};
 pub use name::{ALL_SYSTEMS, Class, Name, NameError, Priority, local};
 pub use node::{LaunchLock, Node, NodeError, base_directory, node_directory, remove_base_if_empty};
+pub use owned::BadFile;
 pub use package::{BODY_BYTES_MAX, HEAD_BYTES, Head, Kind, Options, Short, Type};
 pub use participant::Participant;
 pub use receiver::{Package, Receiver};
@@ -154,8 +155,8 @@ pub use send_error::SendError;
 pub use sender::{Loan, Sender};
 pub use slots::SLOTS_MAX;
 pub use stream::{
-    Around, HeldRecord, Next, OpenRecord, RecordInfo, STREAM_READERS_MAX, Stamp, StreamError, StreamId, StreamInfo,
-    StreamReader, StreamShape, StreamShapeError, StreamWriter, WriteError,
+    Around, HeldRecord, Next, OpenRecord, RecordInfo, STREAM_KEEP_MAX, STREAM_READERS_MAX, Stamp, StreamError,
+    StreamId, StreamInfo, StreamReader, StreamShape, StreamShapeError, StreamWriter, WriteError,
 };
 pub use system_time::{ERROR_UNKNOWN_NS, SystemClock, SystemTime, TimeKeeper, TimeRecord, TimeSource, Watched};
 pub use throttle::Throttle;

@@ -18,16 +18,39 @@ use std::path::{Path, PathBuf};
 pub(crate) const OWNER_BYTE: u64 = 0;
 
 /// Why a file is not what it should be.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum BadSegment {
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// Foreign, or damaged.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum BadFile {
+    /// Foreign, or damaged; what it should be.
     #[error("its file is no {0}, or damaged; end its owner, and remove the file with `rohrpost clean`")]
     Foreign(&'static str),
     /// Another version's layout.
     #[error("it was made by another version (layout {0}, this program {VERSION}); build both from the same version")]
     Version(u32),
+    /// Shorter than what it says that it is.
+    #[error(
+        "its file was cut: it has {there} bytes, and says that it is a {what} of {whole}; end its owner, and remove \
+         the file with `rohrpost clean`"
+    )]
+    Cut {
+        /// What it should be.
+        what: &'static str,
+        /// Bytes of the file.
+        there: u64,
+        /// Bytes that it should have.
+        whole: u64,
+    },
+    /// Whole, and of another name.
+    #[error("its file is that of {0}: somebody copied or renamed it; remove it with `rohrpost clean`")]
+    Misnamed(String),
+}
+
+/// Why a file cannot be used as what it should be.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BadSegment {
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    #[error(transparent)]
+    File(#[from] BadFile),
 }
 
 /// A kind of file that one participant owns.
@@ -59,8 +82,8 @@ pub(crate) trait Owned: Sized {
 
 /// Why it could not be had.
 pub(crate) enum Refused<S> {
-    /// Somebody has it; what is there, if it can be read.
-    Owned(Option<S>),
+    /// Somebody has it; what is there, or why it cannot be read.
+    Owned(Result<S, BadFile>),
     File(PathBuf, io::Error),
 }
 
@@ -98,12 +121,12 @@ fn take_over<S: Owned>(path: &Path, id: S::Id, shape: &S::Shape) -> Result<Prede
         Err(error) => return Err(failed(error)),
     };
     let old = match S::check(&file, id, Use::Keep) {
-        Ok(old) => Some(old),
-        Err(BadSegment::Foreign(_) | BadSegment::Version(_)) => None,
+        Ok(old) => Ok(old),
+        Err(BadSegment::File(why)) => Err(why),
         Err(BadSegment::Io(error)) => return Err(failed(error)),
     };
     let Some(lock) = Held::try_take(file, OWNER_BYTE).map_err(failed)? else { return Err(Refused::Owned(old)) };
-    let Some(old) = old else { return Ok(Predecessor::None) };
+    let Ok(old) = old else { return Ok(Predecessor::None) };
     if !old.goes_on_as(shape) {
         return Ok(Predecessor::Other(old));
     }

@@ -7,7 +7,7 @@ use crate::layout::{Identity, PAGE, Page, SLOT_PREFIX, Shape};
 use crate::mapped;
 use crate::memory::{Located, Mapping, Rooms, Use};
 use crate::name::Name;
-use crate::owned::BadSegment;
+use crate::owned::{BadFile, BadSegment};
 use crate::package::{HEAD_BYTES, Head};
 use crate::slots::{Claim, Slots, Taken};
 use std::fs::File;
@@ -92,17 +92,17 @@ impl Segment {
     fn identify(file: &File, name: Name) -> Result<Shape, BadSegment> {
         let there = file.metadata()?;
         if !there.is_file() || there.len() < size_of::<Page>() as u64 {
-            return Err(BadSegment::Foreign(WHAT));
+            return Err(BadFile::Foreign(WHAT).into());
         }
         let mut first = [0; size_of::<Identity>()];
         file.read_exact_at(&mut first, 0)?;
         let identity = Identity::from_bytes(&first);
         if let Some(other) = identity.other_version() {
-            return Err(BadSegment::Version(other));
+            return Err(BadFile::Version(other).into());
         }
-        let (found, shape) = identity.read().ok_or(BadSegment::Foreign(WHAT))?;
+        let (found, shape) = identity.read().ok_or(BadFile::Foreign(WHAT))?;
         if found != name || there.len() < shape.segment_bytes() as u64 {
-            return Err(BadSegment::Foreign(WHAT));
+            return Err(BadFile::Foreign(WHAT).into());
         }
         Ok(shape)
     }

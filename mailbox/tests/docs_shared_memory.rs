@@ -18,7 +18,7 @@ const PAGE: &str = include_str!("../../docs/src/shared-memory.md");
 /// Where the parts of a mailbox and their fields are told.
 const PARTS: &str = "## A mailbox";
 const FIELDS: &str = "### Identity, owner, hot";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// The offset that a section's table gives for a field: the first of the row's cells that begins with its name tells.
 fn at(section: &str, field: &str) -> usize {
@@ -323,6 +323,13 @@ fn a_table_of_traffic_is_as_documented() {
 }
 
 #[test]
+fn the_page_tells_one_version_of_all_files() {
+    let told: Vec<_> = PAGE.lines().filter_map(|line| line.strip_prefix("| 8 | 4 | version")).collect();
+    assert_eq!((told.len(), rohrpost_mailbox::LAYOUT_VERSION), (5, VERSION));
+    assert!(told.iter().all(|told| told.contains(&format!(" {VERSION} |"))), "{told:?}");
+}
+
+#[test]
 fn routes_are_as_documented() {
     let ground = Ground::new();
     let name = |local| Name::new(1, 200, 0, local);
@@ -369,7 +376,8 @@ fn a_stream_is_as_documented() {
     assert_eq!(there.u64(at(STREAM, "written")), 75);
     let seats = at(STREAM, "seats");
     let index = seats + (33 * 128_usize).next_multiple_of(4096);
-    let frames = index + (70 * 64_usize).next_multiple_of(4096);
+    let hints = index + 70 * 64;
+    let frames = index + (70 * (64 + 8_usize)).next_multiple_of(4096);
     let entry = index + 74 % 70 * 64;
     let word = there.u64(entry + at(ENTRY, "word"));
     assert_eq!(word >> 20, 74);
@@ -379,6 +387,7 @@ fn a_stream_is_as_documented() {
     let fields = fields.map(|field| there.u64(entry + at(ENTRY, field)));
     let info = held.info();
     assert_eq!(fields, [1_000_074, 1_000_073, 9, info.written_ns, 8, u64::from(info.incarnation)]);
+    assert_eq!(there.u64(hints + 74 % 70 * 8), 1_000_074, "the hint");
     assert_eq!(u64::from(there.u32(seats + at(SEAT, "hold"))), frame + 1);
     assert_eq!(there.u64(seats + at(SEAT, "sleeper")), 0);
     assert_eq!(there.0.len(), shape.segment_bytes());

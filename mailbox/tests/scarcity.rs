@@ -4,13 +4,12 @@
 
 mod common;
 
+use common::small_memory::{may_mount, unfinished, with_small_memory};
 use common::{Ground, LOW, MAILBOX, OTHER, label, shape, stay, tell};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, Receiver, SendError, Shape, sys::room};
-use std::ffi::CString;
 use std::fs;
 use std::io;
-use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -73,48 +72,6 @@ fn names(process: u8) -> impl Iterator<Item = Name> {
     (0..4).flat_map(move |class| (0..250).map(move |instance| Name::new(1, 1 + process * 4 + class, instance, 0)))
 }
 
-fn unfinished(ground: &Ground) -> Vec<PathBuf> {
-    let all = fs::read_dir(ground.path()).unwrap().map(|entry| entry.unwrap().path());
-    let is_unfinished = |path: &PathBuf| {
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        name == "unfinished" || name.ends_with(".new")
-    };
-    all.filter(is_unfinished).collect()
-}
-
-fn c_path(path: &Path) -> CString {
-    CString::new(path.as_os_str().as_bytes()).unwrap()
-}
-
-/// Has a process mount a memory of `pages` here that it alone sees.
-fn with_small_memory(command: &mut Command, place: &Path, pages: usize) {
-    let (place, options) = (c_path(place), CString::new(format!("size={}", pages * 4096)).unwrap());
-    // As a user without rights: in a user namespace, where one has all of them.
-    // SAFETY: takes nothing.
-    let spaces = libc::CLONE_NEWNS | if unsafe { libc::geteuid() } == 0 { 0 } else { libc::CLONE_NEWUSER };
-    let mount = move || {
-        let check = |result: i32| if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) };
-        // SAFETY: strings that live as long as the calls, or null where that is allowed; nothing is allocated.
-        unsafe {
-            check(libc::unshare(spaces))?;
-            let all = libc::MS_REC | libc::MS_PRIVATE;
-            check(libc::mount(std::ptr::null(), c"/".as_ptr(), std::ptr::null(), all, std::ptr::null()))?;
-            let tmpfs = c"tmpfs".as_ptr();
-            check(libc::mount(tmpfs, place.as_ptr(), tmpfs, 0, options.as_ptr().cast()))
-        }
-    };
-    // SAFETY: system calls alone, which may be made between fork and exec.
-    unsafe { command.pre_exec(mount) };
-}
-
-/// Whether a process may mount here at all: some containers forbid it.
-fn may_mount() -> bool {
-    let place = tempfile::tempdir().unwrap();
-    let mut command = Command::new("true");
-    with_small_memory(&mut command, place.path(), 16);
-    command.status().is_ok_and(|status| status.success())
-}
-
 #[test]
 fn without_memory_nothing_is_half_made_and_what_is_there_goes_on() {
     if !may_mount() {
@@ -154,7 +111,7 @@ fn fill_a_small_memory(ground: &Ground) {
     let said = error.to_string();
     let named = said.split_once("(df ").and_then(|(_, rest)| rest.strip_suffix(")?")).unwrap();
     assert!(Path::new(named).is_dir(), "{said}");
-    assert_eq!((unfinished(ground), node.mailboxes().unwrap()), (vec![], there));
+    assert_eq!((unfinished(ground.path()), node.mailboxes().unwrap()), (vec![], there));
     // What is there works to its last byte, and anew.
     for receiver in &mut all {
         let mut sender = me.sender(receiver.name()).unwrap();
@@ -184,7 +141,7 @@ fn without_descriptors_the_error_names_the_limit_and_the_other_mailboxes_go_on()
     let process = ground.start("open");
     assert_eq!(process.hear(), "well");
     process.finish();
-    assert_eq!(unfinished(&ground), [] as [PathBuf; 0]);
+    assert_eq!(unfinished(ground.path()), [] as [PathBuf; 0]);
 }
 
 /// Runs out of descriptors at each place where one is needed.

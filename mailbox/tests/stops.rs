@@ -9,13 +9,10 @@
 mod common;
 
 use common::board::{Board, MAILBOXES, missing, shared};
-use common::crew::{Actor, alone, master};
+use common::crew::{Actor, alone, be_led, instruction_kills, master};
 use common::load::{Listener, Talker, WaitMode, Weather};
 use common::random::Random;
 use common::{Ground, HIGH, LOW, MAILBOX, label, received, shape, tell, until};
-use nix::sys::ptrace;
-use nix::sys::signal::{Signal, raise};
-use nix::sys::wait::{WaitStatus, waitpid};
 use rohrpost_mailbox::{Loss, Node, OverflowPolicy, Participant, Priority, Receiver, SendError, Sender, Shape};
 use std::sync::atomic::{AtomicU32, Ordering::SeqCst};
 use std::time::Duration;
@@ -24,10 +21,6 @@ const SENDERS: usize = 4;
 /// The seat of the receiver.
 const RECEIVER: usize = SENDERS;
 const STOPS: u64 = 100;
-
-fn kills() -> u64 {
-    std::env::var("ROHRPOST_INSTRUCTION_KILLS").map_or(10, |kills| kills.parse().expect("a number of kills"))
-}
 
 #[test]
 fn role() {
@@ -151,8 +144,6 @@ const OPERATIONS: &[Operation] = &[
 
 /// In the process that is led: stops itself, does it, and says so.
 fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
-    ptrace::traceme().unwrap();
-    let stop = || raise(Signal::SIGSTOP).unwrap();
     // Full: it may look at each slot just while that one is in use, since the others act between any two of its
     // instructions.
     let told = |sent| match sent {
@@ -165,7 +156,7 @@ fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
     match operation.does {
         Does::Receive => {
             let mut receiver = me.receiver(MAILBOX, operation.shape()).unwrap();
-            stop();
+            be_led();
             drop(receiver.try_receive());
             done.store(DONE, SeqCst);
         }
@@ -174,7 +165,7 @@ fn led(operation: &Operation, ground: &Ground, done: &AtomicU32) {
             if matches!(operation.does, Does::Renew(_)) {
                 send(&mut sender, priority);
             }
-            stop();
+            be_led();
             let how = if matches!(operation.does, Does::Loan(_)) {
                 told(sender.loan(priority).and_then(|mut loan| {
                     loan.body()[..12].fill(1);
@@ -241,7 +232,7 @@ impl Operation {
         let (instructions, ended) = self.lead(ground, u64::MAX, |_, _| ());
         let expected = if self.name == "send and be refused" { REFUSED } else { DONE };
         assert_eq!((ended, instructions > 200), (expected, true), "{}: {instructions} instructions", self.name);
-        let kills = kills().min(instructions);
+        let kills = instruction_kills().min(instructions);
         for kill in 0..kills {
             self.lead(ground, 1 + kill * instructions / kills, |_, _| ());
             if kill % 200 == 199 {
@@ -265,9 +256,7 @@ impl Operation {
         let mut others = Others::new(ground, self);
         let mut instructions = 0;
         while done.load(SeqCst) == 0 && instructions < most {
-            ptrace::step(actor.pid(), None).unwrap();
-            let how = waitpid(actor.pid(), None).unwrap();
-            assert_eq!(how, WaitStatus::Stopped(actor.pid(), Signal::SIGTRAP), "{}: see above", self.name);
+            actor.step(self.name);
             instructions += 1;
             meanwhile(&mut others, self.name);
         }

@@ -10,6 +10,7 @@ use rohrpost_mailbox::{
     Around, Label, Name, Next, Participant, Source, Stamp, StreamError, StreamId, StreamReader, StreamShape, Watches,
     WriteError, wait_any,
 };
+use std::os::unix::fs::FileExt;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -241,6 +242,28 @@ fn readers_follow_to_a_stream_of_another_shape() {
     read_on(&mut reader, 9, false);
     assert_eq!(reader.accounts(), (9, 0));
     assert_eq!(reader.shape(), Some(&SMALL));
+}
+
+/// All seats are taken, and a stream that was given up is still the one of its name.
+#[test]
+fn readers_of_a_stream_without_a_free_seat_wait_for_what_replaces_it() {
+    let ground = Ground::new();
+    let participant = ground.join();
+    drop(participant.stream_writer(ID, SMALL).unwrap());
+    let mut readers: Vec<_> = (0..SMALL.readers).map(|_| participant.stream_reader(ID).unwrap()).collect();
+    // As a successor leaves it that dies before the new one has its name.
+    let file = std::fs::File::options().write(true).open(ground.path().join(format!("{:08x}.3.ring", MAILBOX.raw())));
+    file.unwrap().write_all_at(&1_u32.to_ne_bytes(), 80).unwrap();
+    // The registry changes.
+    drop(participant.stream_writer(StreamId { number: 4, ..ID }, SMALL).unwrap());
+    for reader in &mut readers {
+        assert!(matches!(reader.try_next().unwrap(), Next::Nothing));
+    }
+    let mut writer = participant.stream_writer(ID, LARGE).unwrap();
+    writer.write(at(1), b"new").unwrap();
+    for reader in &mut readers {
+        assert!(matches!(reader.try_next().unwrap(), Next::Record(record) if record.body() == b"new"));
+    }
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for item in log.by_ref() {
         let due = item?;
         last_due_ns = due.due_ns;
-        if let carmen::Record::Scan { scan, .. } = due.record
+        if let carmen::LogRecord::Scan { scan, .. } = due.record
             && let Some(pose) = scan.pose
         {
             let before = Instant::now();

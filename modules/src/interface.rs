@@ -11,6 +11,9 @@ pub trait Interface {
     /// The class, by its name in the configuration.
     const CLASS: &'static str;
 
+    /// Whether a module serves it only if it has a name of the class.
+    const OPTIONAL: bool = false;
+
     /// Functions and data.
     fn description() -> Description;
 }
@@ -53,6 +56,57 @@ impl<T> Clone for DataPort<T> {
 }
 
 impl<T> Copy for DataPort<T> {}
+
+/// One stream of an interface.
+///
+/// ```
+/// use rohrpost_modules::interface;
+///
+/// /// Measures.
+/// #[interface(class = "scale", crate = rohrpost_modules::macro_support)]
+/// pub trait Scale {
+///     /// What lies on it.
+///     #[stream(1)]
+///     #[schema(unit = "kg")]
+///     fn mass() -> f64;
+/// }
+///
+/// let port = ScaleInterface::MASS;
+/// assert_eq!((port.class, port.number, port.name), ("scale", 1, "mass"));
+/// assert_eq!(port.data().number, 1); // its newest value, as data
+/// ```
+pub struct StreamPort<T> {
+    /// The interface's class.
+    pub class: &'static str,
+    /// Number in the interface.
+    pub number: u16,
+    /// Its name.
+    pub name: &'static str,
+    /// The interface's hash, computed when first needed.
+    pub hash: fn() -> u32,
+    data: PhantomData<fn() -> T>,
+}
+
+impl<T> StreamPort<T> {
+    /// For the `interface` attribute.
+    #[doc(hidden)]
+    pub const fn new(class: &'static str, number: u16, name: &'static str, hash: fn() -> u32) -> Self {
+        Self { class, number, name, hash, data: PhantomData }
+    }
+
+    /// Its newest value, as data: to ask for, or to subscribe to from another node.
+    pub const fn data(self) -> DataPort<T> {
+        DataPort::new(self.class, self.number, self.name, self.hash)
+    }
+}
+
+impl<T> Clone for StreamPort<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for StreamPort<T> {}
 
 /// A typed client of another module's interface. Implemented by the `interface` attribute.
 pub trait Proxy {
@@ -98,7 +152,24 @@ impl ProxyCore {
     }
 }
 
-/// The interfaces of a module: one, or a tuple of them, one an alias.
+/// An interface that a module serves if the configuration gives it a name of the class, and else goes without.
+impl<I: Interface> Interface for Option<I> {
+    const CLASS: &'static str = I::CLASS;
+    const OPTIONAL: bool = true;
+
+    fn description() -> Description {
+        I::description()
+    }
+}
+
+impl<M, I: Serve<M>> Serve<M> for Option<I> {
+    fn serve(module: &mut M, function: u16, arguments: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault> {
+        I::serve(module, function, arguments, reply)
+    }
+}
+
+/// The interfaces of a module: one, or a tuple of them, one an alias. Each must have a name of its class, but for those
+/// in an `Option`.
 pub trait Interfaces<M> {
     /// A line for each.
     fn table() -> Vec<Served<M>>;
@@ -108,6 +179,8 @@ pub trait Interfaces<M> {
 pub struct Served<M> {
     /// Class of the alias that has it.
     pub class: &'static str,
+    /// Whether there may be no such alias.
+    pub is_optional: bool,
     /// Functions and data.
     pub description: Description,
     /// Runs a function.
@@ -119,7 +192,7 @@ pub type ServeFunction<M> = fn(&mut M, u16, &[u8], &mut Vec<u8>) -> Result<(), F
 
 impl<M, I: Serve<M>> Interfaces<M> for I {
     fn table() -> Vec<Served<M>> {
-        vec![Served { class: I::CLASS, description: I::description(), serve: I::serve }]
+        vec![Served { class: I::CLASS, is_optional: I::OPTIONAL, description: I::description(), serve: I::serve }]
     }
 }
 
@@ -129,6 +202,7 @@ macro_rules! interfaces_of_tuples {
             fn table() -> Vec<Served<M>> {
                 vec![$(Served {
                     class: $interface::CLASS,
+                    is_optional: $interface::OPTIONAL,
                     description: $interface::description(),
                     serve: $interface::serve,
                 }),*]
@@ -136,4 +210,4 @@ macro_rules! interfaces_of_tuples {
         }
     )*};
 }
-interfaces_of_tuples! { () (A) (A, B) (A, B, C) (A, B, C, D) }
+interfaces_of_tuples! { () (A) (A, B) (A, B, C) (A, B, C, D) (A, B, C, D, E) }

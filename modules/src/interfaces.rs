@@ -18,7 +18,7 @@ pub use tcp::{
 
 use crate::interface;
 use crate::output::OutputLine;
-use crate::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
+use crate::types::{Image, LaserScan, OccupancyGrid, Odometry, PointCloud, Pose, Twist};
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +54,7 @@ pub trait Motor {
 #[interface(class = "laser", crate = crate::macro_support)]
 pub trait Laser {
     /// One sweep.
-    #[data(1)]
+    #[stream(1)]
     fn scan() -> LaserScan;
 }
 
@@ -62,8 +62,24 @@ pub trait Laser {
 #[interface(class = "odometry", crate = crate::macro_support)]
 pub trait Wheels {
     /// Where the base believes to be, and how it moves.
-    #[data(1)]
+    #[stream(1)]
     fn odometry() -> Odometry;
+}
+
+/// Sees pictures.
+#[interface(class = "camera", crate = crate::macro_support)]
+pub trait Camera {
+    /// What it sees.
+    #[stream(1)]
+    fn image() -> Image;
+}
+
+/// Sees how far away things are, in all of its picture.
+#[interface(class = "depth", crate = crate::macro_support)]
+pub trait Depth {
+    /// The points that it sees, in its own frame.
+    #[stream(1)]
+    fn points() -> PointCloud;
 }
 
 /// What a map was made of.
@@ -116,6 +132,8 @@ pub struct Progress {
     pub odometries: u64,
     /// Records left out because their stamps are not to be believed.
     pub discarded: u64,
+    /// Records that their stream did not take, as they are too far behind its newest.
+    pub late: u64,
     /// Broken lines.
     pub malformed: u64,
     /// Lines of other kinds.

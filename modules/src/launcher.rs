@@ -131,12 +131,14 @@ pub const LOOK_BYTES_MAX: usize = 1 << 20;
 pub enum Scope {
     /// Its modules, and the traffic by class.
     Modules,
-    /// These and all mailboxes.
+    /// These, all mailboxes and all streams.
     Mailboxes,
+    /// Its streams alone.
+    Streams,
     /// These and what everybody sends.
     All,
-    /// What there is of one module (its raw name): its mailboxes and those that it sends to, what it sends and what is
-    /// sent to it.
+    /// What there is of one module (its raw name): its streams, its mailboxes and those that it sends to, what it sends
+    /// and what is sent to it.
     Module(u32),
 }
 

@@ -34,7 +34,7 @@ use std::fmt;
 ///     type Interfaces = ();
 ///
 ///     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
-///         let odometry = context.subscribe(WheelsInterface::ODOMETRY, &settings.odometry, Rate::hz(1.0)?)?;
+///         let odometry = context.subscribe(WheelsInterface::ODOMETRY.data(), &settings.odometry, Rate::hz(1.0)?)?;
 ///         Ok(Self { odometry })
 ///     }
 ///

@@ -14,18 +14,6 @@ const LEASE_MAX_MS: u32 = 60_000;
 /// A subscriber that wants data more often gets it so often: the period is its word, the work is ours.
 const PERIOD_MIN_US: u32 = 100;
 
-/// The newest value of one kind of data.
-#[derive(Default)]
-pub(crate) struct Newest {
-    pub(crate) endpoint: usize,
-    pub(crate) number: u16,
-    /// Its name, for messages.
-    pub(crate) name: &'static str,
-    pub(crate) stamp_ns: u64,
-    /// Postcard of the value.
-    pub(crate) value: Vec<u8>,
-}
-
 /// What a subscriber's request asks for.
 #[derive(Clone, Copy)]
 pub(crate) struct RequestOrigin {
@@ -150,11 +138,16 @@ impl Subscriptions {
         self.missed_before + self.list.iter().map(|s| u64::from(s.missed)).sum::<u64>()
     }
 
-    /// A new value: `deliver` it to subscribers of each.
-    pub(crate) fn published(&mut self, newest: &Newest, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
+    /// A new value of this kind of data: `deliver` it to subscribers of each.
+    pub(crate) fn published(
+        &mut self,
+        endpoint: usize,
+        number: u16,
+        mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery,
+    ) {
         let mut gone = false;
         for subscription in &mut self.list {
-            if (subscription.endpoint, subscription.wish.number) != (newest.endpoint, newest.number) {
+            if (subscription.endpoint, subscription.wish.number) != (endpoint, number) {
                 continue;
             }
             if subscription.wish.period_us == 0 {
@@ -247,8 +240,7 @@ mod tests {
 
     fn publish(all: &mut Subscriptions, delivery: fn() -> Delivery) -> usize {
         let mut sent = 0;
-        let newest = Newest { number: 1, ..Newest::default() };
-        all.published(&newest, |_| {
+        all.published(0, 1, |_| {
             sent += 1;
             delivery()
         });
@@ -268,8 +260,7 @@ mod tests {
     fn each_value_goes_to_a_subscriber_of_each() {
         let mut all = subscribed(0);
         assert_eq!((publish(&mut all, || Delivery::Sent), publish(&mut all, || Delivery::Sent)), (1, 1));
-        let other = Newest { number: 2, ..Newest::default() };
-        all.published(&other, |_| unreachable!("nobody asked for number 2"));
+        all.published(0, 2, |_| unreachable!("nobody asked for number 2"));
         assert_eq!(all.list[0].sequence, 2);
     }
 

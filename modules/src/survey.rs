@@ -13,6 +13,7 @@
 mod distant;
 mod form;
 mod standing;
+mod streams;
 mod usage;
 
 pub use crate::launcher::Scope;
@@ -20,6 +21,7 @@ pub use distant::{Distant, LookFailure, look_at_all};
 pub use form::Snapshot;
 pub(crate) use standing::in_words;
 pub use standing::{Standing, Working};
+pub use streams::StreamSurvey;
 pub use usage::Usage;
 
 use crate::launcher::{ChildState, known_children};
@@ -55,6 +57,8 @@ pub struct Survey {
     pub modules: Vec<ModuleSurvey>,
     /// All mailboxes, in order of their names.
     pub mailboxes: Vec<MailboxInfo>,
+    /// All streams, in order of their names and numbers.
+    pub streams: Vec<StreamSurvey>,
     /// What all mailboxes together did, most urgent class first.
     pub classes: Vec<ClassTraffic>,
     /// What everybody sends and publishes.
@@ -130,7 +134,8 @@ impl Survey {
         }
         add_children(&mut modules, installation, known_children(node));
         let classes = sum_of_ends(installation, &mailboxes);
-        Ok(Self { node: node_name.into(), at_ns, modules, mailboxes, classes, flows })
+        let streams = streams::look(node, node_name, at_ns)?;
+        Ok(Self { node: node_name.into(), at_ns, modules, mailboxes, streams, classes, flows })
     }
 
     /// The same, no more of it than is asked for.
@@ -148,6 +153,11 @@ impl Survey {
             Scope::Modules => {
                 self.flows.clear();
                 self.mailboxes.clear();
+                self.streams.clear();
+            }
+            Scope::Streams => {
+                let Self { node, at_ns, streams, .. } = self;
+                return Self { streams, ..Self::empty(node, at_ns) };
             }
             Scope::Module(raw) => self.reduce_to(Name::from_raw(raw).module()),
         }
@@ -156,6 +166,7 @@ impl Survey {
 
     fn reduce_to(&mut self, name: Name) {
         let is_own = |other: Name| other.module() == name;
+        self.streams.retain(|stream| is_own(stream.info.id.name));
         self.flows.retain(|flow| is_own(flow.from) || is_own(flow.to));
         let flows = &self.flows;
         let is_sent_to = |mailbox: Name| flows.iter().any(|flow| is_own(flow.from) && flow.to == mailbox);
@@ -163,21 +174,21 @@ impl Survey {
         self.modules.retain(|module| module.name == name || module.aliases.contains(&name));
     }
 
+    fn empty(node: String, at_ns: u64) -> Self {
+        let (modules, mailboxes, streams) = (Vec::new(), Vec::new(), Vec::new());
+        Self { node, at_ns, modules, mailboxes, streams, classes: Vec::new(), flows: Vec::new() }
+    }
+
     /// Several nodes as one, in this order; of each node of `silent`, which do not answer, the modules that the
     /// configuration names. What routers delivered for nodes that answer is left out: it is among what these sent.
     pub fn joined(surveys: Vec<Self>, silent: &[&str], installation: &Installation) -> Self {
-        let mut all = Self {
-            node: surveys.first().map(|first| first.node.clone()).unwrap_or_default(),
-            at_ns: monotonic_ns(),
-            modules: Vec::new(),
-            mailboxes: Vec::new(),
-            classes: Vec::new(),
-            flows: Vec::new(),
-        };
+        let node = surveys.first().map(|first| first.node.clone()).unwrap_or_default();
+        let mut all = Self::empty(node, monotonic_ns());
         for survey in surveys {
             let node = survey.node;
             all.modules.extend(survey.modules);
             all.mailboxes.extend(survey.mailboxes);
+            all.streams.extend(survey.streams);
             add(&mut all.classes, &survey.classes);
             let counts = |flow: &FlowInfo| !is_hop(installation, &node, flow) || is_of(installation, flow.from, silent);
             all.flows.extend(survey.flows.into_iter().filter(counts));
@@ -188,6 +199,7 @@ impl Survey {
             all.modules.extend(unseen.map(|module| ModuleSurvey { node: (*node).into(), ..module }));
         }
         all.mailboxes.sort_by_key(|mailbox| mailbox.name);
+        all.streams.sort_by_key(|stream| stream.info.id);
         all.classes.sort_by_key(|class| std::cmp::Reverse(class.class));
         all
     }

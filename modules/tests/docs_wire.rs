@@ -8,6 +8,10 @@ use rohrpost_modules::common::{self, DataHead, OutputLevel, SetParameters};
 use rohrpost_modules::interfaces::{DriveError, MotorInterface};
 use rohrpost_modules::output::{LINES, OutputLine};
 use rohrpost_modules::parameter::Refusal;
+use rohrpost_modules::types::{
+    Bytes, Image, ImageFormat, LaserScan, OccupancyGrid, Odometry, PointCloud, PointFormat, Pose, Twist,
+};
+use rohrpost_schema::{Schema, Type as Described};
 
 const PAGE: &str = include_str!("../../docs/src/wire.md");
 
@@ -139,4 +143,55 @@ fn faults_have_the_documented_numbers() {
     for (number, fault) in faults.iter().enumerate() {
         assert_eq!(usize::from(postcard::to_stdvec(fault).unwrap()[0]), number, "{fault}");
     }
+}
+
+#[test]
+fn images_and_points_have_the_documented_bytes() {
+    let pixels = Bytes(vec![0, 128, 255, 0, 255, 128, 0, 0]);
+    let image = Image { width_px: 3, height_px: 2, row_bytes: 4, format: ImageFormat::Gray8, pixels };
+    image.check().unwrap();
+    assert_eq!(hex(&block("image")), hex(&postcard::to_stdvec(&image).unwrap()));
+    let place = [1.5f32, 0.0, -0.5].into_iter().flat_map(f32::to_le_bytes);
+    let points = Bytes(place.chain([255, 0, 0, 0]).collect());
+    let cloud = PointCloud { columns: 1, rows: 1, format: PointFormat::XyzRgb, points };
+    cloud.check().unwrap();
+    assert_eq!(hex(&block("points")), hex(&postcard::to_stdvec(&cloud).unwrap()));
+}
+
+/// Numbers and names in the first columns of a table.
+fn rows(head: &str) -> Vec<(String, String)> {
+    let (table, _) = PAGE.split(head).nth(1).unwrap().split_once("\n\n").unwrap();
+    let cells = |line: &str| -> Vec<String> { line.split('|').map(|cell| cell.trim().to_owned()).collect() };
+    table.lines().skip(2).map(cells).map(|cells| (cells[1].clone(), cells[2].clone())).collect()
+}
+
+#[test]
+fn formats_of_pixels_and_points_have_the_documented_numbers() {
+    for (head, described) in [
+        ("| | format | bytes of a pixel |", ImageFormat::schema()),
+        ("| | format | bytes of a point |", PointFormat::schema()),
+    ] {
+        let Described::Enum { variants, .. } = described else { panic!("{head} is of an enum") };
+        let expected = variants.into_iter().enumerate().map(|(number, variant)| (number.to_string(), variant.name));
+        assert_eq!(rows(head), expected.collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn standard_types_have_the_documented_names() {
+    let described = [
+        Pose::schema(),
+        Twist::schema(),
+        Odometry::schema(),
+        LaserScan::schema(),
+        OccupancyGrid::schema(),
+        Image::<Bytes>::schema(),
+        PointCloud::<Bytes>::schema(),
+    ];
+    let names = described.into_iter().map(|described| match described {
+        Described::Struct(named) => format!("`{}`", named.name),
+        other => panic!("{other:?} is no struct"),
+    });
+    let documented = rows("| name | what it is |").into_iter().map(|(name, _)| name);
+    assert_eq!(documented.collect::<Vec<_>>(), names.collect::<Vec<_>>());
 }

@@ -8,7 +8,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rohrpost_modules::fusion::{Around, History, NoValue, Records, Refused, Stamp};
-use rohrpost_modules::robot::carmen::{self, Record, Settings};
+use rohrpost_modules::robot::carmen::{self, LogRecord, Settings};
 use rohrpost_modules::types::Odometry;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -48,9 +48,9 @@ fn read(path: &Path) -> Vec<Line> {
         let Some(stamp_s) = record.stamp_s() else { continue };
         let stamp = Stamp::new(1, (stamp_s * 1e9).round() as u64);
         lines.push(match record {
-            Record::Odometry { odometry, .. } => Line::Odometry { line, stamp, odometry },
-            Record::Scan { .. } => Line::Scan { line, stamp },
-            Record::Param { .. } => continue,
+            LogRecord::Odometry { odometry, .. } => Line::Odometry { line, stamp, odometry },
+            LogRecord::Scan { .. } => Line::Scan { line, stamp },
+            LogRecord::Param { .. } => continue,
         });
     }
     lines

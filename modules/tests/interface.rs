@@ -5,10 +5,10 @@
 use rohrpost_modules::call::Fault;
 use rohrpost_modules::common::HASH;
 use rohrpost_modules::interface;
-use rohrpost_modules::interface::{Interface, Serve};
+use rohrpost_modules::interface::{DataPort, Interface, Serve, StreamPort};
 use rohrpost_modules::interfaces::{CartographerInterface, CollectorInterface, LaserInterface, MotorInterface};
 use rohrpost_modules::launcher::LauncherInterface;
-use rohrpost_modules::schema::{Description, Schema, describe_field};
+use rohrpost_modules::schema::{DataKind, Description, Schema, describe_field};
 
 /// Opens and closes.
 ///
@@ -71,6 +71,34 @@ fn a_description_says_it_all() {
     assert_eq!(Description::from_bytes(&description.to_bytes()), Ok(description));
 }
 
+/// Weighs, and remembers.
+#[interface(class = "scale", crate = rohrpost_modules::macro_support)]
+pub trait Scale {
+    /// Whether it is level.
+    #[data(2)]
+    fn level() -> bool;
+
+    /// What lies on it.
+    #[stream(1)]
+    #[schema(unit = "kg")]
+    fn mass() -> f64;
+}
+
+#[test]
+fn a_stream_is_described_among_data_and_has_a_port_of_its_own() {
+    let description = ScaleInterface::description();
+    let kinds: Vec<_> = description.data.iter().map(|item| (item.number, item.kind)).collect();
+    assert_eq!(kinds, [(2, DataKind::Data), (1, DataKind::Stream)]);
+    let streams: Vec<_> = description.streams().map(|item| describe_field(&item.field)).collect();
+    assert_eq!(streams, ["mass: f64 kg"]);
+    assert_eq!(Description::from_bytes(&description.to_bytes()), Ok(description));
+    let port: StreamPort<f64> = ScaleInterface::MASS;
+    let (level, newest): (DataPort<bool>, DataPort<f64>) = (ScaleInterface::LEVEL, port.data());
+    assert_eq!((port.class, port.number, port.name, level.number), ("scale", 1, "mass", 2));
+    assert_eq!((newest.class, newest.number, newest.name), ("scale", 1, "mass"));
+    assert_eq!(((port.hash)(), (newest.hash)()), (ScaleInterface::hash(), ScaleInterface::hash()));
+}
+
 #[test]
 fn what_modules_say_comes_back() {
     for description in [
@@ -99,7 +127,7 @@ fn an_older_program_is_refused_by_name() {
     );
     // How descriptions began before they had a version: with the length of the name.
     let error = Description::from_bytes(b"\x05Motor\x05motor").unwrap_err().to_string();
-    assert!(error.starts_with("descriptions of version 5, this program knows 1"), "{error}");
+    assert!(error.starts_with("descriptions of version 5, this program knows 2"), "{error}");
 }
 
 #[test]
@@ -141,9 +169,10 @@ fn the_hash_is_of_what_matters() {
     assert!(changed(|d| d.functions[1].result = u8::schema()), "results do");
     assert!(changed(|d| d.functions[1].idempotent = false), "what may be repeated does");
     assert!(changed(|d| d.data[0].field.ty = Vec::<f64>::schema()), "data do");
+    assert!(changed(|d| d.data[0].kind = DataKind::Stream), "what is a stream does");
     // Recordings and other nodes have it: it does not change with the compiler or from run to run.
     assert_eq!(
-        hash, 1_252_876_277,
+        hash, 1_809_337_075,
         "the hash has changed, and with it the wire: raise the layout version if that is meant"
     );
 }

@@ -154,7 +154,9 @@ fn a_package_costs_one_call_to_send_one_to_receive_and_those_to_sleep_and_wake()
     };
     both("send", "tx", PACKAGES);
     both("sleep", "tx", 1);
-    both("receive", "rx", PACKAGES);
+    // The first package is received by a call that waits already when counting begins, and the call after the last one
+    // may come when counting is over.
+    both("receive", "rx", PACKAGES - 1);
     // None, if the module was never quick enough to sleep before its package came.
     both("wake", "rx", 0);
     both("pause", "tx", 0);

@@ -47,6 +47,7 @@ settings = { laser = "laser.7", odometry = "odometry.0", resolution-m = 5 }
 name = "pilot.2"
 builtin = "pilot"
 settings = { motor = "motor.0" }
+stream = { picture = { keep = 4 } }
 [gui]
 show = [
     { from = "laser.0", data = "scan" },
@@ -55,11 +56,11 @@ show = [
 ]
 "#;
 
-const SAID: [&str; 11] = [
+const SAID: [&str; 12] = [
     "13: module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, \
-     laser",
+     laser, camera, depth",
     "17: module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
-     `laser-noise-m`, `odometry-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
+     `laser-noise-m`, `odometry-rate-hz`, `camera-rate-hz`, `depth-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
     "21: module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz",
     "28: module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`",
     "34: module `pilot.1`: settings: `laser` is `odometry.0`, but this module calls functions of class `laser`",
@@ -68,8 +69,9 @@ const SAID: [&str; 11] = [
     "40: module `mapper.0`: settings: `resolution-m` is 5; use 0.005 to 1",
     "40: module `mapper.0`: settings: `laser` is `laser.7`, which no [[module]] defines; add one, or name another",
     "44: module `pilot.2`: settings: missing field `laser`",
-    "48: [gui] show: `laser.0` has no data `scam`; did you mean `scan`?",
-    "49: [gui] show: `mapper.0` has no data `grid`; it has map, pose",
+    "45: module `pilot.2`: the builtin has no stream `picture`; it has none; drop the section",
+    "49: [gui] show: `laser.0` has no data `scam`; did you mean `scan`?",
+    "50: [gui] show: `mapper.0` has no data `grid`; it has map, pose",
 ];
 
 #[test]
@@ -115,11 +117,16 @@ fn what_a_file_means_can_be_read_by_programs() {
     let motor = &base["modules"][1];
     assert_eq!((&motor["name"], &motor["scheduling"]["fifo"]), (&"motor.0".into(), &25.into()));
     assert_eq!(motor["mailboxes"]["commands"]["max_age_ms"], 300.0);
+    assert_eq!((&motor["streams"]["scan"]["late_ms"], &motor["streams"]["image"]["keep"]), (&50.0.into(), &8.into()));
     assert_eq!(json["missing_programs"][0]["module"], "motor.0");
     let number = |module: &serde_json::Value| module["number"].as_u64().unwrap();
     let system = installation["system"]["id"].as_u64().unwrap();
     assert_eq!(number(motor), system << 24 | motor["priority"].as_u64().unwrap() << 16);
     assert_eq!((&motor["required"], &motor["optional"]), (&true.into(), &false.into()));
+    let larger = full.replace("record = \"8 MiB\"\nkeep = 8", "record = \"1 GiB\"\nkeep = 1000000");
+    std::fs::write(place.path("larger.toml"), larger).unwrap();
+    let notes = place.say(&["check", "larger.toml", "--json"]).json()["notes"].to_string();
+    assert!(notes.contains("node base needs 1000009.1 GiB of shared memory, and this computer has "), "{notes}");
     // The opposite of its own declaration.
     std::fs::write(place.path("sealed.toml"), full.replace("security = \"none\"", "security = \"keys\"")).unwrap();
     let json_of_sealed = place.say(&["check", "sealed.toml", "--json"]).json();

@@ -8,9 +8,11 @@ use rohrpost::serde::Serialize;
 use rohrpost::wire::append;
 use rohrpost::{Name, ToolLink};
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{Node, ParticipantInfo, local, node_directory};
+use rohrpost_mailbox::{Node, NodeError, ParticipantInfo, local, node_directory};
+use rohrpost_modules::runtime::ClientError;
 use rohrpost_testbed::report::skipped;
 use std::fmt::Debug;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -260,7 +262,15 @@ impl Robot {
     }
 
     pub(crate) fn tool(&self, timeout: Duration) -> ToolLink {
-        ToolLink::join(&self.installation, &self.node, &self.node_name, timeout).unwrap()
+        self.tool_if_there(timeout).unwrap_or_else(|| panic!("the node is gone: {}", self.node.path().display()))
+    }
+
+    /// The same of a node that may end meanwhile: none when it is gone.
+    pub(crate) fn tool_if_there(&self, timeout: Duration) -> Option<ToolLink> {
+        match ToolLink::join(&self.installation, &self.node, &self.node_name, timeout) {
+            Err(ClientError::Node(NodeError::Io(_, error))) if error.kind() == ErrorKind::NotFound => None,
+            joined => Some(joined.unwrap()),
+        }
     }
 
     /// Sends a probe a command, once; waiting for its answer would repeat it.

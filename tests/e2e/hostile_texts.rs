@@ -2,10 +2,11 @@
 //! terminal.
 
 use crate::harness::{OUTPUT, PATIENCE, Place, wait};
+use crate::record::recording_that_says;
 use rohrpost::interface::{Interface, Serve};
 use rohrpost::output::plain::is_obeyed;
 use rohrpost::parameter::{Parameter, ParameterSet, Refusal};
-use rohrpost::schema::{DataItem, Description, Field, Function, Members, Named, Schema, Type};
+use rohrpost::schema::{DataItem, DataKind, Description, Field, Function, Members, Named, Schema, Type};
 use rohrpost::wire::append;
 use rohrpost::{Context, Fault, Module, ModuleError};
 use std::time::Duration;
@@ -68,6 +69,7 @@ impl Interface for HostileInterface {
             functions: vec![function(FAILS, "fails"), function(TELLS, "tells"), function(REFUSES, "refuses"), odd],
             data: vec![DataItem {
                 number: 1,
+                kind: DataKind::Data,
                 field: Field::new(HOSTILE, structure(String::schema())).said(HOSTILE, HOSTILE),
             }],
         }
@@ -191,7 +193,11 @@ fn no_tool_lets_a_module_drive_the_terminal() {
     robot.tool(PATIENCE).close();
     let saved = place.path("saved.toml");
     let saved = saved.to_str().unwrap();
+    let recording = recording_that_says(&place, HOSTILE, &structure(String::schema()));
+    let recording = recording.to_str().unwrap();
     let tried: &[&[&str]] = &[
+        &["record", "info", recording],
+        &["record", "cut", recording, &place.path("cut.mcap").display().to_string(), HOSTILE],
         &["call", "probe.0"],
         &["call", "probe.0", "tells"],
         &["call", "probe.0", "fails"],
@@ -256,6 +262,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["graph", "--seconds", "0.3", "--silent", "--json"],
         &["list", "--json"],
         &["top", "--once", "--json"],
+        &["record", "info", recording, "--json"],
     ] {
         let said = place.say(words);
         assert_plain(words, &said.out);

@@ -111,6 +111,20 @@ fn all_nodes_are_listed_from_each_of_them() {
         let there: Vec<&Value> = mailboxes.iter().filter(|line| line["mailbox"] == mailbox.as_str()).collect();
         assert_eq!((there.len(), &there[0]["node"]), (1, &node.into()));
     }
+    std::fs::write(two.place.path("picture"), "pixels").unwrap();
+    two.say_at("arm", &["stream", "write", "probe.1", "7", "picture"]).ok();
+    for tool in [&["stream", "list", "--json"][..], &["list", "--json"], &["top", "--json", "--interval", "0.1"]] {
+        let json = two.say(tool).json();
+        let (streams, wanted) = (&json["streams"], ("arm", "probe.1", 7, 1));
+        assert_eq!(streams.as_array().unwrap().len(), 1, "{json}");
+        let [node, stream, number, written] = ["node", "stream", "number", "written"].map(|key| &streams[0][key]);
+        assert!(node == wanted.0 && stream == wanted.1 && *number == wanted.2 && *written == wanted.3, "{streams}");
+    }
+    for tool in [&["stream", "list"][..], &["list", "--streams"]] {
+        let text = two.say(tool).ok();
+        assert!(text.contains("\narm   probe.1  -          7  64 x 1024 B   0 of 8  nobody"), "{text}");
+    }
+    assert_eq!(two.say_at("base", &["stream", "list"]).ok(), "node base of test has no streams\n");
     let once = two.say(&["top", "--once", "--interval", "0.2"]).ok();
     assert!(once.starts_with("test: 2 nodes ") && once.contains("probe.1   arm "), "{once}");
     // It receives each beat twice, in two mailboxes. If they were counted again at delivery, there would be more.

@@ -47,6 +47,8 @@ fn a_look_from_afar_shows_what_a_look_from_near_does() {
     let mut tool = robot.tool(PATIENCE);
     tool.status(robot.name("probe.0")).unwrap();
     wait("the probe publishes", || robot.node.traffic().iter().any(FlowInfo::is_publication).then_some(()));
+    std::fs::write(place.path("picture"), "pixels").unwrap();
+    place.say(&["stream", "write", "probe.0", "7", "picture"]).ok();
     let before = survey(&mut tool, Scope::All);
     let near = Survey::new(&robot.node, &robot.installation, "main").unwrap();
     let after = survey(&mut tool, Scope::All);
@@ -71,6 +73,8 @@ fn a_look_from_afar_shows_what_a_look_from_near_does() {
     }
     let shapes = |survey: &Survey| survey.mailboxes.iter().map(|m| (m.name, m.shape, m.owner)).collect::<Vec<_>>();
     assert_eq!(shapes(&after), shapes(&near));
+    let streams = |survey: &Survey| survey.streams.iter().map(|s| format!("{:?}", s.info)).collect::<Vec<_>>();
+    assert_eq!((streams(&after), near.streams.len()), (streams(&near), 1));
     let me = tool.link.me();
     assert_eq!(kinds(&after.flows, me), kinds(&near.flows, me));
     let beat = |survey: &Survey| survey.flows.iter().find(|flow| flow.is_publication()).unwrap().clone();
@@ -87,13 +91,21 @@ fn a_look_is_no_larger_than_what_is_asked_for() {
     let mut tool = robot.tool(PATIENCE);
     let probe = robot.name("probe.0");
     wait("the probe publishes", || robot.node.traffic().iter().any(FlowInfo::is_publication).then_some(()));
+    std::fs::write(place.path("picture"), "pixels").unwrap();
+    for module in ["probe.0", "probe.1"] {
+        place.say(&["stream", "write", module, "7", "picture"]).ok();
+    }
     let modules = survey(&mut tool, Scope::Modules);
     assert_eq!((modules.modules.len(), modules.mailboxes.len(), modules.flows.len()), (3, 0, 0));
+    assert!(modules.streams.is_empty());
     assert!(!modules.classes.is_empty());
     let mailboxes = survey(&mut tool, Scope::Mailboxes);
     assert!(mailboxes.mailboxes.len() > 3 && mailboxes.flows.is_empty());
+    assert_eq!(mailboxes.streams.len(), 2);
+    let streams = survey(&mut tool, Scope::Streams);
+    assert_eq!((streams.streams.len(), streams.modules.len(), streams.mailboxes.len()), (2, 0, 0));
     let one = survey(&mut tool, Scope::Module(probe.raw()));
-    assert_eq!(one.modules.len(), 1);
+    assert_eq!((one.modules.len(), one.streams.len()), (1, 1));
     assert!(!one.flows.is_empty());
     assert!(one.flows.iter().all(|flow| [flow.from.module(), flow.to.module()].contains(&probe)));
     let sent: Vec<Name> = one.flows.iter().filter(|flow| flow.from.module() == probe).map(|flow| flow.to).collect();

@@ -1,7 +1,7 @@
 //! `rohrpost new`: its project is built, tested, launched and called, as its README says.
 
 use crate::harness::{Place, wait};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -23,12 +23,11 @@ fn cargo(project: &Path, command: &str) -> Command {
     cargo
 }
 
-#[test]
-fn a_new_project_builds_runs_and_has_a_test_that_passes() {
-    let place = Place::new();
-    let made = place.say(&["new", "wind-vane"]).ok();
+/// Makes a project, builds it, and runs its own test.
+fn made_and_tested(place: &Place, words: &[&str]) -> PathBuf {
+    let made = place.say(&[&["new"], words].concat()).ok();
     assert!(made.contains("cargo build && rohrpost launch robot.toml"), "{made}");
-    let project = place.path("wind-vane");
+    let project = place.path(words[0]);
     // The versions that are here already.
     std::fs::copy(Path::new(ROOT).join("Cargo.lock"), project.join("Cargo.lock")).unwrap();
     // target/debug/deps/e2e-…
@@ -39,7 +38,46 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
     assert!(String::from_utf8_lossy(&tested.stdout).contains("1 passed"), "{tested:?}");
     let built = cargo(&project, "build").output().unwrap();
     assert!(built.status.success(), "{built:?}");
+    project
+}
 
+/// Build products of a removed project are useless.
+fn clean(project: &Path, name: &str) {
+    let cleaned = cargo(project, "clean").args(["--package", name]).output().unwrap();
+    assert!(cleaned.status.success(), "{cleaned:?}");
+}
+
+#[test]
+fn a_new_camera_writes_pictures_of_1080_rows_in_place() {
+    let place = Place::new();
+    let project = made_and_tested(&place, &["eye", "--camera"]);
+    let config = project.join("robot.toml");
+    let explained = place.say(&["check", config.to_str().unwrap()]).ok();
+    assert!(explained.contains("image"), "{explained}");
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    wait("eye.0 is on", || {
+        launch.assert_runs();
+        (robot.state("eye.0") == "on").then_some(())
+    });
+    wait("it writes pictures", || {
+        let listed = place.say(&["stream", "info", "eye.0", "1", "--json"]).json();
+        (listed["written"].as_u64()? > 3).then_some(())
+    });
+    let picture = place.path("picture");
+    place.say(&["stream", "read", "eye.0", "1", "--raw", picture.to_str().unwrap()]).ok();
+    // Sizes, format and length, and three bytes a pixel.
+    let bytes = std::fs::metadata(picture).unwrap().len();
+    assert!((1920 * 1080 * 3..1920 * 1080 * 3 + 32).contains(&bytes), "{bytes}");
+    launch.stop();
+    place.assert_empty();
+    clean(&project, "eye");
+}
+
+#[test]
+fn a_new_project_builds_runs_and_has_a_test_that_passes() {
+    let place = Place::new();
+    let project = made_and_tested(&place, &["wind-vane"]);
     let config = project.join("robot.toml");
     place.say(&["check", config.to_str().unwrap()]).ok();
     let mut launch = place.launch(&config);
@@ -70,9 +108,7 @@ fn a_new_project_builds_runs_and_has_a_test_that_passes() {
     });
     launch.stop();
     place.assert_empty();
-    // Build products of a removed project are useless.
-    let cleaned = cargo(&project, "clean").args(["--package", "wind-vane"]).output().unwrap();
-    assert!(cleaned.status.success(), "{cleaned:?}");
+    clean(&project, "wind-vane");
 }
 
 #[test]

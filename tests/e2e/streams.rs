@@ -77,7 +77,7 @@ fn files_that_were_written_are_listed_and_read_back() {
     }
     assert_eq!(stream["writer"]["alive"], false, "the tool that wrote has ended: {listing:#}");
     let text = place.say(&["stream", "list"]).ok();
-    assert!(text.contains("probe.0       7  4 x 1024 B   0 of 2  nobody"), "{text}");
+    assert!(text.contains("probe.0  -          7  4 x 1024 B   0 of 2  nobody"), "{text}");
 
     let read = |more: &[&str]| place.say(&[&["stream", "read", "probe.0", "7"], more].concat());
     assert_eq!(read(&[]).ok(), "#2  1000.500000000  0 B\n", "the newest");

@@ -45,10 +45,10 @@ fn slots(said: &str, counter: &str) -> Vec<u64> {
     row.unwrap_or_default().split_whitespace().map(|count| count.parse().unwrap()).collect()
 }
 
-/// The losses of the modules that call and subscribe; none while one does not answer.
+/// The losses of the modules that call and subscribe; none while one does not answer, and when the node has ended.
 fn lost_so_far(robots: &[Robot; 3]) -> Option<Before> {
     let (brain, mut all) = (&robots[1], Before::new());
-    let mut tool = brain.tool(SOON);
+    let mut tool = brain.tool_if_there(SOON)?;
     let told = ["pilot.0", "mapper.0"].map(|by| (by, tool.exchange(brain.name(by))));
     tool.close();
     for (by, told) in told {
@@ -61,7 +61,7 @@ fn lost_so_far(robots: &[Robot; 3]) -> Option<Before> {
 
 /// The report of a node's router, if it answers.
 fn said<T: Data>(robot: &Robot, router: &str, port: DataPort<T>) -> Option<T> {
-    let mut tool = robot.tool(SOON);
+    let mut tool = robot.tool_if_there(SOON)?;
     let ask = |body: &mut Vec<u8>| append(body, &(port.number,));
     let read = |bytes: &[u8]| from_bytes::<(u64, T)>(bytes);
     let said = tool.call(robot.name(router), GET_DATA, RouterInterface::hash(), ask, read);

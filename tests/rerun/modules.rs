@@ -4,7 +4,7 @@
 
 use super::load::on_one_processor;
 use rohrpost::serde::Deserialize;
-use rohrpost::types::{LaserScan, OccupancyGrid, Odometry, Pose, Twist};
+use rohrpost::types::{Image, ImageFormat, LaserScan, OccupancyGrid, Odometry, Pose, Twist};
 use rohrpost::{Context, Module, ModuleError, Rate, Received, Subscription};
 use rohrpost_mailbox::monotonic_ns;
 use std::io::{Read, Write};
@@ -12,6 +12,8 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 pub(crate) const BEAT: Duration = Duration::from_millis(5);
+/// A picture has 108 KiB.
+const PICTURE_SIDE_PX: u32 = 192;
 /// Rows of data that are sent in a beat while there is a flood.
 const FLOOD: u64 = 8;
 
@@ -80,6 +82,10 @@ pub(crate) trait Sending {
 
     #[data(6)]
     fn noise() -> Vec<u64>;
+
+    /// Larger than a package.
+    #[stream(7)]
+    fn picture() -> Image;
 }
 
 /// Receives.
@@ -136,6 +142,10 @@ impl Module for Source {
             context.publish_now(SendingInterface::SCAN, &scan)?;
             let pose = Pose { x_m: f64::from(turn.cos()), y_m: f64::from(turn.sin()), heading_rad: f64::from(turn) };
             context.publish_now(SendingInterface::ODOMETRY, &Odometry { pose, twist: Twist::default() })?;
+            let (now_ns, image) = (context.now().ns, Image::empty(PICTURE_SIDE_PX, PICTURE_SIDE_PX, ImageFormat::Rgb8));
+            let mut open = context.begin(SendingInterface::PICTURE, now_ns)?;
+            open.fill(&image, image.raw_bytes() as usize)?.fill(self.beats as u8);
+            open.finish()?;
         }
         if self.beats.is_multiple_of(20) {
             context.publish_now(SendingInterface::MAP, &patch(self.beats / 20))?;

@@ -54,6 +54,21 @@ pub(crate) fn rows(printed: &str) -> BTreeMap<String, u64> {
     all
 }
 
+/// What a drawing has of an entity: the names of its components, and bytes.
+pub(crate) fn content(printed: &str, entity: &str) -> (BTreeSet<String>, f64) {
+    let (mut components, mut bytes) = (BTreeSet::new(), 0.0);
+    let head = format!(" - {entity} - data columns: [");
+    for line in printed.lines().filter(|line| line.starts_with("Chunk(")) {
+        let Some((chunk, columns)) = line.split_once(&head) else { continue };
+        components.extend(columns.trim_end_matches(']').split_whitespace().map(str::to_owned));
+        let size = chunk.rsplit_once('(').unwrap().1.trim_end_matches(')');
+        let (number, unit) = size.split_once(' ').unwrap();
+        let power = ["B", "KiB", "MiB", "GiB"].iter().position(|known| *known == unit).unwrap();
+        bytes += number.parse::<f64>().unwrap() * 1024_f64.powi(power as i32);
+    }
+    (components, bytes)
+}
+
 /// The table "Num chunks per entity", lines such as `/world/frame: 18`.
 pub(crate) fn entities_of(stats: &str) -> BTreeSet<String> {
     let lines = stats.lines().skip_while(|line| !line.starts_with("Num chunks per entity"));

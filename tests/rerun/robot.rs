@@ -8,7 +8,7 @@ use rohrpost::types::LaserScan;
 use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Name, ToolLink};
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{MailboxInfo, ModuleState, Node, node_directory};
+use rohrpost_mailbox::{MailboxInfo, ModuleState, Node, StreamId, StreamInfo, node_directory};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -124,6 +124,12 @@ impl Robot {
         stamp_ns
     }
 
+    /// The stream of pictures, which the bridge alone reads.
+    pub(crate) fn pictures(&self) -> StreamInfo {
+        let id = StreamId { name: self.name("source.0"), number: SendingInterface::PICTURE.number };
+        self.node.inspect_stream(id).unwrap().unwrap()
+    }
+
     /// One of the bridge's mailboxes.
     pub(crate) fn bridge_mailbox(&self, local: u8) -> MailboxInfo {
         self.node.look_at(self.name("gui.0").with_local(local)).unwrap()
@@ -213,6 +219,9 @@ builtin = "output"
 name = "source.0"
 program = {program}
 settings = {{ {settings} }}
+[module.stream.picture]
+record = "110 KiB"
+keep = 2
 [[module]]
 name = "sink.0"
 program = {program}
@@ -233,6 +242,7 @@ show = [
     {{ from = "source.0", data = "map", rate = 0.0 }},
     {{ from = "source.0", data = "marks", rate = 0.0 }},
     {{ from = "source.0", data = "noise", rate = 0.0 }},
+    {{ from = "source.0", data = "picture", rate = 5.0 }},
 ]
 "#
     )

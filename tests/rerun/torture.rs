@@ -14,7 +14,7 @@
 
 use super::load::{Load, on_one_processor};
 use super::modules::Mark;
-use super::robot::Robot;
+use super::robot::{Robot, wait};
 use super::viewer::{Viewer, free_port};
 use rohrpost_testbed::stalls::{Late, Stalls, unless_stalled};
 use std::time::{Duration, Instant};
@@ -102,6 +102,17 @@ impl<'a> Test<'a> {
         Ok(all)
     }
 
+    /// The bridge reads the stream of pictures, and holds none of them; so a viewer that stands still holds none.
+    fn holds_no_picture(&self) {
+        assert_eq!(self.robot.pictures().readers, 1, "the bridge reads it");
+        let written = self.robot.pictures().written;
+        // It may just be copying one.
+        wait("no picture is held while others are written", || {
+            let pictures = self.robot.pictures();
+            (pictures.written > written + 1 && pictures.holding == 0).then_some(())
+        });
+    }
+
     fn restart(&mut self) {
         self.viewer = None;
         self.viewer = Some(Viewer::start(self.port));
@@ -119,6 +130,7 @@ impl<'a> Test<'a> {
         let always = [
             "/blueprint_panel",
             "/world/scan/source.0",
+            "/pictures/source.0/picture",
             "/world/robot/source.0/body",
             "/modules/sink.0",
             "/output/",
@@ -235,6 +247,7 @@ fn a_viewer_that_misbehaves_does_not_slow_the_robot() {
 
         test.viewer().freeze();
         test.windows_over(LONG_FREEZE)?;
+        test.holds_no_picture();
         test.viewer().go_on();
         test.returned(&Mark::Frozen(1), "Frozen");
         let stuck = test.counts();

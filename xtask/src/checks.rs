@@ -71,7 +71,7 @@ const PRODUCT: Stage = Stage {
     },
 };
 
-const ALL: [Stage; 6] = [
+const ALL: [Stage; 7] = [
     Stage {
         name: "tests of all but the GUI bridge",
         budget: 25,
@@ -82,7 +82,7 @@ const ALL: [Stage; 6] = [
     },
     Stage { name: "ThreadSanitizer", budget: 1, run: || whole(tsan::run().map(drop)) },
     Stage { name: "instructions of the hot paths", budget: 4, run: || whole(instructions::check()) },
-    Stage { name: "fuzzing, short", budget: 3, run: || whole(fuzz::short()) },
+    Stage { name: "fuzzing, short", budget: 4, run: || whole(fuzz::short()) },
     Stage {
         name: "tests of the GUI bridge",
         budget: 5,
@@ -92,6 +92,7 @@ const ALL: [Stage; 6] = [
         },
     },
     Stage { name: "drawings, with Rerun's command line", budget: 5, run: || whole(drawings()) },
+    Stage { name: "recordings, with Python's reader", budget: 2, run: || whole(recordings()) },
 ];
 
 /// A stage without parts.
@@ -119,6 +120,13 @@ fn drawings() -> Result<(), Failure> {
             .env("ROHRPOST_RERUN", rerun)
             .env("ROHRPOST_BRIDGE", cargo::target().join(BRIDGE_PROFILE).join(BRIDGE)),
     )
+}
+
+/// By the makers of the format, in Python: it says whether others can read what is written here.
+fn recordings() -> Result<(), Failure> {
+    let python = venv::mcap()?;
+    let test = ["test", "--package", "rohrpost-recording", "--features", "python-tests", "--test", "python"];
+    cargo::run("testing recordings with Python's reader", tests(&test).env("ROHRPOST_MCAP_PYTHON", python))
 }
 
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the

@@ -1,6 +1,7 @@
-//! Rerun's own command line and viewer, from PyPI into `target/venv`.
+//! Programs of others that tests need, from PyPI: Rerun's command line and viewer in `target/venv`, a reader of MCAP
+//! files in `target/venv-mcap`.
 //!
-//! Its version is that of the `rerun` crate: a viewer reads drawings of its own version best.
+//! Rerun's version is that of the `rerun` crate: a viewer reads drawings of its own version best.
 
 use crate::cargo;
 use crate::failure::Failure;
@@ -9,6 +10,8 @@ use std::process::Command;
 
 /// The package and its version, as `gui-bridge/Cargo.toml` has it.
 const PACKAGE: &str = "rerun-sdk==0.36.3";
+/// The library of the makers of the format, in Python, with what it needs to decompress.
+const MCAP_PACKAGE: &str = "mcap==1.6.0";
 
 /// A Python with Rerun in it.
 pub(crate) struct Venv {
@@ -21,23 +24,42 @@ pub(crate) struct Venv {
 
 /// Finds it, or makes it.
 pub(crate) fn venv() -> Result<Venv, Failure> {
-    let folder = cargo::target().join("venv");
+    let what = "Rerun's viewer and command line (160 MB to fetch, 740 MB on disk)";
+    let python = python_with("venv", PACKAGE, what, |python| {
+        cargo::run("turning off its analytics", Command::new(program(python)?).args(["analytics", "disable"]))
+    })?;
+    Ok(Venv { rerun: program(&python)?, python })
+}
+
+/// A Python that reads MCAP files; finds it, or makes it.
+pub(crate) fn mcap() -> Result<PathBuf, Failure> {
+    python_with("venv-mcap", MCAP_PACKAGE, "a reader of MCAP files", |_| Ok(()))
+}
+
+/// The interpreter of an environment with a package.
+fn python_with(
+    name: &str,
+    package: &str,
+    what: &str,
+    then: impl Fn(&Path) -> Result<(), Failure>,
+) -> Result<PathBuf, Failure> {
+    let folder = cargo::target().join(name);
     let python = folder.join("bin").join("python");
     // Written last: a folder without it was interrupted.
     let stamp = folder.join("rohrpost-stamp");
-    if std::fs::read_to_string(&stamp).is_ok_and(|made| made == PACKAGE) {
-        return Ok(Venv { rerun: program(&python)?, python });
+    if std::fs::read_to_string(&stamp).is_ok_and(|made| made == package) {
+        return Ok(python);
     }
-    cargo::run("making a Python environment in target/venv", Command::new("python3").args(["-m", "venv"]).arg(&folder))
+    let why = format!("making a Python environment in target/{name}");
+    cargo::run(&why, Command::new("python3").args(["-m", "venv"]).arg(&folder))
         .map_err(|failure| format!("{failure}; on Debian: apt-get install -y python3-venv"))?;
     cargo::run(
-        "installing Rerun's viewer and command line in it (160 MB to fetch, 740 MB on disk)",
-        Command::new(&python).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", PACKAGE]),
+        &format!("installing {what} in it"),
+        Command::new(&python).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", package]),
     )?;
-    let rerun = program(&python)?;
-    cargo::run("turning off its analytics", Command::new(&rerun).args(["analytics", "disable"]))?;
-    std::fs::write(&stamp, PACKAGE).map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
-    Ok(Venv { python, rerun })
+    then(&python)?;
+    std::fs::write(&stamp, package).map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
+    Ok(python)
 }
 
 fn program(python: &Path) -> Result<PathBuf, Failure> {

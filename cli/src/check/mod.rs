@@ -1,11 +1,13 @@
 //! `rohrpost check`, and reading a configuration with every check that is possible before anything runs.
 
 mod json;
+mod memory;
 
-use super::daemons;
+use super::{daemons, doctor};
 use crate::terminal::{Failure, say};
 use rohrpost::Name;
 use rohrpost_config::{Errors, Flow, Installation, MissingProgram, TimeSource, explain};
+use rohrpost_mailbox::base_directory;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -64,6 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let missing = missing_programs(&installation, only)?;
     let mut notes = separated_by_size(&installation);
     notes.extend(daemons_here(&installation, Path::new("/proc")));
+    let base = base_directory();
+    let room = doctor::room_of_nodes(&base);
+    notes.extend(room.into_iter().flat_map(|room| memory::too_small(&installation, only, &base, room)));
     if arguments.json {
         say(json::installation(&installation, only, &missing, &notes));
         return Ok(ExitCode::SUCCESS);

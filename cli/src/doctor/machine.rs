@@ -4,7 +4,7 @@ use super::lan::LanView;
 use super::protection::Protection;
 use rohrpost_config::{FIFO_MAX, Installation, Module, Node as NodeConfig, Program, Scheduling, find_program};
 use rohrpost_mailbox::sys::{self, Room};
-use rohrpost_mailbox::{Node, NodeError, base_directory};
+use rohrpost_mailbox::{Node, NodeError, base_directory, saturating_sum};
 use std::path::{Path, PathBuf};
 
 const BRIDGE: &str = "rohrpost-gui-bridge";
@@ -13,7 +13,7 @@ const BRIDGE: &str = "rohrpost-gui-bridge";
 pub(super) struct Needs {
     /// Highest SCHED_FIFO priority that is requested.
     pub(super) priority: u8,
-    /// Bytes of mailboxes.
+    /// Bytes of mailboxes and of the streams that the configuration names.
     pub(super) memory: u64,
     /// Whether a GUI runs.
     pub(super) gui: bool,
@@ -40,7 +40,7 @@ impl Needs {
         };
         Self {
             priority: modules().map(priority).max().unwrap_or(0),
-            memory: modules().map(|module| module.memory()).sum(),
+            memory: installation.memory_on(&node.name),
             gui: !installation.gui.show.is_empty(),
             bridge: modules().find_map(|module| bridge_of(installation, module)),
             processes: modules().count(),
@@ -94,6 +94,15 @@ pub(super) struct Bridge {
 pub(super) struct NodeFound {
     pub(super) path: PathBuf,
     pub(super) seen: NodeDirectory,
+    pub(super) streams: StreamsFound,
+}
+
+/// The streams in a node's directory.
+#[derive(Default)]
+pub(super) struct StreamsFound {
+    pub(super) number: usize,
+    /// Memory that they take.
+    pub(super) bytes: u64,
 }
 
 /// What is in a node's directory.
@@ -115,11 +124,9 @@ impl Machine {
     pub(super) fn this(needs: &Needs, lan: Option<LanView>, protection: Protection) -> Self {
         let base = base_directory();
         let program = |name| find_program(name, Path::new("."), &beside());
-        // The first launch creates the directory; until then its future place counts.
-        let there = base.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
         let asked = KernelFacts {
             fifo: try_fifo(needs.priority),
-            room: sys::room(there).ok(),
+            room: room_of_nodes(&base),
             nodes: nodes(&base),
             bridge: bridge(&base, needs.bridge.clone().or_else(|| program(BRIDGE))),
             viewer: program("rerun"),
@@ -180,6 +187,12 @@ impl Machine {
     }
 }
 
+/// Room of the file system of all nodes. The first launch creates their directory; until then its future place counts.
+pub(crate) fn room_of_nodes(base: &Path) -> Option<Room> {
+    let there = base.ancestors().find(|path| path.exists()).unwrap_or(Path::new("/"));
+    sys::room(there).ok()
+}
+
 /// A limit of the kernel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Limit {
@@ -198,7 +211,16 @@ fn try_fifo(priority: u8) -> Result<(), String> {
 }
 
 fn nodes(base: &Path) -> Vec<NodeFound> {
-    directories(base).into_iter().map(|path| NodeFound { seen: seen(&path), path }).collect()
+    directories(base).into_iter().map(|path| NodeFound { seen: seen(&path), streams: streams(&path), path }).collect()
+}
+
+/// Without those that cannot be read.
+fn streams(path: &Path) -> StreamsFound {
+    let Ok(node) = Node::open(path) else { return StreamsFound::default() };
+    let all = node.streams().unwrap_or_default().into_iter();
+    let sizes: Vec<u64> =
+        all.filter_map(|id| Some(node.inspect_stream(id).ok()??.shape.segment_bytes() as u64)).collect();
+    StreamsFound { number: sizes.len(), bytes: saturating_sum(sizes) }
 }
 
 fn directories(base: &Path) -> Vec<PathBuf> {

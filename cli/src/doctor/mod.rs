@@ -13,6 +13,7 @@ mod security;
 
 use crate::terminal::{Failure, say};
 use finding::{Finding, Grade};
+pub(super) use machine::room_of_nodes;
 use machine::{Machine, Needs};
 use protection::Protection;
 use rohrpost::launch::choose_node;

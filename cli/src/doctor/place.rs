@@ -1,11 +1,12 @@
 //! The directory where a node would be created, its limits, and what exists there already.
 
 use super::finding::{Finding, Grade};
-use super::machine::{Bridge, Machine, Needs, NodeDirectory};
-use rohrpost_config::size_text;
+use super::machine::{Bridge, Machine, Needs, NodeDirectory, StreamsFound};
+use crate::units::size;
 use std::path::Path;
 
-/// Room for tools, and for mailboxes that modules create at run time, bytes.
+/// Room for tools, for mailboxes that modules create at run time, and for streams that the configuration does not name,
+/// bytes.
 const SPARE: u64 = 16 << 20;
 /// Size of the smallest node: its own pages, an output module, and one tool.
 const LEAST: u64 = 2 << 20;
@@ -20,15 +21,6 @@ pub(super) fn findings(machine: &Machine, needs: &Needs) -> Vec<Finding> {
     found.extend(gui(machine, needs));
     found.push(systemd(machine));
     found
-}
-
-/// A size in its largest unit, with at most one decimal.
-pub(super) fn size(bytes: u64) -> String {
-    let (unit, one) = [("GiB", 1u64 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)]
-        .into_iter()
-        .find(|(_, one)| bytes >= *one)
-        .unwrap_or(("B", 1));
-    if bytes.is_multiple_of(one) { size_text(bytes) } else { format!("{:.1} {unit}", bytes as f64 / one as f64) }
 }
 
 /// A mount point, and its file system type.
@@ -62,8 +54,10 @@ impl Mount {
 }
 
 fn file_system(machine: &Machine) -> Option<Finding> {
-    let (what, why) =
-        ("node directory", "mailboxes are files there; on any other file system the kernel writes them to a disk");
+    let (what, why) = (
+        "node directory",
+        "mailboxes and streams are files there; on any other file system the kernel writes them to a disk",
+    );
     let mount = mount(machine)?;
     let is = format!("{} ({})", machine.asked.base.display(), mount.kind);
     if mount.is_memory() {
@@ -73,7 +67,7 @@ fn file_system(machine: &Machine) -> Option<Finding> {
 }
 
 fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
-    let (what, why) = ("shared memory", "a mailbox takes all of its memory when it is created");
+    let (what, why) = ("shared memory", "mailboxes and streams take all of their memory when they are made");
     let mount = mount(machine);
     let Some(room) = machine.asked.room else {
         let fix = match &mount {
@@ -83,7 +77,7 @@ fn room(machine: &Machine, needs: &Needs) -> Option<Finding> {
         return Some(Finding::not(Grade::Warn, what, "its size is unknown", why, fix));
     };
     let needed = match &needs.from {
-        Some(file) => format!("; {} needs {} for its mailboxes", file.display(), size(needs.memory)),
+        Some(file) => format!("; {} needs {} for its mailboxes and streams", file.display(), size(needs.memory)),
         None => String::new(),
     };
     let is = format!("{} free of {}{needed}", size(room.free), size(room.bytes));
@@ -210,11 +204,14 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
     let why = "a node of this user, launched by this computer or left by a crash";
     let finding = |node: &super::machine::NodeFound| {
         let (what, path) = ("node", node.path.display());
+        let streams = streams(&node.streams);
         match &node.seen {
-            NodeDirectory::Launched(pid) => Finding::ok(what, format!("{path}: launched by process {pid}"), why),
-            NodeDirectory::InUse => Finding::ok(what, format!("{path}: in use, without a launch"), why),
+            NodeDirectory::Launched(pid) => {
+                Finding::ok(what, format!("{path}: launched by process {pid}{streams}"), why)
+            }
+            NodeDirectory::InUse => Finding::ok(what, format!("{path}: in use, without a launch{streams}"), why),
             NodeDirectory::Dead => {
-                Finding::not(Grade::Warn, what, format!("{path}: no process uses it"), why, "rohrpost clean")
+                Finding::not(Grade::Warn, what, format!("{path}: no process uses it{streams}"), why, "rohrpost clean")
             }
             NodeDirectory::OtherVersion(version) => Finding::not(
                 Grade::Warn,
@@ -232,6 +229,15 @@ fn nodes(machine: &Machine) -> Vec<Finding> {
         }
     };
     machine.asked.nodes.iter().map(finding).collect()
+}
+
+/// The streams of a node, behind what else is said of it.
+fn streams(found: &StreamsFound) -> String {
+    match found.number {
+        0 => String::new(),
+        1 => format!("; 1 stream takes {}", size(found.bytes)),
+        number => format!("; {number} streams take {}", size(found.bytes)),
+    }
 }
 
 fn gui(machine: &Machine, needs: &Needs) -> Vec<Finding> {

@@ -2,6 +2,7 @@
 
 use super::finding::{Finding, Grade};
 use super::machine::{Limit, Machine, Needs};
+use crate::units::size;
 use rohrpost_config::FIFO_MAX;
 
 /// Bit of CAP_SYS_NICE.
@@ -65,7 +66,7 @@ fn memory_lock(machine: &Machine) -> Option<Finding> {
         Limit::Of(bytes) => {
             let fix = "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/rohrpost.conf, and log \
                 in anew; in a container: `--ulimit memlock=-1`";
-            Finding::not(Grade::Warn, what, format!("at most {}", super::place::size(bytes)), why, fix)
+            Finding::not(Grade::Warn, what, format!("at most {}", size(bytes)), why, fix)
         }
     })
 }

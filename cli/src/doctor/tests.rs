@@ -1,7 +1,7 @@
 //! Output of `doctor` for recorded computers and networks.
 
 use super::lan::{LanView, PeerNode, Port, PortState, Reach, Stamps};
-use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound};
+use super::machine::{Bridge, KernelFacts, NodeDirectory, NodeFound, StreamsFound};
 use super::protection::{LanProtection, Tcp};
 use super::*;
 use rohrpost_mailbox::{LAYOUT_VERSION, sys::Room};
@@ -89,12 +89,17 @@ fn open() -> Protection {
     Protection { lan: Some(LanProtection::Open), tcp: Some(Tcp::Open) }
 }
 
+/// A node with so many streams of 68 MiB.
+fn node(path: &str, seen: NodeDirectory, number: usize) -> NodeFound {
+    NodeFound { path: path.into(), seen, streams: StreamsFound { number, bytes: number as u64 * (68 << 20) } }
+}
+
 fn good() -> (KernelFacts, Needs) {
     let asked = KernelFacts {
         fifo: Ok(()),
         base: "/dev/shm/rohrpost-1000".into(),
         room: Some(Room { bytes: 8 << 30, free: 7 << 30 }),
-        nodes: vec![NodeFound { path: "/dev/shm/rohrpost-1000/arm.main".into(), seen: NodeDirectory::Launched(812) }],
+        nodes: vec![node("/dev/shm/rohrpost-1000/arm.main", NodeDirectory::Launched(812), 2)],
         bridge: Some(Bridge { path: "/opt/rohrpost/rohrpost-gui-bridge".into(), pid: Some(820) }),
         viewer: Some("/usr/local/bin/rerun".into()),
         lan: Some(lan_that_works()),
@@ -110,8 +115,8 @@ fn bad() -> (KernelFacts, Needs) {
         base: "/home/robot/nodes".into(),
         room: Some(Room { bytes: 64 << 20, free: 1 << 20 }),
         nodes: vec![
-            NodeFound { path: "/home/robot/nodes/demo.main".into(), seen: NodeDirectory::Dead },
-            NodeFound { path: "/home/robot/nodes/old.main".into(), seen: NodeDirectory::OtherVersion(99) },
+            node("/home/robot/nodes/demo.main", NodeDirectory::Dead, 1),
+            node("/home/robot/nodes/old.main", NodeDirectory::OtherVersion(99), 0),
         ],
         bridge: None,
         viewer: None,

@@ -11,16 +11,42 @@ use std::process::ExitCode;
 /// Rohrpost's sources that this command was built from; they contain the library.
 const BUILT_FROM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// The project's files: path and content, with `{{…}}` for placeholders.
-const FILES: [(&str, &str); 7] = [
+/// A file of the project: its path, and its content with `{{…}}` for placeholders.
+type Template = (&'static str, &'static str);
+
+/// The files that all projects have.
+const COMMON: [Template; 3] = [
     ("Cargo.toml", include_str!("template/Cargo.toml.in")),
     (".gitignore", include_str!("template/gitignore.in")),
-    ("README.md", include_str!("template/README.md.in")),
-    ("robot.toml", include_str!("template/robot.toml.in")),
-    ("src/lib.rs", include_str!("template/lib.rs.in")),
     ("src/main.rs", include_str!("template/main.rs.in")),
-    ("tests/module.rs", include_str!("template/module.rs.in")),
 ];
+
+/// What the module does before its author changes it.
+struct Kind {
+    /// What the project is, for the user.
+    text: &'static str,
+    files: [Template; 4],
+}
+
+const COUNTER: Kind = Kind {
+    text: "a module that counts",
+    files: [
+        ("README.md", include_str!("template/README.md.in")),
+        ("robot.toml", include_str!("template/robot.toml.in")),
+        ("src/lib.rs", include_str!("template/lib.rs.in")),
+        ("tests/module.rs", include_str!("template/module.rs.in")),
+    ],
+};
+
+const CAMERA: Kind = Kind {
+    text: "a camera that draws its pictures",
+    files: [
+        ("README.md", include_str!("template/camera/README.md.in")),
+        ("robot.toml", include_str!("template/camera/robot.toml.in")),
+        ("src/lib.rs", include_str!("template/camera/lib.rs.in")),
+        ("tests/module.rs", include_str!("template/camera/module.rs.in")),
+    ],
+};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:
@@ -29,6 +55,9 @@ const FILES: [(&str, &str); 7] = [
 pub(super) struct Arguments {
     /// The module's class, which names the project too: lower-case letters, digits and `-`.
     name: String,
+    /// Begin with a camera: pictures of 1920 by 1080 pixels in a stream.
+    #[arg(long)]
+    camera: bool,
     /// Folder of the project; default: NAME in the present folder.
     #[arg(long, value_name = "DIR")]
     path: Option<PathBuf>,
@@ -50,13 +79,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(format!("{}: {error}; name another folder with --path DIR", folder.display()).into()),
     }
-    for (file, template) in FILES {
+    let kind = if arguments.camera { CAMERA } else { COUNTER };
+    for (file, template) in COMMON.iter().chain(&kind.files) {
         write(&folder.join(file), &fill(template, &name, &rohrpost))?;
     }
-    let shown = folder.display();
+    let (shown, text) = (folder.display(), kind.text);
     say(format_args!(
-        "made {shown}: a module that counts, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost \
-        launch robot.toml\n\n\
+        "made {shown}: {text}, its test, and a configuration\n\n  cd {shown}\n  cargo build && rohrpost launch \
+         robot.toml\n\n\
          README.md there says how to go on."
     ));
     Ok(ExitCode::SUCCESS)
@@ -99,7 +129,7 @@ mod tests {
     #[test]
     fn the_template_has_no_placeholders_left_and_a_valid_configuration() {
         let name: ModuleName = "wind-vane".parse().unwrap();
-        for (file, template) in FILES {
+        for (file, template) in COMMON.into_iter().chain(COUNTER.files).chain(CAMERA.files) {
             let text = fill(template, &name, "/opt/rohrpost");
             assert!(!text.contains("{{"), "{file}: {text}");
             if file == "robot.toml" {
@@ -107,5 +137,11 @@ mod tests {
                 assert_eq!(installation.modules.len(), 2);
             }
         }
+    }
+
+    #[test]
+    fn a_camera_has_at_most_sixty_lines() {
+        let (_, module) = CAMERA.files.into_iter().find(|(file, _)| *file == "src/lib.rs").unwrap();
+        assert!(module.lines().count() <= 60, "{}", module.lines().count());
     }
 }

@@ -3,15 +3,17 @@
 use crate::target::{Running, Target};
 use crate::terminal::Failure;
 use rohrpost::Name;
+use rohrpost::description::noted;
 use rohrpost::output::plain;
+use rohrpost::schema::{DataItem, Description};
 use rohrpost_mailbox::{StreamError, StreamId, StreamInfo};
 
 #[derive(clap::Args)]
 pub(super) struct StreamChoice {
     /// Module of the stream, such as camera.0.
     stream: String,
-    /// Number of the stream, as `rohrpost stream list` shows it.
-    number: u16,
+    /// The stream: its name, such as image, or its number; `rohrpost stream list` shows both.
+    item: String,
     #[command(flatten)]
     target: Target,
 }
@@ -20,10 +22,12 @@ pub(super) struct StreamChoice {
 pub(super) struct ChosenStream {
     pub(super) running: Running,
     pub(super) id: StreamId,
+    /// What its module's description says of it; none without a description of this number.
+    pub(super) item: Option<DataItem>,
 }
 
 /// The selected node, which must run on this computer.
-pub(super) fn node_here(target: &Target) -> Result<Running, Failure> {
+fn node_here(target: &Target) -> Result<Running, Failure> {
     let running = target.find()?;
     let far = match running.shown()[..] {
         [only] if only != running.node_name => Some(only.to_owned()),
@@ -45,8 +49,7 @@ pub(super) fn stream_text(running: &Running, id: StreamId) -> String {
 }
 
 /// An error about a stream, with its name as people type it.
-pub(super) fn stream_failure(running: &Running, id: StreamId, error: &StreamError) -> Failure {
-    let text = stream_text(running, id);
+pub(super) fn stream_failure(running: &Running, id: StreamId, text: &str, error: &StreamError) -> Failure {
     match error {
         StreamError::Owned { module, pid, .. } => {
             let writer = writer_text((*module != Name::NONE).then(|| running.text(*module)).as_deref(), Some(*pid));
@@ -56,7 +59,7 @@ pub(super) fn stream_failure(running: &Running, id: StreamId, error: &StreamErro
             )
             .into()
         }
-        error => plain::line(&error.to_string().replace(&id.to_string(), &text)).into(),
+        error => plain::line(&error.to_string().replace(&id.to_string(), text)).into(),
     }
 }
 
@@ -79,17 +82,57 @@ impl StreamChoice {
             )
             .into());
         }
-        Ok(ChosenStream { id: StreamId { name, number: self.number }, running })
+        let description = noted(&running.node, name);
+        let (number, item) = find_item(&self.stream, &self.item, description.as_ref())?;
+        Ok(ChosenStream { id: StreamId { name, number }, item, running })
     }
 }
 
+/// The number of the stream that is named by its name or number, and what the description says of it.
+fn find_item(stream: &str, text: &str, description: Option<&Description>) -> Result<(u16, Option<DataItem>), Failure> {
+    let mut items = description.into_iter().flat_map(Description::streams);
+    if let Ok(number) = text.parse() {
+        return Ok((number, items.find(|item| item.number == number).cloned()));
+    }
+    if let Some(item) = items.find(|item| item.field.name == text) {
+        return Ok((item.number, Some(item.clone())));
+    }
+    let Some(description) = description else {
+        return Err(format!(
+            "{stream} has left no description here, so what `{text}` is, is not known; name the stream by its number: \
+             `rohrpost stream list` lists all"
+        )
+        .into());
+    };
+    let names: Vec<&str> = description.streams().map(|item| item.field.name.as_str()).collect();
+    Err(match (description.data_item(text), &names[..]) {
+        (Some(_), _) => {
+            format!("`{text}` of {stream} is data and no stream; `rohrpost echo {stream} {text}` prints it")
+        }
+        (None, []) => {
+            format!("{stream} describes no streams; name one by its number: `rohrpost stream list` lists all")
+        }
+        (None, _) => format!("{stream} has no stream `{text}`; it has: {}", names.join(", ")),
+    }
+    .into())
+}
+
+/// What a module's description says of its stream.
+pub(super) fn item_of(running: &Running, id: StreamId) -> Option<DataItem> {
+    noted(&running.node, id.name)?.streams().find(|item| item.number == id.number).cloned()
+}
+
 impl ChosenStream {
+    /// As people type it, by its name where that is known.
     pub(super) fn text(&self) -> String {
-        stream_text(&self.running, self.id)
+        match &self.item {
+            Some(item) => format!("{} {}", self.running.text(self.id.name), item.field.name),
+            None => stream_text(&self.running, self.id),
+        }
     }
 
     pub(super) fn failure(&self, error: &StreamError) -> Failure {
-        stream_failure(&self.running, self.id, error)
+        stream_failure(&self.running, self.id, &self.text(), error)
     }
 
     /// The stream as it is now, if there is one.
@@ -126,10 +169,49 @@ pub(crate) fn completed_names(target: &Target) -> Vec<String> {
     names.into_iter().map(|name| running.text(name)).collect()
 }
 
-/// Numbers of the streams of the module that one of these words names, for completions.
-pub(crate) fn completed_numbers(target: &Target, words: &[String]) -> Vec<String> {
+/// Streams of the module that one of these words names, for completions: by name, with a text, where that is known.
+pub(crate) fn completed_items(target: &Target, words: &[String]) -> Vec<(String, String)> {
     let Ok(running) = target.find() else { return Vec::new() };
     let named = words.iter().find_map(|word| running.installation.classes.parse_name(word).ok());
     let all = running.node.streams().unwrap_or_default();
-    all.iter().filter(|id| Some(id.name) == named).map(|id| id.number.to_string()).collect()
+    let item = |id: &StreamId| match item_of(&running, *id) {
+        Some(item) => (item.field.name, item.field.text),
+        None => (id.number.to_string(), String::new()),
+    };
+    all.iter().filter(|id| Some(id.name) == named).map(item).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rohrpost::schema::{DataKind, Field, Type};
+
+    #[test]
+    fn a_stream_is_named_by_its_name_or_its_number() {
+        let item = |number, kind, name: &str| DataItem { number, kind, field: Field::new(name, Type::F64) };
+        let (motion, image) = (item(1, DataKind::Data, "motion"), item(2, DataKind::Stream, "image"));
+        let about = |data: &[&DataItem]| Description {
+            name: "Camera".into(),
+            class: "camera".into(),
+            text: String::new(),
+            functions: Vec::new(),
+            data: data.iter().copied().cloned().collect(),
+        };
+        let camera = about(&[&motion, &image]);
+        let find = |text, about| find_item("camera.0", text, about).map_err(|error| error.to_string());
+        assert_eq!(find("image", Some(&camera)), Ok((2, Some(image.clone()))));
+        assert_eq!(find("2", Some(&camera)), Ok((2, Some(image))));
+        // Data of this number is none of the stream that somebody wrote by hand.
+        assert_eq!((find("1", Some(&camera)), find("7", None)), (Ok((1, None)), Ok((7, None))));
+        for (text, about, words) in [
+            ("imege", Some(&camera), "camera.0 has no stream `imege`; it has: image"),
+            ("motion", Some(&camera), "data and no stream; `rohrpost echo camera.0 motion` prints it"),
+            ("image", Some(&about(&[&motion])), "describes no streams; name one by its number"),
+            ("image", None, "camera.0 has left no description here"),
+            ("70000", None, "camera.0 has left no description here"),
+        ] {
+            let told = find(text, about).unwrap_err();
+            assert!(told.contains(words), "{text}: {told}");
+        }
+    }
 }

@@ -1,9 +1,12 @@
 //! `stream list` and `stream info`.
 
-use super::choice::{StreamChoice, node_here, stream_failure};
-use super::view::{StreamView, print_stream, print_streams};
-use crate::target::Target;
+use super::choice::{StreamChoice, stream_failure, stream_text};
+use super::view::{StreamView, name_items, print_stream, print_streams, stream_views};
+use crate::list::{NodeLine, node_lines};
+use crate::observer::Silence;
+use crate::target::{Running, Target};
 use crate::terminal::{Failure, say};
+use rohrpost::survey::{Scope, StreamSurvey};
 use rohrpost_mailbox::monotonic_ns;
 use serde::Serialize;
 use std::process::ExitCode;
@@ -29,51 +32,61 @@ pub(super) struct InfoArguments {
 #[derive(Serialize)]
 struct StreamListing<'a> {
     installation: &'a str,
+    /// The node that the tool runs on.
     node: &'a str,
+    nodes: Vec<NodeLine>,
     streams: Vec<StreamView>,
-    /// Files that are no stream, or not ours.
+    /// Files of that node that are no stream, or not ours.
     unreadable: Vec<String>,
 }
 
 pub(super) fn list(arguments: &ListArguments) -> Result<ExitCode, Failure> {
-    let running = node_here(&arguments.target)?;
-    let mut listing = StreamListing {
+    let running = arguments.target.find()?;
+    let (survey, silent) = running.survey(Scope::Streams)?;
+    let nodes = running.shown();
+    let mut streams = stream_views(&running.installation, &survey.streams);
+    name_items(&running, &mut streams);
+    let listing = StreamListing {
         installation: &running.installation.name,
         node: &running.node_name,
-        streams: Vec::new(),
-        unreadable: Vec::new(),
+        nodes: node_lines(&nodes, &silent),
+        streams,
+        unreadable: if nodes.contains(&&*running.node_name) { unreadable(&running)? } else { Vec::new() },
     };
-    for id in running.node.streams()? {
-        match running.node.inspect_stream(id) {
-            Ok(Some(info)) => {
-                listing.streams.push(StreamView::new(&info, monotonic_ns(), |name| running.text(name)));
-            }
-            // Removed meanwhile.
-            Ok(None) => {}
-            Err(error) => listing.unreadable.push(stream_failure(&running, id, &error).to_string()),
-        }
-    }
     if arguments.json {
         say(serde_json::to_string(&listing)?);
         return Ok(ExitCode::SUCCESS);
     }
-    let StreamListing { installation, node, streams, unreadable } = &listing;
+    let StreamListing { installation, streams, unreadable, .. } = &listing;
+    let several = nodes.len() > 1;
+    let (noun, have) = if several { ("nodes", "have") } else { ("node", "has") };
+    let whole = format!("{noun} {} of {installation}", nodes.join(", "));
     if streams.is_empty() {
-        say(format_args!("node {node} of {installation} has no streams"));
+        say(format_args!("{whole} {have} no streams"));
     } else {
-        say(format_args!("node {node} of {installation}\n\n{}", print_streams(streams).trim_end()));
+        say(format_args!("{whole}\n\n{}", print_streams(streams, several).trim_end()));
     }
-    if !unreadable.is_empty() {
-        say(format_args!("\n{}", unreadable.join("\n")));
+    let notes: Vec<String> = silent.iter().map(Silence::text).chain(unreadable.iter().cloned()).collect();
+    if !notes.is_empty() {
+        say(format_args!("\n{}", notes.join("\n")));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Why streams of the node that the tool runs on are not listed.
+fn unreadable(running: &Running) -> Result<Vec<String>, Failure> {
+    let all = running.node.streams()?.into_iter();
+    let failed = all.filter_map(|id| Some((id, running.node.inspect_stream(id).err()?)));
+    let told = |(id, error)| stream_failure(running, id, &stream_text(running, id), &error).to_string();
+    Ok(failed.map(told).collect())
 }
 
 pub(super) fn info(arguments: &InfoArguments) -> Result<ExitCode, Failure> {
     let chosen = arguments.stream.find()?;
     let info = chosen.inspect()?;
-    let view = StreamView::new(&info, monotonic_ns(), |name| chosen.running.text(name));
-    let node = &chosen.running.node_name;
-    say(if arguments.json { serde_json::to_string(&view)? } else { print_stream(&view, node) });
+    let seen = StreamSurvey { node: chosen.running.node_name.clone(), at_ns: monotonic_ns(), info };
+    let item = chosen.item.as_ref().map(|item| item.field.name.clone());
+    let view = StreamView::new(&seen, item, |name| chosen.running.text(name));
+    say(if arguments.json { serde_json::to_string(&view)? } else { print_stream(&view) });
     Ok(ExitCode::SUCCESS)
 }

@@ -1,27 +1,36 @@
 //! `rohrpost stream`: streams of records, seen from outside, read, and written by hand.
 //!
-//! A stream lies in the shared memory of its node, so these tools run on the computer of that node. `list` and `info`
-//! take no reader's seat; `read` takes one. What the bytes mean is not known here.
+//! A stream lies in the shared memory of its node, so these tools run on the computer of that node; of other nodes
+//! `list` shows what their launches see. `list` and `info` take no reader's seat; `read` and `interp` take one. What
+//! the bytes mean is in the description that the module which writes has left beside its mailbox; without one they are
+//! told as they are.
 
+mod between;
 mod choice;
+mod interp;
 mod list;
+mod moment;
 mod output;
 mod read;
+mod refusal;
 mod stamp;
 mod view;
 mod write;
 
 use crate::terminal::Failure;
-pub(super) use choice::{completed_names, completed_numbers};
+pub(super) use choice::{completed_items, completed_names};
+pub(super) use stamp::{parse_stamp, stamp_text};
 use std::process::ExitCode;
+pub(super) use view::{StreamView, name_items, print_streams, stream_views};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost stream list                                  all streams of this node
-  rohrpost stream info camera.0 1                       all that is known of one
-  rohrpost stream read camera.0 1                       its newest record
-  rohrpost stream read camera.0 1 --at 1700000000.25    the two records around a time
-  rohrpost stream write camera.0 1 a.jpg b.jpg --delay 0.1")]
+  rohrpost stream list                                       the streams of all nodes
+  rohrpost stream info camera.0 image                        all that is known of one
+  rohrpost stream read odometry.0 odometry                   its newest record
+  rohrpost stream read odometry.0 odometry --at -1.5s        the two records around a time
+  rohrpost stream interp odometry.0 odometry --at -1.5s      the value at that time
+  rohrpost stream write camera.0 40 a.jpg b.jpg --delay 0.1")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     action: StreamCommand,
@@ -29,12 +38,14 @@ pub(super) struct Arguments {
 
 #[derive(clap::Subcommand)]
 enum StreamCommand {
-    /// List the streams of a node; disturbs nobody.
+    /// List the streams of all nodes, or of one; disturbs nobody.
     List(list::ListArguments),
     /// Show one stream: its writer, readers and limits; disturbs nobody.
     Info(list::InfoArguments),
     /// Print records: the newest, the next ones, or the two around a time.
     Read(read::ReadArguments),
+    /// Print the value at a time, interpolated between the two records around it, or why there is none.
+    Interp(interp::InterpArguments),
     /// Write files, each as a record; refused while a module writes.
     Write(write::WriteArguments),
 }
@@ -44,6 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         StreamCommand::List(arguments) => list::list(arguments),
         StreamCommand::Info(arguments) => list::info(arguments),
         StreamCommand::Read(arguments) => read::run(arguments),
+        StreamCommand::Interp(arguments) => interp::run(arguments),
         StreamCommand::Write(arguments) => write::run(arguments),
     }
 }

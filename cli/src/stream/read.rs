@@ -1,26 +1,24 @@
 //! `stream read`.
 
 use super::choice::{ChosenStream, StreamChoice};
+use super::moment::{StreamMoment, parse_moment};
 use super::output::{RecordForm, RecordOutput};
-use super::stamp::{parse_stamp, stamp_text};
-use crate::terminal::{Failure, say};
-use crate::units::{Stop, seconds};
+use super::refusal::around_or_refusal;
+use crate::terminal::Failure;
+use crate::units::{LOOK, Stop, seconds};
 use rohrpost::Name;
-use rohrpost_mailbox::{Around, Next, Participant, RecordInfo, Stamp, StreamInfo, StreamReader};
+use rohrpost_mailbox::{Next, Participant, Stamp, StreamInfo, StreamReader};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Longest sleep without a check for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
-
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  rohrpost stream read camera.0 1                        the newest record
-  rohrpost stream read camera.0 1 --next 10              the next ten that are written
-  rohrpost stream read camera.0 1 --from 0               all from a sequence on that are there
-  rohrpost stream read camera.0 1 --at 1700000000.25     the two around a time, or why not
-  rohrpost stream read camera.0 1 --raw newest.jpg
+  rohrpost stream read odometry.0 odometry                  the newest record
+  rohrpost stream read odometry.0 odometry --next 10        the next ten that are written
+  rohrpost stream read odometry.0 odometry --from 0         all from a sequence on that are there
+  rohrpost stream read odometry.0 odometry --at -1.5s       the two around a time, or why not
+  rohrpost stream read camera.0 image --raw newest.postcard
 Takes a reader's seat while it runs; the writer waits for no reader.")]
 pub(super) struct ReadArguments {
     #[command(flatten)]
@@ -31,9 +29,11 @@ pub(super) struct ReadArguments {
     /// Read from this sequence on; without --next, to the newest.
     #[arg(long, value_name = "SEQUENCE")]
     from: Option<u64>,
-    /// Read the two records around this time: seconds of system time, as stamps are printed.
-    #[arg(long, value_name = "STAMP", value_parser = parse_stamp, conflicts_with_all = ["next", "from"])]
-    at: Option<u64>,
+    /// Read the two records around this time: a stamp as they are printed, or ns since 1970, or from the newest record
+    /// on, such as -1.5s.
+    #[arg(long, value_name = "TIME", value_parser = parse_moment, allow_hyphen_values = true,
+        conflicts_with_all = ["next", "from"])]
+    at: Option<StreamMoment>,
     /// Epoch of that time; default: that of the newest record.
     #[arg(long, requires = "at")]
     epoch: Option<u64>,
@@ -43,10 +43,13 @@ pub(super) struct ReadArguments {
     /// Write the bytes of records, one after the other, into this file; `-`: print them, and nothing else.
     #[arg(long, value_name = "FILE")]
     raw: Option<PathBuf>,
-    /// Print at most this many bytes of a record as hex; 0 prints all.
-    #[arg(long, default_value_t = 64, value_name = "N")]
+    /// Print bytes as they are, as hex, also where the description of the module tells what they mean.
+    #[arg(long)]
+    hex: bool,
+    /// Print at most this many bytes as hex: of a record, in JSON of a field of bytes; 0 prints all.
+    #[arg(long, default_value_t = RecordForm::BYTES_MAX, value_name = "N")]
     bytes: usize,
-    /// One JSON object a record, with all of its bytes.
+    /// One JSON object a record, with its value; without a description, with all of its bytes.
     #[arg(long)]
     json: bool,
 }
@@ -54,14 +57,15 @@ pub(super) struct ReadArguments {
 pub(super) fn run(arguments: &ReadArguments) -> Result<ExitCode, Failure> {
     let chosen = arguments.stream.find()?;
     let info = chosen.inspect()?;
-    let form = if arguments.json { RecordForm::Json } else { RecordForm::Line { bytes_max: arguments.bytes } };
+    let form = RecordForm::new(arguments.json, arguments.bytes);
     let participant = Participant::join(&chosen.running.node, Name::NONE)?;
     let reader = participant.stream_reader(chosen.id).map_err(|error| chosen.failure(&error))?;
     // Last: a file is made anew only when there is a stream to read.
-    let output = RecordOutput::open(form, arguments.raw.as_deref())?;
+    let ty = chosen.item.as_ref().filter(|_| !arguments.hex).map(|item| item.field.ty.clone());
+    let output = RecordOutput::open(form, ty, arguments.raw.as_deref())?;
     let mut reading = StreamReading { arguments, chosen, info, reader, body: Vec::new(), output };
     match (arguments.at, arguments.next, arguments.from) {
-        (Some(at_ns), ..) => reading.around(at_ns),
+        (Some(at), ..) => reading.around(at),
         (None, None, None) => reading.newest(),
         (None, wanted, from) => reading.follow(wanted, from),
     }
@@ -133,21 +137,17 @@ impl StreamReading<'_> {
     }
 
     /// The two records around a time, or why not.
-    fn around(&mut self, ns: u64) -> Result<ExitCode, Failure> {
-        let newest_epoch = self.info.newest.map_or(0, |newest| newest.stamp.epoch);
-        let at = Stamp { epoch: self.arguments.epoch.unwrap_or(newest_epoch), ns };
+    fn around(&mut self, at: StreamMoment) -> Result<ExitCode, Failure> {
+        let newest = self.info.newest.map_or(Stamp { epoch: 0, ns: 0 }, |newest| newest.stamp);
+        let at = at.stamp(newest, self.arguments.epoch);
         let answer = self.reader.around(at).map_err(|error| self.chosen.failure(&error))?;
-        match refusal(at, &answer) {
+        match around_or_refusal(at, &answer) {
             Ok((before, after)) => {
                 self.side("before", before.sequence)?;
                 self.side("after", after.sequence)?;
                 Ok(ExitCode::SUCCESS)
             }
-            Err(refusal) if self.arguments.json => {
-                say(serde_json::to_string(&refusal)?);
-                Ok(ExitCode::FAILURE)
-            }
-            Err(refusal) => Err(format!("stream {}: {}", self.chosen.text(), refusal.text).into()),
+            Err(refusal) => refusal.told(&self.chosen.text(), self.arguments.json),
         }
     }
 
@@ -158,84 +158,5 @@ impl StreamReading<'_> {
         };
         self.output.record(Some(side), &record, &self.body)?;
         Ok(())
-    }
-}
-
-/// Why there are no two records around a time.
-#[derive(Debug, serde::Serialize)]
-struct AroundRefusal {
-    answer: &'static str,
-    by_ns: Option<u64>,
-    newest_epoch: Option<u64>,
-    text: String,
-}
-
-/// The two records around a time; or why not, and how far it is.
-fn refusal(at: Stamp, answer: &Around) -> Result<(RecordInfo, RecordInfo), AroundRefusal> {
-    let refused = |answer, by_ns, newest_epoch, text| Err(AroundRefusal { answer, by_ns, newest_epoch, text });
-    match *answer {
-        Around::Records { before, after } => Ok((before, after)),
-        Around::Empty => refused("empty", None, None, "nothing was written yet".into()),
-        Around::BeforeOldest { by_ns } => {
-            let first = stamp_text(at.ns.saturating_add(by_ns));
-            let text =
-                format!("the record before that time is not there; the first time with two around it is {first}");
-            refused("before oldest", Some(by_ns), None, text)
-        }
-        Around::NotYet { by_ns } => {
-            let by = stamp_text(by_ns);
-            let text = format!("not yet: nearer records may come until stamps are at most {by} s further");
-            refused("not yet", Some(by_ns), None, text)
-        }
-        Around::OtherEpoch { newest } => {
-            let text = format!(
-                "no two records of epoch {} are around that time, and none will be; the newest record is of epoch \
-                 {newest}, see --epoch",
-                at.epoch
-            );
-            refused("other epoch", None, Some(newest), text)
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn each_answer_that_is_no_record_says_exactly_why() {
-        let at = Stamp { epoch: 3, ns: 2_000_000_000 };
-        for (answer, words) in [
-            (Around::Empty, "nothing was written yet"),
-            (
-                Around::BeforeOldest { by_ns: 5 },
-                "the record before that time is not there; the first time with two around it is 2.000000005",
-            ),
-            (
-                Around::NotYet { by_ns: 1_500_000_000 },
-                "not yet: nearer records may come until stamps are at most 1.500000000 s further",
-            ),
-            (
-                Around::OtherEpoch { newest: 4 },
-                "no two records of epoch 3 are around that time, and none will be; the newest record is of epoch 4, \
-                 see --epoch",
-            ),
-        ] {
-            assert_eq!(refusal(at, &answer).unwrap_err().text, words, "{answer:?}");
-        }
-    }
-
-    #[test]
-    fn the_two_records_are_handed_on() {
-        let record = |sequence| RecordInfo {
-            sequence,
-            stamp: Stamp { epoch: 3, ns: 1 },
-            written_ns: 1,
-            len_bytes: 0,
-            incarnation: 1,
-        };
-        let answer = Around::Records { before: record(4), after: record(5) };
-        let (before, after) = refusal(Stamp { epoch: 3, ns: 1 }, &answer).unwrap();
-        assert_eq!((before.sequence, after.sequence), (4, 5));
     }
 }

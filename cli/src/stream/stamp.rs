@@ -4,12 +4,12 @@ const BILLION: u64 = 1_000_000_000;
 const DECIMALS: usize = 9;
 
 /// Nanoseconds as seconds.
-pub(super) fn stamp_text(ns: u64) -> String {
+pub(crate) fn stamp_text(ns: u64) -> String {
     format!("{}.{:09}", ns / BILLION, ns % BILLION)
 }
 
 /// Reads seconds, with at most nine decimals.
-pub(super) fn parse_stamp(text: &str) -> Result<u64, String> {
+pub(crate) fn parse_stamp(text: &str) -> Result<u64, String> {
     let wrong = || "write seconds, with at most nine decimals, such as 1700000000.25".to_owned();
     let (seconds, decimals) = text.split_once('.').unwrap_or((text, "0"));
     let is_number = |digits: &str| !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_digit());

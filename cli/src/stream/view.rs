@@ -1,19 +1,27 @@
 //! What is known of a stream, as programs read it and as people do.
 
-use super::choice::writer_text;
+use super::choice::{item_of, writer_text};
 use super::stamp::stamp_text;
-use crate::table::{table, time};
+use crate::table::{table_of, time};
+use crate::target::Running;
 use crate::units::{bytes, short};
 use rohrpost::Name;
-use rohrpost_mailbox::{RecordInfo, StreamInfo};
+use rohrpost::survey::StreamSurvey;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{RecordInfo, StreamId};
 use serde::Serialize;
 use std::time::Duration;
 
 /// A stream.
 #[derive(Serialize)]
-pub(super) struct StreamView {
+pub(crate) struct StreamView {
+    node: String,
+    #[serde(skip)]
+    id: StreamId,
     stream: String,
     number: u16,
+    /// Its name; none without a description of its module on the node that the tool runs on.
+    item: Option<String>,
     record_bytes: u32,
     keep: u32,
     late_s: f64,
@@ -76,13 +84,17 @@ impl WriterView {
 }
 
 impl StreamView {
-    /// At this time of the monotonic clock; `name` writes names as people read them.
-    pub(super) fn new(info: &StreamInfo, now_ns: u64, name: impl Fn(Name) -> String) -> Self {
+    /// `item` is the name of the stream; `name` writes names of modules as people read them.
+    pub(super) fn new(seen: &StreamSurvey, item: Option<String>, name: impl Fn(Name) -> String) -> Self {
+        let StreamSurvey { node, at_ns, info } = seen;
         let shape = &info.shape;
-        let record = |record: &RecordInfo| RecordView::new(record, now_ns);
+        let record = |record: &RecordInfo| RecordView::new(record, *at_ns);
         Self {
+            node: node.clone(),
+            id: info.id,
             stream: name(info.id.name),
             number: info.id.number,
+            item,
             record_bytes: shape.record_bytes,
             keep: shape.keep,
             late_s: shape.late.as_secs_f64(),
@@ -105,25 +117,46 @@ impl StreamView {
     }
 }
 
-/// Streams, one a line.
-pub(super) fn print_streams(streams: &[StreamView]) -> String {
+/// Streams as people and programs read them.
+pub(crate) fn stream_views(installation: &Installation, streams: &[StreamSurvey]) -> Vec<StreamView> {
+    streams.iter().map(|seen| StreamView::new(seen, None, |name| installation.classes.format(name))).collect()
+}
+
+/// Names the streams of the node that the tool runs on, where descriptions of their modules tell the names.
+pub(crate) fn name_items(running: &Running, streams: &mut [StreamView]) {
+    for stream in streams.iter_mut().filter(|stream| stream.node == running.node_name) {
+        stream.item = item_of(running, stream.id).map(|item| item.field.name);
+    }
+}
+
+/// Streams, one a line; those of several nodes each with its node.
+pub(crate) fn print_streams(streams: &[StreamView], several: bool) -> String {
+    let heads = [
+        "node", "stream", "item", ">number", ">records", ">readers", "writer", ">written", ">refused", ">newest",
+        ">memory",
+    ];
+    let first = usize::from(!several);
     let rows = streams.iter().map(|stream| {
-        [
+        let row = [
+            stream.node.clone(),
             stream.stream.clone(),
+            stream.item.clone().unwrap_or_else(|| "-".into()),
             stream.number.to_string(),
             format!("{} x {} B", stream.keep, stream.record_bytes),
             format!("{} of {}", stream.readers, stream.readers_max),
             stream.writer.as_ref().filter(|writer| writer.alive).map_or("nobody".into(), WriterView::text),
             stream.written.to_string(),
+            stream.refused.to_string(),
             stream.newest.as_ref().map_or("none".into(), |newest| format!("{} ago", short(newest.age_s))),
             bytes(stream.memory_bytes as f64),
-        ]
+        ];
+        row[first..].to_vec()
     });
-    table(["stream", ">number", ">records", ">readers", "writer", ">written", ">newest", ">memory"], rows)
+    table_of(&heads[first..], rows)
 }
 
 /// All that is known of one stream.
-pub(super) fn print_stream(stream: &StreamView, node: &str) -> String {
+pub(super) fn print_stream(stream: &StreamView) -> String {
     let writer = match &stream.writer {
         None => "nobody yet".into(),
         Some(writer) if writer.alive => writer.text(),
@@ -151,13 +184,14 @@ pub(super) fn print_stream(stream: &StreamView, node: &str) -> String {
         ("adoptions", stream.adoptions.to_string()),
     ];
     let facts: String = facts.iter().map(|(what, text)| format!("\n  {what:10}  {text}")).collect();
-    format!("stream {} {}, node {node}\n{facts}", stream.stream, stream.number)
+    let item = stream.item.as_ref().map_or(String::new(), |item| format!(", {item}"));
+    format!("stream {} {}{item}, node {}\n{facts}", stream.stream, stream.number, stream.node)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rohrpost_mailbox::{Party, Stamp, StreamId, StreamShape};
+    use rohrpost_mailbox::{Party, Stamp, StreamInfo, StreamShape};
 
     const NOW_NS: u64 = 5_000_000_000;
 
@@ -185,7 +219,9 @@ mod tests {
     }
 
     fn view(info: &StreamInfo) -> StreamView {
-        StreamView::new(info, NOW_NS, |_| "camera.0".into())
+        let seen = StreamSurvey { node: "main".into(), at_ns: NOW_NS, info: info.clone() };
+        let item = (info.id.number == 7).then(|| "image".into());
+        StreamView::new(&seen, item, |_| "camera.0".into())
     }
 
     #[test]
@@ -193,26 +229,28 @@ mod tests {
         let mut empty = StreamInfo { writer: None, written: 0, newest: None, oldest: None, readers: 0, ..info(true) };
         empty.id.number = 8;
         assert_eq!(
-            print_streams(&[view(&info(true)), view(&info(false)), view(&empty)]),
+            print_streams(&[view(&info(true)), view(&info(false)), view(&empty)], false),
             "\
-stream    number      records  readers  writer                  written     newest    memory
-camera.0       7  64 x 1024 B   2 of 8  camera.0, process 4711      100  30 ms ago  90.11 kB
-camera.0       7  64 x 1024 B   2 of 8  nobody                      100  30 ms ago  90.11 kB
-camera.0       8  64 x 1024 B   0 of 8  nobody                        0       none  90.11 kB
+stream    item   number      records  readers  writer                  written  refused     newest    memory
+camera.0  image       7  64 x 1024 B   2 of 8  camera.0, process 4711      100        2  30 ms ago  94.21 kB
+camera.0  image       7  64 x 1024 B   2 of 8  nobody                      100        2  30 ms ago  94.21 kB
+camera.0  -           8  64 x 1024 B   0 of 8  nobody                        0        2       none  94.21 kB
 "
         );
+        let several = print_streams(&[view(&empty)], true);
+        assert!(several.starts_with("node  stream") && several.contains("\nmain  camera.0"), "{several}");
     }
 
     #[test]
     fn one_stream_is_told_with_all_that_is_known() {
         assert_eq!(
-            print_stream(&view(&info(false)), "main"),
-            "stream camera.0 7, node main
+            print_stream(&view(&info(false))),
+            "stream camera.0 7, image, node main
 
   writer      nobody; the last was camera.0, process 4711
   readers     2 of 8 seats in use; 1 hold a record, 1 sleep
   keeps       64 records of at most 1024 B
-  memory      90112 B
+  memory      94208 B
   late        a stamp may be 50 ms behind the newest
   written     100
   refused     2
@@ -221,7 +259,7 @@ camera.0       8  64 x 1024 B   0 of 8  nobody                        0       no
   adoptions   1"
         );
         let strict = StreamInfo { shape: StreamShape::default(), writer: None, ..info(true) };
-        let told = print_stream(&view(&strict), "main");
+        let told = print_stream(&view(&strict));
         assert!(told.contains("writer      nobody yet\n"), "{told}");
         assert!(told.contains("late        a stamp behind the newest is refused\n"), "{told}");
     }

@@ -1,4 +1,4 @@
-//! The page about one module: its process, its mailboxes with their waiting times, and its interface.
+//! The page about one module: its process, its mailboxes with their waiting times, its streams, and its interface.
 
 use super::super::call::usage;
 use super::super::list::mailbox_lines;
@@ -9,7 +9,7 @@ use super::model::{FlowEnd, Model, Row, Sample};
 use rohrpost::Name;
 use rohrpost::output::plain;
 use rohrpost::schema::{Description, describe_field, describe_result};
-use rohrpost::survey::sum;
+use rohrpost::survey::{StreamSurvey, sum};
 use rohrpost_config::{Installation, Program};
 use rohrpost_mailbox::{LATENCY_BUCKETS, Latency, MailboxInfo};
 use std::time::Duration;
@@ -28,13 +28,12 @@ pub(super) fn page(
     let mut lines = vec![format!("{}: {}", row.line.module, row.line.account.state)];
     lines.extend(indented(&about(installation, sample, row)));
     let module = sample.survey.module(name);
-    let own = |mailbox: &&MailboxInfo| {
-        module.is_some_and(|module| {
-            let of = mailbox.name.module();
-            of == module.name || module.aliases.contains(&of)
-        })
+    let is_own = |name: Name| {
+        let of = name.module();
+        module.is_some_and(|module| of == module.name || module.aliases.contains(&of))
     };
-    let mailboxes: Vec<MailboxInfo> = sample.survey.mailboxes.iter().filter(own).cloned().collect();
+    let mailboxes = sample.survey.mailboxes.iter().filter(|mailbox| is_own(mailbox.name));
+    let mailboxes: Vec<MailboxInfo> = mailboxes.cloned().collect();
     if !mailboxes.is_empty() {
         lines.extend(["".into(), "mailboxes".into()]);
         lines.extend(indented(&mailbox_table(installation, &mailboxes)));
@@ -46,6 +45,11 @@ pub(super) fn page(
             let name = class.class.and_then(|id| installation.classes.name(id)).unwrap_or("others");
             lines.extend(histogram(name, &class.latency));
         }
+    }
+    let streams: Vec<_> = sample.survey.streams.iter().filter(|stream| is_own(stream.info.id.name)).collect();
+    if !streams.is_empty() {
+        lines.extend(["".into(), "streams".into()]);
+        lines.extend(indented(&stream_table(installation, &streams)));
     }
     lines.extend(peers("sends to", &row.sends_to));
     lines.extend(peers("receives from", &row.receives_from));
@@ -123,6 +127,22 @@ fn mailbox_table(installation: &Installation, mailboxes: &[MailboxInfo]) -> Stri
         ]
     });
     table(["", ">slots", "when full", ">waiting", ">received", "lost"], rows)
+}
+
+/// Narrower than that of `list`, too.
+fn stream_table(installation: &Installation, streams: &[&StreamSurvey]) -> String {
+    let rows = streams.iter().map(|StreamSurvey { info, .. }| {
+        let shape = &info.shape;
+        [
+            format!("{} {}", installation.classes.format(info.id.name.module()), info.id.number),
+            format!("{} x {} B", shape.keep, shape.record_bytes),
+            format!("{} of {}", info.readers, shape.readers),
+            info.written.to_string(),
+            info.refused.to_string(),
+            memory(shape.segment_bytes() as f64),
+        ]
+    });
+    table(["", ">records", ">readers", ">written", ">refused", ">memory"], rows)
 }
 
 /// The modules that it exchanges packages with, and the amounts.

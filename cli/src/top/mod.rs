@@ -92,5 +92,7 @@ fn once(running: &Running, interval: Duration) -> Result<Model, Failure> {
         tool.close();
         now = sample::put_together(running, seen, Some(&earlier), &said);
     }
-    Ok(Model::new(&running.installation, &running.node_name, &running.shown(), &now, Some(&earlier)))
+    let mut model = Model::new(&running.installation, &running.node_name, &running.shown(), &now, Some(&earlier));
+    super::stream::name_items(running, &mut model.streams);
+    Ok(model)
 }

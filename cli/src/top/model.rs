@@ -2,6 +2,7 @@
 
 use super::super::list::{MailboxLine, mailbox_lines};
 use super::super::observer::Silence;
+use super::super::stream::{StreamView, stream_views};
 use super::super::summary::{Losses, ModuleLine};
 use rohrpost::Name;
 use rohrpost::survey::{ModuleSurvey, Standing, Survey};
@@ -72,6 +73,7 @@ pub(super) struct Model {
     pub(super) lost_per_s: Option<f64>,
     pub(super) modules: Vec<Row>,
     pub(super) mailboxes: Vec<MailboxLine>,
+    pub(super) streams: Vec<StreamView>,
 }
 
 /// A module.
@@ -167,6 +169,7 @@ impl Model {
             lost_per_s: since.map(|(before, interval)| lost_since(before, interval)),
             modules,
             mailboxes: mailbox_lines(installation, &now.survey.mailboxes),
+            streams: stream_views(installation, &now.survey.streams),
         }
     }
 

@@ -256,3 +256,25 @@ fn a_reader_that_waits_in_vain_can_be_called_off() {
     });
     assert!(order.is_none());
 }
+
+#[test]
+fn large_pictures_stay_within_the_bound_and_the_newest_is_drawn() {
+    let store = Store::new(Duration::ZERO);
+    let side = 3300;
+    let picture = |second: i64| {
+        let pixels = vec![second as u8; side * side * 3];
+        row(second, &rerun::Image::from_rgb24(pixels, [side as u32, side as u32]))
+    };
+    for second in 0..6 {
+        for camera in ["a", "b", "c"] {
+            store.put(camera.into(), picture(second));
+            assert!(store.lock().bytes <= ENTITIES_BYTES_MAX, "{second}");
+        }
+        if second == 3 {
+            assert!(!due(&store).is_empty());
+        }
+    }
+    let newest = due(&store);
+    assert!(!newest.is_empty() && newest.iter().all(|(_, second)| *second == 5), "{newest:?}");
+    assert!(store.counts().dropped > 0, "three do not fit");
+}

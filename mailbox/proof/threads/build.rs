@@ -1,5 +1,6 @@
-//! Writes the slot core once as it is and once per broken variant, each beside the runs. What is broken stands in the
-//! tables of the models (`../loom/src/broken`), so that a change of the core is followed in one place.
+//! Writes the slot core and the core of streams once as they are and once per broken variant, each beside its runs.
+//! What is broken stands in the tables of the models (`../loom/src/broken`, `stream_broken.rs`), so that a change of a
+//! core is followed in one place.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,15 +11,44 @@ use std::{env, fs};
 mod broken;
 #[path = "src/caught.rs"]
 mod caught;
+#[allow(dead_code)]
+#[path = "../loom/src/stream_broken.rs"]
+mod stream_broken;
 
-use broken::{BROKEN, Edit};
-use caught::CAUGHT;
+use broken::{Broken, Edit};
+use caught::{CAUGHT, STREAM_CAUGHT};
 
-const CORE: [&str; 8] = ["word", "full", "hot", "bodies", "slots", "queue", "bell", "cell"];
-const OURS: [&str; 2] = ["rig", "runs"];
+/// Files of this crate; the others are the mailbox's.
+const OURS: [&str; 3] = ["rig", "runs", "stream_rig"];
+
+/// A part of the mailbox that is proved by itself.
+struct Proof {
+    /// The module of the source as it is.
+    real: &'static str,
+    /// What a variant consists of; the last file has the runs.
+    parts: &'static [&'static str],
+    broken: &'static [&'static [Broken]],
+    /// Variants that must be reported, each with its run.
+    caught: &'static [(&'static str, &'static str)],
+}
+
+const PROOFS: [Proof; 2] = [
+    Proof {
+        real: "real",
+        parts: &["word", "full", "hot", "bodies", "slots", "queue", "bell", "cell", "rig", "runs"],
+        broken: broken::BROKEN,
+        caught: CAUGHT,
+    },
+    Proof {
+        real: "real_stream",
+        parts: &["stream/ring", "stream/writing", "stream_rig"],
+        broken: &[stream_broken::BROKEN],
+        caught: STREAM_CAUGHT,
+    },
+];
 
 fn main() {
-    for read in ["src", "../loom/src/broken", "../../src"] {
+    for read in ["src", "../loom/src/broken", "../loom/src/stream_broken.rs", "../../src"] {
         println!("cargo:rerun-if-changed={read}");
     }
     let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
@@ -33,37 +63,48 @@ fn main() {
 
 fn generate(out: &Path) -> String {
     fs::write(out.join("name.rs"), plain(&source("name"))).expect("OUT_DIR can be written");
-    let mut modules = variant(out, "real", &[]);
-    let mut table = String::from("pub(crate) const BROKEN: &[(&str, &str, fn())] = &[\n");
-    for (name, run) in CAUGHT {
-        let broken = BROKEN.iter().copied().flatten().find(|broken| broken.name == *name);
-        let broken = broken.unwrap_or_else(|| panic!("caught.rs names {name}, which ../loom/src/broken has no more"));
-        modules.push_str(&variant(out, name, broken.edits));
-        writeln!(table, "({name:?}, {run:?}, {name}::runs::{run}),").expect("a String takes all");
+    let (mut modules, mut table) =
+        (String::new(), String::from("pub(crate) const BROKEN: &[(&str, &str, fn())] = &[\n"));
+    for proof in &PROOFS {
+        let runs = last(proof.parts.last().expect("a proof has runs"));
+        modules.push_str(&variant(out, proof.parts, proof.real, &[]));
+        for (name, run) in proof.caught {
+            let broken = proof.broken.iter().copied().flatten().find(|broken| broken.name == *name);
+            let broken = broken.unwrap_or_else(|| panic!("caught.rs names {name}, which ../loom/src has no more"));
+            modules.push_str(&variant(out, proof.parts, name, broken.edits));
+            writeln!(table, "({name:?}, {run:?}, {name}::{runs}::{run}),").expect("a String takes all");
+        }
     }
     modules + &table + "];\n"
 }
 
 /// Writes the files of a variant, and returns its module.
-fn variant(out: &Path, name: &str, edits: &[Edit]) -> String {
+fn variant(out: &Path, parts: &[&str], name: &str, edits: &[Edit]) -> String {
     fs::create_dir_all(out.join(name)).expect("OUT_DIR can be written");
     let mut module = format!("pub(crate) mod {name} {{\n");
-    for part in CORE.iter().chain(&OURS) {
+    for part in parts {
         let mut text = plain(&source(part));
         for edit in edits.iter().filter(|edit| edit.file == *part) {
             let found = text.matches(edit.from).count();
             assert_eq!(found, 1, "variant {name}: {part}.rs must have this once, not {found} times:\n{}", edit.from);
             text = text.replacen(edit.from, edit.to, 1);
         }
-        for part in CORE.iter().chain(&OURS) {
-            text = text.replace(&format!("crate::{part}::"), &format!("super::{part}::"));
+        for part in parts {
+            text = text.replace(&format!("crate::{}::", part.replace('/', "::")), &format!("super::{}::", last(part)));
         }
+        let part = last(part);
         let path = out.join(name).join(part).with_extension("rs");
         fs::write(&path, text).expect("OUT_DIR can be written");
         writeln!(module, "pub(crate) mod {part} {{ include!({path:?}); }}").expect("a String takes all");
     }
-    assert!(edits.iter().all(|edit| CORE.contains(&edit.file)), "variant {name}: edits what is not of the core");
+    let is_of_core = |edit: &Edit| parts.contains(&edit.file) && !OURS.contains(&edit.file);
+    assert!(edits.iter().all(is_of_core), "variant {name}: edits what is not of the core");
     module + "}\n"
+}
+
+/// The name of a part's module: that of its file.
+fn last(part: &str) -> &str {
+    part.rsplit('/').next().unwrap_or(part)
 }
 
 fn source(part: &str) -> String {

@@ -3,7 +3,7 @@
 use crate::files::{is_lack_of_descriptors, is_lack_of_memory};
 use crate::name::Name;
 use crate::node::NodeError;
-use crate::owned::BadSegment;
+use crate::owned::{BadFile, BadSegment};
 use crate::stream::shape::{StreamId, StreamShapeError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -64,7 +64,7 @@ pub enum StreamError {
     File(StreamId, PathBuf, io::Error),
     /// Its file is something else.
     #[error("stream {0}: {1}")]
-    Bad(StreamId, String),
+    Bad(StreamId, BadFile),
     /// The node cannot be used.
     #[error(transparent)]
     Node(#[from] NodeError),
@@ -85,7 +85,7 @@ impl StreamError {
     pub(crate) fn of_bad(file: &Path, id: StreamId, why: BadSegment) -> Self {
         match why {
             BadSegment::Io(source) => Self::of(file, id, 0, source),
-            why => Self::Bad(id, why.to_string()),
+            BadSegment::File(why) => Self::Bad(id, why),
         }
     }
 }

@@ -21,5 +21,5 @@ pub use inspect::StreamInfo;
 pub use reader::StreamReader;
 pub use record::{Around, HeldRecord, Next, RecordInfo};
 pub use ring::{STREAM_READERS_MAX, Stamp};
-pub use shape::{StreamId, StreamShape, StreamShapeError};
+pub use shape::{STREAM_KEEP_MAX, StreamId, StreamShape, StreamShapeError};
 pub use writer::{OpenRecord, StreamWriter};

@@ -4,7 +4,7 @@ use crate::participant::Participant;
 use crate::stream::error::StreamError;
 use crate::stream::lookup::{self, Answer};
 use crate::stream::record::{Around, HeldRecord, Next, RecordInfo, TakenSeat};
-use crate::stream::ring::{Line, Look, Ring, Stamp, TRIES};
+use crate::stream::ring::{Line, Look, Ring, SEQUENCE_MAX, Stamp, TRIES};
 use crate::stream::shape::{StreamId, StreamShape};
 use crate::waiting::{self, Waiting, steps::Steps};
 use std::sync::Arc;
@@ -61,9 +61,36 @@ impl StreamReader {
         self.next
     }
 
-    /// Goes on from this sequence. What is there no more counts as lost.
+    /// Goes on from this sequence, at most 2^56: no stream comes to more. What is there no more counts as lost.
     pub fn seek(&mut self, sequence: u64) {
-        self.next = sequence;
+        self.next = sequence.min(SEQUENCE_MAX);
+    }
+
+    /// Passes over all that was written until now; it counts neither as read nor as lost.
+    ///
+    /// ```
+    /// use rohrpost_mailbox::{Name, Next, Node, Participant, Stamp, StreamId, StreamShape};
+    /// # let dir = tempfile::tempdir()?;
+    /// let node = Node::create(&dir.path().join("node"), 0o700)?;
+    /// let participant = Participant::join(&node, Name::new(1, 200, 0, 0))?;
+    /// let id = StreamId { name: Name::new(1, 200, 0, 0), number: 1 };
+    /// let mut writer = participant.stream_writer(id, StreamShape::default())?;
+    /// let mut reader = participant.stream_reader(id)?;
+    /// writer.write(Stamp { epoch: 1, ns: 1_000 }, b"a picture")?;
+    /// reader.pass_over()?;
+    /// assert!(matches!(reader.try_next()?, Next::Nothing));
+    /// assert_eq!(reader.accounts(), (0, 0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`StreamReader::try_next`].
+    pub fn pass_over(&mut self) -> Result<(), StreamError> {
+        self.leave_retired()?;
+        if let Some(ring) = self.ring() {
+            self.next = self.next.max(ring.written());
+        }
+        Ok(())
     }
 
     /// Records read one after the other, and records lost on the way. Both are what was written since it began, less
@@ -194,7 +221,8 @@ impl StreamReader {
                     let oldest = ring.oldest_after(self.next);
                     let lost = oldest - self.next;
                     self.next = oldest;
-                    self.lost += lost;
+                    // Only damaged files and many jumps back come to so many.
+                    self.lost = self.lost.saturating_add(lost);
                     return Ok(Next::Lost(lost));
                 }
                 Look::NotYet => {}
@@ -268,18 +296,12 @@ impl StreamReader {
         if registry_epoch == self.registry_epoch {
             return Ok(false);
         }
-        let place = TakenSeat::take(&self.participant, self.id)?;
+        let place = TakenSeat::take(&self.participant, self.id, self.place.as_ref())?;
         self.registry_epoch = registry_epoch;
         let Some(place) = place else { return Ok(false) };
-        if let Some(old) = &self.place {
-            // The same again: its successor died before the new one had its name.
-            if place.segment.is_retired() {
-                return Ok(false);
-            }
-            // It was removed and made anew: what replaces a stream goes on with its sequence.
-            if place.ring().first() < old.ring().written() {
-                self.next = place.ring().first();
-            }
+        // It was removed and made anew: what replaces a stream goes on with its sequence.
+        if self.place.as_ref().is_some_and(|old| place.ring().first() < old.ring().written()) {
+            self.next = place.ring().first();
         }
         self.place = Some(place);
         Ok(true)

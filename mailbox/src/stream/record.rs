@@ -9,6 +9,7 @@ use crate::stream::ring::{Line, Ring, Stamp};
 use crate::stream::segment::{StreamSegment, path_of};
 use crate::stream::shape::StreamId;
 use std::io;
+use std::os::unix::fs::MetadataExt;
 
 /// What is said of a record, besides its bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -90,12 +91,17 @@ pub(crate) struct TakenSeat {
     pub(super) segment: StreamSegment,
     pub(super) seat: usize,
     /// Holds the seat's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
-    _lock: Held,
+    lock: Held,
 }
 
 impl TakenSeat {
-    /// None when there is no such stream.
-    pub(super) fn take(participant: &Participant, id: StreamId) -> Result<Option<Self>, StreamError> {
+    /// None when there is no such stream, or still the one of this seat: it was given up, and what replaces it has not
+    /// its name yet. A second seat there would be another reader's.
+    pub(super) fn take(
+        participant: &Participant,
+        id: StreamId,
+        instead_of: Option<&Self>,
+    ) -> Result<Option<Self>, StreamError> {
         let node = participant.node();
         let path = path_of(node.path(), id);
         let (segment, file) = match StreamSegment::open(node.path(), id) {
@@ -103,16 +109,24 @@ impl TakenSeat {
             Err(BadSegment::Io(error)) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(why) => return Err(StreamError::of_bad(&path, id, why)),
         };
+        let failed = |error| StreamError::of(&path, id, 0, error);
+        if let Some(old) = instead_of {
+            let [there, here] = [&file, &old.lock.file].map(|file| file.metadata().map_err(failed));
+            let (there, here) = (there?, here?);
+            if (there.dev(), there.ino()) == (here.dev(), here.ino()) {
+                return Ok(None);
+            }
+        }
         let readers = segment.shape.readers;
         // The first byte is the writer's.
         let lock = Held::try_take_first(file, 1..1 + u64::from(readers));
-        let Some(lock) = lock.map_err(|error| StreamError::of(&path, id, 0, error))? else {
+        let Some(lock) = lock.map_err(failed)? else {
             return Err(StreamError::Crowded { id, readers });
         };
         step!("seat: locked");
         let seat = lock.byte() as usize - 1;
         segment.ring().sit_down(seat);
-        Ok(Some(Self { segment, seat, _lock: lock }))
+        Ok(Some(Self { segment, seat, lock }))
     }
 
     pub(super) fn ring(&self) -> Ring<'_> {

@@ -44,6 +44,9 @@ const FRAME_BITS: u32 = 20;
 const FRAME: u64 = (1 << FRAME_BITS) - 1;
 /// Most frames of a stream.
 pub(crate) const FRAMES_MAX: usize = FRAME as usize;
+/// No stream comes to more records, in two thousand years of a million a second: a larger number is damage. So sums of
+/// sequences do not overflow.
+pub(crate) const SEQUENCE_MAX: u64 = 1 << 56;
 /// Most readers of a stream at a time.
 pub const STREAM_READERS_MAX: usize = 64;
 
@@ -93,6 +96,8 @@ pub(crate) struct About {
 /// An entry as it was read, whole.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Line {
+    /// Where its entry is.
+    at: usize,
     word: u64,
     pub(crate) sequence: u64,
     pub(crate) frame: usize,
@@ -103,6 +108,11 @@ impl Line {
     /// The greatest stamp of its epoch up to this record.
     pub(crate) fn newest_ns(&self) -> u64 {
         self.about.before_ns.max(self.about.stamp.ns)
+    }
+
+    /// The same, with the epoch.
+    pub(crate) fn reached(&self) -> Stamp {
+        Stamp { ns: self.newest_ns(), ..self.about.stamp }
     }
 }
 
@@ -136,14 +146,23 @@ pub(crate) struct Ring<'a> {
     /// The first sequence that was written here; those before it are in no ring any more.
     first: u64,
     entries: &'a [IndexEntry],
+    /// Of each entry the greatest stamp of its epoch up to it: a hint where to look by stamp, eight in a cache line.
+    /// Nothing is believed of it that the entry does not say as well.
+    reached_ns: &'a [AtomicU64],
     seats: &'a [Seat],
 }
 
 impl<'a> Ring<'a> {
-    /// There is at least one entry, and at most [`STREAM_READERS_MAX`] seats: both come from a checked shape.
+    /// There is at least one entry, a hint for each, and at most [`STREAM_READERS_MAX`] seats: all come from a checked
+    /// shape.
     #[inline]
-    pub(crate) fn new(written: &'a AtomicU64, first: u64, entries: &'a [IndexEntry], seats: &'a [Seat]) -> Self {
-        Self { written, first, entries, seats }
+    pub(crate) fn new(
+        written: &'a AtomicU64,
+        first: u64,
+        (entries, reached_ns): (&'a [IndexEntry], &'a [AtomicU64]),
+        seats: &'a [Seat],
+    ) -> Self {
+        Self { written, first, entries, reached_ns, seats }
     }
 
     /// Makes each entry one of a record that is gone. For a ring that nobody else sees yet.
@@ -172,14 +191,34 @@ impl<'a> Ring<'a> {
         self.seats
     }
 
+    fn at(&self, sequence: u64) -> usize {
+        (sequence % self.keep()) as usize
+    }
+
     pub(super) fn entry(&self, sequence: u64) -> &'a IndexEntry {
-        &self.entries[(sequence % self.keep()) as usize]
+        &self.entries[self.at(sequence)]
+    }
+
+    /// A record's entry and its hint, for the writer.
+    pub(super) fn place(&self, sequence: u64) -> (&'a IndexEntry, &'a AtomicU64) {
+        let at = self.at(sequence);
+        (&self.entries[at], &self.reached_ns[at])
+    }
+
+    /// The hints of a record and of less than `keep` after it, by sequence.
+    pub(super) fn hints_from(&self, low: u64) -> impl Fn(u64) -> u64 + use<'a> {
+        // One division for all of them.
+        let (hints, begin) = (self.reached_ns, self.at(low));
+        move |sequence| {
+            let at = begin + (sequence - low) as usize;
+            hints[if at < hints.len() { at } else { at - hints.len() }].load(Ordering::Relaxed)
+        }
     }
 
     /// Records ever written, in all rings of this stream. May be late by the one that is being written.
     pub(crate) fn written(&self) -> u64 {
         // ORDERING: Acquire; pairs with the store after publishing: the records that are counted are seen.
-        self.written.load(Ordering::Acquire)
+        self.written.load(Ordering::Acquire).min(SEQUENCE_MAX)
     }
 
     pub(super) fn count(&self, written: u64) {
@@ -191,7 +230,8 @@ impl<'a> Ring<'a> {
     /// What there is of a record.
     #[inline]
     pub(crate) fn look(&self, sequence: u64) -> Look {
-        let entry = self.entry(sequence);
+        let at = self.at(sequence);
+        let entry = &self.entries[at];
         // ORDERING: Acquire (B); pairs with (A): the entry, and the frame that it names, are whole.
         let word = entry.word.load(Ordering::Acquire);
         let frame = (word & FRAME) as usize;
@@ -214,7 +254,7 @@ impl<'a> Ring<'a> {
             len_bytes: long(&entry.len_bytes),
             incarnation: long(&entry.incarnation) as u32,
         };
-        let line = Line { word, sequence, frame: frame - 1, about };
+        let line = Line { at, word, sequence, frame: frame - 1, about };
         if self.is_there(&line) { Look::There(line) } else { Look::Gone }
     }
 
@@ -224,7 +264,7 @@ impl<'a> Ring<'a> {
         // ORDERING (D): what was read of entry and frame before the second look at the word. Pairs with (C): the writer
         // begins the entry anew before it uses the frame again.
         fence(Ordering::Acquire);
-        self.entry(line.sequence).word.load(Ordering::Relaxed) == line.word
+        self.entries[line.at].word.load(Ordering::Relaxed) == line.word
     }
 
     /// Whether there is anything to say of a record but that it is not written yet.
@@ -247,8 +287,8 @@ impl<'a> Ring<'a> {
     pub(crate) fn oldest_after(&self, gone: u64) -> u64 {
         // The place of the gone record is the newer one's at least from when that was begun.
         let newer = ahead(self.entry(gone).word.load(Ordering::Relaxed), gone).max(0) as u64;
-        let end = gone.saturating_add(newer).saturating_add(1).max(self.written());
-        self.oldest_before(end).max(gone.saturating_add(1))
+        let end = (gone + newer + 1).min(SEQUENCE_MAX).max(self.written());
+        self.oldest_before(end).max(gone + 1)
     }
 
     /// The oldest record when this one is the next to be written.
@@ -266,7 +306,7 @@ impl<'a> Ring<'a> {
         // word has changed.
         fence(Ordering::SeqCst);
         step!("hold: said");
-        let held = self.entry(line.sequence).word.load(Ordering::Relaxed) == line.word;
+        let held = self.entries[line.at].word.load(Ordering::Relaxed) == line.word;
         if !held {
             self.release(seat);
         }
@@ -307,6 +347,15 @@ impl<'a> Ring<'a> {
 pub(super) const TRIES: usize = 8;
 
 impl IndexEntry {
+    /// The frame of the record of this sequence; none if this is another's entry, or its writer died over it. For the
+    /// writer, which alone changes it.
+    pub(super) fn frame(&self, sequence: u64, frames: usize) -> Option<u32> {
+        let word = self.word.load(Ordering::Relaxed);
+        // Of a damaged file any number is possible.
+        let frame = ((word & FRAME) as u32).checked_sub(1).filter(|frame| (*frame as usize) < frames);
+        frame.filter(|_| ahead(word, sequence) == 0)
+    }
+
     /// Makes this the entry of a record; the writer alone. The word is the last to be written.
     pub(super) fn write(&self, sequence: u64, frame: usize, about: &About) {
         self.word.store(word(sequence, None), Ordering::Relaxed);
@@ -325,8 +374,8 @@ impl IndexEntry {
             field.store(value, Ordering::Relaxed);
         }
         step!("entry: filled");
-        // ORDERING: Release (A); the entry and the frame are whole. Pairs with (B).
-        self.word.store(word(sequence, Some(frame)), Ordering::Release);
+        // ORDERING: Release (A); the entry and the frame are whole. Pairs with (B). SeqCst for (E).
+        self.word.store(word(sequence, Some(frame)), Ordering::SeqCst);
         step!("entry: published");
     }
 }

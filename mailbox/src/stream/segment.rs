@@ -4,12 +4,13 @@ use crate::files::open_shared;
 use crate::layout::PAGE;
 use crate::memory::{Located, Mapping, Pages, Rooms, Use};
 use crate::name::Name;
-use crate::owned::{BadSegment, Owned};
+use crate::owned::{BadFile, BadSegment, Owned};
 use crate::step::step;
 use crate::stream::bytes;
 use crate::stream::ring::{IndexEntry, Line, Ring, Seat};
 use crate::stream::shape::{StreamId, StreamIdentity, StreamPage, StreamShape};
 use crate::stream::writing::{Frame, Progress};
+use crate::sync::prefetch_to_write;
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
@@ -21,6 +22,7 @@ pub(crate) struct StreamSegment {
     page: Located<StreamPage>,
     seats: Located<[Seat]>,
     entries: Located<[IndexEntry]>,
+    hints: Located<[AtomicU64]>,
     /// All frames as words; none of a stream with records of plain memory.
     words: Located<[AtomicU64]>,
     frames: Rooms,
@@ -66,6 +68,7 @@ impl StreamSegment {
         Ok(Self {
             seats: seats.locate_slice(0, usize::from(shape.readers)),
             entries: index.locate_slice(0, shape.keep as usize),
+            hints: index.locate_slice(shape.hints_offset(), shape.keep as usize),
             words: frames.locate_slice(0, if shape.is_racing() { bytes / size_of::<u64>() } else { 0 }),
             frames: frames.rooms(0, shape.frame_bytes(), shape.frames()),
             first: page.identity.first.load(Ordering::Relaxed),
@@ -79,17 +82,21 @@ impl StreamSegment {
     fn identify(file: &File, id: StreamId) -> Result<StreamShape, BadSegment> {
         let there = file.metadata()?;
         if !there.is_file() || there.len() < PAGE as u64 {
-            return Err(BadSegment::Foreign(Self::WHAT));
+            return Err(BadFile::Foreign(Self::WHAT).into());
         }
         let mut first = [0; size_of::<StreamIdentity>()];
         file.read_exact_at(&mut first, 0)?;
         let identity = StreamIdentity::from_bytes(&first);
         if let Some(other) = identity.other_version() {
-            return Err(BadSegment::Version(other));
+            return Err(BadFile::Version(other).into());
         }
-        let (found, shape) = identity.read().ok_or(BadSegment::Foreign(Self::WHAT))?;
-        if found != id || there.len() < shape.segment_bytes() as u64 {
-            return Err(BadSegment::Foreign(Self::WHAT));
+        let (found, shape) = identity.read().ok_or(BadFile::Foreign(Self::WHAT))?;
+        if found != id {
+            return Err(BadFile::Misnamed(format!("{} {found}", Self::WHAT)).into());
+        }
+        let (what, there, whole) = (Self::WHAT, there.len(), shape.segment_bytes() as u64);
+        if there < whole {
+            return Err(BadFile::Cut { what, there, whole }.into());
         }
         Ok(shape)
     }
@@ -101,7 +108,7 @@ impl StreamSegment {
 
     #[inline]
     pub(crate) fn ring(&self) -> Ring<'_> {
-        Ring::new(&self.page.written.0, self.first, &self.entries, &self.seats)
+        Ring::new(&self.page.written.0, self.first, (&self.entries, &self.hints), &self.seats)
     }
 
     /// Whether nothing more is written here.
@@ -132,6 +139,12 @@ impl StreamSegment {
         }
     }
 
+    /// Asks for the beginning of a frame that is about to be filled.
+    #[inline]
+    pub(crate) fn expect(&self, frame: usize) {
+        prefetch_to_write(self.frames.room(frame).as_ptr());
+    }
+
     /// The bytes of a frame, to fill in place.
     ///
     /// # Panics
@@ -150,15 +163,16 @@ impl StreamSegment {
     /// Copies a record's bytes; false when it was overwritten, and then there are none. The seat is the caller's, and
     /// names no frame.
     pub(crate) fn copy(&self, seat: usize, line: &Line, into: &mut Vec<u8>) -> bool {
-        into.clear();
         let (ring, len) = (self.ring(), self.len(line));
         let copied = if self.shape.is_racing() {
+            // What is there is written over: a body of the same length needs nothing.
             into.resize(len, 0);
             bytes::load(self.words(line.frame), into);
             ring.is_there(line)
         } else {
             let held = ring.hold(seat, line);
             if held {
+                into.clear();
                 into.extend_from_slice(self.body(line));
                 ring.release(seat);
             }
@@ -170,12 +184,12 @@ impl StreamSegment {
         copied
     }
 
-    /// The bytes of a record that the caller holds.
+    /// The bytes of a record that the caller holds, or has written and is the only one to write over.
     pub(crate) fn body(&self, line: &Line) -> &[u8] {
         let body = self.frames.room(line.frame);
         // SAFETY: `len` stays inside the room, and the borrow of `self` keeps the map. The caller's seat names the
-        // frame since before the entry was seen to name it still (`Ring::hold`), so the writer goes round it: nobody
-        // writes these bytes. All bits are bytes.
+        // frame since before the entry was seen to name it still (`Ring::hold`), so the writer goes round it; or the
+        // caller borrows the writer (`StreamWriter::newest`). Nobody writes these bytes. All bits are bytes.
         unsafe { std::slice::from_raw_parts(body.as_ptr(), self.len(line)) }
     }
 }

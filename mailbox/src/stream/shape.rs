@@ -6,6 +6,7 @@
 //!   128  written     records ever written
 //!  4096  seats       one a reader, 128 B each, in pages of their own: readers write these alone
 //!     …  index       one entry a record that is kept, 64 B each; begins a page
+//!     …  hints       one a record that is kept, 8 B each: behind the index
 //!     …  frames      keep + readers + 1, each a multiple of 64 B; begins a page
 //! ```
 //!
@@ -14,7 +15,7 @@
 use crate::layout::{PAGE, VERSION};
 use crate::memory::Shared;
 use crate::name::Name;
-use crate::stream::ring::{FRAMES_MAX, IndexEntry, STREAM_READERS_MAX, Seat};
+use crate::stream::ring::{FRAMES_MAX, IndexEntry, SEQUENCE_MAX, STREAM_READERS_MAX, Seat};
 use std::fmt;
 use std::mem::offset_of;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -22,6 +23,8 @@ use std::time::Duration;
 
 /// `rohrring` in ASCII, little-endian.
 const MAGIC: u64 = u64::from_le_bytes(*b"rohrring");
+/// Most records that a stream keeps.
+pub const STREAM_KEEP_MAX: u32 = (FRAMES_MAX - STREAM_READERS_MAX - 1) as u32;
 /// Records up to this size are copied with atomics, and may be read while the writer goes on. Larger ones are held
 /// while they are copied: an atomic copy moves eight bytes at a time.
 pub(crate) const RACING_BYTES_MAX: usize = 4096;
@@ -69,15 +72,11 @@ pub enum StreamShapeError {
     #[error("records of 0 bytes; at least 1 is needed to write")]
     Record,
     /// Too few, or more than there can be.
-    #[error("keeps {0} records; a stream keeps 2 to {max}", max = keep_max())]
+    #[error("keeps {0} records; a stream keeps 2 to {STREAM_KEEP_MAX}")]
     Keep(u32),
     /// None, or more than there can be.
     #[error("{0} readers; a stream has 1 to {STREAM_READERS_MAX}")]
     Readers(u16),
-}
-
-const fn keep_max() -> usize {
-    FRAMES_MAX - STREAM_READERS_MAX - 1
 }
 
 impl StreamShape {
@@ -85,7 +84,7 @@ impl StreamShape {
         if self.record_bytes == 0 {
             return Err(StreamShapeError::Record);
         }
-        if self.keep < 2 || self.keep as usize > keep_max() {
+        if self.keep < 2 || self.keep > STREAM_KEEP_MAX {
             return Err(StreamShapeError::Keep(self.keep));
         }
         if self.readers == 0 || usize::from(self.readers) > STREAM_READERS_MAX {
@@ -115,8 +114,14 @@ impl StreamShape {
         PAGE + self.seats_bytes()
     }
 
+    /// Of the index and the hints behind it.
     pub(crate) fn index_bytes(&self) -> usize {
-        (self.keep as usize * size_of::<IndexEntry>()).next_multiple_of(PAGE)
+        (self.hints_offset() + self.keep as usize * size_of::<u64>()).next_multiple_of(PAGE)
+    }
+
+    /// In the index's part.
+    pub(crate) fn hints_offset(&self) -> usize {
+        self.keep as usize * size_of::<IndexEntry>()
     }
 
     pub(crate) fn frames_offset(&self) -> usize {
@@ -207,6 +212,9 @@ impl StreamIdentity {
             late: Duration::from_nanos(self.late_ns.load(Ordering::Relaxed)),
         };
         shape.check().ok()?;
+        if self.first.load(Ordering::Relaxed) > SEQUENCE_MAX {
+            return None;
+        }
         let number = self.number.load(Ordering::Relaxed).try_into().ok()?;
         Some((StreamId { name: Name::from_raw(self.name.load(Ordering::Relaxed)), number }, shape))
     }

@@ -9,7 +9,8 @@ use crate::owned::{self, Refused};
 use crate::participant::Participant;
 use crate::step::step;
 use crate::stream::error::{StreamError, WriteError};
-use crate::stream::ring::{About, Seat, Stamp};
+use crate::stream::record::RecordInfo;
+use crate::stream::ring::{About, Line, Look, Seat, Stamp};
 use crate::stream::segment::StreamSegment;
 use crate::stream::shape::{StreamId, StreamShape};
 use crate::stream::writing::{Frame, Progress};
@@ -65,12 +66,13 @@ impl Participant {
         })?;
         let obtained = owned::obtain::<StreamSegment>(node, id, shape, &registry);
         let (segment, lock) = obtained.map_err(|why| match why {
-            Refused::Owned(there) => {
-                let load = |word: &std::sync::atomic::AtomicU32| word.load(Ordering::Relaxed);
-                let says = there.as_ref().map(|there| &there.page().writer);
-                let module = says.map_or(Name::NONE, |says| Name::from_raw(load(&says.module)));
-                StreamError::Owned { id, module, pid: says.map_or(0, |says| load(&says.pid)) }
+            Refused::Owned(Ok(there)) => {
+                let says = &there.page().writer;
+                let module = Name::from_raw(says.module.load(Ordering::Relaxed));
+                StreamError::Owned { id, module, pid: says.pid.load(Ordering::Relaxed) }
             }
+            // A program of another version, mostly.
+            Refused::Owned(Err(why)) => StreamError::Bad(id, why),
             Refused::File(path, source) => StreamError::of(&path, id, shape.segment_bytes(), source),
         })?;
         step!("stream: owned");
@@ -129,7 +131,33 @@ impl StreamWriter {
     pub fn begin(&mut self, stamp: Stamp) -> Result<OpenRecord<'_>, WriteError> {
         self.check(stamp, 0)?;
         let frame = self.claim()?;
-        Ok(OpenRecord { writer: self, frame: Some(frame), stamp })
+        Ok(OpenRecord { open: Some((self, frame)), stamp })
+    }
+
+    /// The record that was written last, by this writer or one before it; none before the first. Only the writer could
+    /// put another in its place, and it is borrowed.
+    ///
+    /// ```
+    /// use rohrpost_mailbox::{Name, Node, Participant, Stamp, StreamId, StreamShape};
+    /// # let dir = tempfile::tempdir()?;
+    /// let node = Node::create(&dir.path().join("node"), 0o700)?;
+    /// let participant = Participant::join(&node, Name::new(1, 200, 0, 0))?;
+    /// let id = StreamId { name: Name::new(1, 200, 0, 0), number: 1 };
+    /// let mut writer = participant.stream_writer(id, StreamShape::default())?;
+    /// assert!(writer.newest().is_none());
+    /// writer.write(Stamp { epoch: 1, ns: 1_000 }, b"a picture")?;
+    /// assert_eq!(writer.newest().map(|(info, bytes)| (info.sequence, bytes)), Some((0, &b"a picture"[..])));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn newest(&self) -> Option<(RecordInfo, &[u8])> {
+        let last = self.progress.next().checked_sub(1)?;
+        let Look::There(line) = self.segment.ring().look(last) else { return None };
+        Some(self.seen(line))
+    }
+
+    /// A record that an entry names, as readers see it.
+    fn seen(&self, line: Line) -> (RecordInfo, &[u8]) {
+        (RecordInfo::of(&self.segment, &line), self.segment.body(&line))
     }
 
     fn check(&self, stamp: Stamp, len: usize) -> Result<(), WriteError> {
@@ -165,7 +193,8 @@ impl StreamWriter {
         };
         let participant = &self.participant;
         let wake = |seat: &Seat, sleeper| wake(participant, seat, sleeper);
-        self.progress.publish(&self.segment.ring(), frame, about, wake)
+        let expect = |frame| self.segment.expect(frame);
+        self.progress.publish(&self.segment.ring(), frame, about, expect, wake)
     }
 }
 
@@ -183,43 +212,50 @@ fn wake(participant: &Participant, seat: &Seat, sleeper: u64) {
 
 /// A record that is being filled in place; readers do not see it. Dropped, nothing happened.
 pub struct OpenRecord<'a> {
-    writer: &'a mut StreamWriter,
-    /// None once it is finished or given back.
-    frame: Option<Frame>,
+    /// None once it is finished.
+    open: Option<(&'a mut StreamWriter, Frame)>,
     stamp: Stamp,
 }
 
-impl OpenRecord<'_> {
+impl<'a> OpenRecord<'a> {
     /// The bytes to fill, as many as a record may have. What they are at first is not told.
     pub fn body_mut(&mut self) -> &mut [u8] {
-        match &mut self.frame {
-            Some(frame) if !self.writer.segment.shape.is_racing() => self.writer.segment.body_mut(frame),
-            _ => &mut self.writer.draft,
-        }
+        let Some((writer, frame)) = &mut self.open else { return &mut [] };
+        if writer.segment.shape.is_racing() { &mut writer.draft } else { writer.segment.body_mut(frame) }
     }
 
     /// Makes the first `len` bytes the next record; its sequence.
     ///
     /// # Errors
     /// [`WriteError::TooLarge`] when a record has not so many.
-    pub fn finish(mut self, len: usize) -> Result<u64, WriteError> {
-        let (id, max) = (self.writer.id(), self.writer.segment.shape.record_bytes as usize);
+    pub fn finish(self, len: usize) -> Result<u64, WriteError> {
+        self.finish_seen(len).map(|(sequence, _)| sequence)
+    }
+
+    /// The same; gives its bytes besides, as readers see them.
+    ///
+    /// # Errors
+    /// As for [`OpenRecord::finish`].
+    pub fn finish_seen(mut self, len: usize) -> Result<(u64, &'a [u8]), WriteError> {
+        // There from `begin` on until here.
+        let Some((writer, mut frame)) = self.open.take() else { unreachable!("it is finished once") };
+        let (id, max) = (writer.id(), writer.segment.shape.record_bytes as usize);
         if len > max {
+            writer.progress.give_back(frame);
             return Err(WriteError::TooLarge { id, len, max });
         }
-        let Some(mut frame) = self.frame.take() else { return Err(WriteError::Damaged(id)) };
-        let writer = &mut *self.writer;
         if writer.segment.shape.is_racing() {
             writer.segment.fill(&mut frame, &writer.draft[..len]);
         }
-        Ok(writer.publish(frame, self.stamp, len))
+        let sequence = writer.publish(frame, self.stamp, len);
+        Ok((sequence, writer.newest().map_or(&[], |(_, bytes)| bytes)))
     }
 }
 
 impl Drop for OpenRecord<'_> {
     fn drop(&mut self) {
-        if let Some(frame) = self.frame.take() {
-            self.writer.progress.give_back(frame);
+        if let Some((writer, frame)) = self.open.take() {
+            writer.progress.give_back(frame);
         }
     }
 }

@@ -9,7 +9,7 @@
 
 use crate::step::step;
 use crate::stream::ring::{About, Look, Ring, STREAM_READERS_MAX, Seat, Stamp};
-use crate::sync::{Ordering, fence};
+use crate::sync::{Ordering, fence, prefetch_to_write, seq_cst_accesses};
 
 /// What the writer knows.
 #[derive(Debug)]
@@ -71,14 +71,17 @@ impl Progress {
 
     /// A frame to fill. There always is one: a seat names one frame at most, and is looked at once.
     pub(crate) fn claim(&mut self, ring: &Ring<'_>) -> Option<Frame> {
-        let mut held = [0; STREAM_READERS_MAX];
-        for (held, seat) in held.iter_mut().zip(ring.seats()) {
-            // ORDERING: Acquire (I); pairs with (H): a reader that held a frame has read it.
-            *held = seat.hold.load(Ordering::Acquire);
+        // ORDERING: Acquire (I); pairs with (H): a reader that held a frame has read it. SeqCst for (E).
+        let held = |seat: &Seat| seat.hold.load(Ordering::SeqCst);
+        // The last to become free is the nearest in the caches, and mostly nobody holds it.
+        let last = self.free.last()? + 1;
+        if ring.seats().iter().all(|seat| held(seat) != last) {
+            return self.free.pop().map(Frame);
         }
-        let held = &held[..ring.seats().len()];
-        // The last to become free is the nearest in the caches.
-        let at = self.free.iter().rposition(|frame| !held.contains(&(frame + 1)))?;
+        let mut all_held = [0; STREAM_READERS_MAX];
+        all_held.iter_mut().zip(ring.seats()).for_each(|(into, seat)| *into = held(seat));
+        let all_held = &all_held[..ring.seats().len()];
+        let at = self.free.iter().rposition(|frame| !all_held.contains(&(frame + 1)))?;
         Some(Frame(self.free.swap_remove(at)))
     }
 
@@ -87,35 +90,39 @@ impl Progress {
         self.free.push(frame.0);
     }
 
-    /// Makes a filled frame the next record, and calls `wake` for each seat that says that its reader sleeps.
-    /// `about.before_ns` is written here.
+    /// Makes a filled frame the next record, and calls `wake` for each seat that says that its reader sleeps; `expect`
+    /// before, for the frame that the next record will mostly have. `about.before_ns` is written here.
     pub(crate) fn publish(
         &mut self,
         ring: &Ring<'_>,
         frame: Frame,
         about: About,
+        expect: impl Fn(usize),
         mut wake: impl FnMut(&Seat, u64),
     ) -> u64 {
         let sequence = self.next;
         let before_ns = self.newest.filter(|newest| newest.epoch == about.stamp.epoch).map_or(0, |newest| newest.ns);
-        // The record that loses its entry, unless its writer died over it.
-        let old = match sequence.checked_sub(ring.keep()).map(|old| ring.look(old)) {
-            Some(Look::There(line)) => Some(line.frame as u32),
-            _ => None,
-        };
+        let newest = Stamp { ns: before_ns.max(about.stamp.ns), ..about.stamp };
+        let (entry, hint) = ring.place(sequence);
+        // The record that loses its entry.
+        let old = sequence.checked_sub(ring.keep()).and_then(|old| entry.frame(old, ring.frames()));
+        // Readers have lines of both, and it takes as long as all of a write until they are here.
+        old.into_iter().for_each(|frame| expect(frame as usize));
+        prefetch_to_write(ring.entry(sequence + 1));
         step!("publish: filled");
-        ring.entry(sequence).write(sequence, frame.number(), &About { before_ns, ..about });
+        hint.store(newest.ns, Ordering::Relaxed);
+        entry.write(sequence, frame.number(), &About { before_ns, ..about });
         self.next = sequence + 1;
         ring.count(self.next);
         step!("publish: counted");
-        self.newest = Some(Stamp { epoch: about.stamp.epoch, ns: before_ns.max(about.stamp.ns) });
+        self.newest = Some(newest);
         self.free.extend(old);
         // ORDERING (E): the new word before the looks at the seats: at their sleepers now, at their holds when the next
-        // frame is claimed. Pairs with (F) and (G). What is written into the old record's frame from here on
-        // comes after (C) already.
-        fence(Ordering::SeqCst);
+        // frame is claimed. All are SeqCst, so they stand in one order with the fences of (F) and (G), with which
+        // they pair. What is written into the old record's frame from here on comes after (C) already.
+        seq_cst_accesses();
         for seat in ring.seats() {
-            let sleeper = seat.sleeper.load(Ordering::Relaxed);
+            let sleeper = seat.sleeper.load(Ordering::SeqCst);
             if sleeper != 0 {
                 step!("publish: before wake");
                 wake(seat, sleeper);

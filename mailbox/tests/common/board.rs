@@ -149,6 +149,12 @@ pub(crate) fn shared() -> &'static AtomicU32 {
     unsafe { map(size_of::<AtomicU32>()).cast().as_ref() }
 }
 
+/// So many of them; all 0.
+pub(crate) fn shared_words(count: usize) -> &'static [AtomicU64] {
+    // SAFETY: page-aligned, zero, which is a valid atomic, large enough, and never unmapped.
+    unsafe { std::slice::from_raw_parts(map(count * size_of::<AtomicU64>()).cast().as_ptr(), count) }
+}
+
 impl Board {
     /// In memory that what this process forks from now on shares. It stays until the process ends.
     pub(crate) fn new(runs: usize) -> Self {

@@ -6,7 +6,8 @@
 
 use super::board::shared;
 use super::{Ground, PATIENCE};
-use nix::sys::signal::{Signal, kill};
+use nix::sys::ptrace;
+use nix::sys::signal::{Signal, kill, raise};
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -88,6 +89,18 @@ impl Actor {
         assert_eq!(how, WaitStatus::Stopped(self.pid, Signal::SIGSTOP), "it ended by itself; see above");
     }
 
+    /// Leads it through one instruction; it is stopped, and asked to be traced.
+    pub(crate) fn step(&self, what: &str) {
+        ptrace::step(self.pid, None).unwrap();
+        let how = waitpid(self.pid, None).unwrap();
+        assert_eq!(how, WaitStatus::Stopped(self.pid, Signal::SIGTRAP), "{what}: see above");
+    }
+
+    /// Lets one go on that was led up to here.
+    pub(crate) fn go_on_alone(&self) {
+        ptrace::detach(self.pid, None).unwrap();
+    }
+
     /// Lets a stopped one go on.
     pub(crate) fn go_on(&self) {
         kill(self.pid, Signal::SIGCONT).unwrap();
@@ -112,6 +125,17 @@ impl Drop for Actor {
             let _ = waitpid(self.pid, None);
         }
     }
+}
+
+/// In an [`Actor`] that is to be led: has it traced, and stops it. What it does from here on is led.
+pub(crate) fn be_led() {
+    ptrace::traceme().unwrap();
+    raise(Signal::SIGSTOP).unwrap();
+}
+
+/// Kills of each operation that is led; an environment variable makes them more.
+pub(crate) fn instruction_kills() -> u64 {
+    std::env::var("ROHRPOST_INSTRUCTION_KILLS").map_or(10, |kills| kills.parse().expect("a number of kills"))
 }
 
 /// In a role: does `act` with one thread, so that it may fork, and comes back when it is done. The test harness has a

@@ -8,6 +8,9 @@ pub(crate) mod crew;
 pub(crate) mod hands;
 pub(crate) mod load;
 pub(crate) mod random;
+pub(crate) mod records;
+pub(crate) mod small_memory;
+pub(crate) mod stream_load;
 
 use rohrpost_mailbox::{
     Label, Loss, MailboxInfo, Name, Node, OverflowPolicy, Participant, Priority, Sender, Shape, Type,

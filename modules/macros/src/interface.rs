@@ -1,5 +1,7 @@
 //! From a trait to an interface, a dispatcher, a description and a proxy.
 
+mod proxy;
+
 use crate::said::Said;
 use crate::text::text_of;
 use proc_macro2::TokenStream;
@@ -7,8 +9,8 @@ use quote::{format_ident, quote};
 use syn::parse::{Parse, ParseStream};
 use syn::spanned::Spanned;
 use syn::{
-    Error, FnArg, GenericArgument, Ident, ItemTrait, LitInt, LitStr, Pat, PathArguments, Result, ReturnType, Signature,
-    Token, TraitItem, TraitItemFn, Type,
+    Error, FnArg, Ident, ItemTrait, LitInt, LitStr, Pat, Result, ReturnType, Signature, Token, TraitItem, TraitItemFn,
+    Type,
 };
 
 const ARGUMENTS_MAX: usize = 8;
@@ -78,11 +80,29 @@ struct Command {
 }
 
 struct Data {
+    kind: DataKind,
     number: LitInt,
     name: Ident,
     text: String,
     ty: Type,
     said: Said,
+}
+
+/// Which attribute declares it.
+#[derive(Clone, Copy, PartialEq)]
+enum DataKind {
+    Data,
+    Stream,
+}
+
+impl DataKind {
+    /// The variant of the schema's `DataKind`.
+    fn variant(self, schema: &TokenStream) -> TokenStream {
+        match self {
+            Self::Data => quote!(#schema::DataKind::Data),
+            Self::Stream => quote!(#schema::DataKind::Stream),
+        }
+    }
 }
 
 pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<TokenStream> {
@@ -92,15 +112,18 @@ pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<Token
     let mut kept = Vec::new();
     for member in std::mem::take(&mut item.items) {
         let TraitItem::Fn(mut function) = member else {
-            return Err(Error::new(member.span(), "an interface has functions only: #[command(n)] and #[data(n)]"));
+            let text = "an interface has functions only: #[command(n)], #[data(n)] and #[stream(n)]";
+            return Err(Error::new(member.span(), text));
         };
         if let Some(number) = take_attribute(&mut function, "command") {
             commands.push(command(number?, &mut function)?);
             kept.push(TraitItem::Fn(function));
         } else if let Some(number) = take_attribute(&mut function, "data") {
-            data.push(data_item(number?, &mut function)?);
+            data.push(data_item(DataKind::Data, number?, &mut function)?);
+        } else if let Some(number) = take_attribute(&mut function, "stream") {
+            data.push(data_item(DataKind::Stream, number?, &mut function)?);
         } else {
-            return Err(Error::new(function.span(), "write #[command(16)] or #[data(1)] before it"));
+            return Err(Error::new(function.span(), "write #[command(16)], #[data(1)] or #[stream(1)] before it"));
         }
     }
     item.items = kept;
@@ -108,11 +131,11 @@ pub(crate) fn expand(attributes: TokenStream, item: TokenStream) -> Result<Token
     distinct(data.iter().map(|item| &item.number))?;
     distinct_names(commands.iter().map(|command| &command.name).chain(data.iter().map(|item| &item.name)))?;
     let interface = interface(&item, &class, &krate, &commands, &data)?;
-    let proxy = proxy(&item, &krate, &commands, &data);
+    let proxy = proxy::proxy(&item, &krate, &commands, &data);
     Ok(quote! { #item #interface #proxy })
 }
 
-/// Takes `#[command(…)]` or `#[data(…)]` off a function.
+/// Takes `#[command(…)]`, `#[data(…)]` or `#[stream(…)]` off a function.
 fn take_attribute(function: &mut TraitItemFn, name: &str) -> Option<Result<Number>> {
     let at = function.attrs.iter().position(|attribute| attribute.path().is_ident(name))?;
     Some(function.attrs.remove(at).parse_args())
@@ -175,21 +198,21 @@ fn owned(ty: &Type, text: &str) -> Result<()> {
     }
 }
 
-fn data_item(number: Number, function: &mut TraitItemFn) -> Result<Data> {
+fn data_item(kind: DataKind, number: Number, function: &mut TraitItemFn) -> Result<Data> {
     let value: u16 = number.number.base10_parse()?;
     if number.idempotent {
-        return Err(Error::new(number.number.span(), "data are not run; `idempotent` is for commands"));
+        return Err(Error::new(number.number.span(), "data and streams are not run; `idempotent` is for commands"));
     }
     if value == 0 || value > 16384 {
-        return Err(Error::new(number.number.span(), "data have numbers from 1 to 16384"));
+        return Err(Error::new(number.number.span(), "data and streams have numbers from 1 to 16384"));
     }
     let (true, ReturnType::Type(_, ty)) = (function.sig.inputs.is_empty(), &function.sig.output) else {
-        return Err(Error::new(function.sig.span(), "data are declared as `fn name() -> Type;`"));
+        return Err(Error::new(function.sig.span(), "data and streams are declared as `fn name() -> Type;`"));
     };
     owned(ty, "data travel to other processes; name an owned type")?;
     let text = text_of(&function.attrs);
     let said = Said::take(&mut function.attrs, ty)?;
-    Ok(Data { number: number.number, name: function.sig.ident.clone(), text, ty: (**ty).clone(), said })
+    Ok(Data { kind, number: number.number, name: function.sig.ident.clone(), text, ty: (**ty).clone(), said })
 }
 
 fn distinct<'a>(numbers: impl Iterator<Item = &'a LitInt>) -> Result<()> {
@@ -213,7 +236,7 @@ fn distinct_names<'a>(names: impl Iterator<Item = &'a Ident>) -> Result<()> {
             return Err(Error::new(name.span(), format!("`{text}` is a function of every proxy; choose another name")));
         }
         if seen.contains(&text) {
-            return Err(Error::new(name.span(), "this name is taken: functions and data share one proxy"));
+            return Err(Error::new(name.span(), "this name is taken: functions, data and streams share one proxy"));
         }
         seen.push(text);
     }
@@ -230,8 +253,9 @@ fn interface(
     let (vis, name) = (&item.vis, &item.ident);
     let interface = format_ident!("{name}Interface");
     let (trait_name, trait_text) = (name.to_string(), text_of(&item.attrs));
-    let doc =
-        format!("The interface [`{name}`]: what a module names as its own. Its constants are the data it publishes.");
+    let doc = format!(
+        "The interface [`{name}`]: what a module names as its own. Its constants are the data and streams it publishes."
+    );
     let schema = &quote!(#krate::schema);
     let functions = commands.iter().map(|command| {
         let Command { number: Number { number, idempotent }, name, text, names, types, said, result } = command;
@@ -245,19 +269,23 @@ fn interface(
             }
         }
     });
-    let items = data.iter().map(|Data { number, name, text, ty, said }| {
-        let field = said.field(schema, &name.to_string(), text, ty);
-        quote!(#schema::DataItem { number: #number, field: #field })
+    let items = data.iter().map(|Data { kind, number, name, text, ty, said }| {
+        let (kind, field) = (kind.variant(schema), said.field(schema, &name.to_string(), text, ty));
+        quote!(#schema::DataItem { number: #number, kind: #kind, field: #field })
     });
     let of_arguments = commands.iter().flat_map(|command| command.names.iter().zip(&command.types).zip(&command.said));
     let proofs = of_arguments.map(|((name, ty), said)| said.proof(&name.to_string(), ty));
     let proofs = proofs.chain(data.iter().map(|item| item.said.proof(&item.name.to_string(), &item.ty)));
-    let ports = data.iter().map(|Data { number, name, text, ty, .. }| {
+    let ports = data.iter().map(|Data { kind, number, name, text, ty, .. }| {
         let constant = Ident::new(&name.to_string().to_uppercase(), name.span());
         let name = name.to_string();
+        let port = match kind {
+            DataKind::Data => quote!(#krate::DataPort),
+            DataKind::Stream => quote!(#krate::StreamPort),
+        };
         quote! {
             #[doc = #text]
-            pub const #constant: #krate::DataPort<#ty> = #krate::DataPort::new(#class, #number, #name, Self::hash);
+            pub const #constant: #port<#ty> = #port::new(#class, #number, #name, Self::hash);
         }
     });
     let arms = commands.iter().map(|command| {
@@ -311,85 +339,6 @@ fn interface(
             }
         }
     })
-}
-
-/// `Result<T, E>` as it is written in a signature.
-fn result_of(ty: &Type) -> Option<(&Type, &Type)> {
-    let Type::Path(path) = ty else { return None };
-    let last = path.path.segments.last().filter(|segment| segment.ident == "Result")?;
-    let PathArguments::AngleBracketed(arguments) = &last.arguments else { return None };
-    let mut types = arguments.args.iter().filter_map(|argument| match argument {
-        GenericArgument::Type(ty) => Some(ty),
-        _ => None,
-    });
-    Some((types.next()?, types.next()?))
-}
-
-fn proxy(item: &ItemTrait, krate: &TokenStream, commands: &[Command], data: &[Data]) -> TokenStream {
-    let (vis, name) = (&item.vis, &item.ident);
-    let (interface, proxy) = (format_ident!("{name}Interface"), format_ident!("{name}Proxy"));
-    let doc = format!("Calls the functions of [`{name}`] in another module.");
-    let calls = commands.iter().map(|command| {
-        let Command { number: Number { number, .. }, name, text, names, types, result, .. } = command;
-        let begin = format_ident!("begin_{name}");
-        let begin_text = format!("Begins [`Self::{name}`] and returns at once; wait for its result later.");
-        let (returns, wait) = match result_of(result) {
-            Some((value, error)) => {
-                (quote!(::std::result::Result<#value, #krate::CallError<#error>>), quote!(wait_result()))
-            }
-            None => (quote!(::std::result::Result<#result, #krate::CallError>), quote!(wait())),
-        };
-        let widen = result_of(result).map(|_| quote!(.map_err(#krate::CallError::widen)));
-        quote! {
-            #[doc = #text]
-            pub fn #name(&self, #(#names: #types),*) -> #returns {
-                self.#begin(#(#names),*) #widen ?.#wait
-            }
-
-            #[doc = #begin_text]
-            pub fn #begin(
-                &self, #(#names: #types),*
-            ) -> ::std::result::Result<#krate::Pending<#result>, #krate::CallError> {
-                self.core.begin(#number, #interface::hash(), &(#(#names,)*))
-            }
-        }
-    });
-    let gets = data.iter().map(|Data { name, ty, .. }| {
-        let constant = Ident::new(&name.to_string().to_uppercase(), name.span());
-        let text = format!("Asks for the newest `{name}`: its system time (ns since 1970) and itself.");
-        quote! {
-            #[doc = #text]
-            pub fn #name(&self) -> ::std::result::Result<(u64, #ty), #krate::CallError> {
-                self.core.get(#interface::#constant)
-            }
-        }
-    });
-    quote! {
-        #[doc = #doc]
-        #vis struct #proxy {
-            core: #krate::ProxyCore,
-        }
-
-        impl #krate::Proxy for #proxy {
-            const CLASS: &'static str = <#interface as #krate::Interface>::CLASS;
-
-            fn new(link: &#krate::Caller, module: #krate::Name) -> Self {
-                Self { core: #krate::ProxyCore::new(link, module) }
-            }
-        }
-
-        impl #proxy {
-            /// The same, with another time in which an answer must come.
-            #[must_use]
-            pub fn with_timeout(mut self, timeout: ::std::time::Duration) -> Self {
-                self.core.timeout = timeout;
-                self
-            }
-
-            #(#calls)*
-            #(#gets)*
-        }
-    }
 }
 
 #[cfg(test)]

@@ -16,16 +16,18 @@ use quote::quote;
 /// Makes a trait an interface: its functions can be called from other modules, its data asked for and subscribed to.
 ///
 /// `#[interface(class = "motor")]` on `trait Motor` leaves the trait to be implemented, and makes `MotorInterface`
-/// (what a module names as its interface; its constants are the data) and `MotorProxy` (its functions look like local
-/// calls).
+/// (what a module names as its interface; its constants are the data and streams) and `MotorProxy` (its functions look
+/// like local calls).
 ///
 /// * `#[command(16)]` before a function gives its number, 16 or more; `#[command(17, idempotent)]` says that running it
 ///   twice does no harm. Functions take `&mut self` and owned arguments, at most eight.
 /// * `#[data(1)] fn scan() -> LaserScan;` declares data. The trait's implementor does not see it; the module publishes
 ///   it.
+/// * `#[stream(2)] fn image() -> Image;` declares a stream: data of which many values are kept with their times, to be
+///   read in place, asked by time, and larger than a package. Data and streams share one set of numbers and names.
 ///
 /// Doc comments become the texts that tools show. `#[schema(unit = "m/s", min = 0.0, max = 1.5)]` before an argument,
-/// or under `#[data(1)]`, says what values mean; all its keys are optional.
+/// or under `#[data(1)]` or `#[stream(2)]`, says what values mean; all its keys are optional.
 ///
 /// ```text
 /// #[rohrpost::interface(class = "compass")]

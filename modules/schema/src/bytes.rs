@@ -6,7 +6,7 @@ use crate::{DEPTH_MAX, Field, Members, Named, Type};
 use std::hash::Hasher;
 
 /// Version of the table. What is stored or sent begins with it.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 /// Types and fields in one description, so that a megabyte of bytes does not become a hundred.
 pub const TYPES_MAX: usize = 16_384;
@@ -225,7 +225,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn byte(&mut self) -> Result<u8, SchemaError> {
+    pub(crate) fn byte(&mut self) -> Result<u8, SchemaError> {
         let (byte, rest) = self.bytes.split_first().ok_or(SchemaError::Short)?;
         self.bytes = rest;
         Ok(*byte)

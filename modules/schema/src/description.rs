@@ -7,9 +7,10 @@ use serde::Serialize;
 /// What an interface offers. A module answers `describe` with it.
 ///
 /// ```
-/// use rohrpost_schema::{DataItem, Description, Field, Type};
+/// use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
 ///
-/// let heading = DataItem { number: 1, field: Field::new("heading", Type::F64).said("From east.", "rad") };
+/// let field = Field::new("heading", Type::F64).said("From east.", "rad");
+/// let heading = DataItem { number: 1, kind: DataKind::Data, field };
 /// let compass = Description {
 ///     name: "Compass".into(),
 ///     class: "compass".into(),
@@ -19,7 +20,7 @@ use serde::Serialize;
 /// };
 /// assert_eq!(Description::from_bytes(&compass.to_bytes()).unwrap(), compass);
 /// assert_eq!(compass.data_item("heading").unwrap().number, 1);
-/// assert!(compass.function("calibrate").is_none());
+/// assert!(compass.function("calibrate").is_none() && compass.streams().next().is_none());
 /// ```
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Description {
@@ -31,7 +32,7 @@ pub struct Description {
     pub text: String,
     /// Its functions, by number.
     pub functions: Vec<Function>,
-    /// Its data, by number.
+    /// Its data and streams, by number.
     pub data: Vec<DataItem>,
 }
 
@@ -57,9 +58,21 @@ pub struct Function {
 pub struct DataItem {
     /// Data number.
     pub number: u16,
+    /// Whether its values are also kept as a stream.
+    pub kind: DataKind,
     /// Its name, what it is, and its type.
     #[serde(flatten)]
     pub field: Field,
+}
+
+/// How a module keeps data for others. Both kinds can be asked for and subscribed to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DataKind {
+    /// The newest value, in the module.
+    Data,
+    /// Many values with their times, in a ring of shared memory that other modules of the node read.
+    Stream,
 }
 
 impl Description {
@@ -79,25 +92,25 @@ impl Description {
                 class: reader.text()?,
                 text: reader.text()?,
                 functions: reader.list(Function::read)?,
-                data: reader
-                    .list(|reader| Ok(DataItem { number: reader.number(16)? as u16, field: reader.field()? }))?,
+                data: reader.list(DataItem::read)?,
             })
         })
     }
 
-    /// Tells interfaces apart: callers and servers must have the same. Numbers, types, units, and names of functions
-    /// and arguments count (to swap two numbers is a mistake that types do not show); texts and ranges do not. A
-    /// mistake goes unseen once in four billion; malice is not what it is for.
+    /// Tells interfaces apart: callers and servers must have the same. Numbers, types, units, what is a
+    /// stream, and names of functions and arguments count (to swap two numbers is a mistake that types do not show);
+    /// texts and ranges do not. A mistake goes unseen once in four billion; malice is not what it is for.
     ///
     /// ```
-    /// use rohrpost_schema::{DataItem, Description, Field, Type};
+    /// use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
     ///
+    /// let heading = |unit: &str| Field::new("heading", Type::F64).said("", unit);
     /// let compass = |text: &str, unit: &str| Description {
     ///     name: "Compass".into(),
     ///     class: "compass".into(),
     ///     text: text.into(),
     ///     functions: Vec::new(),
-    ///     data: vec![DataItem { number: 1, field: Field::new("heading", Type::F64).said("", unit) }],
+    ///     data: vec![DataItem { number: 1, kind: DataKind::Data, field: heading(unit) }],
     /// };
     /// assert_eq!(compass("", "rad").hash(), compass("Tells where north is.", "rad").hash());
     /// assert_ne!(compass("", "rad").hash(), compass("", "deg").hash());
@@ -109,8 +122,7 @@ impl Description {
     fn written(&self, bare: bool) -> Vec<u8> {
         Writer::whole(bare, |writer| {
             let head = writer.name(&self.name).name(&self.class).text(&self.text);
-            head.list(&self.functions, Function::written)
-                .list(&self.data, |writer, item| writer.number(item.number.into()).field(&item.field))
+            head.list(&self.functions, Function::written).list(&self.data, DataItem::written)
         })
     }
 
@@ -119,9 +131,30 @@ impl Description {
         self.functions.iter().find(|function| function.name == name)
     }
 
-    /// Data by its name.
+    /// Data or a stream by its name.
     pub fn data_item(&self, name: &str) -> Option<&DataItem> {
         self.data.iter().find(|item| item.field.name == name)
+    }
+
+    /// Its streams, by number.
+    pub fn streams(&self) -> impl Iterator<Item = &DataItem> {
+        self.data.iter().filter(|item| item.kind == DataKind::Stream)
+    }
+}
+
+impl DataItem {
+    fn written<'w>(writer: &'w mut Writer, item: &Self) -> &'w mut Writer {
+        writer.number(item.number.into()).byte(item.kind as u8).field(&item.field)
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, SchemaError> {
+        let number = reader.number(16)? as u16;
+        let kind = match reader.byte()? {
+            0 => DataKind::Data,
+            1 => DataKind::Stream,
+            other => return Err(SchemaError::Byte("kind of data", other)),
+        };
+        Ok(Self { number, kind, field: reader.field()? })
     }
 }
 

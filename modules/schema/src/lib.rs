@@ -25,6 +25,7 @@
 extern crate self as rohrpost_schema;
 
 mod argument;
+mod byte_field;
 mod bytes;
 mod decode;
 mod description;
@@ -43,9 +44,10 @@ mod value;
 mod words;
 
 pub use argument::parse_argument;
+pub use byte_field::Bytes;
 pub use bytes::{SchemaError, TYPES_MAX, VERSION, hash};
 pub use decode::decode;
-pub use description::{DataItem, Description, Function};
+pub use description::{DataItem, DataKind, Description, Function};
 pub use encode::encode;
 pub use error::{WalkError, WalkProblem};
 pub use quantities::{counters, quantities, quantity_fields};
@@ -55,7 +57,7 @@ pub use tree::{Field, Members, Named, Type};
 pub use value::Value;
 pub use words::{describe_field, describe_result, describe_type, is_word};
 
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// Descriptions and values nest no deeper than this.
 pub const DEPTH_MAX: usize = 128;
@@ -141,3 +143,28 @@ pub fn bound<T: Serialize>(value: &T) -> Option<Vec<u8>> {
 pub trait Data: Serialize + DeserializeOwned + Schema + 'static {}
 
 impl<T: Serialize + DeserializeOwned + Schema + 'static> Data for T {}
+
+/// Data with a form that borrows its byte fields where they lie, so that reading it copies none of them. The bytes are
+/// the same: a field of type [`Bytes`] or `Vec<u8>` is a `&[u8]` there, and a text a `&str`.
+///
+/// ```
+/// use rohrpost_schema::{Bytes, Schema, View};
+/// use serde::{Deserialize, Serialize};
+///
+/// #[derive(Serialize, Deserialize, Schema)]
+/// struct Frame { width_px: u32, pixels: Bytes }
+///
+/// #[derive(Deserialize)]
+/// struct FrameView<'a> { width_px: u32, pixels: &'a [u8] }
+///
+/// impl View for Frame { type View<'a> = FrameView<'a>; }
+///
+/// let bytes = postcard::to_stdvec(&Frame { width_px: 2, pixels: vec![7, 9].into() })?;
+/// let view: FrameView<'_> = postcard::from_bytes(&bytes)?;
+/// assert_eq!((view.width_px, view.pixels), (2, &bytes[2..]));
+/// # Ok::<(), postcard::Error>(())
+/// ```
+pub trait View: Data {
+    /// The form that borrows.
+    type View<'a>: Deserialize<'a>;
+}

@@ -1,11 +1,13 @@
-//! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed.
+//! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed. Each record has its own time, also one that
+//! stands behind later ones in the log.
 
 use super::settings::{self, RefusedSetting, Settings as _};
 use crate::interfaces::{Laser, LaserInterface, Player, PlayerInterface, Progress, Wheels, WheelsInterface};
 use crate::module::{Module, ModuleError};
-use crate::robot::carmen::{self, Record};
+use crate::robot::carmen::{self, LogRecord};
 use crate::robot::playback::{Due, Playback};
-use crate::runtime::Context;
+use crate::runtime::{Context, ContextError, RecordError};
+use rohrpost_mailbox::SystemTime;
 use serde::Deserialize;
 use std::io::BufRead;
 use std::time::Duration;
@@ -51,6 +53,8 @@ pub(super) struct Carmen {
     start_ns: Option<u64>,
     /// When it was switched off.
     paused_ns: Option<u64>,
+    /// System time when it was last looked at.
+    looked: SystemTime,
     progress: Progress,
 }
 
@@ -67,22 +71,23 @@ impl Module for Carmen {
         context.set_period(TICK);
         tracing::info!("plays {} at {} times its speed", settings.file, settings.speed);
         let (speed, progress) = (settings.speed, Progress::default());
-        Ok(Self { playback, speed, next: None, start_ns: None, paused_ns: None, progress })
+        let looked = context.now();
+        Ok(Self { playback, speed, next: None, start_ns: None, paused_ns: None, looked, progress })
     }
 
     fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         if let (Some(start_ns), Some(paused_ns)) = (self.start_ns, self.paused_ns.take()) {
-            self.start_ns = Some(start_ns + context.now().ns.saturating_sub(paused_ns));
+            self.start_ns = Some(start_ns + self.now_ns(context).saturating_sub(paused_ns));
         }
         Ok(())
     }
 
     fn off(&mut self, context: &mut Context) {
-        self.paused_ns = Some(context.now().ns);
+        self.paused_ns = Some(self.now_ns(context));
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        let now_ns = context.now().ns;
+        let now_ns = self.now_ns(context);
         let start_ns = *self.start_ns.get_or_insert(now_ns);
         for _ in 0..AT_ONCE_MAX {
             if self.progress.finished {
@@ -96,7 +101,7 @@ impl Module for Carmen {
                 self.next = Some(due);
                 break;
             }
-            self.play(start_ns + due.due_ns, due, context)?;
+            self.play(start_ns, due, context)?;
         }
         let counters = self.playback.counters();
         self.progress.discarded = counters.discarded;
@@ -107,29 +112,49 @@ impl Module for Carmen {
 }
 
 impl Carmen {
-    fn play(&mut self, stamp_ns: u64, due: Due, context: &mut Context) -> Result<(), ModuleError> {
+    /// System time. After a step of it, the log goes on from where it was.
+    fn now_ns(&mut self, context: &Context) -> u64 {
+        let last = std::mem::replace(&mut self.looked, context.now());
+        if self.looked.epoch != last.epoch {
+            let moved = |ns: u64| (ns + self.looked.ns).saturating_sub(last.ns);
+            (self.start_ns, self.paused_ns) = (self.start_ns.map(moved), self.paused_ns.map(moved));
+        }
+        self.looked.ns
+    }
+
+    fn play(&mut self, start_ns: u64, due: Due, context: &mut Context) -> Result<(), ModuleError> {
         self.progress.played_s = due.due_ns as f64 * self.speed / 1e9;
-        match due.record {
-            Record::Odometry { odometry, .. } => {
-                context.publish(WheelsInterface::ODOMETRY, stamp_ns, &odometry)?;
-                self.progress.odometries += 1;
+        let stamp_ns = start_ns.saturating_add_signed(due.stamp_ns).max(1);
+        let (written, count) = match due.record {
+            LogRecord::Odometry { odometry, .. } => {
+                let written = context.write(WheelsInterface::ODOMETRY, stamp_ns, &odometry);
+                (written, &mut self.progress.odometries)
             }
-            Record::Scan { scan, .. } => {
-                context.publish(LaserInterface::SCAN, stamp_ns, &scan)?;
-                self.progress.scans += 1;
+            LogRecord::Scan { scan, .. } => {
+                (context.write(LaserInterface::SCAN, stamp_ns, &scan), &mut self.progress.scans)
             }
-            Record::Param { .. } => {}
+            LogRecord::Param { .. } => return Ok(()),
+        };
+        match written {
+            Ok(_) => *count += 1,
+            Err(ContextError::Record(late @ RecordError::Late { .. })) => {
+                if self.progress.late == 0 {
+                    tracing::warn!("{late}; records like this one are counted as `late` in `progress`");
+                }
+                self.progress.late += 1;
+            }
+            Err(error) => return Err(error.into()),
         }
         Ok(())
     }
 
     fn finish(&mut self) {
         self.progress.finished = true;
-        let Progress { scans, odometries, .. } = self.progress;
+        let Progress { scans, odometries, late, .. } = self.progress;
         let counters = self.playback.counters();
         tracing::info!(
-            "the log is over: {scans} scans and {odometries} odometries played, {} discarded for their stamps, {} \
-            broken",
+            "the log is over: {scans} scans and {odometries} odometries played, {} discarded for their stamps, {late} \
+            too late, {} broken",
             counters.discarded,
             counters.malformed
         );

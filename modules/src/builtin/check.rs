@@ -2,15 +2,18 @@
 //! modules, so it is here that both meet.
 
 use super::{Builtin, description};
-use rohrpost_config::{Installation, Problem, Program, Show, nearest};
+use rohrpost_config::{Installation, Module, Problem, Program, Show, nearest};
+use rohrpost_schema::Description;
+use std::collections::BTreeSet;
 
-/// Everything that built-in modules would refuse, by their settings, by what they call and by what the GUI is to show
-/// of them. What programs of one's own would refuse only they know.
+/// Everything that built-in modules would refuse, by their settings, by what they call, by the sections of their
+/// streams and by what the GUI is to show of them. What programs of one's own would refuse only they know.
 pub fn check(installation: &Installation) -> Vec<Problem> {
     let mut problems = Vec::new();
     for module in &installation.modules {
         let Program::Builtin(name) = &module.program else { continue };
         problems.extend(Builtin::find(name).map(|builtin| (builtin.check)(installation, module)).unwrap_or_default());
+        problems.extend(unknown_streams(installation, module, name));
     }
     problems.extend(installation.gui.show.iter().filter_map(|show| data_of(installation, show)));
     problems
@@ -25,6 +28,27 @@ pub fn check_saved(installation: &Installation) -> Vec<Problem> {
         Some(Problem { line: Some(error.line), message: format!("[\"{}\"]: {}", error.module, error.message) })
     });
     wrong.collect()
+}
+
+/// Sections for streams that no interface of a built-in module has.
+fn unknown_streams(installation: &Installation, module: &Module, builtin: &str) -> Vec<Problem> {
+    let classes = module.names().filter_map(|name| installation.classes.name(name.class()));
+    let descriptions: Vec<Description> = classes.filter_map(|class| description(builtin, class)).collect();
+    let items = descriptions.iter().flat_map(Description::streams);
+    let known: BTreeSet<&str> = items.map(|item| item.field.name.as_str()).collect();
+    let problem = |stream: &String| {
+        let right = match nearest(stream, known.iter().copied()) {
+            Some(name) => format!("did you mean `{name}`?"),
+            None if known.is_empty() => "it has none; drop the section".into(),
+            None => format!("it has {}", known.iter().copied().collect::<Vec<_>>().join(", ")),
+        };
+        let name = installation.classes.format(module.name);
+        Problem {
+            line: Some(installation.stream_line(module, stream)),
+            message: format!("module `{name}`: the builtin has no stream `{stream}`; {right}"),
+        }
+    };
+    module.streams.keys().filter(|stream| !known.contains(stream.as_str())).map(problem).collect()
 }
 
 /// What the GUI is to show of a built-in module, and that has no such data.

@@ -1,26 +1,26 @@
 //! `mapper`: draws a map from scans and poses.
 
+mod poses;
+
 use super::settings::{self, Called, RefusedSetting, Settings as _};
 use crate::interface::Interface;
 use crate::interfaces::{Cartographer, CartographerInterface, LaserInterface, MapCounts, WheelsInterface};
 use crate::module::{Module, ModuleError};
 use crate::robot::grid::{Mapper, Settings as GridSettings, TileIndex};
-use crate::runtime::{Context, Rate, Received, Subscription};
-use crate::types::{LaserScan, Odometry, Pose};
-use rohrpost_fusion::{History, NoValue, Records as _, Refused, Stamp};
+use crate::runtime::{Context, ContextError, Moment, Rate, Received, StreamSubscription, Subscription, Unreadable};
+use crate::types::{LaserScan, Pose};
+use poses::{NoPose, Poses};
 use serde::Deserialize;
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-/// Changed patches are published so often, at most so many at a time, so that a large change comes in pieces.
-const TICK: Duration = Duration::from_millis(500);
+/// Scans that wait for odometry are looked at so often, at least.
+const TICK: Duration = Duration::from_millis(100);
+/// Changed patches are published every so many ticks, at most so many at a time: a large change comes in pieces.
+const TICKS_BETWEEN_PATCHES: u32 = 5;
 const PATCHES_AT_ONCE: usize = 16;
-/// Odometry that is kept to find a scan's pose in.
-const POSES: usize = 256;
-/// Between two poses further apart than this, nobody knows where the robot was.
-const GAP_MAX_NS: u64 = 5_000_000_000;
 /// Scans that wait for odometry younger than themselves.
-const WAITING_MAX: usize = 32;
+const WAITING_MAX: usize = 256;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
@@ -29,6 +29,19 @@ pub(super) struct Settings {
     odometry: String,
     #[serde(default = "resolution_m")]
     resolution_m: f64,
+    #[serde(default)]
+    pose_from: PoseFrom,
+}
+
+/// Where a scan's pose comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum PoseFrom {
+    /// From the scan, if it brings one (of a log that was corrected afterwards); else from odometry.
+    #[default]
+    Scan,
+    /// Always from odometry at the time of the scan.
+    Odometry,
 }
 
 impl settings::Settings for Settings {
@@ -52,16 +65,49 @@ fn resolution_m() -> f64 {
 }
 
 pub(super) struct MapModule {
-    laser: Subscription<LaserScan>,
-    odometry: Subscription<Odometry>,
+    scans: Scans,
+    poses: Poses,
+    pose_from: PoseFrom,
     settings: GridSettings,
     map: Mapper,
-    poses: History<Pose>,
-    /// Counts the times that odometry's stamps went back: time was set, or the base was restarted.
-    epoch: u64,
-    waiting: VecDeque<(Stamp, LaserScan)>,
+    waiting: VecDeque<WaitingScan>,
     unpublished: BTreeSet<TileIndex>,
+    ticks: u32,
     counts: MapCounts,
+}
+
+/// How scans come.
+enum Scans {
+    /// From the stream of a module on this node.
+    Stream(StreamSubscription<LaserScan>),
+    /// From another node, in packages.
+    Packages(Subscription<LaserScan>),
+}
+
+/// A scan with a pose that is not known yet.
+struct WaitingScan {
+    moment: Moment,
+    stamp_ns: u64,
+    scan: LaserScan,
+}
+
+impl Scans {
+    fn subscribe(context: &mut Context, laser: &str) -> Result<Self, ContextError> {
+        match context.subscribe_stream(LaserInterface::SCAN, laser) {
+            Ok(stream) => Ok(Self::Stream(stream)),
+            Err(ContextError::FarStream { .. }) => {
+                context.subscribe(LaserInterface::SCAN.data(), laser, Rate::Each).map(Self::Packages)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn read(&self, data: &Received<'_>) -> Result<Option<LaserScan>, Unreadable> {
+        match self {
+            Self::Stream(stream) => data.read(stream),
+            Self::Packages(packages) => data.read(packages),
+        }
+    }
 }
 
 impl Module for MapModule {
@@ -69,36 +115,65 @@ impl Module for MapModule {
     type Interfaces = CartographerInterface;
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
-        let laser = context.subscribe(LaserInterface::SCAN, &settings.laser, Rate::Each)?;
-        let odometry = context.subscribe(WheelsInterface::ODOMETRY, &settings.odometry, Rate::Each)?;
+        let scans = Scans::subscribe(context, &settings.laser)?;
+        let poses = Poses::open(context, &settings.odometry)?;
         settings.check()?;
+        let pose_from = settings.pose_from;
         let settings = GridSettings { resolution_m: settings.resolution_m, ..GridSettings::default() };
         context.set_period(TICK);
         Ok(Self {
-            laser,
-            odometry,
+            scans,
+            poses,
+            pose_from,
             settings,
             map: Mapper::new(settings),
-            poses: History::new(POSES, 0),
-            epoch: 0,
             waiting: VecDeque::with_capacity(WAITING_MAX),
             unpublished: BTreeSet::new(),
+            ticks: 0,
             counts: MapCounts::default(),
         })
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if let Some(odometry) = data.read(&self.odometry)? {
-            self.counts.odometries += 1;
-            self.remember(data.head.stamp_ns, odometry.pose);
-        } else if let Some(scan) = data.read(&self.laser)? {
+        if let Some(scan) = self.scans.read(data)? {
             self.counts.scans += 1;
-            self.waiting.push_back((Stamp::new(self.epoch, data.head.stamp_ns), scan));
+            let (moment, stamp_ns) = (self.poses.moment(data), data.head.stamp_ns);
+            self.waiting.push_back(WaitingScan { moment, stamp_ns, scan });
+        } else {
+            self.poses.take(data)?;
         }
         self.work_off(context)
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        self.work_off(context)?;
+        self.ticks = self.ticks.wrapping_add(1);
+        if self.ticks.is_multiple_of(TICKS_BETWEEN_PATCHES) { self.publish_patches(context) } else { Ok(()) }
+    }
+}
+
+impl MapModule {
+    /// Maps the scans with known poses.
+    fn work_off(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        while let Some(WaitingScan { moment, stamp_ns, scan }) = self.waiting.front() {
+            let pose = match scan.pose.filter(|_| self.pose_from == PoseFrom::Scan) {
+                Some(pose) => Ok(pose),
+                None => self.poses.at(*moment),
+            };
+            match pose {
+                Err(NoPose::NotYet) if self.waiting.len() < WAITING_MAX => break,
+                Err(_) => self.counts.without_pose += 1,
+                Ok(pose) => {
+                    self.counts.mapped += u64::from(self.map.integrate(scan, &pose).is_ok());
+                    context.publish::<Pose>(CartographerInterface::POSE, *stamp_ns, &pose)?;
+                }
+            }
+            self.waiting.pop_front();
+        }
+        Ok(())
+    }
+
+    fn publish_patches(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         self.unpublished.extend(self.map.take_changed());
         for _ in 0..PATCHES_AT_ONCE {
             let Some(index) = self.unpublished.pop_first() else { break };
@@ -110,44 +185,10 @@ impl Module for MapModule {
     }
 }
 
-impl MapModule {
-    fn remember(&mut self, stamp_ns: u64, pose: Pose) {
-        let sequence = self.counts.odometries;
-        let taken = self.poses.push(Stamp::new(self.epoch, stamp_ns), sequence, pose);
-        if let Err(Refused::Late { .. }) = taken {
-            // Earlier poses, and scans that wait for one of them, are of no use now.
-            self.epoch += 1;
-            let first = self.poses.push(Stamp::new(self.epoch, stamp_ns), sequence, pose);
-            debug_assert_eq!(first, Ok(()), "an epoch takes its first record");
-        }
-    }
-
-    /// Maps the scans with known poses.
-    fn work_off(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        while let Some((stamp, scan)) = self.waiting.front() {
-            let pose = match scan.pose {
-                Some(pose) => Ok(pose),
-                None => self.poses.at(*stamp, GAP_MAX_NS),
-            };
-            match pose {
-                Err(NoValue::NotYet { .. } | NoValue::Empty) if self.waiting.len() < WAITING_MAX => break,
-                Err(_) => self.counts.without_pose += 1,
-                Ok(pose) => {
-                    self.counts.mapped += u64::from(self.map.integrate(scan, &pose).is_ok());
-                    let stamp_ns = stamp.ns;
-                    context.publish::<Pose>(CartographerInterface::POSE, stamp_ns, &pose)?;
-                }
-            }
-            self.waiting.pop_front();
-        }
-        Ok(())
-    }
-}
-
 impl Cartographer for MapModule {
     fn counts(&mut self) -> MapCounts {
         let cells = self.map.counts();
-        MapCounts { free: cells.free, occupied: cells.occupied, ..self.counts }
+        MapCounts { odometries: self.poses.count(), free: cells.free, occupied: cells.occupied, ..self.counts }
     }
 
     fn publish_all(&mut self) {

@@ -51,7 +51,7 @@ impl Module for PilotModule {
     type Interfaces = ();
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
-        let laser = context.subscribe(LaserInterface::SCAN, &settings.laser, Rate::Each)?;
+        let laser = context.subscribe(LaserInterface::SCAN.data(), &settings.laser, Rate::Each)?;
         let motor = context.proxy::<MotorProxy>(&settings.motor)?.with_timeout(PATIENCE);
         let manners =
             PilotSettings { cruise_m_s: settings.cruise_m_s, seed: settings.seed, ..PilotSettings::default() };

@@ -20,6 +20,11 @@ pub(super) trait Settings: DeserializeOwned {
         &[]
     }
 
+    /// Records that it writes, of the streams that may need larger ones than the default.
+    fn recorded(&self) -> Vec<Recorded> {
+        Vec::new()
+    }
+
     /// Modules that it calls.
     fn calls(&self) -> Vec<Called<'_>> {
         Vec::new()
@@ -34,6 +39,16 @@ pub(super) struct RefusedSetting {
     pub(super) key: &'static str,
     /// What it is, and what it should be.
     pub(super) why: String,
+}
+
+/// Largest record of a stream.
+pub(super) struct Recorded {
+    /// Class of the interface that has the stream.
+    pub(super) class: &'static str,
+    /// The stream's name.
+    pub(super) stream: &'static str,
+    /// Bytes that it may have.
+    pub(super) bytes: usize,
 }
 
 /// A module that a setting names.
@@ -73,6 +88,12 @@ pub(super) fn module<M: Module<Settings: Settings>>(installation: &Installation,
         let line = Some(installation.settings_line(module, error.key));
         problems.push(Problem { line, message: format!("{what}: settings: {error}") });
     }
+    for recorded in settings.recorded() {
+        problems.extend(
+            small_record(installation, module, &recorded)
+                .map(|message| Problem { line: Some(module.line), message: format!("{what}: {message}") }),
+        );
+    }
     for called in settings.calls() {
         problems.extend(wrong_call(installation, module, &called).map(|message| Problem {
             line: Some(installation.settings_line(module, called.key)),
@@ -99,6 +120,25 @@ fn aliases<M: Module>(installation: &Installation, module: &Configured, what: &s
         }
     }
     problems
+}
+
+/// Whether a module has a name of this class, its own or an alias.
+pub(super) fn has_class(installation: &Installation, module: &Configured, class: &str) -> bool {
+    let id = installation.classes.id(class);
+    module.names().any(|name| Some(name.class()) == id)
+}
+
+fn small_record(installation: &Installation, module: &Configured, recorded: &Recorded) -> Option<String> {
+    let Recorded { class, stream, bytes } = *recorded;
+    let takes = module.streams.get(stream).copied().unwrap_or_default().record_bytes;
+    let is_small = has_class(installation, module, class) && bytes > takes as usize;
+    is_small.then(|| {
+        let right = bytes.div_ceil(1024);
+        format!(
+            "stream `{stream}` has records of up to {bytes} bytes, and takes {takes}; write `record = \"{right} KiB\"` \
+             or more in [module.stream.{stream}]"
+        )
+    })
 }
 
 fn wrong_call(installation: &Installation, module: &Configured, called: &Called<'_>) -> Option<String> {

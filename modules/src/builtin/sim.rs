@@ -1,14 +1,22 @@
-//! `sim`: a robot in a text map stands in for the drivers of motor, wheels and scanner.
+//! `sim`: a robot in a text map stands in for the drivers of motor, wheels, scanner, camera and depth sensor.
 
-use super::settings::{self, RefusedSetting, Settings as _};
-use crate::interfaces::{DriveError, LaserInterface, Motor, MotorInterface, WheelsInterface};
+mod every;
+mod sensors;
+
+use super::settings::{self, Recorded, RefusedSetting, Settings as _};
+use crate::interface::Interface;
+use crate::interfaces::{
+    CameraInterface, DepthInterface, DriveError, LaserInterface, Motor, MotorInterface, WheelsInterface,
+};
 use crate::module::{Module, ModuleError};
 use crate::parameter::ParameterSet;
 use crate::robot::simulator::{STEP_NS, Scanner, Settings as RobotSettings, Simulator};
 use crate::robot::world::World;
 use crate::runtime::Context;
 use crate::types::Twist;
+use every::Every;
 use rohrpost_mailbox::SystemClock;
+use sensors::Sensors;
 use std::time::Duration;
 
 #[crate::parameters(crate = crate::macro_support)]
@@ -28,6 +36,12 @@ pub(super) struct Settings {
     /// Odometry in a second of system time.
     #[parameter(unit = "Hz", min = 0.01, max = 100.0)]
     odometry_rate_hz: f64,
+    /// Pictures in a second of system time.
+    #[parameter(unit = "Hz", min = 0.01, max = 100.0)]
+    camera_rate_hz: f64,
+    /// Point clouds in a second of system time.
+    #[parameter(unit = "Hz", min = 0.01, max = 100.0)]
+    depth_rate_hz: f64,
     beams: usize,
     range_max_m: f64,
     dead_man_ms: u64,
@@ -42,6 +56,8 @@ impl Default for Settings {
             laser_rate_hz: 10.0,
             laser_noise_m: Scanner::default().range_noise_m,
             odometry_rate_hz: 20.0,
+            camera_rate_hz: 10.0,
+            depth_rate_hz: 5.0,
             beams: 181,
             range_max_m: 8.0,
             dead_man_ms: 500,
@@ -52,6 +68,13 @@ impl Default for Settings {
 impl settings::Settings for Settings {
     fn parameters(&self) -> &'static [&'static str] {
         self.names()
+    }
+
+    fn recorded(&self) -> Vec<Recorded> {
+        // Four numbers and a length of at most five bytes each, and no pose.
+        let bytes = 25 + 4 * self.beams;
+        let scan = Recorded { class: LaserInterface::CLASS, stream: LaserInterface::SCAN.name, bytes };
+        [scan].into_iter().chain(Sensors::recorded()).collect()
     }
 
     fn check(&self) -> Result<(), RefusedSetting> {
@@ -76,39 +99,8 @@ pub(super) struct Sim {
     epoch: u64,
     odometry: Every,
     laser: Every,
+    sensors: Sensors,
     bumps: u64,
-}
-
-/// Something that happens once a period of system time.
-struct Every {
-    period_ns: u64,
-    next_ns: u64,
-}
-
-impl Every {
-    fn hz(rate_hz: f64) -> Self {
-        Self { period_ns: period_ns(rate_hz), next_ns: 0 }
-    }
-
-    /// From the last time on, at another rate.
-    fn set_hz(&mut self, rate_hz: f64) {
-        let last_ns = self.next_ns.saturating_sub(self.period_ns);
-        self.period_ns = period_ns(rate_hz);
-        self.next_ns = last_ns + self.period_ns;
-    }
-
-    /// Whether it is time again.
-    fn is_due(&mut self, now_ns: u64) -> bool {
-        if now_ns < self.next_ns {
-            return false;
-        }
-        self.next_ns = (self.next_ns + self.period_ns).max(now_ns.saturating_sub(self.period_ns));
-        true
-    }
-}
-
-fn period_ns(rate_hz: f64) -> u64 {
-    (1e9 / rate_hz) as u64
 }
 
 fn world(settings: &Settings, context: &Context) -> Result<World, ModuleError> {
@@ -122,7 +114,8 @@ fn world(settings: &Settings, context: &Context) -> Result<World, ModuleError> {
 
 impl Module for Sim {
     type Settings = Settings;
-    type Interfaces = (MotorInterface, WheelsInterface, LaserInterface);
+    type Interfaces =
+        (MotorInterface, WheelsInterface, LaserInterface, Option<CameraInterface>, Option<DepthInterface>);
 
     fn new(settings: Settings, context: &mut Context) -> Result<Self, ModuleError> {
         settings.check()?;
@@ -142,6 +135,7 @@ impl Module for Sim {
             epoch: context.clock().now().epoch,
             odometry: Every::hz(settings.odometry_rate_hz),
             laser: Every::hz(settings.laser_rate_hz),
+            sensors: Sensors::new(context, settings.camera_rate_hz, settings.depth_rate_hz),
             bumps: 0,
             settings,
         })
@@ -154,6 +148,7 @@ impl Module for Sim {
     fn parameters_changed(&mut self, _: &mut Context, _: &[&str]) -> Result<(), ModuleError> {
         self.laser.set_hz(self.settings.laser_rate_hz);
         self.odometry.set_hz(self.settings.odometry_rate_hz);
+        self.sensors.set_rates(self.settings.camera_rate_hz, self.settings.depth_rate_hz);
         self.simulator.set_range_noise(self.settings.laser_noise_m);
         Ok(())
     }
@@ -176,13 +171,13 @@ impl Module for Sim {
         }
         if self.odometry.is_due(now_ns) {
             let odometry = self.simulator.odometry();
-            context.publish(WheelsInterface::ODOMETRY, now_ns, &odometry)?;
+            context.write(WheelsInterface::ODOMETRY, now_ns, &odometry)?;
             context.publish(MotorInterface::MOTION, now_ns, &odometry.twist)?;
         }
         if self.laser.is_due(now_ns) {
-            context.publish(LaserInterface::SCAN, now_ns, &self.simulator.scan())?;
+            context.write(LaserInterface::SCAN, now_ns, &self.simulator.scan())?;
         }
-        Ok(())
+        Ok(self.sensors.look(context, &self.simulator, now_ns)?)
     }
 }
 
@@ -194,8 +189,9 @@ impl Sim {
         if now.epoch != self.epoch {
             self.epoch = now.epoch;
             self.simulator.set_time(now.ns);
-            self.odometry.next_ns = now.ns;
-            self.laser.next_ns = now.ns;
+            self.odometry.restart(now.ns);
+            self.laser.restart(now.ns);
+            self.sensors.restart(now.ns);
         }
         now.ns
     }
@@ -215,3 +211,5 @@ impl Motor for Sim {
 
 impl crate::interfaces::Wheels for Sim {}
 impl crate::interfaces::Laser for Sim {}
+impl crate::interfaces::Camera for Sim {}
+impl crate::interfaces::Depth for Sim {}

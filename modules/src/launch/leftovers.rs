@@ -17,7 +17,8 @@ pub const CONFIG_FILE: &str = "config";
 /// What it resolved to, for programs: a file of the node's directory.
 const RESOLVED_FILE: &str = "node.json";
 
-/// Ends modules of this node that still live though no launch watches them, and removes mailboxes that nobody owns.
+/// Ends modules of this node that still live though no launch watches them, and removes mailboxes that nobody owns
+/// and streams that nobody writes.
 pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str) -> Result<Vec<String>, LaunchError> {
     let ours = || {
         // A participant that joins or leaves just now has no name in the table, or no number; 0 would be our own
@@ -51,6 +52,10 @@ pub(super) fn end(node: &Arc<Node>, installation: &Installation, node_name: &str
     // A new start begins with empty mailboxes: what was meant for the last run must not drive this one.
     for name in node.mailboxes()? {
         node.remove_orphan(name)?;
+    }
+    // Nor does it begin with the memory of streams that it may not have.
+    for stream in node.streams()? {
+        node.remove_orphan_stream(stream)?;
     }
     // What was on other nodes then need not be now; the router says so anew.
     node.forget_routes()?;

@@ -41,7 +41,7 @@ impl Default for Settings {
 
 /// A line that means something to us.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Record {
+pub enum LogRecord {
     /// A setting of the robot that wrote the log.
     Param {
         /// Its name.
@@ -68,7 +68,7 @@ pub enum Record {
     },
 }
 
-impl Record {
+impl LogRecord {
     /// The stamp, if the record has one.
     pub fn stamp_s(&self) -> Option<f64> {
         match self {
@@ -150,7 +150,7 @@ pub fn open(path: &Path, settings: Settings) -> Result<Reader<Box<dyn BufRead + 
 /// The records of a log, in the order of its lines.
 ///
 /// ```
-/// use rohrpost_modules::robot::carmen::{Reader, Record, Settings};
+/// use rohrpost_modules::robot::carmen::{Reader, LogRecord, Settings};
 /// let log = "SYNC start\nODOM 1 2 0.5 0.3 0 0 7.25 robot 7.25\n";
 /// let mut reader = Reader::new(log.as_bytes(), Settings::default());
 /// let record = reader.next().unwrap().unwrap();
@@ -203,7 +203,7 @@ impl<R: BufRead> Reader<R> {
     }
 
     /// None: a line of no kind we read.
-    fn parse(&self) -> Result<Option<Record>, Flaw> {
+    fn parse(&self) -> Result<Option<LogRecord>, Flaw> {
         let text = str::from_utf8(&self.buffer).map_err(|_| Flaw::NotText)?;
         let mut fields = Fields(text.split_ascii_whitespace());
         match fields.0.next() {
@@ -217,7 +217,7 @@ impl<R: BufRead> Reader<R> {
 }
 
 impl<R: BufRead> Iterator for Reader<R> {
-    type Item = Result<Record, LogError>;
+    type Item = Result<LogRecord, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         while !self.over {
@@ -279,19 +279,19 @@ impl<'t> Fields<'t> {
         }
     }
 
-    fn param(&mut self) -> Result<Record, Flaw> {
+    fn param(&mut self) -> Result<LogRecord, Flaw> {
         let (name, value) = (self.word("name")?.to_owned(), self.word("value")?.to_owned());
-        Ok(Record::Param { name, value })
+        Ok(LogRecord::Param { name, value })
     }
 
-    fn odometry(&mut self) -> Result<Record, Flaw> {
+    fn odometry(&mut self) -> Result<LogRecord, Flaw> {
         let pose = self.pose()?;
         let twist = Twist { speed_m_s: self.number("speed")?, turn_rate_rad_s: self.number("turn rate")? };
         self.number("acceleration")?;
-        Ok(Record::Odometry { stamp_s: self.stamp()?, odometry: Odometry { pose, twist } })
+        Ok(LogRecord::Odometry { stamp_s: self.stamp()?, odometry: Odometry { pose, twist } })
     }
 
-    fn scan(&mut self, settings: Settings) -> Result<Record, Flaw> {
+    fn scan(&mut self, settings: Settings) -> Result<LogRecord, Flaw> {
         let word = self.word("number of readings")?;
         let not_a_number = || Flaw::NotANumber { field: "number of readings", found: word.chars().take(40).collect() };
         let readings: usize = word.parse().map_err(|_| not_a_number())?;
@@ -311,7 +311,7 @@ impl<'t> Fields<'t> {
             ranges_m,
             pose: Some(pose),
         };
-        Ok(Record::Scan { stamp_s: self.stamp()?, scan, odometry })
+        Ok(LogRecord::Scan { stamp_s: self.stamp()?, scan, odometry })
     }
 }
 

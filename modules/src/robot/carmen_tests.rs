@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-fn read(text: &str) -> Vec<Result<Record, LogError>> {
+fn read(text: &str) -> Vec<Result<LogRecord, LogError>> {
     Reader::new(text.as_bytes(), Settings::default()).collect()
 }
 
@@ -16,7 +16,7 @@ fn flaw(text: &str) -> (u64, Flaw) {
 fn records_are_read_in_the_order_of_the_lines() {
     let log = "# remark\nPARAM offset 0.0 nohost 0\nNEFF 15\nODOM 1 2 3 0.5 -0.25 0 9.5 host 9.5\n\
                FLASER 3 1.5 81.83 0.01 4 5 6 7 8 9 8.5 host 8.5\nTRUEPOS 0 0 0\n\n";
-    let records: Vec<Record> = read(log).into_iter().map(Result::unwrap).collect();
+    let records: Vec<LogRecord> = read(log).into_iter().map(Result::unwrap).collect();
     let odometry = Odometry {
         pose: Pose { x_m: 1.0, y_m: 2.0, heading_rad: 3.0 },
         twist: Twist { speed_m_s: 0.5, turn_rate_rad_s: -0.25 },
@@ -33,9 +33,9 @@ fn records_are_read_in_the_order_of_the_lines() {
     assert_eq!(
         records,
         [
-            Record::Param { name: "offset".into(), value: "0.0".into() },
-            Record::Odometry { stamp_s: 9.5, odometry },
-            Record::Scan { stamp_s: 8.5, scan, odometry: believed },
+            LogRecord::Param { name: "offset".into(), value: "0.0".into() },
+            LogRecord::Odometry { stamp_s: 9.5, odometry },
+            LogRecord::Scan { stamp_s: 8.5, scan, odometry: believed },
         ]
     );
     let mut reader = Reader::new(log.as_bytes(), Settings::default());
@@ -85,7 +85,7 @@ fn endless_and_foreign_lines_are_passed() {
     let items: Vec<_> = Reader::new(log.as_slice(), Settings::default()).collect();
     assert!(matches!(items[1], Err(LogError::Malformed { line: 2, flaw: Flaw::NotText })));
     assert!(matches!(items[2], Err(LogError::Malformed { line: 3, flaw: Flaw::TooLong })));
-    assert!(matches!(items[3], Ok(Record::Odometry { stamp_s: 2.0, .. })));
+    assert!(matches!(items[3], Ok(LogRecord::Odometry { stamp_s: 2.0, .. })));
     assert_eq!(items.len(), 4);
 }
 
@@ -128,7 +128,7 @@ proptest! {
         let line = format!("FLASER {} {readings}{x} {y} {theta} 0 0 0 {stamp} h {stamp}\n", ranges.len());
         let expected = Pose { x_m: x, y_m: y, heading_rad: theta };
         match read(&line).pop() {
-            Some(Ok(Record::Scan { stamp_s, scan, .. })) => {
+            Some(Ok(LogRecord::Scan { stamp_s, scan, .. })) => {
                 prop_assert_eq!(stamp_s, stamp);
                 prop_assert_eq!(scan.ranges_m, ranges);
                 prop_assert_eq!(scan.pose, Some(expected));

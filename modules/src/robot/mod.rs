@@ -3,16 +3,21 @@
 //!
 //! ```text
 //! world ──▶ simulator ──scan──▶ pilot ──twist──▶ simulator
-//!               └─odometry──▶ fusion ──pose──┐
-//! carmen ────────────────scan─────────────▶ grid ──▶ tiles of a map
+//!               ├─odometry──▶ fusion ──pose──┐
+//! carmen ───────│────────scan─────────────▶ grid ──▶ tiles of a map
+//!               └─pose──▶ camera, depth ──▶ picture, points
 //! ```
 //!
 //! Logic alone: nothing here sends a package, reads a clock or starts a thread; time is an argument. Modules wrap it.
 
+pub mod camera;
 pub mod carmen;
+pub mod depth;
 pub mod grid;
 pub mod pilot;
+pub mod pinhole;
 pub mod playback;
+pub mod sight;
 pub mod simulator;
 mod traverse;
 pub mod world;

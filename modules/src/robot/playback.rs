@@ -1,4 +1,4 @@
-//! A log played back: its records in the order of the file, each with the time at which it is due.
+//! A log played back: its records in the order of the file, each with its own time, and with that at which it is due.
 //!
 //! Stamps of a log are not to be trusted alone:
 //!
@@ -10,7 +10,7 @@
 //! - More than [`GAP_MAX_S`] ahead: discarded too, since believing one wrong stamp would cost the rest of the log. If
 //!   the next stamp agrees with it, it was a pause, which is played as one of `GAP_MAX_S`.
 
-use super::carmen::{LogError, Reader, Record};
+use super::carmen::{LogError, LogRecord, Reader};
 use std::io::BufRead;
 use thiserror::Error;
 
@@ -25,8 +25,11 @@ pub struct Due {
     /// Since the start of the playback: time in the log divided by the speed. Never less than that of the record
     /// before.
     pub due_ns: u64,
+    /// The record's own time, likewise since the start. Before `due_ns` if the record is behind others; negative if it
+    /// is behind the first one. That of a record without a stamp is `due_ns`.
+    pub stamp_ns: i64,
     /// What to play.
-    pub record: Record,
+    pub record: LogRecord,
 }
 
 /// What became of the lines so far.
@@ -109,9 +112,12 @@ impl<R: BufRead> Playback<R> {
         Counters { skipped: self.reader.skipped(), ..self.counters }
     }
 
-    fn due_ns(&self) -> u64 {
-        let since_start_s = self.span.as_ref().map_or(0.0, |span| span.latest_s - span.start_s);
-        (since_start_s / self.speed * 1e9).round() as u64
+    /// A record, after it was believed.
+    fn due(&self, record: LogRecord) -> Due {
+        let (start_s, latest_s) = self.span.as_ref().map_or((0.0, 0.0), |span| (span.start_s, span.latest_s));
+        let since_start_ns = |stamp_s: f64| ((stamp_s - start_s) / self.speed * 1e9).round();
+        let stamp_ns = since_start_ns(record.stamp_s().unwrap_or(latest_s)) as i64;
+        Due { due_ns: since_start_ns(latest_s) as u64, stamp_ns, record }
     }
 }
 
@@ -136,11 +142,11 @@ impl<R: BufRead> Iterator for Playback<R> {
                 }
             }
             match &record {
-                Record::Scan { .. } => self.counters.scans += 1,
-                Record::Odometry { .. } => self.counters.odometries += 1,
-                Record::Param { .. } => {}
+                LogRecord::Scan { .. } => self.counters.scans += 1,
+                LogRecord::Odometry { .. } => self.counters.odometries += 1,
+                LogRecord::Param { .. } => {}
             }
-            return Some(Ok(Due { due_ns: self.due_ns(), record }));
+            return Some(Ok(self.due(record)));
         }
     }
 }
@@ -173,6 +179,20 @@ mod tests {
             (vec![0.0, 1e9, 1e9, 1e9 + 1.0], 1.0, vec![0, 10_000, 11_000], 1, "the first stamp was wrong"),
         ] {
             assert_eq!(play(&stamps_s, speed), (due_ms, discarded), "{why}");
+        }
+    }
+
+    #[test]
+    fn stamps_are_the_records_own() {
+        for (stamps_s, speed, own_ms, why) in [
+            (vec![5.0, 5.5, 6.0], 2.0, vec![0, 250, 500], "twice as fast"),
+            (vec![5.0, 5.5, 4.75, 6.0], 1.0, vec![0, 500, -250, 1000], "behind all others"),
+            (vec![5.0, 905.0, 905.5, 905.25], 1.0, vec![0, 10_000, 9_750], "behind, after a pause of 900 s"),
+        ] {
+            let log: String = stamps_s.iter().map(|stamp| format!("ODOM 0 0 0 0 0 0 {stamp} h 0\n")).collect();
+            let playback = Playback::new(Reader::new(log.as_bytes(), Settings::default()), speed).unwrap();
+            let found: Vec<i64> = playback.map(|item| item.unwrap().stamp_ns / 1_000_000).collect();
+            assert_eq!(found, own_ms, "{why}");
         }
     }
 

@@ -15,7 +15,6 @@
 //!
 //! The other one is the grid format of the MovingAI benchmarks (`type octile`).
 
-use super::traverse::Traversal;
 use crate::types::Pose;
 use std::f64::consts::{FRAC_PI_2, PI};
 use thiserror::Error;
@@ -190,18 +189,6 @@ impl World {
             || self.is_blocked((x_m / self.cell_m).floor() as i64, (y_m / self.cell_m).floor() as i64)
     }
 
-    /// Distance to the first blocked square in this direction, exactly; none within `range_max_m`. 0 inside a wall.
-    pub fn cast(&self, x_m: f64, y_m: f64, direction_rad: f64, range_max_m: f64) -> Option<f64> {
-        if !(x_m.is_finite() && y_m.is_finite() && direction_rad.is_finite()) {
-            return Some(0.0);
-        }
-        Traversal::new(x_m / self.cell_m, y_m / self.cell_m, direction_rad)
-            .take_while(|crossing| crossing.entry * self.cell_m <= range_max_m)
-            // All beyond the map is blocked, so that this ends even with an endless range.
-            .find(|crossing| self.is_blocked(crossing.column, crossing.row))
-            .map(|crossing| crossing.entry * self.cell_m)
-    }
-
     /// Whether a disc reaches into a blocked square. Touching from outside is no collision.
     pub fn disc_collides(&self, x_m: f64, y_m: f64, radius_m: f64) -> bool {
         if !(x_m.is_finite() && y_m.is_finite() && radius_m.is_finite()) {
@@ -223,7 +210,8 @@ impl World {
         })
     }
 
-    fn is_blocked(&self, column: i64, row: i64) -> bool {
+    /// Whether a square is blocked, or off the map.
+    pub(super) fn is_blocked(&self, column: i64, row: i64) -> bool {
         match (usize::try_from(column), usize::try_from(row)) {
             (Ok(column), Ok(row)) if column < self.columns && row < self.rows => {
                 self.blocked[row * self.columns + column]

@@ -1,15 +1,20 @@
 //! What a module can ask of its runtime.
 
 mod publishing;
+mod streaming;
 mod subscribing;
+
+pub(super) use publishing::Distribution;
 
 use super::endpoint::Endpoint;
 use super::error::ContextError;
 use super::follow::Followings;
+use super::newest::Newest;
 use super::refusals::Refusals;
+use super::stream::{FollowedStreams, OwnStreams};
 use crate::call::{Caller, Link};
 use crate::interface::Proxy;
-use crate::publish::{Newest, Subscriptions};
+use crate::publish::Subscriptions;
 use rohrpost_config::{Installation, Principal};
 use rohrpost_mailbox::{
     Interest, Name, OverflowPolicy, Publications, Receiver, Shape, SystemClock, SystemTime, Watch, Watches, local,
@@ -35,7 +40,7 @@ const PERIOD_MAX: Duration = Duration::from_secs(86_400);
 ///
 /// fn prepare(context: &mut Context) -> Result<Subscription<Odometry>, ContextError> {
 ///     context.set_period(std::time::Duration::from_millis(100));
-///     context.subscribe(WheelsInterface::ODOMETRY, "odometry.0", Rate::Each)
+///     context.subscribe(WheelsInterface::ODOMETRY.data(), "odometry.0", Rate::Each)
 /// }
 /// ```
 pub struct Context {
@@ -48,6 +53,10 @@ pub struct Context {
     /// Numbers and names of the functions of all of them.
     pub(crate) functions: Vec<(u16, String)>,
     pub(crate) newest: Vec<Newest>,
+    /// Streams that the module writes.
+    pub(super) streams: OwnStreams,
+    /// Streams of which it is given each record.
+    pub(super) followed_streams: FollowedStreams,
     /// Counts what is published.
     publications: Publications,
     pub(crate) subscriptions: Subscriptions,
@@ -88,6 +97,8 @@ impl Context {
             served: Vec::new(),
             functions: Vec::new(),
             newest: Vec::new(),
+            streams: Vec::new(),
+            followed_streams: FollowedStreams::default(),
             publications,
             subscriptions,
             followings,
@@ -253,15 +264,9 @@ impl Context {
         self.watches.as_mut().is_some_and(|watches| watches.remove(watch))
     }
 
+    /// A module that this one sends commands to.
     fn named(&self, module: &str, wanted: &'static str) -> Result<Name, ContextError> {
-        let classes = &self.installation.classes;
-        // What is beyond the LAN has a name of four parts, and stands in another configuration.
-        let is_beyond = self.installation.tcp.is_some() && module.split('.').count() == 4;
-        let name = if is_beyond { classes.parse_name(module)?.module() } else { classes.parse_module(module)? };
-        let class = self.installation.classes.name(name.class()).unwrap_or_default();
-        if class != wanted {
-            return Err(ContextError::Class { module: module.into(), class: class.into(), wanted });
-        }
+        let (name, is_beyond) = self.of_class(module, wanted)?;
         // The configuration counts on `calls`: the number of callers decides how many slots a mailbox needs.
         let declared = is_beyond || self.installation.module(self.me).is_none_or(|me| me.calls.contains(&name));
         if !declared {
@@ -270,5 +275,18 @@ impl Context {
             );
         }
         Ok(name)
+    }
+
+    /// A module of this class, and whether it is beyond the LAN.
+    fn of_class(&self, module: &str, wanted: &'static str) -> Result<(Name, bool), ContextError> {
+        let classes = &self.installation.classes;
+        // What is beyond the LAN has a name of four parts, and stands in another configuration.
+        let is_beyond = self.installation.tcp.is_some() && module.split('.').count() == 4;
+        let name = if is_beyond { classes.parse_name(module)?.module() } else { classes.parse_module(module)? };
+        let class = self.installation.classes.name(name.class()).unwrap_or_default();
+        if class != wanted {
+            return Err(ContextError::Class { module: module.into(), class: class.into(), wanted });
+        }
+        Ok((name, is_beyond))
     }
 }

@@ -1,6 +1,7 @@
 //! One name under which a module's process is reached: its command mailbox, and its interface.
 
 use super::server::CommandServer;
+use super::stream::{StreamItem, is_new};
 use crate::call::Fault;
 use crate::interface::{ServeFunction, Served};
 use rohrpost_config::Principal;
@@ -18,8 +19,12 @@ pub(crate) struct Endpoint<M> {
 pub(crate) struct Offer<M> {
     /// Numbers of functions that may be run twice.
     pub(crate) idempotent: Vec<u16>,
-    /// Numbers of its data.
+    /// Numbers of its data and streams.
     pub(crate) data: Vec<u16>,
+    /// Its streams.
+    pub(crate) streams: Vec<StreamItem>,
+    /// The interface is another than the one that was served under this name before, as far as is known.
+    pub(crate) is_new: bool,
     /// None: the module serves no interface under this name, only the common functions.
     pub(crate) serve: Option<ServeFunction<M>>,
     pub(crate) hash: u32,
@@ -46,6 +51,8 @@ impl<M> Endpoint<M> {
         let idempotent = description.functions.iter().filter(|f| f.idempotent).map(|f| f.number).collect();
         let functions = description.functions.iter().map(|f| (f.number, f.name.clone())).collect();
         let data = description.data.iter().map(|item| item.number).collect();
+        let streams = StreamItem::all_of(&description);
+        let is_new = is_new(commands.participant(), name, hash);
         // Writing to a growing vector does not fail.
         let description = description.to_bytes();
         // For tools that must not ask: a question would be one more package.
@@ -53,7 +60,7 @@ impl<M> Endpoint<M> {
             // On a full /dev/shm, say: a module that could take its mailboxes over goes on all the same.
             tracing::warn!("{name}: tools cannot describe it: {error}");
         }
-        let offer = Offer { idempotent, data, serve, hash, functions, description };
+        let offer = Offer { idempotent, data, streams, is_new, serve, hash, functions, description };
         Self { name, command_server: CommandServer::new(commands, named), offer }
     }
 }

@@ -1,5 +1,6 @@
 //! Why a module did not start.
 
+use super::stream::{RecordError, StreamReadError};
 use rohrpost_config::{Errors, NameTextError, SettingsError};
 use rohrpost_mailbox::NodeError;
 use std::path::PathBuf;
@@ -46,6 +47,24 @@ pub enum StartError {
         /// Class of the interface.
         interface: &'static str,
     },
+    /// A stream of the configuration that the program does not have.
+    #[error(
+        "{place}: `{module}` has a section [module.stream.{stream}], but none of its interfaces has such a stream: \
+         {known}; remove the section, or write the name that follows `fn` in the interface"
+    )]
+    NoStream {
+        /// File and line of the section.
+        place: String,
+        /// The module.
+        module: String,
+        /// The stream.
+        stream: String,
+        /// Which there are.
+        known: String,
+    },
+    /// A stream that cannot be made; the text names it as the configuration does.
+    #[error("{0}")]
+    Stream(String),
     /// Launch is gone.
     #[error("launch, process {0}, ended before this module began")]
     Orphan(u32),
@@ -72,8 +91,14 @@ impl StartError {
             | Self::NoModule(..)
             | Self::Settings(_)
             | Self::Endpoint(..)
+            | Self::NoStream { .. }
             | Self::Interface { .. } => Self::CONFIGURATION,
-            Self::Node(_) | Self::Mailbox(_) | Self::Orphan(_) | Self::Module(..) | Self::System(..) => 1,
+            Self::Node(_)
+            | Self::Mailbox(_)
+            | Self::Stream(_)
+            | Self::Orphan(_)
+            | Self::Module(..)
+            | Self::System(..) => 1,
         }
     }
 }
@@ -122,4 +147,26 @@ pub enum ContextError {
     /// The value cannot be written as postcard.
     #[error("data `{0}` cannot be written: {1}")]
     Encode(&'static str, postcard::Error),
+    /// It is not data but a stream, which is written as such.
+    #[error("`{0}` is a stream: write it with `write` or `begin`, which publish it, too")]
+    IsStream(&'static str),
+    /// A value that did not become a record of a stream.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A stream that cannot be read.
+    #[error(transparent)]
+    Read(#[from] StreamReadError),
+    /// A stream of another node.
+    #[error(
+        "stream `{stream}` of {module} is on node `{node}`, and a stream is read on its own node; subscribe to its \
+         values with `subscribe(PORT.data(), …)`"
+    )]
+    FarStream {
+        /// The stream.
+        stream: String,
+        /// The module.
+        module: String,
+        /// Its node; `?` beyond the LAN.
+        node: String,
+    },
 }

@@ -10,14 +10,16 @@ pub(super) fn page(context: &Context, from: u16) -> ExchangePage {
     let mut link = context.link.borrow_mut();
     // Answers that nobody waits for any more.
     link.collect();
-    let followed = context.followings.tallies().map(|(publisher, number, came, lost)| Exchange {
-        module: named(publisher),
-        data: Some(number),
-        packages: came,
-        repeated: 0,
-        lost,
-        late: 0,
-    });
+    let followed = context.followings.tallies().chain(context.followed_streams.tallies()).map(
+        |(publisher, number, came, lost)| Exchange {
+            module: named(publisher),
+            data: Some(number),
+            packages: came,
+            repeated: 0,
+            lost,
+            late: 0,
+        },
+    );
     let called = link.tallies().iter().map(|tally| Exchange {
         module: named(tally.to),
         data: None,

@@ -1,10 +1,12 @@
 //! The subscribing side of continuous data: asks, renews, and sees gaps.
 
 use super::refusals::Cause;
+use super::subscribed::{Origin, Subscribed, seal};
 use crate::call::append;
 use crate::call::{CallError, Fault, Link, is_to};
 use crate::common::{DataHead, SUBSCRIBE, Subscribe, UNSUBSCRIBE, Unsubscribe};
 use rohrpost_mailbox::{Head, Name, Options};
+use rohrpost_schema::Data;
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};
 
@@ -73,6 +75,16 @@ impl<T> Clone for Subscription<T> {
 }
 
 impl<T> Copy for Subscription<T> {}
+
+impl<T: Data> Subscribed for Subscription<T> {
+    type Item = T;
+}
+
+impl<T> seal::Kind for Subscription<T> {
+    fn brought(&self, origin: Origin) -> bool {
+        matches!(origin, Origin::Package { mailbox, id } if (mailbox, id) == (self.mailbox, self.id))
+    }
+}
 
 impl<T> Subscription<T> {
     pub(crate) fn new(id: u16, mailbox: u8) -> Self {

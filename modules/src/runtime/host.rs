@@ -2,14 +2,16 @@
 
 mod functions;
 
+use super::stream::{CheckedReader, Stream, StreamReadError};
 use crate::call::append;
 use crate::call::{CallError, Link, REPLIES_KEPT};
 use crate::common::{self, DescriptionPart};
+use crate::interface::StreamPort;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
 };
-use rohrpost_schema::Description;
+use rohrpost_schema::{Data, Description};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -146,6 +148,36 @@ impl ToolLink {
             self.data = Some(self.link.participant().clone().receiver(name, shape)?);
         }
         self.data.as_mut().ok_or(CreateError::Reserved(Name::NONE))
+    }
+
+    /// A stream of a module of this node, read as [`super::Context::stream`] reads it.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Stream, StreamReadError, ToolLink};
+    /// # use rohrpost_modules::{interface::StreamPort, types::Pose};
+    /// # use rohrpost_config::Installation;
+    /// # use rohrpost_mailbox::Name;
+    /// fn hook(
+    ///     tool: &ToolLink,
+    ///     installation: &Installation,
+    ///     port: StreamPort<Pose>,
+    ///     crane: Name,
+    /// ) -> Result<Stream<Pose>, StreamReadError> {
+    ///     tool.stream(installation, port, crane)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// [`StreamReadError::Ring`] when all its seats are taken, or its file cannot be read.
+    pub fn stream<T: Data>(
+        &self,
+        installation: &Installation,
+        port: StreamPort<T>,
+        module: Name,
+    ) -> Result<Stream<T>, StreamReadError> {
+        let installation = Arc::new(installation.clone());
+        let reader = CheckedReader::open(self.link.participant(), &installation, port.into(), module)?;
+        Ok(Stream::new(reader, self.clock.clone()))
     }
 
     /// Calls a common function with a tuple of arguments.

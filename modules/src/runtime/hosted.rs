@@ -13,7 +13,7 @@ use crate::module::Module;
 use crate::output;
 use crate::publish::RequestOrigin;
 use rohrpost_config::Principal;
-use rohrpost_mailbox::{Head, Label, Name, Options, SendError, Work, local, monotonic_ns};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Head, Label, Name, Options, SendError, Work, local, monotonic_ns};
 
 /// What is needed to run one command.
 pub(super) struct Hosted<'a, M> {
@@ -128,11 +128,14 @@ impl<M: Module> Hosted<'_, M> {
     fn get_data(&self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         let (number,): (u16,) = read_arguments(call.arguments)?;
         self.offer.require_data(number)?;
-        let is_it = |newest: &&crate::publish::Newest| (newest.endpoint, newest.number) == (self.index, number);
-        let newest = self.context.newest.iter().find(is_it).ok_or(Fault::NothingYet)?;
+        let newest = self.context.newest_of(self.index, number).ok_or(Fault::NothingYet)?;
+        // A stream's records may be larger than any package.
+        if newest.value.len() > BODY_BYTES_MAX {
+            return Err(Fault::TooLarge(u32::try_from(newest.value.len()).unwrap_or(u32::MAX)));
+        }
         // A tuple of the time and the value: in postcard just the one after the other.
         write_result(reply, &newest.stamp_ns)?;
-        reply.extend_from_slice(&newest.value);
+        reply.extend_from_slice(newest.value);
         Ok(())
     }
 }

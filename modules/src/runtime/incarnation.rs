@@ -76,6 +76,7 @@ impl<M: Module> Incarnation<M> {
             return Ok(());
         }
         self.error.clear();
+        context.followed_streams.pass_over();
         if let Err(error) = self.work(Work::On, context, M::on) {
             self.fail(&error, context);
             return Err(Fault::ModuleError(self.error.clone()));
@@ -119,7 +120,7 @@ impl<M: Module> Incarnation<M> {
             uptime_ms: self.started.elapsed().as_millis() as u64,
             subscribers: context.subscriptions.len() as u32,
             missed: context.subscriptions.missed(),
-            lost: context.followings.lost(),
+            lost: context.followings.lost() + context.followed_streams.lost(),
             output_lost: output::lost(),
             output_suppressed: output::suppressed(),
             output_level: output::level(),

@@ -4,6 +4,7 @@
 //!             ┌──────────────── one thread ────────────────┐
 //!  commands ─▶│ server: once? hosted: dispatch, reply      │─▶ replies
 //!  data     ─▶│ runner: received, tick, on, off            │─▶ data of subscriptions
+//!  records  ─▶│ stream: of others, by time or one by one   │─▶ records of own streams
 //!  replies  ─▶│ link: proxies' calls, renewals             │─▶ commands
 //!             └────────────────────────────────────────────┘
 //! ```
@@ -16,19 +17,26 @@ mod follow;
 mod host;
 mod hosted;
 mod incarnation;
+mod newest;
 mod parameters;
 mod received;
 pub(crate) mod refusals;
 mod runner;
 pub(crate) mod server;
 mod start;
+mod stream;
+mod subscribed;
+mod unreadable;
 
 pub use context::Context;
 pub use error::{ContextError, StartError};
 pub use follow::{BadRate, Rate, Subscription};
 pub use host::{ClientError, ToolLink, describe};
-pub use received::{Received, Unreadable};
+pub use received::Received;
 pub use runner::{exit, run, run_started};
 pub use server::{read_arguments, write_result};
 pub(crate) use start::environment;
 pub use start::{Start, find_other_versions, find_running, kept};
+pub use stream::{Moment, OpenValue, Record, RecordError, Stream, StreamReadError, StreamSubscription};
+pub use subscribed::Subscribed;
+pub use unreadable::Unreadable;

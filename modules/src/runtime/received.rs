@@ -1,18 +1,11 @@
 //! Data on their way to a module.
 
-use super::follow::Subscription;
+use super::stream::Moment;
+use super::subscribed::{Origin, Subscribed};
+use super::unreadable::Unreadable;
 use crate::common::DataHead;
-use rohrpost_mailbox::Name;
-use rohrpost_schema::Data;
-
-/// Data that came are not of the type that their publisher's interface says.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("data {number} of {from} cannot be read: {error}; its publisher does not write what its interface says")]
-pub struct Unreadable {
-    from: Name,
-    number: u16,
-    error: postcard::Error,
-}
+use rohrpost_mailbox::{Name, local};
+use rohrpost_schema::{Data, View};
 
 /// Data that a subscription brought.
 ///
@@ -29,22 +22,72 @@ pub struct Received<'a> {
     pub from: Name,
     /// Data number in its interface.
     pub number: u16,
-    /// Mailbox it came to.
+    /// Mailbox it came to; 0 for a record of a stream, which comes to none.
     pub mailbox: u8,
-    /// Which subscription.
-    pub(crate) id: u16,
-    /// Time, number, misses.
+    /// Time, number, misses. Of a stream: the lower bits of the record's sequence, and records lost so far.
     pub head: DataHead,
-    /// The value, postcard.
+    /// The value, postcard. That of a stream's record lies in its ring.
     pub value: &'a [u8],
+    origin: Origin,
 }
 
-impl Received<'_> {
+impl<'a> Received<'a> {
+    pub(super) fn new(from: Name, number: u16, origin: Origin, head: DataHead, value: &'a [u8]) -> Self {
+        let mailbox = match origin {
+            Origin::Package { mailbox, .. } => mailbox,
+            Origin::Stream { .. } => local::COMMANDS,
+        };
+        Self { from, number, mailbox, head, value, origin }
+    }
+
+    /// When it was true, to look for in a stream ([`super::Stream::at`]); that of a record with its epoch.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Received, Stream, StreamReadError};
+    /// # use rohrpost_modules::types::Pose;
+    /// fn pose_then(data: &Received<'_>, poses: &mut Stream<Pose>) -> Result<Option<Pose>, StreamReadError> {
+    ///     Ok(poses.at(data.moment())?.ok())
+    /// }
+    /// ```
+    pub fn moment(&self) -> Moment {
+        match self.origin {
+            Origin::Package { .. } => Moment::Ns(self.head.stamp_ns),
+            Origin::Stream { stamp, .. } => stamp.into(),
+        }
+    }
+
     /// The value, if it belongs to this subscription; none of what belongs to another.
     ///
     /// # Errors
     /// It belongs to it, and cannot be read.
-    pub fn read<T: Data>(&self, subscription: &Subscription<T>) -> Result<Option<T>, Unreadable> {
+    pub fn read<S: Subscribed>(&self, subscription: &S) -> Result<Option<S::Item>, Unreadable> {
+        self.is_of(subscription).then(|| self.decode()).transpose()
+    }
+
+    /// The same with its bytes where they lie, which copies none of them.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Received, StreamSubscription, Unreadable};
+    /// use rohrpost_modules::schema::View;
+    ///
+    /// fn look<T: View>(
+    ///     data: &Received<'_>,
+    ///     images: &StreamSubscription<T>,
+    ///     see: impl Fn(T::View<'_>),
+    /// ) -> Result<(), Unreadable> {
+    ///     if let Some(image) = data.view(images)? {
+    ///         see(image);
+    ///     }
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// It belongs to it, and cannot be read.
+    pub fn view<S: Subscribed>(&self, subscription: &S) -> Result<Option<<S::Item as View>::View<'a>>, Unreadable>
+    where
+        S::Item: View,
+    {
         self.is_of(subscription).then(|| self.decode()).transpose()
     }
 
@@ -62,11 +105,12 @@ impl Received<'_> {
     /// # Errors
     /// It came there, and cannot be read.
     pub fn read_from<T: Data>(&self, mailbox: u8) -> Result<Option<T>, Unreadable> {
-        (self.mailbox == mailbox).then(|| self.decode()).transpose()
+        let came = matches!(self.origin, Origin::Package { .. }) && self.mailbox == mailbox;
+        came.then(|| self.decode()).transpose()
     }
 
-    fn decode<T: Data>(&self) -> Result<T, Unreadable> {
-        postcard::from_bytes(self.value).map_err(|error| Unreadable { from: self.from, number: self.number, error })
+    fn decode<V: serde::Deserialize<'a>>(&self) -> Result<V, Unreadable> {
+        postcard::from_bytes(self.value).map_err(|error| Unreadable::new(self.from, self.number, error))
     }
 
     /// Whether it belongs to this subscription.
@@ -77,14 +121,15 @@ impl Received<'_> {
     ///     if data.is_of(odometry) { data.head.missed.into() } else { 0 }
     /// }
     /// ```
-    pub fn is_of<T>(&self, subscription: &Subscription<T>) -> bool {
-        (self.mailbox, self.id) == (subscription.mailbox, subscription.id)
+    pub fn is_of<S: Subscribed>(&self, subscription: &S) -> bool {
+        subscription.brought(self.origin)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runtime::follow::Subscription;
 
     const HEAD: DataHead = DataHead { stamp_ns: 0, sequence: 0, missed: 0, incarnation: 0 };
 
@@ -92,7 +137,7 @@ mod tests {
     fn what_is_of_another_is_told_from_what_cannot_be_read() {
         let from = Name::new(1, 150, 0, 0);
         let read = |id: u16, mailbox: u8, value: &[u8]| {
-            let received = Received { from, number: 3, mailbox, id, head: HEAD, value };
+            let received = Received::new(from, 3, Origin::Package { mailbox, id }, HEAD, value);
             received.read(&Subscription::<u16>::new(7, 2))
         };
         assert_eq!(read(7, 2, &[5]), Ok(Some(5)));

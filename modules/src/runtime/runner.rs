@@ -8,11 +8,15 @@ use super::incarnation::Incarnation;
 use super::received::Received;
 use super::refusals::Cause;
 use super::start::Start;
+use super::stream::{self, Step};
+use super::subscribed::Origin;
 use crate::common::DataHead;
 use crate::interface::Interfaces;
 use crate::module::Module;
 use crate::output;
-use rohrpost_mailbox::{Kind, ModuleState, OverflowPolicy, Receiver, Waiting, Watches, Work, monotonic_ns, wait_any};
+use rohrpost_mailbox::{
+    Kind, ModuleState, OverflowPolicy, Receiver, Source, Waiting, Watches, Work, monotonic_ns, wait_any,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -114,7 +118,7 @@ pub(crate) struct Running<M> {
     /// See [`Waiting::spin`].
     pub(crate) spin: Duration,
     /// Empty; kept for its memory, so that going to sleep allocates nothing.
-    pub(crate) receivers: Vec<&'static mut Receiver>,
+    pub(crate) sources: Vec<&'static mut (dyn Source + 'static)>,
 }
 
 impl<M: Module> Running<M> {
@@ -131,6 +135,7 @@ impl<M: Module> Running<M> {
         while !self.stop.load(Ordering::Acquire) {
             let mut busy = self.commands();
             busy |= self.take_data();
+            busy |= self.take_records();
             self.periodic();
             output::drain();
             let slept = if busy { self.look() } else { self.sleep() };
@@ -172,6 +177,34 @@ impl<M: Module> Running<M> {
         }
         own.append(&mut self.context.own);
         self.context.own = own;
+        any
+    }
+
+    /// Hands out records of the streams that the module follows, while it is on.
+    fn take_records(&mut self) -> bool {
+        let mut any = false;
+        // Taken out meanwhile, as own mailboxes are.
+        let mut followed = std::mem::take(&mut self.context.followed_streams.list);
+        for stream in &mut followed {
+            any |= burst(|| {
+                if self.life.state != ModuleState::On {
+                    return false;
+                }
+                match stream.step() {
+                    Step::Record(record) => {
+                        let received = record.received();
+                        let part = |module: &mut M, context: &mut Context| module.received(context, &received);
+                        let result = self.life.work(Work::Received(received.number), &mut self.context, part);
+                        self.life.check(result, &mut self.context);
+                        true
+                    }
+                    Step::Again => true,
+                    Step::Nothing => false,
+                }
+            });
+        }
+        followed.append(&mut self.context.followed_streams.list);
+        self.context.followed_streams.list = followed;
         any
     }
 
@@ -224,21 +257,24 @@ impl<M: Module> Running<M> {
         let delivery = self.context.subscriptions.next_ns();
         let delivery = delivery.map(|ns| Instant::now() + Duration::from_nanos(ns.saturating_sub(now_ns)));
         let output = output::retry_at();
-        let deadline = [tick, renewal, delivery, output].into_iter().flatten().min();
+        let stream = self.context.followed_streams.retry().filter(|_| on);
+        let deadline = [tick, renewal, delivery, output, stream].into_iter().flatten().min();
         let mut link = self.context.link.borrow_mut();
-        let mut receivers = empty(std::mem::take(&mut self.receivers));
-        receivers.extend(self.endpoints.iter_mut().map(|endpoint| &mut endpoint.command_server.commands));
-        receivers.push(&mut self.data);
-        receivers.extend(&mut self.context.own);
-        receivers.push(link.replies());
+        let mut sources = empty(std::mem::take(&mut self.sources));
+        sources.extend(self.endpoints.iter_mut().map(|endpoint| source(&mut endpoint.command_server.commands)));
+        sources.push(&mut self.data);
+        sources.extend(self.context.own.iter_mut().map(source));
+        sources.push(link.replies());
+        // Records that are written while it is off are passed over, and wake nobody.
+        sources.extend(self.context.followed_streams.sources().filter(|_| on));
         let waiting = Waiting { spin: self.spin, deadline };
         let stop = || self.stop.load(Ordering::Acquire);
         // What comes for a module that is off waits where it is: it would end every sleep.
         let slept = match self.context.watches.as_mut().filter(|_| on) {
-            Some(watches) => watches.wait_any(&mut receivers, waiting, stop),
-            None => wait_any(&mut receivers, waiting, stop),
+            Some(watches) => watches.wait_any(&mut sources, waiting, stop),
+            None => wait_any(&mut sources, waiting, stop),
         };
-        self.receivers = empty(receivers);
+        self.sources = empty(sources);
         slept
     }
 
@@ -254,6 +290,7 @@ impl<M: Module> Running<M> {
         if !self.by_hand {
             return;
         }
+        stream::remove(&self.life.participant, std::mem::take(&mut self.context.streams));
         // With it go its proxies, which hold the link.
         drop(self.life);
         let commands = self.endpoints.into_iter().map(|endpoint| endpoint.command_server.commands);
@@ -277,7 +314,8 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &
             return true;
         };
         if context.admits((local, latest), head, number, &data) && life.state == ModuleState::On {
-            let received = Received { from: head.from, number, mailbox: local, id: head.id, head: data, value };
+            let origin = Origin::Package { mailbox: local, id: head.id };
+            let received = Received::new(head.from, number, origin, data, value);
             let part = |module: &mut M, context: &mut Context| module.received(context, &received);
             let result = life.work(Work::Received(number), context, part);
             life.check(result, context);
@@ -302,9 +340,14 @@ fn burst(mut handle: impl FnMut() -> bool) -> bool {
 
 /// The same memory without what was in it, for things that live for another time. Collecting in place is how the
 /// standard library does this; were it not, it would allocate, and `tests/hot_path.rs` would tell.
-fn empty<'a>(mut receivers: Vec<&mut Receiver>) -> Vec<&'a mut Receiver> {
-    receivers.clear();
-    receivers.into_iter().map(|_| -> &'a mut Receiver { unreachable!("it is empty") }).collect()
+fn empty<'a>(mut sources: Vec<&mut (dyn Source + 'static)>) -> Vec<&'a mut (dyn Source + 'static)> {
+    sources.clear();
+    sources.into_iter().map(|_| -> &'a mut (dyn Source + 'static) { unreachable!("it is empty") }).collect()
+}
+
+/// A mailbox, as one of the things that are waited for.
+fn source(mailbox: &mut Receiver) -> &mut (dyn Source + 'static) {
+    mailbox
 }
 
 /// What a module serves, in the order of its endpoints.

@@ -6,6 +6,7 @@ use super::error::StartError;
 use super::incarnation::Incarnation;
 use super::parameters;
 use super::runner::{Running, served};
+use super::stream::{self, ServedStreams};
 use crate::call::Link;
 use crate::module::Module;
 use crate::output;
@@ -138,7 +139,7 @@ impl Start {
             let named = installation.callers(name);
             endpoints.push(Endpoint::new(name, &class, commands, &named, at.map(|at| served.swap_remove(at))));
         }
-        if let Some(left) = served.first() {
+        if let Some(left) = served.iter().find(|served| !served.is_optional) {
             let names: Vec<String> =
                 module.names().map(|name| format!("`{}`", installation.classes.format(name))).collect();
             return Err(StartError::Interface { module: text, names: names.join(", "), interface: left.class });
@@ -151,6 +152,12 @@ impl Start {
         let mut context = Context::new(self.name, installation.clone(), link, names, clock, data.shape());
         let settings = installation.settings_as(module)?;
         context.serves(&endpoints);
+        let streams_of = |endpoint| {
+            let Endpoint { name, offer, .. }: &Endpoint<M> = endpoint;
+            ServedStreams { name: *name, items: &offer.streams, is_new: offer.is_new }
+        };
+        let served: Vec<_> = endpoints.iter().map(streams_of).collect();
+        context.streams = stream::make(&participant, &installation, module, &served)?;
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);
         participant.end_work();
@@ -160,7 +167,7 @@ impl Start {
         let by_hand = self.launcher.is_none();
         let spin = module.spin;
         let life = Incarnation::new(made, participant, module.busy_after);
-        Ok(Running { life, endpoints, data, context, stop, turn_on, by_hand, spin, receivers: Vec::new() })
+        Ok(Running { life, endpoints, data, context, stop, turn_on, by_hand, spin, sources: Vec::new() })
     }
 }
 

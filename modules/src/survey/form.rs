@@ -6,12 +6,13 @@
 #[cfg(test)]
 mod tests;
 
-use super::{MailboxSnapshot, ModuleSurvey, Survey, Usage, Working};
+use super::{MailboxSnapshot, ModuleSurvey, StreamSurvey, Survey, Usage, Working};
 use crate::launcher::ChildState;
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{
     Class, ClassTraffic, FlowInfo, FlowSecond, LATENCY_BUCKETS, Latency, Loss, MailboxDetail, MailboxInfo, ModuleState,
-    Name, OverflowPolicy, ParticipantInfo, Party, Priority, Shape, SlotInfo, Type, VictimInfo, WaitingPackage,
+    Name, OverflowPolicy, ParticipantInfo, Party, Priority, RecordInfo, STREAM_KEEP_MAX, Shape, SlotInfo, Stamp,
+    StreamId, StreamInfo, StreamShape, Type, VictimInfo, WaitingPackage,
 };
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -96,6 +97,7 @@ as_plain! {
     Class => u8, |class| class.0, Self;
     Priority => u8, |priority| priority.0, Self;
     Type => i16, |ty| ty.0, Self;
+    usize => u64, |count| *count as u64, |count| Self::try_from(count).unwrap_or(Self::MAX);
     Duration => u64, |time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX), Self::from_nanos;
 }
 
@@ -206,6 +208,7 @@ travels! {
         at_ns: u64,
         modules: Vec<ModuleSurvey>,
         mailboxes: Vec<MailboxInfo>,
+        streams: Vec<StreamSurvey>,
         classes: Vec<ClassTraffic>,
         flows: Vec<FlowInfo>,
     };
@@ -258,6 +261,29 @@ travels! {
         max_age: Option<Duration>,
         claims: u8,
     };
+    struct StreamSurvey as StreamForm { node: String, at_ns: u64, info: StreamInfo, };
+    struct StreamInfo as StreamInfoForm {
+        id: StreamId,
+        shape: StreamShape,
+        writer: Option<Party>,
+        adoptions: u32,
+        written: u64,
+        refused: u64,
+        oldest: Option<RecordInfo>,
+        newest: Option<RecordInfo>,
+        readers: u16,
+        holding: u16,
+        sleeping: u16,
+    };
+    struct StreamId as StreamIdForm { name: Name, number: u16, };
+    struct RecordInfo as RecordForm {
+        sequence: u64,
+        stamp: Stamp,
+        written_ns: u64,
+        len_bytes: usize,
+        incarnation: u32,
+    };
+    struct Stamp as StampForm { epoch: u64, ns: u64, };
     enum OverflowPolicy as FullForm { Displace, Latest, Reject, };
     struct ClassTraffic as ClassForm {
         class: Option<Class>,
@@ -299,6 +325,29 @@ travels! {
     struct WaitingPackage as WaitingForm { priority: Priority, ticket: u64, is_redelivered: bool, };
     struct VictimInfo as VictimForm { priority: Priority, is_replaced: bool, };
     struct Party as PartyForm { participant: u16, pid: Option<u32>, module: Name, is_alive: bool, };
+}
+
+#[derive(Serialize, Deserialize, Schema)]
+struct StreamShapeForm {
+    record_bytes: u32,
+    keep: u32,
+    readers: u16,
+    late_ns: u64,
+}
+
+impl Travels for StreamShape {
+    type Form = StreamShapeForm;
+
+    fn form(&self) -> StreamShapeForm {
+        let Self { record_bytes, keep, readers, late } = *self;
+        StreamShapeForm { record_bytes, keep, readers, late_ns: late.form() }
+    }
+
+    /// No stream keeps more than it can: its size is computed from this.
+    fn of(form: StreamShapeForm) -> Self {
+        let StreamShapeForm { record_bytes, keep, readers, late_ns } = form;
+        Self { record_bytes, keep: keep.min(STREAM_KEEP_MAX), readers, late: Duration::of(late_ns) }
+    }
 }
 
 /// Most buckets are empty: those that are not, with their numbers.

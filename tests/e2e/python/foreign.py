@@ -20,7 +20,7 @@ INTERFACE_DIFFERS, UNKNOWN_FUNCTION = 3, 4
 PRIORITY = 96
 
 # Descriptions: their version, and the tag of a u32. A field's marks are 0 when nothing more is said of it.
-VERSION, U32, NO_MARKS = b"\x01", b"\x04", b"\x00"
+VERSION, U32, NO_MARKS = b"\x02", b"\x04", b"\x00"
 DESCRIPTION = (
     VERSION + text("Doubling") + text("probe") + text("Doubles numbers")
     + varint(1) + varint(DOUBLE) + text("double") + text("Twice the number") + b"\x01"

@@ -9,12 +9,12 @@ use rohrpost_modules::interfaces::Page;
 use rohrpost_modules::launcher::Children;
 use rohrpost_modules::runtime::read_arguments;
 use rohrpost_modules::schema::Data;
-use rohrpost_modules::types::{LaserScan, OccupancyGrid, Odometry, Twist};
+use rohrpost_modules::types::{Image, LaserScan, OccupancyGrid, Odometry, PointCloud, Twist};
 
 pub(crate) fn run(data: &[u8]) {
     envelopes(data);
     let Some((which, body)) = data.split_first() else { return };
-    match which % 14 {
+    match which % 16 {
         0 => round::<Status>(body),
         1 => round::<Subscribe>(body),
         2 => round::<SetParameters>(body),
@@ -27,6 +27,8 @@ pub(crate) fn run(data: &[u8]) {
         9 => round::<(Odometry, Twist)>(body),
         10 => round::<(String, Option<char>, u128, i16)>(body),
         11 => round::<Children>(body),
+        14 => round::<Image>(body),
+        15 => round::<PointCloud>(body),
         _ => once(body),
     }
 }

@@ -28,6 +28,7 @@ mod seals;
 mod segments;
 mod sessions;
 mod split;
+mod streams;
 
 /// One target.
 #[derive(Clone, Copy, Debug)]

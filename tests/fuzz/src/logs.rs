@@ -1,7 +1,7 @@
 //! Logs of CARMEN, as the demonstration plays them: read, believed or not, played, and drawn into a map.
 
 use rohrpost_modules::fusion::{History, Records, Stamp};
-use rohrpost_modules::robot::carmen::{LogError, Reader, Record, Settings};
+use rohrpost_modules::robot::carmen::{LogError, LogRecord, Reader, Settings};
 use rohrpost_modules::robot::grid::{Mapper, Settings as GridSettings};
 use rohrpost_modules::robot::playback::Playback;
 
@@ -34,17 +34,17 @@ fn play(data: &[u8]) {
         assert!(due.due_ns >= last_ns, "due times never go back");
         last_ns = due.due_ns;
         match due.record {
-            Record::Odometry { odometry, .. } => {
+            LogRecord::Odometry { odometry, .. } => {
                 sequence += 1;
                 let taken = poses.push(Stamp::new(0, due.due_ns), sequence, odometry.pose);
                 assert_eq!(taken, Ok(()), "due times never go back");
             }
-            Record::Scan { scan, odometry, .. } if scans < SCANS => {
+            LogRecord::Scan { scan, odometry, .. } if scans < SCANS => {
                 scans += 1;
                 let pose = poses.at(Stamp::new(0, due.due_ns), u64::MAX).ok().or(scan.pose).unwrap_or(odometry);
                 let _ = map.integrate(&scan, &pose);
             }
-            Record::Scan { .. } | Record::Param { .. } => {}
+            LogRecord::Scan { .. } | LogRecord::Param { .. } => {}
         }
     }
     for index in map.take_changed() {

@@ -1,11 +1,12 @@
-//! A node's files as another process may leave them: any bytes in a mailbox, in the table of participants, in a table
-//! of traffic, in the time page and in owners' descriptions of themselves; before they are opened, and while they are
-//! in use.
+//! A node's files as another process may leave them: any bytes in a mailbox, in a stream, in the table of participants,
+//! in a table of traffic, in the time page and in owners' descriptions of themselves; before they are opened, and while
+//! they are in use.
 //!
 //! The input is a program: what to do next, and which bytes to change before. Every second byte or so of it is an
 //! instruction, so that a fuzzer can put programs together.
 
 use crate::split::Bytes;
+use crate::streams::{STREAM_STEPS, Stream, ring_file};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     Label, ModuleState, Name, Node, OverflowPolicy, Participant, Priority, Publications, Receiver, Sender, Shape,
@@ -53,6 +54,7 @@ struct Robot {
     keeper: Option<TimeKeeper>,
     clock: Option<SystemClock>,
     publications: Option<Publications>,
+    stream: Stream,
 }
 
 impl Robot {
@@ -63,11 +65,12 @@ impl Robot {
         let max_age = (how & 16 != 0).then_some(Duration::from_millis(1));
         let shape = Shape { slots, body_bytes_max: 40, full, max_age, claims: 1 + (how >> 5) };
         let (node, participant, receiver, sender, keeper, clock, publications) = Default::default();
-        Self { path, shape, node, participant, receiver, sender, keeper, clock, publications }
+        let stream = Stream::new(how);
+        Self { path, shape, node, participant, receiver, sender, keeper, clock, publications, stream }
     }
 
     fn step(&mut self, bytes: &mut Bytes<'_>) {
-        match bytes.byte() % 24 {
+        match bytes.byte() % (24 + STREAM_STEPS) {
             0 => self.node = Node::create(&self.path, 0o700).ok(),
             1 => self.node = Node::open(&self.path).ok(),
             2 => self.participant = self.join(Name::new(1, 200, 0, 0)),
@@ -88,7 +91,8 @@ impl Robot {
             17 => self.describe(),
             18 => self.lengthen(bytes),
             19 => self.overwrite(bytes),
-            _ => self.change(bytes),
+            20..24 => self.change(bytes),
+            stream => self.stream.step(stream - 24, self.participant.as_ref(), bytes),
         }
     }
 
@@ -206,6 +210,7 @@ impl Robot {
         let mailbox = |name: Name, kind: &str| format!("{:08x}.{kind}", name.raw());
         let name = match which % 7 {
             _ if which == u8::MAX => "routes".into(),
+            _ if which >= 192 => return ring_file(&self.path),
             0 | 1 => mailbox(MAILBOX, "mbx"),
             2 => mailbox(OTHER, "mbx"),
             3 => "node".into(),

@@ -13,12 +13,12 @@ use rohrpost::common::OutputLevel;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::MotorInterface;
 use rohrpost::output::OutputLine;
-use rohrpost::survey::{ModuleSurvey, Survey, Usage, sum};
+use rohrpost::survey::{ModuleSurvey, StreamSurvey, Survey, Usage, sum};
 use rohrpost_config::Installation;
 use rohrpost_mailbox::sys::Scheduling;
 use rohrpost_mailbox::{
     Class, ClassTraffic, FlowInfo, Latency, Loss, MailboxInfo, ModuleState, OverflowPolicy, ParticipantInfo, Shape,
-    Type, local,
+    StreamId, StreamInfo, StreamShape, Type, local,
 };
 use std::path::Path;
 use std::time::Duration;
@@ -157,7 +157,8 @@ fn sample(installation: &Installation, at_ns: u64, counts: &[Counts]) -> Sample 
         flow(module, if module.name == pilot { motor } else { pilot }, counts.sent)
     };
     let flows = flows.map(flow).collect();
-    let survey = Survey { node: "main".into(), at_ns, classes: sum(&mailboxes), modules, mailboxes, flows };
+    let streams = vec![stream(at_ns, name(installation, "odometry.0"))];
+    let survey = Survey { node: "main".into(), at_ns, classes: sum(&mailboxes), modules, mailboxes, streams, flows };
     let lines = module_lines(installation, &survey, None);
     Sample {
         lines: counts.iter().zip(lines).map(|(counts, seen)| line(counts, seen)).collect(),
@@ -236,6 +237,23 @@ fn mailbox(module: &ModuleSurvey) -> MailboxInfo {
         sent: module.received + u64::from(module.depth),
         classes: vec![class],
     }
+}
+
+fn stream(at_ns: u64, name: Name) -> StreamSurvey {
+    let info = StreamInfo {
+        id: StreamId { name, number: 1 },
+        shape: StreamShape::default(),
+        writer: None,
+        adoptions: 0,
+        written: 220,
+        refused: 1,
+        oldest: None,
+        newest: None,
+        readers: 2,
+        holding: 0,
+        sleeping: 1,
+    };
+    StreamSurvey { node: "main".into(), at_ns, info }
 }
 
 fn flow(module: &ModuleSurvey, to: Name, packages: u64) -> FlowInfo {

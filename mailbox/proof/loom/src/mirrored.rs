@@ -106,6 +106,18 @@ pub(crate) const MIRRORED: &[Mirrored] = &[
         lines: &["hints.load(Ordering::SeqCst)"],
     },
     Mirrored {
+        file: "stream/ring",
+        what: "SeqCst stands for the fence that the models have in stream/writing (seq_cst_accesses), and no model \
+            would see it weakened",
+        lines: &["self.word.store(word(sequence, Some(frame)), Ordering::SeqCst)"],
+    },
+    Mirrored {
+        file: "stream/writing",
+        what: "SeqCst stands for the fence that the models have there (seq_cst_accesses), and no model would see it \
+            weakened",
+        lines: &["seat.hold.load(Ordering::SeqCst)", "seq_cst_accesses();", "seat.sleeper.load(Ordering::SeqCst)"],
+    },
+    Mirrored {
         file: "doorbell",
         what: "models::Mailbox::ring does the same, change both",
         lines: &["fn ring(", "let polling = bell.ring();", "FUTEX_WAKE", "if polling {", "write_to_pipe("],

@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex};
 struct Stream {
     written: AtomicU64,
     entries: Vec<IndexEntry>,
+    hints: Vec<AtomicU64>,
     seats: Vec<Seat>,
     /// Two words a frame, that may be copied while they are written.
     words: Vec<[AtomicU64; 2]>,
@@ -38,6 +39,7 @@ impl Stream {
         let stream = Self {
             written: AtomicU64::new(0),
             entries: (0..keep).map(|_| IndexEntry::default()).collect(),
+            hints: (0..keep).map(|_| AtomicU64::default()).collect(),
             seats: (0..readers).map(|_| Seat::default()).collect(),
             words: (0..frames).map(|_| Default::default()).collect(),
             plain: (0..frames).map(|_| UnsafeCell::new(0)).collect(),
@@ -48,7 +50,7 @@ impl Stream {
     }
 
     fn ring(&self) -> Ring<'_> {
-        Ring::new(&self.written, 0, &self.entries, &self.seats)
+        Ring::new(&self.written, 0, (&self.entries, &self.hints), &self.seats)
     }
 
     /// As `StreamWriter::write`.
@@ -68,9 +70,10 @@ impl Stream {
         }
         let stamp = Stamp { epoch: 1, ns: stamp_ns };
         let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: sequence + 1, incarnation: 0 };
-        progress.publish(&ring, frame, about, |_, _| {
+        let wake = |_: &Seat, _| {
             self.rings.fetch_add(1, Ordering::Release);
-        });
+        };
+        progress.publish(&ring, frame, about, |_| (), wake);
     }
 
     fn writes(&self, progress: &mut Progress, count: u64, bytes: Bytes) {
@@ -375,9 +378,15 @@ pub(crate) fn a_dead_sleeper_is_forgotten_alone() {
     let frame = progress.claim(&stream.ring()).unwrap();
     let stamp = Stamp { epoch: 1, ns: 1 };
     let about = About { stamp, before_ns: 0, written_ns: 0, len_bytes: 0, incarnation: 0 };
-    progress.publish(&stream.ring(), frame, about, |_, sleeper| {
-        assert_eq!(sleeper, 8);
-        *wakes.lock().unwrap() += 1;
-    });
+    progress.publish(
+        &stream.ring(),
+        frame,
+        about,
+        |_| (),
+        |_, sleeper| {
+            assert_eq!(sleeper, 8);
+            *wakes.lock().unwrap() += 1;
+        },
+    );
     assert_eq!(*wakes.lock().unwrap(), 1, "the living sleeper is not woken");
 }

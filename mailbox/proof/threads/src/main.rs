@@ -1,11 +1,13 @@
-//! The slot core of the mailbox under ThreadSanitizer: its very source, with the processor's atomics and real threads
-//! in one address space, since two mappings of one file are two memories to ThreadSanitizer.
+//! The slot core of the mailbox and the core of streams under ThreadSanitizer: their very source, with the processor's
+//! atomics and real threads in one address space, since two mappings of one file are two memories to ThreadSanitizer.
 //!
 //! ```text
 //!  mailbox/src/{word,slots,…,cell}.rs ─────┬── unchanged ──▶ every run ends, and nothing is reported
 //!  src/{rig,runs}.rs ──────────────────────┤
 //!  ../loom/src/broken/, one edit each ─────┴── edited ─────▶ a data race is reported (src/caught.rs says in which run)
 //! ```
+//!
+//! The same for `mailbox/src/stream/{ring,writing}.rs`, with `src/stream_rig.rs` and `../loom/src/stream_broken.rs`.
 //!
 //! `cargo xtask tsan` builds and runs this. Each run is a process of its own. The standard library is not instrumented:
 //! of it threads are used alone (ThreadSanitizer sees them begin and end), and no body passes through it.
@@ -31,19 +33,32 @@ mod caught;
 mod rig;
 #[cfg(any())]
 mod runs;
+#[cfg(any())]
+mod stream_rig;
 
 use std::process::{Command, ExitCode, Output};
 use std::time::{Duration, Instant};
-use variants::{BROKEN, real};
+use variants::{BROKEN, real, real_stream};
 
-/// A run takes seconds; one that is broken may have no end.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// A run, and what it is called.
+type Run = (&'static str, fn());
 
-/// How many of what a run does; the environment variable makes it more or fewer, percent.
-fn scaled(usual: u64) -> u64 {
+/// The sources as they are, each with its runs.
+const REAL: [(&str, &[Run]); 2] = [("real", real::runs::ALL), ("real_stream", real_stream::stream_rig::ALL)];
+
+/// A run takes seconds, on a busy computer half a minute; one that is broken may have no end.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// For how long a thread does something again and again.
+const ENOUGH: Duration = Duration::from_secs(10);
+
+/// Numbers what a thread does so often. The environment variable makes it more or fewer, percent. On a busy computer it
+/// is done less often: there each step that hands the processor over costs a time slice of another process.
+fn rounds(usual: u64) -> impl Iterator<Item = u64> {
     let percent = std::env::var("ROHRPOST_RUN_PERCENT").ok().and_then(|text| text.parse().ok());
     let usually = if cfg!(test) { 5 } else { 200 };
-    (usual * percent.unwrap_or(usually) / 100).max(1)
+    let began = Instant::now();
+    (0..(usual * percent.unwrap_or(usually) / 100).max(1)).take_while(move |_| began.elapsed() < ENOUGH)
 }
 
 /// With names of a variant and a run, does it; without, does all, each in a process of its own, and checks.
@@ -74,15 +89,16 @@ fn main() -> ExitCode {
 }
 
 fn find(variant: &str, run: &str) -> Option<fn()> {
-    let broken = || BROKEN.iter().find(|(name, its, _)| *name == variant && *its == run).map(|(_, _, run)| *run);
-    let whole = || real::runs::ALL.iter().find(|(name, _)| *name == run).map(|(_, run)| *run);
-    if variant == "real" { whole() } else { broken() }
+    let whole = REAL.iter().filter(|(name, _)| *name == variant).flat_map(|(_, runs)| *runs);
+    let broken = BROKEN.iter().filter(|(name, ..)| *name == variant).map(|(_, name, run)| (name, run));
+    let mut all = whole.map(|(name, run)| (name, run)).chain(broken);
+    all.find(|(name, _)| **name == run).map(|(_, run)| *run)
 }
 
 fn validate() -> ExitCode {
     let mut wrong = 0;
-    for (run, _) in real::runs::ALL {
-        let ended = process("real", run);
+    for (real, run) in REAL.iter().flat_map(|(real, runs)| runs.iter().map(move |(run, _)| (real, run))) {
+        let ended = process(real, run);
         let clean = ended.0.status.success() && !is_race(&ended.0);
         report(clean, &format!("{run}: nothing to report"), &ended, &mut wrong);
     }
@@ -102,7 +118,7 @@ fn report(good: bool, promise: &str, (output, took): &(Output, Duration), wrong:
     }
 }
 
-/// Not any report will do: it must be about two threads in one body.
+/// Not any report will do: it must be about two threads in one body, or in one record (`stream_rig.rs`).
 fn is_race(output: &Output) -> bool {
     let text = String::from_utf8_lossy(&output.stderr);
     text.contains("WARNING: ThreadSanitizer: data race") && text.contains("rig.rs")
@@ -122,6 +138,6 @@ mod tests {
     /// Without ThreadSanitizer, and few times: torn bodies and false accounts would show all the same.
     #[test]
     fn every_run_ends_and_is_accounted() {
-        super::real::runs::ALL.iter().for_each(|(_, run)| run());
+        super::REAL.iter().flat_map(|(_, runs)| *runs).for_each(|(_, run)| run());
     }
 }

@@ -12,6 +12,7 @@ use super::queue::Queue;
 use super::slots::{Posted, Published, Slots};
 use super::word::{Claimant, FREE, State, Victim};
 use crate::name::Priority;
+use crate::rounds;
 use crate::step::{dice, reached, shake};
 use crate::sync::{AtomicU32, AtomicU64, Ordering};
 use std::cell::UnsafeCell;
@@ -114,7 +115,7 @@ impl Mailbox {
             shake(participant.into());
             let _end = End(self);
             let mut sender = Sender::new(self, participant, full);
-            for _ in 0..packages {
+            for _ in rounds(packages) {
                 sender.send(priority);
                 if dice().is_multiple_of(8) {
                     thread::yield_now();
@@ -312,10 +313,12 @@ impl Receiver {
 
     /// Receives until all senders have ended and nothing is left; with `sleeps`, sleeps when there is nothing.
     pub(crate) fn drain(&mut self, sleeps: bool) {
-        let until = Instant::now() + PATIENCE;
+        let mut until = Instant::now() + PATIENCE;
         loop {
             let more = self.mailbox.has_senders();
-            while self.take() {}
+            while self.take() {
+                until = Instant::now() + PATIENCE;
+            }
             if !more && !self.queue.may_have_more(&self.mailbox.slots()) {
                 return;
             }

@@ -3,7 +3,7 @@
 use super::cell::{SeqCount, SeqLatch};
 use super::full::OverflowPolicy;
 use super::rig::{Mailbox, Receiver, Sender, Sent};
-use crate::scaled;
+use crate::rounds;
 use crate::step::{reached, shake};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
@@ -32,7 +32,7 @@ fn join(threads: impl IntoIterator<Item = JoinHandle<()>>) {
 /// Two slots, two senders, a receiver that never sleeps.
 pub(crate) fn handing_over() {
     let mailbox = Mailbox::new(2);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Reject, 10, scaled(60_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Reject, 10, 60_000));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -42,7 +42,7 @@ pub(crate) fn handing_over() {
 /// The receiver sleeps whenever there is nothing.
 pub(crate) fn sleeping() {
     let mailbox = Mailbox::new(4);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Reject, 10, scaled(20_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Reject, 10, 20_000));
     Receiver::new(mailbox).drain(true);
     join(senders);
     mailbox.is_accounted();
@@ -51,7 +51,7 @@ pub(crate) fn sleeping() {
 /// Two slots, three senders of which each outranks the one before.
 pub(crate) fn displacing() {
     let mailbox = Mailbox::new(2);
-    let senders = [1, 2, 3].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10 * me as u8, scaled(50_000)));
+    let senders = [1, 2, 3].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10 * me as u8, 50_000));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -61,7 +61,7 @@ pub(crate) fn displacing() {
 /// States: each newer package replaces the one of its sender that still waits.
 pub(crate) fn replacing() {
     let mailbox = Mailbox::new(4);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Latest, 10 * me as u8, scaled(50_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Latest, 10 * me as u8, 50_000));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -71,7 +71,7 @@ pub(crate) fn replacing() {
 /// The same with one slot: the newer is written where the older was.
 pub(crate) fn reusing() {
     let mailbox = Mailbox::new(1);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Latest, 10 * me as u8, scaled(50_000)));
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Latest, 10 * me as u8, 50_000));
     Receiver::new(mailbox).drain(false);
     join(senders);
     mailbox.is_accounted();
@@ -79,11 +79,11 @@ pub(crate) fn reusing() {
 
 /// Senders die while they fill, beside two that live.
 pub(crate) fn reclaiming() {
-    let rounds = (0..scaled(40)).map(|round| {
+    let mailboxes = rounds(40).map(|round| {
         let mailbox = Mailbox::new(3);
         shake(round + 1);
         let dying = [1, 2].map(|me| mailbox.dies_filling(me, OverflowPolicy::Displace, 20));
-        let living = [3, 4].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10, 200));
+        let living = [3, 4].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10, 100));
         let mut receiver = Receiver::new(mailbox);
         while mailbox.has_senders() {
             receiver.take();
@@ -96,7 +96,7 @@ pub(crate) fn reclaiming() {
         mailbox
     });
     // At the end: what is broken is to be seen, not only what follows from it.
-    for mailbox in rounds.collect::<Vec<_>>() {
+    for mailbox in mailboxes.collect::<Vec<_>>() {
         mailbox.is_accounted();
         assert_eq!(mailbox.counts.unfinished.load(Ordering::Relaxed), 2);
     }
@@ -105,8 +105,8 @@ pub(crate) fn reclaiming() {
 /// Receivers die with a package in hand, one after the other, while packages come in.
 pub(crate) fn adopting() {
     let mailbox = Mailbox::new(3);
-    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10 * me as u8, scaled(20_000)));
-    for life in 0..scaled(250) {
+    let senders = [1, 2].map(|me| mailbox.send_from(me, OverflowPolicy::Displace, 10 * me as u8, 20_000));
+    for life in rounds(250) {
         let receiver = thread::spawn(move || {
             shake(life + 100);
             let mut receiver = Receiver::adopting(mailbox);
@@ -124,7 +124,7 @@ pub(crate) fn adopting() {
 
 /// Mailboxes are given up under their senders, which go on in the next.
 pub(crate) fn retiring() {
-    for _ in 0..scaled(200) {
+    for _ in rounds(200) {
         let [old, new] = [2, 2].map(Mailbox::new);
         let senders = [1, 2].map(|me| {
             thread::spawn(move || {
@@ -180,9 +180,9 @@ fn whole(words: [u64; 4]) -> u64 {
 /// One thread writes cells of both types, two read them: each value is whole, and none is older than the one before.
 pub(crate) fn reading_cells() {
     let cells: &'static Cells = Box::leak(Box::default());
-    let values = scaled(20_000);
+    const LAST: u64 = u64::MAX;
     let writer = thread::spawn(move || {
-        for value in 1..=values {
+        for value in rounds(20_000).chain([LAST]) {
             cells.count.write(|| store(&cells.words, value));
             cells.latch.fill(|place| store(&cells.places[place], value));
             cells.latch.publish();
@@ -192,7 +192,7 @@ pub(crate) fn reading_cells() {
         thread::spawn(move || {
             shake(seed);
             let (mut in_place, mut latched) = (0, 0);
-            while in_place < values || latched < values {
+            while in_place < LAST || latched < LAST {
                 if let Some((_, words)) = cells.count.read(|| load(&cells.words)) {
                     let value = whole(words);
                     assert!(value >= in_place, "{value} after {in_place}");

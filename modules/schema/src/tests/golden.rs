@@ -2,7 +2,10 @@
 //! `docs/src/wire.md`.
 
 use crate::bytes::PLAIN;
-use crate::{DEPTH_MAX, DataItem, Description, Field, Function, Members, Named, Schema, SchemaError, TYPES_MAX, Type};
+use crate::{
+    DEPTH_MAX, DataItem, DataKind, Description, Field, Function, Members, Named, Schema, SchemaError, TYPES_MAX, Type,
+    VERSION,
+};
 use std::collections::BTreeMap;
 
 const PAGE: &str = include_str!("../../../../docs/src/wire.md");
@@ -39,41 +42,41 @@ fn each_kind_of_type_has_its_bytes() {
     let field = |name: &str, ty| Field::new(name, ty);
     let structure = |members| Type::Struct(Named::new("S", members));
     for (ty, bytes) in [
-        (<()>::schema(), "01 00"),
-        (bool::schema(), "01 01"),
-        (u8::schema(), "01 02"),
-        (u16::schema(), "01 03"),
-        (u32::schema(), "01 04"),
-        (u64::schema(), "01 05"),
-        (usize::schema(), "01 05"),
-        (u128::schema(), "01 06"),
-        (i8::schema(), "01 07"),
-        (i16::schema(), "01 08"),
-        (i32::schema(), "01 09"),
-        (i64::schema(), "01 0a"),
-        (isize::schema(), "01 0a"),
-        (i128::schema(), "01 0b"),
-        (f32::schema(), "01 0c"),
-        (f64::schema(), "01 0d"),
-        (char::schema(), "01 0e"),
-        (String::schema(), "01 0f"),
-        (Type::Bytes, "01 10"),
-        (Option::<f64>::schema(), "01 11 0d"),
-        (Vec::<u8>::schema(), "01 12 02"),
-        (<[f32; 300]>::schema(), "01 13 ac 02 0c"),
-        (BTreeMap::<String, bool>::schema(), "01 14 0f 01"),
-        (<(u8, char)>::schema(), "01 15 02 02 0e"),
-        (structure(Members::None), "01 16 01 53 00 00"),
-        (structure(Members::One(Box::new(field("", Type::U8)))), "01 16 01 53 00 01 00 00 02"),
-        (structure(Members::Tuple(vec![field("", Type::U8); 2])), "01 16 01 53 00 02 02 00 00 02 00 00 02"),
-        (structure(Members::Fields(vec![field("x", Type::U8)])), "01 16 01 53 00 03 01 01 78 00 02"),
+        (<()>::schema(), "02 00"),
+        (bool::schema(), "02 01"),
+        (u8::schema(), "02 02"),
+        (u16::schema(), "02 03"),
+        (u32::schema(), "02 04"),
+        (u64::schema(), "02 05"),
+        (usize::schema(), "02 05"),
+        (u128::schema(), "02 06"),
+        (i8::schema(), "02 07"),
+        (i16::schema(), "02 08"),
+        (i32::schema(), "02 09"),
+        (i64::schema(), "02 0a"),
+        (isize::schema(), "02 0a"),
+        (i128::schema(), "02 0b"),
+        (f32::schema(), "02 0c"),
+        (f64::schema(), "02 0d"),
+        (char::schema(), "02 0e"),
+        (String::schema(), "02 0f"),
+        (Type::Bytes, "02 10"),
+        (Option::<f64>::schema(), "02 11 0d"),
+        (Vec::<u8>::schema(), "02 12 02"),
+        (<[f32; 300]>::schema(), "02 13 ac 02 0c"),
+        (BTreeMap::<String, bool>::schema(), "02 14 0f 01"),
+        (<(u8, char)>::schema(), "02 15 02 02 0e"),
+        (structure(Members::None), "02 16 01 53 00 00"),
+        (structure(Members::One(Box::new(field("", Type::U8)))), "02 16 01 53 00 01 00 00 02"),
+        (structure(Members::Tuple(vec![field("", Type::U8); 2])), "02 16 01 53 00 02 02 00 00 02 00 00 02"),
+        (structure(Members::Fields(vec![field("x", Type::U8)])), "02 16 01 53 00 03 01 01 78 00 02"),
         (
             <Result<(), String>>::schema(),
-            "01 17 06 52 65 73 75 6c 74 00 02 02 4f 6b 00 01 00 00 00 03 45 72 72 00 01 00 00 0f",
+            "02 17 06 52 65 73 75 6c 74 00 02 02 4f 6b 00 01 00 00 00 03 45 72 72 00 01 00 00 0f",
         ),
         (
             Way::schema(),
-            "01 16 0c 72 6f 68 72 70 6f 73 74 2e 57 61 79 0c 41 20 77 61 79 20 74 6f 20 67 6f 2e 03 02 \
+            "02 16 0c 72 6f 68 72 70 6f 73 74 2e 57 61 79 0c 41 20 77 61 79 20 74 6f 20 67 6f 2e 03 02 \
              05 73 70 65 65 64 0f 09 48 6f 77 20 66 61 73 74 2e 03 6d 2f 73 04 00 00 80 bf 04 00 00 c0 3f 0c \
              05 73 74 65 70 73 00 12 17 04 53 74 65 70 00 04 \
              04 53 74 6f 70 0e 4e 6f 74 68 69 6e 67 20 6d 6f 76 65 73 2e 00 \
@@ -94,20 +97,20 @@ fn what_is_no_type_is_refused_by_name() {
         Type::from_bytes(&bytes).unwrap_err()
     };
     for (bytes, expected) in [
-        ("02 00", "descriptions of version 2, this program knows 1; use programs of the same version of Rohrpost"),
+        ("01 00", "descriptions of version 1, this program knows 2; use programs of the same version of Rohrpost"),
         // As postcard-schema wrote a u32 once.
         (
             "03 75 33 32 08",
-            "descriptions of version 3, this program knows 1; use programs of the same version of Rohrpost",
+            "descriptions of version 3, this program knows 2; use programs of the same version of Rohrpost",
         ),
-        ("01", "the description ends too early"),
-        ("01 0f 00 00", "2 bytes behind the end of the description"),
-        ("01 18", "the byte 24 is no type"),
-        ("01 16 01 53 00 04", "the byte 4 is no kind of members"),
-        ("01 16 01 53 00 01 00 10 02", "the byte 16 is no sum of marks"),
-        ("01 16 01 ff", "text that is not UTF-8"),
-        ("01 13 ff ff ff ff 10", "a number that does not fit 32 bits"),
-        ("01 15 ff ff ff ff 0f", "the description ends too early"),
+        ("02", "the description ends too early"),
+        ("02 0f 00 00", "2 bytes behind the end of the description"),
+        ("02 18", "the byte 24 is no type"),
+        ("02 16 01 53 00 04", "the byte 4 is no kind of members"),
+        ("02 16 01 53 00 01 00 10 02", "the byte 16 is no sum of marks"),
+        ("02 16 01 ff", "text that is not UTF-8"),
+        ("02 13 ff ff ff ff 10", "a number that does not fit 32 bits"),
+        ("02 15 ff ff ff ff 0f", "the description ends too early"),
     ] {
         assert_eq!(read(bytes).to_string(), expected, "{bytes}");
     }
@@ -115,7 +118,7 @@ fn what_is_no_type_is_refused_by_name() {
 
 #[test]
 fn depth_and_number_are_bounded() {
-    let options = |levels: usize| [&[1][..], &[17].repeat(levels - 1), &[0]].concat();
+    let options = |levels: usize| [&[VERSION][..], &[17].repeat(levels - 1), &[0]].concat();
     assert!(Type::from_bytes(&options(DEPTH_MAX)).is_ok());
     assert_eq!(Type::from_bytes(&options(DEPTH_MAX + 1)), Err(SchemaError::Deep));
     assert_eq!(Type::from_bytes(&options(1_000_000)), Err(SchemaError::Deep));
@@ -172,7 +175,10 @@ fn a_description_has_the_documented_bytes_and_hash() {
         class: "motor".into(),
         text: "A wheel.".into(),
         functions: vec![turn],
-        data: vec![DataItem { number: 300, field: Field::new("angle", angle).said("Where.", "") }],
+        data: vec![
+            DataItem { number: 300, kind: DataKind::Data, field: Field::new("angle", angle).said("Where.", "") },
+            DataItem { number: 2, kind: DataKind::Stream, field: Field::new("steps", Type::U32) },
+        ],
     };
     assert_eq!(hex(&description.to_bytes()), hex(&block("description")));
     assert_eq!(Description::from_bytes(&block("description")).as_ref(), Ok(&description));

@@ -216,9 +216,9 @@ fn types_and_values_read_well() {
 #[test]
 fn what_has_no_name_or_no_value_is_shown() {
     for (bytes, expected) in [
-        (&[1, 23, 0, 0, 0][..], "(no value)"),
-        (&[1, 23, 0, 0, 1, 0, 0, 0], "\"\""),
-        (&[1, 22, 0, 0, 3, 1, 0, 0, 1], "{\"\": bool}"),
+        (&[2, 23, 0, 0, 0][..], "(no value)"),
+        (&[2, 23, 0, 0, 1, 0, 0, 0], "\"\""),
+        (&[2, 22, 0, 0, 3, 1, 0, 0, 1], "{\"\": bool}"),
     ] {
         assert_eq!(Type::from_bytes(bytes).map(|ty| describe_type(&ty)), Ok(expected.into()));
     }

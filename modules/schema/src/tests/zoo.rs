@@ -1,44 +1,9 @@
 //! Typed values: postcard and the walker must agree on every byte.
 
 use super::{check_cuts, check_value, map, same, text, through_json, variant};
-use crate::{Data, Schema, Type, Value, decode, encode};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use crate::{Bytes, Data, Schema, Type, Value, decode, encode};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
-
-/// Bytes that are bytes to serde, too.
-#[derive(Clone, Debug, PartialEq)]
-struct Blob(Vec<u8>);
-
-impl Schema for Blob {
-    const LEVELS: usize = 1;
-
-    fn schema() -> Type {
-        Type::Bytes
-    }
-}
-
-impl Serialize for Blob {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_bytes(&self.0)
-    }
-}
-
-impl<'de> Deserialize<'de> for Blob {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct BlobVisitor;
-        impl de::Visitor<'_> for BlobVisitor {
-            type Value = Blob;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("bytes")
-            }
-            fn visit_bytes<E>(self, bytes: &[u8]) -> Result<Blob, E> {
-                Ok(Blob(bytes.to_vec()))
-            }
-        }
-        deserializer.deserialize_byte_buf(BlobVisitor)
-    }
-}
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 struct Marker;
@@ -117,7 +82,7 @@ struct Zoo {
     some_nothing: [Option<()>; 2],
     orders: Vec<Order>,
     bytes: Vec<u8>,
-    blob: Blob,
+    blob: Bytes,
     by_name: BTreeMap<String, u16>,
     by_number: BTreeMap<i64, char>,
     by_lamp: BTreeMap<Lamp, bool>,
@@ -153,7 +118,7 @@ fn zoo() -> Zoo {
             Order::Drive { speed_m_s: 0.1, until: Some(Lamp::On) },
         ],
         bytes: vec![0, 128, 255],
-        blob: Blob(vec![1, 2]),
+        blob: vec![1, 2].into(),
         by_name: [("a".into(), 1), ("".into(), 2)].into(),
         by_number: [(-5, 'x')].into(),
         by_lamp: [(Lamp::Off, false), (Lamp::On, true)].into(),

@@ -17,7 +17,7 @@ impl Context {
     /// # use rohrpost_modules::runtime::{Context, ContextError, Rate, Subscription};
     /// fn follow(context: &mut Context) -> Result<Subscription<Odometry>, ContextError> {
     ///     let ten_hz = Rate::Every(std::time::Duration::from_millis(100));
-    ///     context.subscribe(WheelsInterface::ODOMETRY, "odometry.0", ten_hz)
+    ///     context.subscribe(WheelsInterface::ODOMETRY.data(), "odometry.0", ten_hz)
     /// }
     /// ```
     ///
@@ -43,7 +43,7 @@ impl Context {
     ///
     /// fn follow(context: &mut Context) -> Result<Subscription<Odometry>, ModuleError> {
     ///     context.open_mailbox(NEWEST, Shape { full: OverflowPolicy::Latest, ..Shape::default() })?;
-    ///     Ok(context.subscribe_in(NEWEST, WheelsInterface::ODOMETRY, "odometry.0", Rate::Each)?)
+    ///     Ok(context.subscribe_in(NEWEST, WheelsInterface::ODOMETRY.data(), "odometry.0", Rate::Each)?)
     /// }
     /// ```
     ///

@@ -1,0 +1,126 @@
+//! `record recover`, `record cut` and `record merge`: new files from old ones.
+
+use super::progress::ProgressLine;
+use super::time::{RecordTime, parse_time};
+use crate::terminal::{Failure, say};
+use crate::units::size;
+use rohrpost_recording::{Recovered, Selection};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+pub(super) struct RecoverArguments {
+    /// File that was not closed, or is damaged.
+    file: PathBuf,
+    /// New file; default: beside it, as NAME.recovered.mcap.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// One JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+pub(super) struct CutArguments {
+    /// Recording.
+    file: PathBuf,
+    /// New file.
+    to: PathBuf,
+    /// Names (laser.0) or topics (laser.0/scan) to keep; all, if none is named.
+    names: Vec<String>,
+    /// What arrived from then on: seconds since 1970, from the begin (+10s), or before the end (-10s).
+    #[arg(long, value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
+    from: Option<RecordTime>,
+    /// What arrived before then.
+    #[arg(long, value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
+    until: Option<RecordTime>,
+    /// One JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Args)]
+pub(super) struct MergeArguments {
+    /// New file.
+    to: PathBuf,
+    /// Recordings.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// One JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn recover(arguments: &RecoverArguments) -> Result<ExitCode, Failure> {
+    let file = &arguments.file;
+    let to = arguments.output.clone().unwrap_or_else(|| rohrpost_recording::recovered_path(file));
+    let mut line = ProgressLine::new();
+    let told = rohrpost_recording::recover(file, &to, &mut |read, all| line.tell(read, all));
+    drop(line);
+    let told = told?;
+    if arguments.json {
+        let damages: Vec<_> =
+            told.damages.iter().map(|(at, what)| json!({"at": at, "what": what.to_string()})).collect();
+        say(json!({
+            "path": told.path, "bytes": told.bytes, "messages": told.messages, "unchecked": told.unchecked,
+            "bytes_before": told.bytes_before, "bytes_read": told.bytes_read, "was_closed": told.was_closed,
+            "damages": damages, "damage_count": told.damage_count,
+        }));
+    } else {
+        say(recovered_text(file, &told));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn recovered_text(file: &Path, told: &Recovered) -> String {
+    let mut text =
+        format!("{}: {} messages of {}, {}", told.path.display(), told.messages, file.display(), size(told.bytes));
+    if told.was_closed && told.damage_count == 0 {
+        text.push_str("\nthe old file was whole already");
+    }
+    if told.unchecked > 0 {
+        let cut = "are of the chunk that the end cuts off: no checksum says that they are right";
+        text.push_str(&format!("\n{} of them {cut}", told.unchecked));
+    }
+    for (at, damage) in &told.damages {
+        text.push_str(&format!("\nat byte {at} of {}: {damage}", told.bytes_before));
+    }
+    let more = told.damage_count - told.damages.len() as u64;
+    if more > 0 {
+        text.push_str(&format!("\nand {more} more"));
+    }
+    text
+}
+
+pub(super) fn cut(arguments: &CutArguments) -> Result<ExitCode, Failure> {
+    let CutArguments { file, to, names, from, until, json } = arguments;
+    let info = rohrpost_recording::info(file)?;
+    let selection = Selection {
+        from_ns: from.map(|time| time.in_file(&info)),
+        until_ns: until.map(|time| time.in_file(&info)),
+        names: names.clone(),
+    };
+    let mut line = ProgressLine::new();
+    let told = rohrpost_recording::cut(file, to, &selection, &mut |read, all| line.tell(read, all));
+    drop(line);
+    report(to, told?, *json);
+    Ok(ExitCode::SUCCESS)
+}
+
+pub(super) fn merge(arguments: &MergeArguments) -> Result<ExitCode, Failure> {
+    let MergeArguments { to, files, json } = arguments;
+    let mut line = ProgressLine::new();
+    let told = rohrpost_recording::merge(files, to, &mut |read, all| line.tell(read, all));
+    drop(line);
+    report(to, told?, *json);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn report(to: &Path, (messages, bytes): (u64, u64), as_json: bool) {
+    if as_json {
+        say(json!({"path": to, "bytes": bytes, "messages": messages}));
+    } else {
+        say(format_args!("{}: {messages} messages, {}", to.display(), size(bytes)));
+    }
+}

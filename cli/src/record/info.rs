@@ -1,0 +1,110 @@
+//! `record info`: what is in files.
+
+use crate::stream::stamp_text;
+use crate::table::table;
+use crate::terminal::{Failure, complain, say};
+use crate::units::size;
+use rohrpost::output::plain;
+use rohrpost::schema::describe_type;
+use rohrpost_recording::{ChannelInfo, Info};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+pub(super) struct RecordingInfoArguments {
+    /// Recordings.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// One JSON object a file.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &RecordingInfoArguments) -> Result<ExitCode, Failure> {
+    let mut code = ExitCode::SUCCESS;
+    for (number, file) in arguments.files.iter().enumerate() {
+        match rohrpost_recording::info(file) {
+            Ok(info) if arguments.json => drop(say(as_json(&info))),
+            Ok(info) => drop(say(format_args!("{}{}", if number == 0 { "" } else { "\n" }, text(&info).trim_end()))),
+            Err(error) => {
+                complain(error);
+                code = ExitCode::FAILURE;
+            }
+        }
+    }
+    Ok(code)
+}
+
+fn text(info: &Info) -> String {
+    let closed = match (info.is_closed, &info.closed_because) {
+        (true, Some(why)) => format!("closed ({why})"),
+        (true, None) => "closed".into(),
+        (false, _) => "not closed: if nothing writes it any more, `rohrpost record recover` makes a whole file".into(),
+    };
+    let (path, bytes, chunks) = (info.path.display(), size(info.bytes), info.chunks);
+    let mut lines = vec![format!("{path}: {} messages, {bytes} in {chunks} chunks, {closed}", info.messages)];
+    if info.lost > 0 {
+        lines.push(format!(
+            "{} messages are lost: the disk was too slow, or they never came to the recorder",
+            info.lost
+        ));
+    }
+    if let (Some(first), Some(last)) = (info.first_ns, info.last_ns) {
+        let seconds = last.saturating_sub(first) as f64 / 1e9;
+        lines.push(format!("from {} to {}, {seconds:.3} s", stamp_text(first), stamp_text(last)));
+    }
+    if info.epochs.len() > 1 {
+        let epochs = info.epochs.iter().map(|its| format!("{} ({} messages)", its.epoch, its.messages));
+        lines.push(format!("system time stepped; epochs: {}", epochs.collect::<Vec<_>>().join(", ")));
+    }
+    let session = info.session.iter().map(|(key, text)| format!("{key} {text}"));
+    if !info.session.is_empty() {
+        lines.push(session.collect::<Vec<_>>().join(", "));
+    }
+    for (name, texts) in &info.others {
+        let texts: Vec<String> = texts.iter().map(|(key, text)| format!("{key} {text}")).collect();
+        lines.push(format!("{name}: {}", texts.join(", ")));
+    }
+    lines.extend(info.damages.iter().map(|(at, damage)| format!("at byte {at}: {damage}")));
+    let rows = info.channels.iter().map(|channel| {
+        let rate = rate(channel).map_or(String::new(), |rate| format!("{rate:.1}"));
+        [channel.topic.clone(), channel.messages.to_string(), rate, channel.lost.to_string(), type_text(channel)]
+    });
+    // Texts of others would make lines of their own.
+    let lines: Vec<_> = lines.iter().map(|line| plain::line(line)).collect();
+    format!("{}\n\n{}", lines.join("\n"), table(["topic", ">messages", ">per s", ">lost", "type"], rows))
+}
+
+/// Messages a second, over the time in which they came.
+fn rate(channel: &ChannelInfo) -> Option<f64> {
+    let ns = channel.last_ns?.checked_sub(channel.first_ns?).filter(|ns| *ns > 0)?;
+    Some((channel.messages - 1) as f64 * 1e9 / ns as f64)
+}
+
+fn type_text(channel: &ChannelInfo) -> String {
+    channel.ty.as_ref().map_or_else(|| channel.type_name.clone(), describe_type)
+}
+
+fn as_json(info: &Info) -> Value {
+    let channels = info.channels.iter().map(|channel| {
+        json!({
+            "topic": channel.topic, "name": channel.name, "item": channel.item, "type_name": channel.type_name,
+            "type": channel.ty.as_ref().map(describe_type), "message_encoding": channel.message_encoding,
+            "messages": channel.messages, "lost": channel.lost, "first_ns": channel.first_ns,
+            "last_ns": channel.last_ns,
+        })
+    });
+    let epochs = info.epochs.iter().map(
+        |its| json!({"epoch": its.epoch, "messages": its.messages, "first_ns": its.first_ns, "last_ns": its.last_ns}),
+    );
+    let damages = info.damages.iter().map(|(at, what)| json!({"at": at, "what": what.to_string()}));
+    let others = info.others.iter().map(|(name, texts)| json!({"name": name, "texts": texts}));
+    json!({
+        "path": info.path, "bytes": info.bytes, "is_closed": info.is_closed, "closed_because": info.closed_because,
+        "library": info.library, "chunks": info.chunks, "messages": info.messages, "lost": info.lost,
+        "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
+        "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
+        "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,39 @@
+//! How far a command is, on a terminal.
+
+use crate::terminal::complain_in_place;
+use std::io::{self, IsTerminal};
+use std::time::{Duration, Instant};
+
+/// Nothing is shown of what takes no longer, and then no more often.
+const PERIOD: Duration = Duration::from_millis(500);
+
+/// A line on the standard error that is written over and over, if that is a terminal.
+pub(super) struct ProgressLine {
+    is_shown: bool,
+    has_shown: bool,
+    said: Instant,
+}
+
+impl ProgressLine {
+    pub(super) fn new() -> Self {
+        Self { is_shown: io::stderr().is_terminal(), has_shown: false, said: Instant::now() }
+    }
+
+    /// So many bytes are read, of so many.
+    pub(super) fn tell(&mut self, read: u64, all: u64) {
+        if !self.is_shown || self.said.elapsed() < PERIOD {
+            return;
+        }
+        self.said = Instant::now();
+        self.has_shown = true;
+        complain_in_place(format_args!("{} %", read.saturating_mul(100).checked_div(all).unwrap_or(100)));
+    }
+}
+
+impl Drop for ProgressLine {
+    fn drop(&mut self) {
+        if self.has_shown {
+            complain_in_place("");
+        }
+    }
+}

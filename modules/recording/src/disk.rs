@@ -1,0 +1,74 @@
+//! The few things that recording asks of a disk. Tests put one in its place that fails.
+
+use nix::sys::statvfs::statvfs;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+/// Where files are made.
+pub(crate) trait Disk: Send {
+    /// A new file; never one that is there.
+    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>>;
+
+    /// What this user may still write.
+    fn free_bytes(&mut self, folder: &Path) -> io::Result<u64>;
+
+    /// Makes names of files survive a loss of power.
+    fn sync_folder(&mut self, folder: &Path) -> io::Result<()>;
+
+    fn remove(&mut self, path: &Path) -> io::Result<()>;
+}
+
+/// An open file.
+pub(crate) trait DiskFile: Send {
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Makes what was written survive a loss of power.
+    fn sync(&mut self) -> io::Result<()>;
+
+    fn truncate(&mut self, len: u64) -> io::Result<()>;
+
+    /// Whether it still has a name: a removed file takes what is written, and nobody ever sees it.
+    fn has_name(&mut self) -> io::Result<bool>;
+}
+
+/// That of the operating system.
+pub(crate) struct RealDisk;
+
+impl Disk for RealDisk {
+    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+        Ok(Box::new(OpenOptions::new().write(true).create_new(true).open(path)?))
+    }
+
+    fn free_bytes(&mut self, folder: &Path) -> io::Result<u64> {
+        let told = statvfs(folder)?;
+        Ok(told.blocks_available().saturating_mul(told.fragment_size()))
+    }
+
+    fn sync_folder(&mut self, folder: &Path) -> io::Result<()> {
+        File::open(folder)?.sync_all()
+    }
+
+    fn remove(&mut self, path: &Path) -> io::Result<()> {
+        std::fs::remove_file(path)
+    }
+}
+
+impl DiskFile for File {
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        Write::write_all(self, bytes)
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.sync_data()
+    }
+
+    fn truncate(&mut self, len: u64) -> io::Result<()> {
+        self.set_len(len)
+    }
+
+    fn has_name(&mut self) -> io::Result<bool> {
+        Ok(self.metadata()?.nlink() > 0)
+    }
+}

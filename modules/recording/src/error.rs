@@ -1,0 +1,166 @@
+//! What goes wrong on the disk and in files.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// What the disk does not do. Recording goes on with a new file as soon as one can be written.
+#[derive(Clone, Debug, Error)]
+pub enum DiskError {
+    /// Not a byte more, or not for this user.
+    #[error("{path}: the disk or the user's quota is full; delete recordings, or record to another disk (df {path})")]
+    Full {
+        /// The file that was written.
+        path: Shown,
+    },
+    /// Less is free than recordings leave to others.
+    #[error(
+        "{folder}: {free_bytes} bytes are free, and recordings leave {leave_bytes}; delete recordings, or record to \
+         another disk"
+    )]
+    Low {
+        /// Where recordings are.
+        folder: Shown,
+        /// Free for this user.
+        free_bytes: u64,
+        /// To be left.
+        leave_bytes: u64,
+    },
+    /// Mounted without writing, perhaps by the kernel after an error.
+    #[error("{path}: the file system is read-only; see `dmesg` for an error of the disk, and mount it for writing")]
+    ReadOnly {
+        /// What was to be written.
+        path: Shown,
+    },
+    /// By the modes of the folder or its file system.
+    #[error("{path}: permission denied; let the user of the recorder write in this folder")]
+    Denied {
+        /// What was to be written.
+        path: Shown,
+    },
+    /// The folder or the open file was removed, or its disk unmounted.
+    #[error("{path}: is gone; make the folder again, or mount its disk")]
+    Gone {
+        /// What is not there.
+        path: Shown,
+    },
+    /// What was written may not be on the disk.
+    #[error("{path}: sync failed, what was written since the last sync may be lost: {error}")]
+    Sync {
+        /// The file.
+        path: Shown,
+        /// What the kernel said.
+        error: Arc<io::Error>,
+    },
+    /// Anything else.
+    #[error("{path}: cannot {doing}: {error}")]
+    Other {
+        /// What was tried.
+        doing: &'static str,
+        /// With which file.
+        path: Shown,
+        /// What the kernel said.
+        error: Arc<io::Error>,
+    },
+}
+
+impl DiskError {
+    /// Sorts an error of the kernel.
+    pub(crate) fn new(doing: &'static str, path: &Path, error: io::Error) -> Self {
+        let shown = Shown(path.to_owned());
+        match error.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full { path: shown },
+            io::ErrorKind::ReadOnlyFilesystem => Self::ReadOnly { path: shown },
+            io::ErrorKind::PermissionDenied => Self::Denied { path: shown },
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Self::Gone { path: shown },
+            _ => Self::Other { doing, path: shown, error: Arc::new(error) },
+        }
+    }
+}
+
+/// A path in a message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shown(pub PathBuf);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.display().fmt(f)
+    }
+}
+
+/// Why a file cannot be read.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// The kernel does not let it.
+    #[error("{path}: cannot read: {error}")]
+    Io {
+        /// The file.
+        path: Shown,
+        /// What the kernel said.
+        error: io::Error,
+    },
+    /// It does not begin with MCAP's magic bytes.
+    #[error("{path}: is no MCAP file; name a file of a recording (*.mcap)")]
+    NotMcap {
+        /// The file.
+        path: Shown,
+    },
+    /// It was not closed: its writer was killed or still writes, or the end is cut off.
+    #[error("{path}: was not closed, so it has no index; if nothing writes it any more, `recover` makes a whole file")]
+    NotClosed {
+        /// The file.
+        path: Shown,
+    },
+    /// Something in it contradicts itself.
+    #[error("{path}: damaged at byte {at}: {what}; `recover` makes a file of what is readable")]
+    Damaged {
+        /// The file.
+        path: Shown,
+        /// Where in the file.
+        at: u64,
+        /// What is wrong.
+        what: Damage,
+    },
+}
+
+/// How a part of a file is damaged.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum Damage {
+    /// The file ends inside of a record.
+    #[error("the file ends inside of a record")]
+    Cut,
+    /// A record that MCAP does not have, or longer than any here.
+    #[error("no record begins here (type {op}, {len} bytes)")]
+    NoRecord {
+        /// Its first byte.
+        op: u8,
+        /// Its length.
+        len: u64,
+    },
+    /// The bytes of a record do not say what such a record says.
+    #[error("a record of type {op} that cannot be read")]
+    Record {
+        /// Its first byte.
+        op: u8,
+    },
+    /// Checked by sum.
+    #[error("the checksum of a chunk is wrong")]
+    ChunkSum,
+    /// Checked by sum.
+    #[error("the checksum of the summary is wrong")]
+    SummarySum,
+    /// Bytes that do not unpack.
+    #[error("a chunk cannot be decompressed")]
+    Compression,
+    /// Written by another program.
+    #[error("a chunk is compressed by `{0}`; only zstd is read here")]
+    ForeignCompression(String),
+    /// Its channel is not described before it.
+    #[error("a message of channel {0}, which is not described")]
+    UnknownChannel(u16),
+    /// Described twice, and not in the same way.
+    #[error("channel or schema {0} is described twice, differently")]
+    Redefined(u16),
+}

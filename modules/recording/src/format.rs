@@ -1,0 +1,77 @@
+//! What of MCAP a recording uses, and the names that only recordings of Rohrpost have.
+
+use std::collections::BTreeMap;
+
+/// The header's profile.
+pub const PROFILE: &str = "rohrpost";
+/// How messages are encoded.
+pub const MESSAGE_ENCODING: &str = "postcard";
+/// How types are described: bytes of `rohrpost-schema`'s `Type`, by the table in `docs/src/wire.md`.
+pub const SCHEMA_ENCODING: &str = "rohrpost-schema";
+/// Version of these names, in each session's metadata.
+pub const VERSION: u32 = 1;
+
+/// A chunk before compression, unless a single message is longer.
+pub const CHUNK_BYTES_MAX: usize = 1 << 20;
+/// A message. Longer ones are refused.
+pub const MESSAGE_BYTES_MAX: usize = 16 << 20;
+/// A record, and a chunk before compression. In files, longer ones are damage.
+pub(crate) const RECORD_BYTES_MAX: usize = MESSAGE_BYTES_MAX + (4 << 20);
+/// What a message takes besides its data: type, length, channel, sequence and two times.
+pub(crate) const MESSAGE_OVERHEAD_BYTES: usize = 9 + 22;
+
+/// Names of metadata records.
+pub mod metadata {
+    /// Which node recorded, with which versions; first in each file.
+    pub const SESSION: &str = "rohrpost.session";
+    /// The texts of the configuration: file name and content; in each file.
+    pub const CONFIGURATION: &str = "rohrpost.configuration";
+    /// System time has stepped: `epoch`, and `arrival-ns` of the first message of it.
+    pub const EPOCH: &str = "rohrpost.epoch";
+    /// Messages that are not in the file: a count for each topic, from the file's beginning. The last one counts.
+    pub const LOST: &str = "rohrpost.lost";
+    /// The file was closed: `reason`.
+    pub const CLOSED: &str = "rohrpost.closed";
+    /// The file was made by `recover`: from which, how much, why.
+    pub const RECOVERED: &str = "rohrpost.recovered";
+    /// The file was made by `cut`: from which, and what was taken.
+    pub const CUT: &str = "rohrpost.cut";
+    /// The file was made by `merge`: a number and a name for each.
+    pub const MERGED: &str = "rohrpost.merged";
+}
+
+/// Keys of a channel's metadata.
+pub mod key {
+    /// The name of what publishes, as `laser.0`.
+    pub const NAME: &str = "name";
+    /// What it publishes, as `scan`.
+    pub const ITEM: &str = "item";
+    /// Of system time. A step begins another channel of the same topic, so each message says its epoch.
+    pub const EPOCH: &str = "epoch";
+}
+
+/// Operation codes of records.
+pub(crate) mod op {
+    pub(crate) const HEADER: u8 = 1;
+    pub(crate) const FOOTER: u8 = 2;
+    pub(crate) const SCHEMA: u8 = 3;
+    pub(crate) const CHANNEL: u8 = 4;
+    pub(crate) const MESSAGE: u8 = 5;
+    pub(crate) const CHUNK: u8 = 6;
+    pub(crate) const MESSAGE_INDEX: u8 = 7;
+    pub(crate) const CHUNK_INDEX: u8 = 8;
+    pub(crate) const ATTACHMENT: u8 = 9;
+    pub(crate) const STATISTICS: u8 = 11;
+    pub(crate) const METADATA: u8 = 12;
+    pub(crate) const METADATA_INDEX: u8 = 13;
+}
+
+/// The topic of an item.
+pub fn topic(name: &str, item: &str) -> String {
+    format!("{name}/{item}")
+}
+
+/// Counts by topic, as metadata has them.
+pub(crate) fn counts(texts: &BTreeMap<String, String>) -> BTreeMap<String, u64> {
+    texts.iter().filter_map(|(topic, count)| Some((topic.clone(), count.parse().ok()?))).collect()
+}

@@ -1,0 +1,246 @@
+//! What is in a file.
+
+use crate::error::{Damage, ReadError};
+use crate::format::{self, key, metadata};
+use crate::read::contents::{Contents, Ending, Item};
+use crate::read::definitions::{Definition, Definitions};
+use crate::read::frames::Frames;
+use crate::read::index::{Index, times_at};
+use mcap::records::Metadata;
+use rohrpost_schema::Type;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What is in a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Info {
+    /// The file.
+    pub path: PathBuf,
+    /// Its length.
+    pub bytes: u64,
+    /// It has its index and its end.
+    pub is_closed: bool,
+    /// Why it was closed, if its writer says so: `rotated`, `ended`, `low space`.
+    pub closed_because: Option<String>,
+    /// Which program wrote it.
+    pub library: String,
+    /// Where it is not readable: looked for in files that were not closed.
+    pub damages: Vec<(u64, Damage)>,
+    /// Chunks.
+    pub chunks: u64,
+    /// Messages in all channels.
+    pub messages: u64,
+    /// Messages that should be in it, and are not.
+    pub lost: u64,
+    /// When the first message came, in nanoseconds of system time.
+    pub first_ns: Option<u64>,
+    /// When the last one came.
+    pub last_ns: Option<u64>,
+    /// By topic.
+    pub channels: Vec<ChannelInfo>,
+    /// Stretches of system time between its steps.
+    pub epochs: Vec<EpochInfo>,
+    /// Node, versions and number of the file.
+    pub session: BTreeMap<String, String>,
+    /// Texts of the configuration, by file name.
+    pub configuration: BTreeMap<String, String>,
+    /// What else the file says of itself: `rohrpost.recovered`, `rohrpost.cut`, `rohrpost.merged`, and others'.
+    pub others: Vec<(String, BTreeMap<String, String>)>,
+}
+
+/// One topic of a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelInfo {
+    /// Name and item.
+    pub topic: String,
+    /// What published: `laser.0`; empty in files of other programs.
+    pub name: String,
+    /// What it published: `scan`.
+    pub item: String,
+    /// The name of its type.
+    pub type_name: String,
+    /// Its type, if it is one of ours.
+    pub ty: Option<Type>,
+    /// `postcard` in our files.
+    pub message_encoding: String,
+    /// Messages.
+    pub messages: u64,
+    /// Messages that should be here, and are not.
+    pub lost: u64,
+    /// When the first one came.
+    pub first_ns: Option<u64>,
+    /// When the last one came.
+    pub last_ns: Option<u64>,
+}
+
+/// A stretch of system time without a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EpochInfo {
+    /// Its number.
+    pub epoch: u64,
+    /// When the first message of it came.
+    pub first_ns: Option<u64>,
+    /// When the last one came.
+    pub last_ns: Option<u64>,
+    /// Messages with stamps of it.
+    pub messages: u64,
+}
+
+/// Reads the index of a closed file, and all of a file that is not.
+///
+/// # Errors
+/// When it is no MCAP file, or its index is damaged.
+pub fn info(path: &Path) -> Result<Info, ReadError> {
+    let mut frames = Frames::open(path)?;
+    match Index::read(&mut frames) {
+        Ok(index) => from_index(frames, &index),
+        Err(ReadError::NotClosed { .. }) => from_all(path),
+        Err(error) => Err(error),
+    }
+}
+
+/// What is counted of each channel.
+#[derive(Default)]
+struct Tally {
+    messages: u64,
+    times: Option<(u64, u64)>,
+}
+
+impl Tally {
+    fn widen(&mut self, times: Option<(u64, u64)>) {
+        self.times = wider(self.times, times);
+    }
+}
+
+fn wider(one: Option<(u64, u64)>, other: Option<(u64, u64)>) -> Option<(u64, u64)> {
+    match (one, other) {
+        (Some((first, last)), Some((other_first, other_last))) => Some((first.min(other_first), last.max(other_last))),
+        (one, other) => one.or(other),
+    }
+}
+
+fn from_index(mut frames: Frames, index: &Index) -> Result<Info, ReadError> {
+    let counts = &index.statistics.channel_message_counts;
+    let mut tallies: BTreeMap<u16, Tally> =
+        counts.iter().map(|(id, messages)| (*id, Tally { messages: *messages, times: None })).collect();
+    // The first chunk of each channel has its first message, the last one its last; in between only a step of time
+    // reaches further, which the file's own times show.
+    let mut ends: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
+    for (id, at) in index.chunks.iter().flat_map(|chunk| &chunk.message_index_offsets) {
+        ends.entry(*id).or_insert((*at, *at)).1 = *at;
+    }
+    for (id, (first, last)) in ends {
+        let tally = tallies.entry(id).or_default();
+        tally.widen(times_at(&mut frames, first)?);
+        tally.widen(times_at(&mut frames, last)?);
+    }
+    let mut contents = Contents::new(frames, index.definitions.clone());
+    let mut about = Vec::new();
+    for at in &index.metadata {
+        about.push(contents.metadata_at(at.offset)?);
+    }
+    contents.read_header()?;
+    let mut info = build(&contents, &index.definitions, &tallies, about);
+    info.is_closed = true;
+    info.chunks = index.chunks.len() as u64;
+    if info.messages > 0 {
+        info.first_ns = Some(index.statistics.message_start_time);
+        info.last_ns = Some(index.statistics.message_end_time);
+    }
+    Ok(info)
+}
+
+fn from_all(path: &Path) -> Result<Info, ReadError> {
+    let mut contents = Contents::open(path)?;
+    let mut tallies: BTreeMap<u16, Tally> = BTreeMap::new();
+    let (mut about, mut damages) = (Vec::new(), Vec::new());
+    while let Some(item) = contents.next()? {
+        match item {
+            Item::Message(found) => {
+                let tally = tallies.entry(found.header.channel_id).or_default();
+                tally.messages += 1;
+                tally.widen(Some((found.header.log_time, found.header.log_time)));
+            }
+            Item::Metadata(metadata) => about.push(metadata),
+            Item::Damaged(at, damage) => damages.push((at, damage)),
+        }
+    }
+    let mut info = build(&contents, contents.definitions(), &tallies, about);
+    info.is_closed = contents.ending() == Some(Ending::Closed);
+    info.chunks = contents.chunks();
+    info.damages = damages;
+    Ok(info)
+}
+
+fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16, Tally>, about: Vec<Metadata>) -> Info {
+    let mut info = Info {
+        path: contents.path().to_owned(),
+        bytes: contents.file_bytes(),
+        is_closed: false,
+        closed_because: None,
+        library: contents.header().map(|header| header.library.clone()).unwrap_or_default(),
+        damages: Vec::new(),
+        chunks: 0,
+        messages: tallies.values().map(|tally| tally.messages).sum(),
+        lost: 0,
+        first_ns: None,
+        last_ns: None,
+        channels: Vec::new(),
+        epochs: Vec::new(),
+        session: BTreeMap::new(),
+        configuration: BTreeMap::new(),
+        others: Vec::new(),
+    };
+    let mut lost = BTreeMap::new();
+    for Metadata { name, metadata: mut texts } in about {
+        match name.as_str() {
+            metadata::SESSION if info.session.is_empty() => info.session = texts,
+            metadata::CONFIGURATION => info.configuration.append(&mut texts),
+            metadata::LOST => lost = format::counts(&texts),
+            metadata::CLOSED => info.closed_because = texts.remove("reason"),
+            // Epochs are told by the channels.
+            metadata::EPOCH => {}
+            _ => info.others.push((name, texts)),
+        }
+    }
+    let mut channels: BTreeMap<&str, ChannelInfo> = BTreeMap::new();
+    let mut epochs: BTreeMap<u64, Tally> = BTreeMap::new();
+    let mut times = None;
+    for (id, channel) in definitions.channels() {
+        let tally = tallies.get(&id);
+        let (messages, its_times) = tally.map_or((0, None), |tally| (tally.messages, tally.times));
+        add(channels.entry(&channel.topic).or_default(), channel, messages, its_times);
+        times = wider(times, its_times);
+        if let Some(epoch) = channel.epoch().filter(|_| messages > 0) {
+            let tally = epochs.entry(epoch).or_default();
+            tally.messages += messages;
+            tally.widen(its_times);
+        }
+    }
+    for (topic, count) in &lost {
+        let channel = channels.entry(topic).or_default();
+        channel.topic.clone_from(topic);
+        channel.lost = *count;
+    }
+    (info.first_ns, info.last_ns) = times.unzip();
+    info.lost = lost.values().sum();
+    info.channels = channels.into_values().collect();
+    let epoch_info = |(epoch, Tally { messages, times }): (u64, Tally)| {
+        let (first_ns, last_ns) = times.unzip();
+        EpochInfo { epoch, first_ns, last_ns, messages }
+    };
+    info.epochs = epochs.into_iter().map(epoch_info).collect();
+    info
+}
+
+/// A topic has a channel for each epoch.
+fn add(info: &mut ChannelInfo, channel: &Definition, messages: u64, times: Option<(u64, u64)>) {
+    let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
+    info.topic.clone_from(&channel.topic);
+    (info.name, info.item) = (text(key::NAME), text(key::ITEM));
+    info.type_name.clone_from(&channel.schema.name);
+    info.ty = channel.schema.ty();
+    info.message_encoding.clone_from(&channel.message_encoding);
+    info.messages += messages;
+    (info.first_ns, info.last_ns) = wider(info.first_ns.zip(info.last_ns), times).unzip();
+}

@@ -1,0 +1,89 @@
+//! Recordings of what modules publish, as [MCAP](https://mcap.dev/spec) files.
+//!
+//! ```text
+//! write ─▶ Inbox: chunks in memory ─▶ Recorder, a thread ─▶ NAME-0001.mcap, NAME-0002.mcap, …
+//!            │ full                      │ the disk fails
+//!            ▼                           ▼
+//!     counted as lost             Status; again, with a new file
+//!
+//! cut, killed, damaged file ─▶ recover ─▶ whole file ─▶ info, cut, merge, Reader
+//! ```
+//!
+//! [`Writer::write`] takes as long as copying the message, whatever the disk does. What does not fit the bounded queue
+//! is counted as lost, by channel, in [`Status`] and in the file. A process that is killed loses what had not left its
+//! memory: at most [`Options::flush`]. A loss of power takes what was not synced: at most [`Options::sync`] more.
+//!
+//! ```
+//! use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer, info};
+//! use rohrpost_schema::Type;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let mut writer = Writer::start(Options::new(folder.path(), "base"), Session::default())?;
+//! let spec = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: Default::default() };
+//! let speed = writer.channel(&spec)?;
+//! writer.write(speed, &Message { arrival_ns: 12, stamp_ns: 10, epoch: 1, sequence: 0, data: &[7] })?;
+//! writer.finish().1?;
+//!
+//! let info = info(&folder.path().join("base-0001.mcap"))?;
+//! assert_eq!((info.messages, info.channels[0].topic.as_str()), (1, "motor.0/speed"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # The format, and why
+//!
+//! - **MCAP:** Rerun, Foxglove and libraries of many languages read it, and each file describes its types itself.
+//! - **Postcard as it came:** nothing is converted while recording. The schema is the description that modules hand out
+//!   (`rohrpost-schema`), so bytes become values again without the program that wrote them.
+//! - **The order is that of arrival.** Log time is the time of arrival, publish time the stamp. Readers that sort by
+//!   time use the index.
+//! - **A channel for each epoch of system time,** with the epoch in its metadata: after a step, times contradict each
+//!   other, and the epoch of a message must survive cutting and merging. The topic stays the same.
+//! - **Chunks go to the file whole, with their length.** `mcap` does so with `disable_seeking`; while it seeks, an open
+//!   chunk has no length, and readers stop before it if the writer was killed.
+//! - **Channels are described in a chunk of their own,** and again in the index: one damaged chunk costs its messages
+//!   only.
+//! - **Each file stands alone:** session, configuration, types and channels are in each; counts of lost messages are
+//!   those since its beginning.
+//! - **A failed file is cut back** to its last whole chunk, so that no message is in two files.
+//! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut` and `merge`.
+//!
+//! Knows no mailbox, no module and no clock but that of its periods: times are arguments.
+
+#![forbid(unsafe_code)]
+
+mod batch;
+mod current;
+mod cut;
+mod disk;
+mod error;
+mod file;
+pub mod format;
+mod inbox;
+mod info;
+mod merge;
+mod options;
+mod output;
+mod read;
+mod reader;
+mod recorder;
+mod recover;
+mod rewrite;
+mod rotate;
+mod shared;
+mod status;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+pub use batch::Message;
+pub use cut::{CutError, Selection, cut};
+pub use error::{Damage, DiskError, ReadError, Shown};
+pub use info::{ChannelInfo, EpochInfo, Info, info};
+pub use merge::{MergeError, merge};
+pub use options::{Options, Session};
+pub use reader::{Reader, RecordedChannel, is_closed};
+pub use recover::{RecoverError, Recovered, recover, recovered_path};
+pub use rewrite::{Progress, RewriteError};
+pub use rotate::Rotation;
+pub use status::{ChannelStatus, Failures, Problem, Status};
+pub use writer::{ChannelError, ChannelId, ChannelSpec, StartError, WriteError, Writer};

@@ -1,0 +1,185 @@
+//! Several files in one, by time of arrival.
+
+use crate::error::{ReadError, Shown};
+use crate::format::{self, metadata};
+use crate::read::contents::{Contents, Ending, Found, Item};
+use crate::read::definitions::{Definition, Definitions, SchemaText};
+use crate::read::frames::Frames;
+use crate::read::index::Index;
+use crate::rewrite::{Progress, RewriteError, Rewriter};
+use mcap::records::Metadata;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Why nothing was merged.
+#[derive(Debug, Error)]
+pub enum MergeError {
+    /// One of the files.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The new one.
+    #[error(transparent)]
+    Rewrite(#[from] RewriteError),
+    /// No files.
+    #[error("nothing to merge; name at least one file")]
+    Nothing,
+    /// Values of one name could not be read alike.
+    #[error(
+        "{topic} is {first_type} in {first} and {second_type} in {second}; merge files of one version, or `cut` the \
+         name out of one of them"
+    )]
+    OtherType {
+        /// Name and item.
+        topic: String,
+        /// A file.
+        first: Shown,
+        /// Its type there.
+        first_type: String,
+        /// Another file.
+        second: Shown,
+        /// Its type there.
+        second_type: String,
+    },
+}
+
+/// Writes messages of all files to a new one: always the one that arrived first of those that are next in their files.
+/// So each file's order stays, also where its time steps back. Its messages and bytes.
+///
+/// # Errors
+/// When one was not closed or is damaged, one name has two types, or the new file cannot be written.
+pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Result<(u64, u64), MergeError> {
+    if paths.is_empty() {
+        return Err(MergeError::Nothing);
+    }
+    let types = check_types(paths)?;
+    let mut new = Rewriter::create(to)?;
+    let names = paths.iter().enumerate().map(|(at, path)| (format!("{:04}", at + 1), file_name(path)));
+    new.metadata(metadata::MERGED, names.collect()).map_err(RewriteError::from)?;
+    let sources = paths.iter().enumerate().map(|(number, path)| Source::open(number, path, &mut new));
+    let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
+    let bytes: u64 = sources.iter().map(|source| source.contents.file_bytes()).sum();
+    while let Some(source) = sources.iter_mut().filter(|its| its.next.is_some()).min_by_key(|its| its.arrival_ns()) {
+        source.write_next(&mut new, &types)?;
+        source.advance(&mut new)?;
+        progress(sources.iter().map(|source| source.contents.at()).sum(), bytes);
+    }
+    let mut lost: BTreeMap<String, u64> = BTreeMap::new();
+    for source in sources {
+        for (id, channel) in source.contents.definitions().channels() {
+            new.channel(source.number, id, &unified(channel, &types)).map_err(RewriteError::from)?;
+        }
+        source.lost.into_iter().for_each(|(topic, count)| *lost.entry(topic).or_default() += count);
+    }
+    if !lost.is_empty() {
+        let texts = lost.into_iter().map(|(topic, count)| (topic, count.to_string()));
+        new.metadata(metadata::LOST, texts.collect()).map_err(RewriteError::from)?;
+    }
+    let messages = new.messages();
+    Ok((messages, new.finish()?))
+}
+
+/// One of the files.
+struct Source {
+    number: usize,
+    contents: Contents,
+    /// Its next message.
+    next: Option<Found>,
+    /// What it says of its losses; the last counts.
+    lost: BTreeMap<String, u64>,
+}
+
+impl Source {
+    /// At its first message.
+    fn open(number: usize, path: &Path, new: &mut Rewriter) -> Result<Self, MergeError> {
+        let mut source = Self { number, contents: Contents::open(path)?, next: None, lost: BTreeMap::new() };
+        source.advance(new)?;
+        Ok(source)
+    }
+
+    fn arrival_ns(&self) -> Option<u64> {
+        self.next.as_ref().map(|found| found.header.log_time)
+    }
+
+    fn write_next(
+        &mut self,
+        new: &mut Rewriter,
+        types: &BTreeMap<String, Arc<SchemaText>>,
+    ) -> Result<(), RewriteError> {
+        let Some(found) = self.next.take() else { return Ok(()) };
+        let Found { channel, header, .. } = &found;
+        if !new.has_channel(self.number, header.channel_id) {
+            new.channel(self.number, header.channel_id, &unified(channel, types))?;
+        }
+        Ok(new.message(self.number, channel, header, self.contents.data(&found))?)
+    }
+
+    /// Reads on to the next message.
+    fn advance(&mut self, new: &mut Rewriter) -> Result<(), MergeError> {
+        while let Some(item) = self.contents.next()? {
+            match item {
+                Item::Message(found) => {
+                    self.next = Some(found);
+                    return Ok(());
+                }
+                Item::Damaged(at, what) => return Err(self.contents.damaged(at, what).into()),
+                Item::Metadata(its) => self.tell(its, new)?,
+            }
+        }
+        match self.contents.ending() {
+            Some(Ending::Closed) => Ok(()),
+            _ => Err(ReadError::NotClosed { path: Shown(self.contents.path().to_owned()) }.into()),
+        }
+    }
+
+    /// What it says of itself is said in the new file, with its name.
+    fn tell(&mut self, its: Metadata, new: &mut Rewriter) -> Result<(), RewriteError> {
+        let mut texts = its.metadata;
+        match its.name.as_str() {
+            metadata::LOST => self.lost = format::counts(&texts),
+            metadata::CLOSED => {}
+            metadata::CONFIGURATION => new.metadata(&its.name, texts)?,
+            name => {
+                texts.entry("source".into()).or_insert_with(|| file_name(self.contents.path()));
+                new.metadata(name, texts)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The type of each topic, if it is one.
+fn check_types(paths: &[PathBuf]) -> Result<BTreeMap<String, Arc<SchemaText>>, MergeError> {
+    let mut types: BTreeMap<String, (Arc<SchemaText>, &Path)> = BTreeMap::new();
+    for path in paths {
+        let definitions: Definitions = Index::read(&mut Frames::open(path)?)?.definitions;
+        for (_, Definition { topic, schema, .. }) in definitions.channels().map(|(id, channel)| (id, &**channel)) {
+            let (known, first) = types.entry(topic.clone()).or_insert_with(|| (schema.clone(), path));
+            if !known.is_same_type(schema) {
+                return Err(MergeError::OtherType {
+                    topic: topic.clone(),
+                    first: Shown(first.to_owned()),
+                    first_type: known.describe(),
+                    second: Shown(path.clone()),
+                    second_type: schema.describe(),
+                });
+            }
+        }
+    }
+    Ok(types.into_iter().map(|(topic, (schema, _))| (topic, schema)).collect())
+}
+
+/// The same channel with the one description of its type: texts in it may have changed from file to file.
+fn unified(channel: &Arc<Definition>, types: &BTreeMap<String, Arc<SchemaText>>) -> Arc<Definition> {
+    match types.get(&channel.topic) {
+        Some(schema) if *schema != channel.schema => {
+            Arc::new(Definition { schema: schema.clone(), ..(**channel).clone() })
+        }
+        _ => channel.clone(),
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,54 @@
+//! What a recording is told at its start.
+
+use crate::rotate::Rotation;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How a recording is written.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where its files are; it must exist.
+    pub folder: PathBuf,
+    /// How their names begin: `STEM-0001.mcap`.
+    pub stem: String,
+    /// When the next file begins.
+    pub rotation: Rotation,
+    /// A message waits no longer in memory for others to fill its chunk: so much is lost if the recorder is killed.
+    pub flush: Duration,
+    /// How often the disk is told to keep what it has: so much is lost with the power.
+    pub sync: Duration,
+    /// How long to wait after an error of the disk before the next try.
+    pub retry: Duration,
+    /// What stays free on the disk.
+    pub leave_bytes: u64,
+    /// Chunks of up to a megabyte that wait in memory while the disk is slow; what comes then is lost, and counted.
+    pub queue_chunks: usize,
+}
+
+impl Options {
+    /// The usual ones.
+    pub fn new(folder: impl Into<PathBuf>, stem: impl Into<String>) -> Self {
+        Self {
+            folder: folder.into(),
+            stem: stem.into(),
+            rotation: Rotation::default(),
+            flush: Duration::from_millis(500),
+            sync: Duration::from_secs(2),
+            retry: Duration::from_secs(1),
+            leave_bytes: 256 << 20,
+            queue_chunks: 32,
+        }
+    }
+}
+
+/// What each file of a recording says about it.
+#[derive(Clone, Debug, Default)]
+pub struct Session {
+    /// The node that records.
+    pub node: String,
+    /// Programs and their versions.
+    pub versions: BTreeMap<String, String>,
+    /// Texts of the configuration, by file name.
+    pub configuration: BTreeMap<String, String>,
+}

@@ -1,0 +1,271 @@
+//! Messages and metadata of a file, in its order.
+
+use crate::error::{Damage, ReadError, Shown};
+use crate::format::op;
+use crate::read::chunk;
+use crate::read::definitions::{Definition, Definitions};
+use crate::read::frames::{Frames, Step};
+use mcap::records::{Header, MessageHeader, Metadata, Record};
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What a message takes before its data.
+const MESSAGE_HEAD_BYTES: usize = 22;
+
+/// A file, read from its beginning or chunk by chunk.
+pub(crate) struct Contents {
+    frames: Frames,
+    definitions: Definitions,
+    header: Option<Header>,
+    /// Records of the present chunk.
+    records: Vec<u8>,
+    /// Where among them the next one is; none outside of chunks.
+    in_chunk: Option<usize>,
+    /// The present chunk is cut off by the file's end.
+    is_cut: bool,
+    chunks: u64,
+    /// Where the present record of the file begins.
+    begins: u64,
+    ending: Option<Ending>,
+}
+
+/// How a file ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ending {
+    /// As it should.
+    Closed,
+    /// Behind a record, or inside of one.
+    Open,
+    /// Not to be read on from here.
+    Damaged,
+}
+
+/// The next thing in a file.
+#[derive(Debug)]
+pub(crate) enum Item {
+    /// A message; its data is [`Contents::data`].
+    Message(Found),
+    /// Of the file, not of a channel.
+    Metadata(Metadata),
+    /// What is not readable: where its record begins, and why. Reading goes on behind it, if it can.
+    Damaged(u64, Damage),
+}
+
+/// A message, and where its data is.
+#[derive(Debug)]
+pub(crate) struct Found {
+    pub(crate) header: MessageHeader,
+    pub(crate) channel: Arc<Definition>,
+    /// It is of a chunk that is cut off, so no sum says that it is right.
+    pub(crate) is_unchecked: bool,
+    data: Range<usize>,
+    is_in_chunk: bool,
+}
+
+impl Contents {
+    /// From the first record on.
+    pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
+        Ok(Self::new(Frames::open(path)?, Definitions::default()))
+    }
+
+    /// With what its index says.
+    pub(crate) fn new(frames: Frames, definitions: Definitions) -> Self {
+        Self {
+            frames,
+            definitions,
+            header: None,
+            records: Vec::new(),
+            in_chunk: None,
+            is_cut: false,
+            chunks: 0,
+            begins: 0,
+            ending: None,
+        }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        self.frames.path()
+    }
+
+    pub(crate) fn definitions(&self) -> &Definitions {
+        &self.definitions
+    }
+
+    /// Which program wrote it.
+    pub(crate) fn header(&self) -> Option<&Header> {
+        self.header.as_ref()
+    }
+
+    /// Chunks so far.
+    pub(crate) fn chunks(&self) -> u64 {
+        self.chunks
+    }
+
+    /// Length of the file.
+    pub(crate) fn file_bytes(&self) -> u64 {
+        self.frames.len()
+    }
+
+    /// Once there is no next thing.
+    pub(crate) fn ending(&self) -> Option<Ending> {
+        self.ending
+    }
+
+    /// Where reading is.
+    pub(crate) fn at(&self) -> u64 {
+        self.frames.at()
+    }
+
+    /// The bytes of the message that came last.
+    pub(crate) fn data(&self, found: &Found) -> &[u8] {
+        let all = if found.is_in_chunk { &self.records[..] } else { self.frames.body() };
+        &all[found.data.clone()]
+    }
+
+    /// As an error for what reads whole files only.
+    pub(crate) fn damaged(&self, at: u64, what: Damage) -> ReadError {
+        ReadError::Damaged { path: Shown(self.path().to_owned()), at, what }
+    }
+
+    /// The next thing; none at the end.
+    pub(crate) fn next(&mut self) -> Result<Option<Item>, ReadError> {
+        while self.ending.is_none() {
+            let found = match self.in_chunk {
+                Some(_) => self.next_in_chunk(),
+                None => self.next_outside()?,
+            };
+            if found.is_some() {
+                return Ok(found);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Goes to the chunk there; then [`Contents::next_in_chunk`] has its messages.
+    pub(crate) fn open_chunk(&mut self, at: u64) -> Result<(), ReadError> {
+        self.frames.seek(at)?;
+        self.begins = at;
+        match self.frames.step()? {
+            Step::Record(op::CHUNK) => {
+                chunk::unpack(self.frames.body(), &mut self.records).map_err(|what| self.damaged(at, what))?;
+                self.in_chunk = Some(0);
+                Ok(())
+            }
+            Step::Damaged(what) => Err(self.damaged(at, what)),
+            _ => Err(self.damaged(at, Damage::Record { op: op::CHUNK_INDEX })),
+        }
+    }
+
+    /// Reads which program wrote it: the first record.
+    pub(crate) fn read_header(&mut self) -> Result<(), ReadError> {
+        self.frames.seek(mcap::MAGIC.len() as u64)?;
+        self.in_chunk = None;
+        self.next_outside().map(drop)
+    }
+
+    /// The metadata there.
+    pub(crate) fn metadata_at(&mut self, at: u64) -> Result<Metadata, ReadError> {
+        self.frames.seek(at)?;
+        self.in_chunk = None;
+        self.begins = at;
+        match self.next_outside()? {
+            Some(Item::Metadata(metadata)) => Ok(metadata),
+            _ => Err(self.damaged(at, Damage::Record { op: op::METADATA_INDEX })),
+        }
+    }
+
+    /// The next thing in the present chunk.
+    pub(crate) fn next_in_chunk(&mut self) -> Option<Item> {
+        loop {
+            let at = self.in_chunk?;
+            let Some((op, body)) = chunk::record_at(&self.records, at) else {
+                self.in_chunk = None;
+                if self.is_cut {
+                    self.ending = Some(Ending::Open);
+                } else if at != self.records.len() {
+                    return Some(Item::Damaged(self.begins, Damage::Record { op: op::CHUNK }));
+                }
+                return None;
+            };
+            self.in_chunk = Some(body.end);
+            let told = match op {
+                op::MESSAGE => match self.found(body, true) {
+                    Ok(found) => return Some(Item::Message(found)),
+                    Err(damage) => Err(damage),
+                },
+                op::SCHEMA | op::CHANNEL => self.definitions.add(op, &self.records[body]),
+                _ => Ok(()),
+            };
+            if let Err(damage) = told {
+                return Some(Item::Damaged(self.begins, damage));
+            }
+        }
+    }
+
+    /// The next record of the file; none if it is nothing of its own.
+    fn next_outside(&mut self) -> Result<Option<Item>, ReadError> {
+        self.begins = self.frames.at();
+        let damaged = |damage| Some(Item::Damaged(self.begins, damage));
+        Ok(match self.frames.step()? {
+            Step::Record(op) => self.record(op)?,
+            Step::Cut(Some(op::CHUNK)) => {
+                chunk::unpack_cut(self.frames.body(), &mut self.records);
+                self.in_chunk = Some(0);
+                self.is_cut = true;
+                damaged(Damage::Cut)
+            }
+            Step::Cut(_) => {
+                self.ending = Some(Ending::Open);
+                damaged(Damage::Cut)
+            }
+            Step::Damaged(damage) => {
+                self.ending = Some(Ending::Damaged);
+                damaged(damage)
+            }
+            Step::End => {
+                self.ending = Some(Ending::Open);
+                None
+            }
+        })
+    }
+
+    fn record(&mut self, op: u8) -> Result<Option<Item>, ReadError> {
+        let told = match op {
+            op::CHUNK => chunk::unpack(self.frames.body(), &mut self.records).map(|()| {
+                self.in_chunk = Some(0);
+                self.chunks += 1;
+                None
+            }),
+            op::MESSAGE => self.found(0..self.frames.body().len(), false).map(|found| Some(Item::Message(found))),
+            op::SCHEMA | op::CHANNEL => self.definitions.add(op, self.frames.body()).map(|()| None),
+            op::HEADER | op::METADATA => match mcap::parse_record(op, self.frames.body()) {
+                Ok(Record::Metadata(metadata)) => Ok(Some(Item::Metadata(metadata))),
+                Ok(Record::Header(header)) => {
+                    self.header = Some(header);
+                    Ok(None)
+                }
+                _ => Err(Damage::Record { op }),
+            },
+            op::FOOTER => {
+                let is_whole = self.frames.is_at_end_magic()?;
+                self.ending = Some(if is_whole { Ending::Closed } else { Ending::Open });
+                Ok(None)
+            }
+            _ => Ok(None),
+        };
+        Ok(told.unwrap_or_else(|damage| Some(Item::Damaged(self.begins, damage))))
+    }
+
+    fn found(&self, body: Range<usize>, is_in_chunk: bool) -> Result<Found, Damage> {
+        let all = if is_in_chunk { &self.records[..] } else { self.frames.body() };
+        let damaged = Damage::Record { op: op::MESSAGE };
+        let Ok(Record::Message { header, data }) = mcap::parse_record(op::MESSAGE, &all[body.clone()]) else {
+            return Err(damaged);
+        };
+        debug_assert_eq!(data.len() + MESSAGE_HEAD_BYTES, body.len(), "where the data is");
+        let channel = self.definitions.channel(header.channel_id).ok_or(Damage::UnknownChannel(header.channel_id))?;
+        let data = body.start + MESSAGE_HEAD_BYTES..body.end;
+        Ok(Found { header, channel: channel.clone(), is_unchecked: self.is_cut, data, is_in_chunk })
+    }
+}

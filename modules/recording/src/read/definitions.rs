@@ -1,0 +1,99 @@
+//! Channels and their types, as a file describes them.
+
+use crate::error::Damage;
+use crate::format::{SCHEMA_ENCODING, key, op};
+use mcap::records::Record;
+use rohrpost_schema::{Type, describe_type};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A channel and its type.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Definition {
+    pub(crate) topic: String,
+    pub(crate) message_encoding: String,
+    pub(crate) texts: BTreeMap<String, String>,
+    pub(crate) schema: Arc<SchemaText>,
+}
+
+/// A type, as it is described.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct SchemaText {
+    pub(crate) name: String,
+    pub(crate) encoding: String,
+    pub(crate) data: Vec<u8>,
+}
+
+impl SchemaText {
+    /// Of one of our types.
+    pub(crate) fn ty(&self) -> Option<Type> {
+        if self.encoding == SCHEMA_ENCODING { Type::from_bytes(&self.data).ok() } else { None }
+    }
+
+    /// Whether values of one are values of the other. Of our types, texts and ranges do not count.
+    pub(crate) fn is_same_type(&self, other: &Self) -> bool {
+        match (self.ty(), other.ty()) {
+            (Some(one), Some(other)) => one.hash() == other.hash(),
+            _ => self == other,
+        }
+    }
+
+    /// For people.
+    pub(crate) fn describe(&self) -> String {
+        self.ty().map_or_else(|| format!("{} ({})", self.name, self.encoding), |ty| describe_type(&ty))
+    }
+}
+
+impl Definition {
+    /// Of system time.
+    pub(crate) fn epoch(&self) -> Option<u64> {
+        self.texts.get(key::EPOCH)?.parse().ok()
+    }
+}
+
+/// All of a file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Definitions {
+    schemas: BTreeMap<u16, Arc<SchemaText>>,
+    channels: BTreeMap<u16, Arc<Definition>>,
+}
+
+impl Definitions {
+    pub(crate) fn channel(&self, id: u16) -> Option<&Arc<Definition>> {
+        self.channels.get(&id)
+    }
+
+    pub(crate) fn channels(&self) -> impl Iterator<Item = (u16, &Arc<Definition>)> {
+        self.channels.iter().map(|(id, definition)| (*id, definition))
+    }
+
+    /// Reads a record of a schema or channel. The same again is no news.
+    pub(crate) fn add(&mut self, op: u8, body: &[u8]) -> Result<(), Damage> {
+        match mcap::parse_record(op, body).map_err(|_| Damage::Record { op })? {
+            Record::Schema { header, data } => {
+                let schema = SchemaText { name: header.name, encoding: header.encoding, data: data.into_owned() };
+                insert(&mut self.schemas, header.id, Arc::new(schema))
+            }
+            Record::Channel(channel) => {
+                let schema = match channel.schema_id {
+                    0 => Arc::default(),
+                    id => self.schemas.get(&id).cloned().ok_or(Damage::Record { op: op::CHANNEL })?,
+                };
+                let mcap::records::Channel { id, topic, message_encoding, metadata: texts, .. } = channel;
+                insert(&mut self.channels, id, Arc::new(Definition { topic, message_encoding, texts, schema }))
+            }
+            _ => Err(Damage::Record { op }),
+        }
+    }
+}
+
+fn insert<T: PartialEq>(all: &mut BTreeMap<u16, T>, id: u16, new: T) -> Result<(), Damage> {
+    match all.get(&id) {
+        Some(known) if *known != new => Err(Damage::Redefined(id)),
+        Some(_) => Ok(()),
+        None => {
+            all.insert(id, new);
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! A file record by record, as far as it goes.
+
+use crate::error::{Damage, ReadError, Shown};
+use crate::format::{RECORD_BYTES_MAX, op};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Type and length of a record.
+pub(crate) const HEAD_BYTES: usize = 9;
+
+/// A file, read from a place on.
+pub(crate) struct Frames {
+    path: PathBuf,
+    input: BufReader<File>,
+    len: u64,
+    at: u64,
+    body: Vec<u8>,
+}
+
+/// What is at a place.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// A record of this type; its bytes are [`Frames::body`].
+    Record(u8),
+    /// The file ends inside of a record of this type, or of its head; what there is of it is [`Frames::body`].
+    Cut(Option<u8>),
+    /// A record that is not to be had.
+    Damaged(Damage),
+    /// The file ends behind a record.
+    End,
+}
+
+impl Frames {
+    /// At the first record.
+    pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
+        let failed = |error| ReadError::Io { path: Shown(path.to_owned()), error };
+        let file = File::open(path).map_err(failed)?;
+        let len = file.metadata().map_err(failed)?.len();
+        let mut frames = Self {
+            path: path.to_owned(),
+            input: BufReader::with_capacity(64 << 10, file),
+            len,
+            at: 0,
+            body: Vec::new(),
+        };
+        frames.fill(mcap::MAGIC.len() as u64)?;
+        if !mcap::MAGIC.starts_with(&frames.body) {
+            return Err(ReadError::NotMcap { path: Shown(path.to_owned()) });
+        }
+        Ok(frames)
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Length of the file when it was opened.
+    pub(crate) fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Where the next record begins.
+    pub(crate) fn at(&self) -> u64 {
+        self.at
+    }
+
+    /// Of the last step.
+    pub(crate) fn body(&self) -> &[u8] {
+        &self.body
+    }
+
+    pub(crate) fn seek(&mut self, to: u64) -> Result<(), ReadError> {
+        self.input.seek(SeekFrom::Start(to)).map_err(|error| self.failed(error))?;
+        self.at = to;
+        Ok(())
+    }
+
+    /// The next record.
+    pub(crate) fn step(&mut self) -> Result<Step, ReadError> {
+        if self.fill(HEAD_BYTES as u64)? == 0 {
+            return Ok(Step::End);
+        }
+        let Some((&op, len)) = self.body.split_first() else { return Ok(Step::End) };
+        let Ok(len) = <[u8; 8]>::try_from(len).map(u64::from_le_bytes) else {
+            self.body.clear();
+            return Ok(Step::Cut(None));
+        };
+        // What has power lost often ends in zeroes.
+        if op == 0 {
+            return Ok(Step::Damaged(Damage::NoRecord { op, len }));
+        }
+        if len > RECORD_BYTES_MAX as u64 {
+            return self.skip(op, len);
+        }
+        let got = self.fill(len)?;
+        Ok(if got == len { Step::Record(op) } else { Step::Cut(Some(op)) })
+    }
+
+    /// Attachments of other programs may be long. All else is damage.
+    fn skip(&mut self, op: u8, len: u64) -> Result<Step, ReadError> {
+        let end = self.at.checked_add(len).filter(|end| op == op::ATTACHMENT && *end <= self.len);
+        let Some(end) = end else { return Ok(Step::Damaged(Damage::NoRecord { op, len })) };
+        self.body.clear();
+        self.seek(end)?;
+        Ok(Step::Record(op))
+    }
+
+    /// Reads so many bytes into the body, or as many as there are.
+    fn fill(&mut self, wanted: u64) -> Result<u64, ReadError> {
+        self.body.clear();
+        let told = self.input.by_ref().take(wanted).read_to_end(&mut self.body);
+        let got = told.map_err(|error| self.failed(error))? as u64;
+        self.at += got;
+        Ok(got)
+    }
+
+    /// The end of the file: footer and magic bytes, if it is long enough.
+    pub(crate) fn tail(&mut self, bytes: u64) -> Result<Option<&[u8]>, ReadError> {
+        let Some(from) = self.len.checked_sub(bytes) else { return Ok(None) };
+        self.seek(from)?;
+        Ok((self.fill(bytes)? == bytes).then_some(&self.body))
+    }
+
+    /// Whether the file goes on with the magic bytes, as it does at its end.
+    pub(crate) fn is_at_end_magic(&mut self) -> Result<bool, ReadError> {
+        self.fill(mcap::MAGIC.len() as u64)?;
+        Ok(self.body == mcap::MAGIC)
+    }
+
+    fn failed(&self, error: io::Error) -> ReadError {
+        ReadError::Io { path: Shown(self.path.clone()), error }
+    }
+}

@@ -1,0 +1,115 @@
+//! The index at the end of a closed file.
+
+use crate::error::{Damage, ReadError, Shown};
+use crate::format::op;
+use crate::read::definitions::Definitions;
+use crate::read::frames::{Frames, HEAD_BYTES, Step};
+use mcap::records::{ChunkIndex, MessageIndex, MetadataIndex, Record, Statistics};
+
+/// Footer: where the summary begins, where its offsets do, its sum.
+const FOOTER_BYTES: usize = 8 + 8 + 4;
+
+/// What a closed file says about itself.
+pub(crate) struct Index {
+    pub(crate) definitions: Definitions,
+    /// In the order of the file.
+    pub(crate) chunks: Vec<ChunkIndex>,
+    pub(crate) metadata: Vec<MetadataIndex>,
+    pub(crate) statistics: Statistics,
+}
+
+impl Index {
+    /// Reads it, checked by its sum.
+    pub(crate) fn read(frames: &mut Frames) -> Result<Self, ReadError> {
+        let not_closed = ReadError::NotClosed { path: Shown(frames.path().to_owned()) };
+        let footer_at = frames.len().saturating_sub((HEAD_BYTES + FOOTER_BYTES + mcap::MAGIC.len()) as u64);
+        let Some(tail) = frames.tail((HEAD_BYTES + FOOTER_BYTES + mcap::MAGIC.len()) as u64)? else {
+            return Err(not_closed);
+        };
+        let (footer, magic) = tail.split_at(HEAD_BYTES + FOOTER_BYTES);
+        if magic != mcap::MAGIC || footer[0] != op::FOOTER {
+            return Err(not_closed);
+        }
+        let (head, body) = footer.split_at(HEAD_BYTES);
+        let Ok(Record::Footer(footer)) = mcap::parse_record(op::FOOTER, body) else { return Err(not_closed) };
+        if footer.summary_start == 0 || footer.summary_start > footer_at {
+            return Err(not_closed);
+        }
+        let mut sum_end = head.to_vec();
+        sum_end.extend_from_slice(&body[..FOOTER_BYTES - 4]);
+        let mut read = Reading::default();
+        let told = read.summary(frames, footer.summary_start, footer_at)?;
+        read.sum.update(&sum_end);
+        let is_right = footer.summary_crc == 0 || footer.summary_crc == read.sum.clone().finalize();
+        match (told, is_right, read.statistics) {
+            (Some(damage), ..) => Err(damaged(frames, damage)),
+            (None, false, _) => Err(damaged(frames, Damage::SummarySum)),
+            (None, true, None) => Err(not_closed),
+            (None, true, Some(statistics)) => {
+                read.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
+                let Reading { definitions, chunks, metadata, .. } = read;
+                Ok(Self { definitions, chunks, metadata, statistics })
+            }
+        }
+    }
+}
+
+/// What is read so far.
+#[derive(Default)]
+struct Reading {
+    definitions: Definitions,
+    chunks: Vec<ChunkIndex>,
+    metadata: Vec<MetadataIndex>,
+    statistics: Option<Statistics>,
+    sum: crc32fast::Hasher,
+}
+
+impl Reading {
+    /// All records up to the footer; what is wrong with them.
+    fn summary(&mut self, frames: &mut Frames, from: u64, footer_at: u64) -> Result<Option<Damage>, ReadError> {
+        frames.seek(from)?;
+        while frames.at() < footer_at {
+            let Step::Record(op) = frames.step()? else { return Ok(Some(Damage::SummarySum)) };
+            let body = frames.body();
+            self.sum.update(&[op]);
+            self.sum.update(&(body.len() as u64).to_le_bytes());
+            self.sum.update(body);
+            if let Err(damage) = self.record(op, body) {
+                return Ok(Some(damage));
+            }
+        }
+        Ok((frames.at() != footer_at).then_some(Damage::SummarySum))
+    }
+
+    fn record(&mut self, op: u8, body: &[u8]) -> Result<(), Damage> {
+        match op {
+            op::SCHEMA | op::CHANNEL => return self.definitions.add(op, body),
+            op::CHUNK_INDEX | op::METADATA_INDEX | op::STATISTICS => {}
+            _ => return Ok(()),
+        }
+        match mcap::parse_record(op, body).map_err(|_| Damage::Record { op })? {
+            Record::ChunkIndex(index) => self.chunks.push(index),
+            Record::MetadataIndex(index) => self.metadata.push(index),
+            Record::Statistics(statistics) => self.statistics = Some(statistics),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// When the first and the last of a channel's messages in a chunk came.
+pub(crate) fn times_at(frames: &mut Frames, at: u64) -> Result<Option<(u64, u64)>, ReadError> {
+    frames.seek(at)?;
+    let what = Damage::Record { op: op::MESSAGE_INDEX };
+    let parsed = match frames.step()? {
+        Step::Record(op::MESSAGE_INDEX) => mcap::parse_record(op::MESSAGE_INDEX, frames.body()),
+        _ => return Err(damaged(frames, what)),
+    };
+    let Ok(Record::MessageIndex(MessageIndex { records, .. })) = parsed else { return Err(damaged(frames, what)) };
+    let times = || records.iter().map(|entry| entry.log_time);
+    Ok(times().min().zip(times().max()))
+}
+
+fn damaged(frames: &Frames, what: Damage) -> ReadError {
+    ReadError::Damaged { path: Shown(frames.path().to_owned()), at: frames.at(), what }
+}

@@ -1,0 +1,123 @@
+//! A whole file from one that was not closed, or is damaged.
+
+use crate::error::{Damage, ReadError, Shown};
+use crate::format::metadata;
+use crate::read::contents::{Contents, Ending, Item};
+use crate::rewrite::{Progress, RewriteError, Rewriter};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// So many damages are listed; all are counted.
+const DAMAGES_LISTED_MAX: usize = 100;
+
+/// What was recovered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recovered {
+    /// The new file.
+    pub path: PathBuf,
+    /// Its length.
+    pub bytes: u64,
+    /// Its messages.
+    pub messages: u64,
+    /// Of those, how many are of a chunk that the end of the file cuts off. They came before the cut; but no checksum
+    /// says so.
+    pub unchecked: u64,
+    /// Length of the old file.
+    pub bytes_before: u64,
+    /// How far in the old file reading came.
+    pub bytes_read: u64,
+    /// The old one was closed.
+    pub was_closed: bool,
+    /// What was not readable: where, and why. The first hundred.
+    pub damages: Vec<(u64, Damage)>,
+    /// All of them.
+    pub damage_count: u64,
+}
+
+/// Why nothing was recovered.
+#[derive(Debug, Error)]
+pub enum RecoverError {
+    /// The old file.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The new one.
+    #[error(transparent)]
+    Rewrite(#[from] RewriteError),
+}
+
+/// Where [`recover`] puts the file that it makes of `path`: beside it, as `NAME.recovered.mcap`.
+pub fn recovered_path(path: &Path) -> PathBuf {
+    path.with_extension("recovered.mcap")
+}
+
+/// Makes a whole file of what is readable, at `to`. The old file stays as it is.
+///
+/// All messages before a cut are in it, and none that was not there. A chunk with a wrong checksum is left out, and
+/// reading goes on behind it; where no record can be found any more, it ends.
+///
+/// # Errors
+/// When the old file is no MCAP file, or the new one cannot be written.
+pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Recovered, RecoverError> {
+    let mut contents = Contents::open(path)?;
+    let mut new = Rewriter::create(to)?;
+    let mut damages = Vec::new();
+    let (mut damage_count, mut unchecked) = (0, 0);
+    while let Some(item) = contents.next()? {
+        progress(contents.at(), contents.file_bytes());
+        match item {
+            Item::Message(found) => {
+                unchecked += u64::from(found.is_unchecked);
+                new.message(0, &found.channel, &found.header, contents.data(&found)).map_err(RewriteError::from)?;
+            }
+            Item::Metadata(metadata) => {
+                new.metadata(&metadata.name, metadata.metadata).map_err(RewriteError::from)?;
+            }
+            Item::Damaged(at, damage) => {
+                damage_count += 1;
+                if damages.len() < DAMAGES_LISTED_MAX {
+                    damages.push((at, damage));
+                }
+            }
+        }
+    }
+    for (id, channel) in contents.definitions().channels() {
+        new.channel(0, id, channel).map_err(RewriteError::from)?;
+    }
+    let (bytes_before, bytes_read) = (contents.file_bytes(), contents.at());
+    let was_closed = contents.ending() == Some(Ending::Closed);
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let about = [
+        ("file", name),
+        ("bytes", bytes_before.to_string()),
+        ("bytes-read", bytes_read.to_string()),
+        ("was-closed", was_closed.to_string()),
+        ("damages", damage_count.to_string()),
+        ("unchecked", unchecked.to_string()),
+    ];
+    let about: BTreeMap<String, String> = about.into_iter().map(|(key, text)| (key.to_owned(), text)).collect();
+    new.metadata(metadata::RECOVERED, about).map_err(RewriteError::from)?;
+    let messages = new.messages();
+    let bytes = new.finish()?;
+    Ok(Recovered {
+        path: to.to_owned(),
+        bytes,
+        messages,
+        unchecked,
+        bytes_before,
+        bytes_read,
+        was_closed,
+        damages,
+        damage_count,
+    })
+}
+
+impl RecoverError {
+    /// The file that is in the way, if it is that.
+    pub fn existing(&self) -> Option<&Shown> {
+        match self {
+            Self::Rewrite(RewriteError::Exists(path)) => Some(path),
+            _ => None,
+        }
+    }
+}

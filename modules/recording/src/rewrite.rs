@@ -1,0 +1,126 @@
+//! A new file from what others have. It gets its name once it is whole; before, it is called `NAME.part`.
+
+use crate::disk::RealDisk;
+use crate::error::{DiskError, Shown};
+use crate::file::OpenFile;
+use crate::format::{CHUNK_BYTES_MAX, MESSAGE_OVERHEAD_BYTES};
+use crate::read::definitions::Definition;
+use mcap::records::MessageHeader;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Told now and then how many bytes are read, and of how many.
+pub type Progress<'a> = dyn FnMut(u64, u64) + 'a;
+
+/// Why there is no new file.
+#[derive(Debug, Error)]
+pub enum RewriteError {
+    /// Nothing is overwritten.
+    #[error("{0}: is there already; remove it, or name another file")]
+    Exists(Shown),
+    /// The disk does not take it.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+}
+
+/// A file in the making. Dropped before its end, it leaves nothing.
+pub(crate) struct Rewriter {
+    /// None once it has its name.
+    file: Option<OpenFile>,
+    part: PathBuf,
+    to: PathBuf,
+    /// Channels by source and number there.
+    channels: BTreeMap<(usize, u16), u16>,
+    chunk_bytes: usize,
+    messages: u64,
+}
+
+impl Rewriter {
+    /// Begins one.
+    pub(crate) fn create(to: &Path) -> Result<Self, RewriteError> {
+        if to.symlink_metadata().is_ok() {
+            return Err(RewriteError::Exists(Shown(to.to_owned())));
+        }
+        let mut part = to.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        // What an interrupted one left.
+        let _ = std::fs::remove_file(&part);
+        let file = OpenFile::create(&mut RealDisk, &part)?;
+        Ok(Self { file: Some(file), part, to: to.to_owned(), channels: BTreeMap::new(), chunk_bytes: 0, messages: 0 })
+    }
+
+    /// Messages so far.
+    pub(crate) fn messages(&self) -> u64 {
+        self.messages
+    }
+
+    pub(crate) fn metadata(&mut self, name: &str, texts: BTreeMap<String, String>) -> Result<(), DiskError> {
+        let Some(file) = &mut self.file else { return Ok(()) };
+        self.chunk_bytes = 0;
+        file.metadata(name, texts)
+    }
+
+    /// Whether it is described.
+    pub(crate) fn has_channel(&self, source: usize, id: u16) -> bool {
+        self.channels.contains_key(&(source, id))
+    }
+
+    /// Describes a channel, also if no message of it comes.
+    pub(crate) fn channel(&mut self, source: usize, id: u16, channel: &Arc<Definition>) -> Result<u16, DiskError> {
+        if let Some(known) = self.channels.get(&(source, id)) {
+            return Ok(*known);
+        }
+        let Some(file) = &mut self.file else { return Ok(id) };
+        let Definition { topic, message_encoding, texts, schema } = &**channel;
+        let schema = match schema.encoding.as_str() {
+            "" => 0,
+            encoding => file.schema(&schema.name, encoding, &schema.data)?,
+        };
+        let new = file.channel(schema, topic, message_encoding, texts)?;
+        self.channels.insert((source, id), new);
+        Ok(new)
+    }
+
+    pub(crate) fn message(
+        &mut self,
+        source: usize,
+        channel: &Arc<Definition>,
+        header: &MessageHeader,
+        data: &[u8],
+    ) -> Result<(), DiskError> {
+        let channel_id = self.channel(source, header.channel_id, channel)?;
+        let Some(file) = &mut self.file else { return Ok(()) };
+        let more = data.len() + MESSAGE_OVERHEAD_BYTES;
+        if self.chunk_bytes > 0 && self.chunk_bytes + more > CHUNK_BYTES_MAX {
+            file.end_chunk()?;
+            self.chunk_bytes = 0;
+        }
+        file.message(&MessageHeader { channel_id, ..*header }, data)?;
+        self.chunk_bytes += more;
+        self.messages += 1;
+        Ok(())
+    }
+
+    /// Closes it and gives it its name. Its length.
+    pub(crate) fn finish(mut self) -> Result<u64, RewriteError> {
+        let Some(file) = &mut self.file else { return Ok(0) };
+        let bytes = file.close(&mut RealDisk)?;
+        let renamed = std::fs::rename(&self.part, &self.to);
+        let failed = |error| DiskError::new("give the file its name", &self.to, error);
+        renamed.map_err(failed)?;
+        self.file = None;
+        Ok(bytes)
+    }
+}
+
+impl Drop for Rewriter {
+    fn drop(&mut self) {
+        if let Some(file) = self.file.take() {
+            file.abandon();
+            let _ = std::fs::remove_file(&self.part);
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! What the writer and its thread have in common.
+
+use crate::inbox::Inbox;
+use crate::status::{ChannelState, Counts, Status};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// The queue, the channels and the counts.
+pub(crate) struct Shared {
+    pub(crate) inbox: Inbox,
+    channels: Mutex<Vec<Arc<ChannelState>>>,
+    counts: Mutex<Counts>,
+}
+
+impl Shared {
+    pub(crate) fn new(inbox: Inbox) -> Self {
+        Self { inbox, channels: Mutex::default(), counts: Mutex::default() }
+    }
+
+    pub(crate) fn add(&self, channel: Arc<ChannelState>) {
+        self.channels.lock().unwrap_or_else(PoisonError::into_inner).push(channel);
+    }
+
+    /// Those behind the first `known`.
+    pub(crate) fn channels_from(&self, known: usize) -> Vec<Arc<ChannelState>> {
+        self.channels.lock().unwrap_or_else(PoisonError::into_inner)[known..].to_vec()
+    }
+
+    pub(crate) fn counts(&self) -> MutexGuard<'_, Counts> {
+        self.counts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn status(&self, is_running: bool) -> Status {
+        let channels: Vec<_> = self.channels_from(0).iter().map(|channel| channel.status()).collect();
+        let now = self.counts().clone();
+        Status {
+            file: now.file,
+            files_closed: now.files_closed,
+            files_torn: now.files_torn,
+            bytes: now.bytes_before + now.bytes_now,
+            written: now.written,
+            synced: now.synced,
+            unsure: now.unsure,
+            lost: channels.iter().map(|channel| channel.lost).sum(),
+            waiting: self.inbox.waiting() + now.held,
+            problem: now.problem,
+            failures: now.failures,
+            is_running,
+            channels,
+        }
+    }
+}

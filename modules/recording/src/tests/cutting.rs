@@ -1,0 +1,117 @@
+//! A file cut anywhere is recovered to what was before the cut; a part is taken by time and name.
+
+use super::support::{Said, file_of, memory_folder, read, said};
+use crate::{CutError, ReadError, RecoverError, RewriteError, Selection, cut, info, recover, recovered_path};
+use std::path::Path;
+
+/// Recovers bytes as a file, and reads it.
+fn recovered(folder: &Path, bytes: &[u8]) -> (crate::Recovered, Vec<Said>) {
+    let path = folder.join("cut.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    let to = recovered_path(&path);
+    let _ = std::fs::remove_file(&to);
+    let report = recover(&path, &to, &mut |_, _| {}).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), bytes, "the old file stays as it is");
+    let told = info(&to).unwrap();
+    assert!(told.is_closed && told.messages == report.messages && told.bytes == report.bytes, "{told:?}");
+    let (all, damages) = read(&to);
+    assert_eq!((all.len() as u64, damages), (report.messages, 0));
+    (report, all)
+}
+
+#[test]
+fn a_file_cut_at_any_byte_is_recovered_to_what_was_before() {
+    let folder = memory_folder();
+    let all = said(60, 40);
+    let bytes = std::fs::read(file_of(folder.path(), "base", &all)).unwrap();
+    let mut before = 0;
+    for len in 0..=bytes.len() {
+        let (report, found) = recovered(folder.path(), &bytes[..len]);
+        assert_eq!(found, all[..found.len()], "cut at {len}");
+        assert!(found.len() >= before, "cut at {len}: a byte more, and fewer messages");
+        assert_eq!(report.was_closed, len == bytes.len());
+        before = found.len();
+    }
+    assert_eq!(before, all.len());
+}
+
+#[test]
+fn of_a_chunk_that_is_cut_what_is_there_is_taken() {
+    let folder = memory_folder();
+    let all = said(900, 1_000);
+    let bytes = std::fs::read(file_of(folder.path(), "base", &all)).unwrap();
+    // Most of the bytes are those of one chunk.
+    let (report, found) = recovered(folder.path(), &bytes[..bytes.len() / 2]);
+    assert_eq!(found, all[..found.len()]);
+    assert!(found.len() > 300, "{}", found.len());
+    assert_eq!(report.unchecked, found.len() as u64);
+    assert_eq!(report.damage_count, 1);
+}
+
+#[test]
+fn what_is_no_recording_is_told_and_nothing_is_made() {
+    let folder = memory_folder();
+    let path = folder.path().join("text.mcap");
+    std::fs::write(&path, "no recording at all").unwrap();
+    let to = recovered_path(&path);
+    let error = recover(&path, &to, &mut |_, _| {}).unwrap_err();
+    assert!(matches!(error, RecoverError::Read(ReadError::NotMcap { .. })), "{error}");
+    assert!(!to.exists());
+    let error = recover(&folder.path().join("none.mcap"), &to, &mut |_, _| {}).unwrap_err();
+    assert!(matches!(error, RecoverError::Read(ReadError::Io { .. })), "{error}");
+}
+
+#[test]
+fn what_is_recovered_overwrites_nothing() {
+    let folder = memory_folder();
+    let path = file_of(folder.path(), "base", &said(3, 10));
+    let to = recovered_path(&path);
+    assert_eq!(to, folder.path().join("base-0001.recovered.mcap"));
+    recover(&path, &to, &mut |_, _| {}).unwrap();
+    let error = recover(&path, &to, &mut |_, _| {}).unwrap_err();
+    assert_eq!(error.existing().map(|shown| shown.0.clone()), Some(to));
+}
+
+#[test]
+fn a_part_is_taken_by_time_and_name() {
+    let folder = memory_folder();
+    let all = said(3_000, 1_500);
+    let path = file_of(folder.path(), "base", &all);
+    let (from_ns, until_ns) = (all[1_000].arrival_ns, all[2_000].arrival_ns);
+    for (names, why) in [
+        (vec![], "all names"),
+        (vec!["laser.1".to_owned()], "a name"),
+        (vec!["laser.0/scan".to_owned(), "laser.2".to_owned()], "a topic and a name"),
+    ] {
+        let to = folder.path().join("part.mcap");
+        let selection = Selection { from_ns: Some(from_ns), until_ns: Some(until_ns), names: names.clone() };
+        let (messages, bytes) = cut(&path, &to, &selection, &mut |_, _| {}).unwrap();
+        let is_wanted = |said: &&Said| names.is_empty() || names.iter().any(|name| said.topic.starts_with(name));
+        let wanted: Vec<Said> = all[1_000..2_000].iter().filter(is_wanted).cloned().collect();
+        assert_eq!(read(&to), (wanted.clone(), 0), "{why}");
+        let told = info(&to).unwrap();
+        assert_eq!((told.messages, told.bytes), (messages, bytes), "{why}");
+        assert_eq!(told.others[0].0, "rohrpost.cut");
+        assert_eq!(told.session["node"], "base", "{why}");
+        std::fs::remove_file(&to).unwrap();
+    }
+}
+
+#[test]
+fn a_part_that_cannot_be_is_explained() {
+    let folder = memory_folder();
+    let path = file_of(folder.path(), "base", &said(9, 10));
+    let to = folder.path().join("part.mcap");
+    let selection = Selection { names: vec!["lasr.0".into()], ..Selection::default() };
+    let error = cut(&path, &to, &selection, &mut |_, _| {}).unwrap_err();
+    assert_eq!(error.to_string(), "the recording has no `lasr.0`; it has laser.0/scan, laser.1/scan, laser.2/scan");
+    let selection = Selection { from_ns: Some(5), until_ns: Some(5), ..Selection::default() };
+    assert!(matches!(cut(&path, &to, &selection, &mut |_, _| {}), Err(CutError::NoTime { from_ns: 5, until_ns: 5 })));
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+    let error = cut(&path, &to, &Selection::default(), &mut |_, _| {}).unwrap_err();
+    assert!(matches!(&error, CutError::Read(ReadError::NotClosed { .. })), "{error}");
+    assert!(!to.exists());
+    let error = cut(&path, &path, &Selection::default(), &mut |_, _| {}).unwrap_err();
+    assert!(matches!(error, CutError::Read(_) | CutError::Rewrite(RewriteError::Exists(_))), "{error}");
+}

@@ -1,0 +1,145 @@
+//! A disk that fails at any operation: all messages are in exactly one file, or counted as lost; and files say so.
+
+use super::disks::{FailingDisk, Faults};
+use super::support::{Said, files, memory_folder, options, read, record, said, session};
+use crate::disk::{Disk, DiskFile, RealDisk};
+use crate::{ChannelSpec, DiskError, Message, Options, Rotation, Writer, info, recover, recovered_path};
+use rohrpost_schema::Type;
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+/// All messages of all files, each made whole, and the losses that they tell.
+fn found(folder: &Path) -> (Vec<Said>, u64) {
+    let (mut all, mut lost) = (Vec::new(), 0);
+    for path in files(folder) {
+        let to = recovered_path(&path);
+        recover(&path, &to, &mut |_, _| {}).unwrap();
+        all.extend(read(&to).0);
+        lost += info(&to).unwrap().lost;
+    }
+    (all, lost)
+}
+
+#[test]
+fn each_message_is_in_one_file_or_counted_as_lost() {
+    for seed in 0..60_u64 {
+        let faults = Faults {
+            create: [0, 100, 500][seed as usize % 3],
+            write: [20, 100, 300, 0][seed as usize % 4],
+            sync: [0, 200][seed as usize % 2],
+            free: [0, 50][seed as usize / 2 % 2],
+        };
+        let folder = memory_folder();
+        let all = said(2_000, 1_000);
+        let rotation = Rotation { bytes_max: 300 << 10, ..Rotation::default() };
+        let options = Options { rotation, queue_chunks: 1, retry: Duration::from_millis(1), ..options(folder.path()) };
+        let (status, refused) = record(Box::new(FailingDisk::new(seed, faults)), options, &all);
+        let (kept, told) = found(folder.path());
+        let replay = format!("seed {seed}, {faults:?}, {status:?}");
+        assert_eq!(status.waiting, 0, "{replay}");
+        assert_eq!(kept.len() as u64, status.written, "{replay}");
+        assert_eq!(status.written + status.lost, all.len() as u64, "{replay}");
+        assert!(status.lost >= refused.len() as u64, "{replay}");
+        assert!(status.synced + status.unsure == status.written, "{replay}");
+        let mut rest = all.iter();
+        assert!(kept.iter().all(|one| rest.any(|other| other == one)), "order, nothing twice; {replay}");
+        // What no file could tell: losses behind the last file that could be written.
+        assert!(told <= status.lost, "{told}; {replay}");
+        if status.problem.is_none() {
+            assert_eq!(told, status.lost, "{replay}");
+        }
+    }
+}
+
+/// A disk that tells the free space that it is given.
+struct SmallDisk(Arc<AtomicU64>);
+
+impl Disk for SmallDisk {
+    fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+        RealDisk.create(path)
+    }
+
+    fn free_bytes(&mut self, _: &Path) -> io::Result<u64> {
+        Ok(self.0.load(Relaxed))
+    }
+
+    fn sync_folder(&mut self, folder: &Path) -> io::Result<()> {
+        RealDisk.sync_folder(folder)
+    }
+
+    fn remove(&mut self, path: &Path) -> io::Result<()> {
+        RealDisk.remove(path)
+    }
+}
+
+fn until(what: &str, is_so: impl Fn() -> bool) {
+    for _ in 0..60_000 {
+        if is_so() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    panic!("not within a minute: {what}");
+}
+
+#[test]
+fn what_is_to_stay_free_stays_free_and_recording_goes_on_when_there_is_room() {
+    let folder = memory_folder();
+    let free = Arc::new(AtomicU64::new(1 << 30));
+    let options = Options { leave_bytes: 1 << 20, ..options(folder.path()) };
+    let mut writer = Writer::start_on(Box::new(SmallDisk(free.clone())), options, session()).unwrap();
+    let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
+    let channel = writer.channel(&spec).unwrap();
+    let data = [7; 1_000];
+    let message = |sequence| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data: &data };
+    writer.write(channel, &message(0)).unwrap();
+    until("the first is written", || writer.status().written == 1);
+    free.store(1 << 20, Relaxed);
+    writer.write(channel, &message(1)).unwrap();
+    until("the problem is told", || writer.status().problem.is_some());
+    let status = writer.status();
+    let error = status.problem.unwrap().error;
+    assert!(matches!(error, DiskError::Low { free_bytes: 1_048_576, leave_bytes: 1_048_576, .. }), "{error}");
+    assert_eq!((status.files_closed, status.files_torn, status.waiting, status.lost), (1, 0, 1, 0));
+    assert!(status.failures.low >= 1 && status.is_running);
+    let first = info(&files(folder.path())[0]).unwrap();
+    assert_eq!((first.is_closed, first.closed_because.as_deref()), (true, Some("low space")));
+    free.store(1 << 30, Relaxed);
+    until("the second is written", || writer.status().written == 2);
+    assert!(writer.status().problem.is_none());
+    let (status, told) = writer.finish();
+    told.unwrap();
+    assert_eq!((status.files_closed, status.lost), (2, 0));
+    assert_eq!(found(folder.path()).0.len(), 2);
+}
+
+#[test]
+fn a_removed_folder_is_noticed_and_a_new_one_is_used() {
+    let around = memory_folder();
+    let folder = around.path().join("recordings");
+    let mut writer = Writer::start(options(&folder), session()).unwrap();
+    until("it is not there", || writer.status().problem.is_some());
+    let error = writer.status().problem.unwrap().error;
+    assert!(matches!(error, DiskError::Gone { .. }), "{error}");
+    let spec = ChannelSpec { name: "laser.0", item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
+    let channel = writer.channel(&spec).unwrap();
+    let message = |sequence| Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence, data: &[1] };
+    writer.write(channel, &message(0)).unwrap();
+    std::fs::create_dir(&folder).unwrap();
+    until("the first is written", || writer.status().written == 1);
+    until("and synced", || writer.status().synced == 1);
+    std::fs::remove_dir_all(&folder).unwrap();
+    until("it is gone", || writer.status().problem.is_some());
+    assert_eq!(writer.status().unsure, 1, "the file took it, and is gone");
+    std::fs::create_dir(&folder).unwrap();
+    writer.write(channel, &message(1)).unwrap();
+    until("the second is written", || writer.status().written == 2);
+    let (status, told) = writer.finish();
+    told.unwrap();
+    assert_eq!((status.synced, status.unsure, status.lost), (1, 1, 0));
+    assert_eq!(found(&folder).0.len(), 1);
+}

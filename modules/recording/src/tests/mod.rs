@@ -1,0 +1,10 @@
+//! What is written is read again; of what is cut or damaged, what is there; and a failing disk loses nothing uncounted.
+
+mod cutting;
+mod damaged;
+mod disks;
+mod failing;
+mod merging;
+mod support;
+mod telling;
+mod written;

@@ -1,0 +1,193 @@
+//! Streams: what a module writes into its own, and how it reads those of others.
+
+use super::Context;
+use crate::interface::StreamPort;
+use crate::runtime::error::ContextError;
+use crate::runtime::stream::{CheckedReader, KnownStream, OpenValue, OwnStream, Stream, StreamSubscription};
+use rohrpost_mailbox::{Name, Stamp};
+use rohrpost_schema::{Data, DataItem};
+
+impl Context {
+    /// Writes a value that was true at `stamp_ns` (system time) into the module's stream: straight into shared memory,
+    /// without a copy between. Returns its sequence, which counts the stream's records. It is published as well:
+    /// counted as data are, and sent to subscribers where it fits a package. Slow or stopped readers do not matter.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// use rohrpost_modules::{interface, types::Pose};
+    ///
+    /// /// Knows where it hangs.
+    /// #[interface(class = "crane", crate = rohrpost_modules::macro_support)]
+    /// pub trait Crane {
+    ///     /// Where its hook hangs.
+    ///     #[stream(1)]
+    ///     fn hook() -> Pose;
+    /// }
+    ///
+    /// fn measured(context: &mut Context, measured_ns: u64, hook: &Pose) -> Result<(), ContextError> {
+    ///     let sequence = context.write(CraneInterface::HOOK, measured_ns, hook)?;
+    ///     tracing::trace!("record {sequence}");
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// [`ContextError::NoName`], [`ContextError::Undeclared`], or [`ContextError::Record`]: too large, or too late.
+    pub fn write<T: Data>(&mut self, port: StreamPort<T>, stamp_ns: u64, value: &T) -> Result<u64, ContextError> {
+        let mut open = self.begin(port, stamp_ns)?;
+        open.put(value)?;
+        open.finish()
+    }
+
+    /// Writes a value that is true now.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// # use rohrpost_modules::interface::StreamPort;
+    /// fn weighed(context: &mut Context, port: StreamPort<f64>, mass_kg: f64) -> Result<u64, ContextError> {
+    ///     context.write_now(port, &mass_kg)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Context::write`].
+    pub fn write_now<T: Data>(&mut self, port: StreamPort<T>, value: &T) -> Result<u64, ContextError> {
+        self.write(port, self.now().ns, value)
+    }
+
+    /// Begins a value that is to be filled in place in shared memory, such as a picture that a driver reads there:
+    /// [`OpenValue::fill`], then [`OpenValue::finish`]. Dropped unfinished, nothing happened.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// # use rohrpost_modules::{interface::StreamPort, schema::Bytes};
+    /// fn blank(context: &mut Context, port: StreamPort<(u32, Bytes)>, stamp_ns: u64) -> Result<u64, ContextError> {
+    ///     let mut open = context.begin(port, stamp_ns)?;
+    ///     open.fill(&(640, Bytes::default()), 640 * 480)?.fill(0);
+    ///     open.finish()
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Context::write`].
+    pub fn begin<T: Data>(&mut self, port: StreamPort<T>, stamp_ns: u64) -> Result<OpenValue<'_, T>, ContextError> {
+        let endpoint = self.endpoint_of(port.class)?;
+        let at = self.streams.iter().position(|stream| stream.is(endpoint, port.number));
+        let is_declared = self.is_declared(endpoint, port.hash);
+        let Some(at) = at.filter(|_| is_declared) else { return Err(self.undeclared(endpoint, &port.data())) };
+        let stamp = Stamp { epoch: self.clock.now().epoch, ns: stamp_ns };
+        let (_, streams, outlet) = self.split();
+        let OwnStream { about, writer } = &mut streams[at];
+        let record = writer.begin(stamp).map_err(|error| about.explain(error))?;
+        Ok(OpenValue::new(record, stamp_ns, about, outlet))
+    }
+
+    /// Opens a stream of another module of this node, to look at when the module likes: its newest record, the next
+    /// one, or what was there at a time. It begins with what is written next. The stream need not be there yet.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError, Stream};
+    /// # use rohrpost_modules::{interface::StreamPort, types::Pose};
+    /// fn open(context: &mut Context, hook: StreamPort<Pose>) -> Result<Stream<Pose>, ContextError> {
+    ///     Ok(context.stream(hook, "crane.0")?.with_gap(std::time::Duration::from_millis(500)))
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// When the text names no module, one of another class, or one of another node ([`ContextError::FarStream`]), and
+    /// [`ContextError::Read`] when all seats of the stream are taken.
+    pub fn stream<T: Data>(&mut self, port: StreamPort<T>, module: &str) -> Result<Stream<T>, ContextError> {
+        Ok(Stream::new(self.open_stream(&port, module)?, self.clock.clone()))
+    }
+
+    /// Opens a stream of which the type is known by its description alone, such as one that a view draws. Each record's
+    /// bytes ([`super::super::Record::bytes`]) are of the type of `item`, a stream of the interface that describes
+    /// itself by `interface`, the description's hash: read them by the description, or as a type that it says.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError, Stream, StreamReadError};
+    /// use rohrpost_modules::schema::{DataItem, Description, decode};
+    /// # use rohrpost_mailbox::Name;
+    ///
+    /// fn open(
+    ///     context: &mut Context,
+    ///     from: Name,
+    ///     description: &Description,
+    /// ) -> Result<Vec<(DataItem, Stream<()>)>, ContextError> {
+    ///     let open = |item: &DataItem| {
+    ///         Ok((item.clone(), context.stream_untyped(from, item, description.hash())?))
+    ///     };
+    ///     description.streams().map(open).collect()
+    /// }
+    ///
+    /// fn print_newest(item: &DataItem, stream: &mut Stream<()>) -> Result<(), StreamReadError> {
+    ///     if let Some(record) = stream.newest()? {
+    ///         println!("{}: {:?}", item.field.name, decode(&item.field.ty, record.bytes()));
+    ///     }
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// [`ContextError::FarStream`] for a module of another node, and [`ContextError::Read`] when all seats of the
+    /// stream are taken.
+    pub fn stream_untyped(&mut self, from: Name, item: &DataItem, interface: u32) -> Result<Stream<()>, ContextError> {
+        let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
+        let beyond = (from.system() != self.me.system()).then_some("?");
+        let reader = self.open_known(known, from, beyond, || self.installation.classes.format(from))?;
+        Ok(Stream::new(reader, self.clock.clone()))
+    }
+
+    /// Follows a stream of another module of this node: each record comes to [`crate::Module::received`], while this
+    /// module is on, and lies in shared memory while it looks. Records that were overwritten before it came to them are
+    /// counted in `data.head.missed`.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError, Received, StreamSubscription};
+    /// # use rohrpost_modules::{ModuleError, interface::StreamPort, types::Pose};
+    /// fn follow(context: &mut Context, hook: StreamPort<Pose>) -> Result<StreamSubscription<Pose>, ContextError> {
+    ///     context.subscribe_stream(hook, "crane.0")
+    /// }
+    ///
+    /// fn received(data: &Received<'_>, hook: &StreamSubscription<Pose>) -> Result<(), ModuleError> {
+    ///     if let Some(pose) = data.read(hook)? {
+    ///         tracing::info!("it hangs at {} m, {} records lost so far", pose.x_m, data.head.missed);
+    ///     }
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Context::stream`].
+    pub fn subscribe_stream<T: Data>(
+        &mut self,
+        port: StreamPort<T>,
+        module: &str,
+    ) -> Result<StreamSubscription<T>, ContextError> {
+        let reader = self.open_stream(&port, module)?;
+        self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
+    }
+
+    fn open_stream<T>(&self, port: &StreamPort<T>, module: &str) -> Result<CheckedReader, ContextError> {
+        let (from, is_beyond) = self.of_class(module, port.class)?;
+        self.open_known((*port).into(), from, is_beyond.then_some("?"), || module.into())
+    }
+
+    /// Opens a stream, which is `beyond` if the node is not of this configuration.
+    fn open_known(
+        &self,
+        known: KnownStream,
+        from: Name,
+        beyond: Option<&str>,
+        module: impl FnOnce() -> String,
+    ) -> Result<CheckedReader, ContextError> {
+        let node = beyond.or_else(|| self.installation.node_of(from));
+        // What the configuration does not have may be here: a module of a test, say.
+        if let Some(node) = node.filter(|node| self.installation.node_of(self.me) != Some(node)) {
+            let (stream, module) = (known.name.into_owned(), module());
+            return Err(ContextError::FarStream { stream, module, node: node.into() });
+        }
+        let participant = self.link.borrow().participant().clone();
+        Ok(CheckedReader::open(&participant, &self.installation, known, from)?)
+    }
+}

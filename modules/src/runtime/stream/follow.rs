@@ -1,0 +1,213 @@
+//! Streams of which the module is given each record.
+
+use super::check::{CheckedReader, Source as Followed};
+use super::error::StreamReadError;
+use crate::common::DataHead;
+use crate::runtime::received::Received;
+use crate::runtime::subscribed::{Origin, Subscribed, seal};
+use rohrpost_mailbox::{HeldRecord, Name, Next, Source, Throttle, monotonic_ns};
+use rohrpost_schema::Data;
+use std::marker::PhantomData;
+use std::time::{Duration, Instant};
+
+/// Losses are told at most so often.
+const TELL_EVERY_NS: u64 = 10_000_000_000;
+/// A stream that cannot be read is tried again after so long.
+const RETRY: Duration = Duration::from_millis(100);
+
+/// Each record of a stream, made by [`super::super::Context::subscribe_stream`]; [`super::super::Received::read`] tells
+/// whether data belong to it.
+///
+/// ```
+/// use rohrpost_modules::runtime::{Received, StreamSubscription, Unreadable};
+/// use rohrpost_modules::types::Pose;
+///
+/// fn x_m(data: &Received<'_>, poses: &StreamSubscription<Pose>) -> Result<Option<f64>, Unreadable> {
+///     Ok(data.read(poses)?.map(|pose| pose.x_m))
+/// }
+/// ```
+pub struct StreamSubscription<T> {
+    id: u16,
+    data: PhantomData<fn() -> T>,
+}
+
+impl<T> Clone for StreamSubscription<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for StreamSubscription<T> {}
+
+impl<T: Data> Subscribed for StreamSubscription<T> {
+    type Item = T;
+}
+
+impl<T> seal::Kind for StreamSubscription<T> {
+    fn brought(&self, origin: Origin) -> bool {
+        matches!(origin, Origin::Stream { id, .. } if id == self.id)
+    }
+}
+
+/// A stream that is followed.
+pub(crate) struct FollowedStream {
+    reader: CheckedReader,
+    id: u16,
+    notices: Notices,
+}
+
+/// What was told of it.
+struct Notices {
+    /// The stream's name.
+    stream: String,
+    /// The module that writes it.
+    module: String,
+    /// Of losses.
+    throttle: Throttle,
+    /// What the last refusal said, so that it is told once.
+    refusal: Option<String>,
+    /// Not read before then, since it could not be.
+    retry: Option<Instant>,
+}
+
+/// All that a module follows.
+#[derive(Default)]
+pub(crate) struct FollowedStreams {
+    /// Those that are not being worked off.
+    pub(in crate::runtime) list: Vec<FollowedStream>,
+    /// Ever made.
+    made: u16,
+}
+
+/// What a followed stream has for the module.
+pub(in crate::runtime) enum Step<'a> {
+    /// A record.
+    Record(FollowedRecord<'a>),
+    /// Not a record, but more may be there.
+    Again,
+    /// Nothing now.
+    Nothing,
+}
+
+/// A record in hand.
+pub(in crate::runtime) struct FollowedRecord<'a> {
+    held: HeldRecord<'a>,
+    source: &'a Followed,
+    /// Which subscription.
+    id: u16,
+    /// Records lost until now.
+    lost: u64,
+}
+
+impl FollowedRecord<'_> {
+    pub(in crate::runtime) fn received(&self) -> Received<'_> {
+        let info = self.held.info();
+        let head = DataHead {
+            stamp_ns: info.stamp.ns,
+            sequence: info.sequence as u32,
+            missed: u32::try_from(self.lost).unwrap_or(u32::MAX),
+            incarnation: 0,
+        };
+        let (from, number) = (self.source.id.name, self.source.id.number);
+        Received::new(from, number, Origin::Stream { id: self.id, stamp: info.stamp }, head, self.held.body())
+    }
+}
+
+impl FollowedStreams {
+    /// None when all ids are used up.
+    pub(in crate::runtime) fn follow<T>(&mut self, reader: CheckedReader) -> Option<StreamSubscription<T>> {
+        let id = self.made;
+        self.made = id.checked_add(1)?;
+        let (stream, module) = (reader.source.name.clone().into_owned(), reader.source.module());
+        let notices = Notices { stream, module, throttle: Throttle::default(), refusal: None, retry: None };
+        self.list.push(FollowedStream { reader, id, notices });
+        Some(StreamSubscription { id, data: PhantomData })
+    }
+
+    /// Passes over what was written until now.
+    pub(in crate::runtime) fn pass_over(&mut self) {
+        for stream in &mut self.list {
+            if let Err(error) = stream.reader.reader.pass_over() {
+                stream.notices.refused(&stream.reader.source.explain(&error));
+            }
+        }
+    }
+
+    /// For each the publisher, the number of the data, records received and records lost.
+    pub(in crate::runtime) fn tallies(&self) -> impl Iterator<Item = (Name, u16, u64, u64)> {
+        self.list.iter().map(|stream| {
+            let (id, (came, lost)) = (stream.reader.source.id, stream.reader.reader.accounts());
+            (id.name, id.number, came, lost)
+        })
+    }
+
+    /// Records that were overwritten before the module came to them.
+    pub(in crate::runtime) fn lost(&self) -> u64 {
+        self.tallies().map(|(_, _, _, lost)| lost).sum()
+    }
+
+    /// When one that could not be read is tried again.
+    pub(in crate::runtime) fn retry(&self) -> Option<Instant> {
+        self.list.iter().filter_map(|stream| stream.notices.retry).min()
+    }
+
+    /// What wakes the module.
+    pub(in crate::runtime) fn sources(&mut self) -> impl Iterator<Item = &mut (dyn Source + 'static)> {
+        let awaited = self.list.iter_mut().filter(|stream| stream.notices.retry.is_none());
+        awaited.map(|stream| -> &mut (dyn Source + 'static) { &mut stream.reader.reader })
+    }
+}
+
+impl FollowedStream {
+    /// The next record, or what there is instead.
+    pub(in crate::runtime) fn step(&mut self) -> Step<'_> {
+        let Self { reader, id, notices } = self;
+        if notices.retry.is_some_and(|retry| Instant::now() < retry) {
+            return Step::Nothing;
+        }
+        notices.retry = None;
+        let (id, (_, lost)) = (*id, reader.reader.accounts());
+        match reader.next() {
+            Ok(Next::Record((held, source))) => {
+                notices.refusal = None;
+                Step::Record(FollowedRecord { held, source, id, lost })
+            }
+            Ok(Next::Lost(more)) => {
+                notices.lost(lost + more);
+                Step::Again
+            }
+            Ok(Next::Nothing) => Step::Nothing,
+            Err(error) => {
+                notices.refused(&error);
+                // That record is passed over, and the next one looked at.
+                if let StreamReadError::InterfaceDiffers { .. } = error { Step::Again } else { Step::Nothing }
+            }
+        }
+    }
+}
+
+impl Notices {
+    #[cold]
+    fn lost(&mut self, lost: u64) {
+        if self.throttle.note(monotonic_ns(), TELL_EVERY_NS).is_some() {
+            let Self { stream, module, .. } = self;
+            tracing::warn!(
+                "{lost} records of stream `{stream}` of {module} were overwritten before this module came to them: it \
+                 is slower than they are written; raise `keep` in [module.stream.{stream}] of {module}, or read only \
+                 the newest"
+            );
+        }
+    }
+
+    #[cold]
+    fn refused(&mut self, error: &StreamReadError) {
+        if let StreamReadError::Ring(_) = error {
+            self.retry = Some(Instant::now() + RETRY);
+        }
+        let text = error.to_string();
+        if self.refusal.as_ref() != Some(&text) {
+            tracing::warn!("{text}");
+            self.refusal = Some(text);
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! A stream of another module, looked at when the module likes.
+
+use super::check::{CheckedReader, Source};
+use super::error::StreamReadError;
+use super::moment::Moment;
+use crate::fusion::{Interpolate, NoValue, Share, Stamp};
+use crate::runtime::unreadable::Unreadable;
+use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo, SystemClock};
+use rohrpost_schema::{Data, View};
+use std::marker::PhantomData;
+use std::time::Duration;
+
+/// Looks for values around a time before it says that they left the ring meanwhile.
+const TRIES: usize = 3;
+
+/// A stream of another module, made by [`super::super::Context::stream`]. It has a position of its own, and one of the
+/// stream's seats. Nothing is copied and nothing waits: the module looks when it likes.
+///
+/// ```
+/// use rohrpost_modules::fusion::NoValue;
+/// use rohrpost_modules::runtime::{Context, ContextError, Stream, StreamReadError};
+/// use rohrpost_modules::{interface, types::Pose};
+///
+/// /// Knows where the crane is.
+/// #[interface(class = "crane", crate = rohrpost_modules::macro_support)]
+/// pub trait Crane {
+///     /// Where its hook hangs.
+///     #[stream(1)]
+///     fn hook() -> Pose;
+/// }
+///
+/// fn open(context: &mut Context) -> Result<Stream<Pose>, ContextError> {
+///     Ok(context.stream(CraneInterface::HOOK, "crane.0")?.with_gap(std::time::Duration::from_millis(200)))
+/// }
+///
+/// fn where_was_it(hook: &mut Stream<Pose>, stamp_ns: u64) -> Result<Option<Pose>, StreamReadError> {
+///     match hook.at(stamp_ns)? {
+///         Ok(pose) => Ok(Some(pose)),                // interpolated, and final
+///         Err(NoValue::NotYet { .. }) => Ok(None),   // ask again later
+///         Err(never) => { tracing::debug!("no pose: {never}"); Ok(None) }
+///     }
+/// }
+/// ```
+pub struct Stream<T> {
+    reader: CheckedReader,
+    clock: SystemClock,
+    gap_max_ns: u64,
+    data: PhantomData<fn() -> T>,
+}
+
+impl<T: Data> Stream<T> {
+    pub(in crate::runtime) fn new(reader: CheckedReader, clock: SystemClock) -> Self {
+        Self { reader, clock, gap_max_ns: u64::MAX, data: PhantomData }
+    }
+
+    /// Values further apart than this have none in between; without it, however far they are apart.
+    #[must_use]
+    pub fn with_gap(mut self, longest: Duration) -> Self {
+        self.gap_max_ns = u64::try_from(longest.as_nanos()).unwrap_or(u64::MAX);
+        self
+    }
+
+    /// The newest record; none before the first. The position stays.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Stream, StreamReadError};
+    /// fn height_now_m(heights: &mut Stream<f64>) -> Result<Option<f64>, StreamReadError> {
+    ///     let newest = heights.newest()?;
+    ///     Ok(newest.map(|record| record.read()).transpose()?)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// The stream cannot be read, or is of another interface.
+    pub fn newest(&mut self) -> Result<Option<Record<'_, T>>, StreamReadError> {
+        Ok(self.reader.newest()?.map(Record::new))
+    }
+
+    /// The next record; the first time the first one written after the stream was opened.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Stream, StreamReadError};
+    /// use rohrpost_mailbox::Next;
+    ///
+    /// fn work_off(heights: &mut Stream<f64>) -> Result<(), StreamReadError> {
+    ///     loop {
+    ///         match heights.try_next()? {
+    ///             Next::Record(record) => println!("{} at {}", record.read()?, record.stamp_ns()),
+    ///             Next::Lost(lost) => println!("{lost} were overwritten before this module came to them"),
+    ///             Next::Nothing => return Ok(()),
+    ///         }
+    ///     }
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Stream::newest`].
+    pub fn try_next(&mut self) -> Result<Next<Record<'_, T>>, StreamReadError> {
+        Ok(self.reader.next()?.map(Record::new))
+    }
+
+    /// As [`Stream::try_next`]; waits for a record, at most so long. All else of the module waits as well.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Stream, StreamReadError};
+    /// # use rohrpost_mailbox::Next;
+    /// fn moves(heights: &mut Stream<f64>) -> Result<bool, StreamReadError> {
+    ///     Ok(!matches!(heights.next_within(std::time::Duration::from_millis(2))?, Next::Nothing))
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Stream::newest`].
+    pub fn next_within(&mut self, timeout: Duration) -> Result<Next<Record<'_, T>>, StreamReadError> {
+        let CheckedReader { reader, source } = &mut self.reader;
+        let next = reader.next_timeout(timeout).map_err(|error| source.explain(&error))?;
+        Ok(source.check_next(next)?.map(Record::new))
+    }
+
+    /// Whether [`Stream::try_next`] has something to tell.
+    pub fn has_next(&self) -> bool {
+        self.reader.reader.has_next()
+    }
+
+    /// The record of this sequence; none when it is there no more, or not yet. The position stays.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Stream, StreamReadError};
+    /// fn stamp_ns(heights: &mut Stream<f64>, sequence: u64) -> Result<Option<u64>, StreamReadError> {
+    ///     Ok(heights.record(sequence)?.map(|record| record.stamp_ns()))
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Stream::newest`].
+    pub fn record(&mut self, sequence: u64) -> Result<Option<Record<'_, T>>, StreamReadError> {
+        Ok(self.reader.record(sequence)?.map(Record::new))
+    }
+
+    /// [`Stream::try_next`] goes on from this sequence. What is there no more counts as lost.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Stream;
+    /// fn once_more(heights: &mut Stream<f64>) {
+    ///     heights.from(heights.position().saturating_sub(10));
+    /// }
+    /// ```
+    pub fn from(&mut self, sequence: u64) {
+        self.reader.reader.seek(sequence);
+    }
+
+    /// Sequence of the next record to read.
+    pub fn position(&self) -> u64 {
+        self.reader.reader.position()
+    }
+
+    /// Records read by [`Stream::try_next`], and records lost on the way.
+    pub fn accounts(&self) -> (u64, u64) {
+        self.reader.reader.accounts()
+    }
+
+    /// The two records around a time, or exactly why not. [`Stream::record`] reads each.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Stream, StreamReadError};
+    /// # use rohrpost_mailbox::Around;
+    /// fn nearest(heights: &mut Stream<f64>, at_ns: u64) -> Result<Option<u64>, StreamReadError> {
+    ///     let Around::Records { before, after } = heights.around(at_ns)? else { return Ok(None) };
+    ///     let is_before = at_ns - before.stamp.ns <= after.stamp.ns - at_ns;
+    ///     Ok(Some(if is_before { before.sequence } else { after.sequence }))
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Stream::newest`].
+    pub fn around(&mut self, at: impl Into<Moment>) -> Result<Around, StreamReadError> {
+        let Stamp { epoch, ns } = self.stamp(at.into());
+        let CheckedReader { reader, source } = &mut self.reader;
+        reader.around(rohrpost_mailbox::Stamp { epoch, ns }).map_err(|error| source.explain(&error))
+    }
+
+    /// The value at a time: that of the record with this stamp, or interpolated between the two around it; or exactly
+    /// why there is none. A value is final: nothing that is written later changes it.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Received, Stream, StreamReadError};
+    /// # use rohrpost_modules::{fusion::NoValue, types::Pose};
+    /// fn pose_then(poses: &mut Stream<Pose>, scan: &Received<'_>) -> Result<Result<Pose, NoValue>, StreamReadError> {
+    ///     poses.at(scan.moment()) // of the same epoch as the scan
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Stream::newest`], and when a record cannot be read.
+    pub fn at(&mut self, at: impl Into<Moment>) -> Result<Result<T, NoValue>, StreamReadError>
+    where
+        T: Interpolate,
+    {
+        let stamp = self.stamp(at.into());
+        let mut by_ns = 0;
+        // Again if the writer has put others in their place meanwhile.
+        for _ in 0..TRIES {
+            let (before, after) = match self.around(stamp)? {
+                Around::Records { before, after } => (before, after),
+                Around::Empty => return Ok(Err(NoValue::Empty)),
+                Around::BeforeOldest { by_ns } => return Ok(Err(NoValue::BeforeOldest { by_ns })),
+                Around::NotYet { by_ns } => return Ok(Err(NoValue::NotYet { by_ns })),
+                Around::OtherEpoch { newest } => {
+                    return Ok(Err(NoValue::OtherEpoch { asked: stamp.epoch, known: newest }));
+                }
+            };
+            let gap_ns = after.stamp.ns.saturating_sub(before.stamp.ns);
+            if gap_ns > self.gap_max_ns {
+                return Ok(Err(NoValue::Gap { gap_ns, gap_max_ns: self.gap_max_ns }));
+            }
+            by_ns = after.stamp.ns.saturating_sub(stamp.ns);
+            let Some(from) = self.value(before.sequence)? else { continue };
+            let share = Share::between(before.stamp.ns, stamp.ns, after.stamp.ns);
+            let Some(share) = share.filter(|_| before.sequence != after.sequence) else { return Ok(Ok(from)) };
+            let Some(to) = self.value(after.sequence)? else { continue };
+            return Ok(Ok(T::interpolate(&from, &to, share)));
+        }
+        Ok(Err(NoValue::BeforeOldest { by_ns }))
+    }
+
+    fn value(&mut self, sequence: u64) -> Result<Option<T>, StreamReadError> {
+        let record = self.record(sequence)?;
+        Ok(record.map(|record| record.read()).transpose()?)
+    }
+
+    fn stamp(&self, moment: Moment) -> Stamp {
+        match moment {
+            Moment::Stamp(stamp) => stamp,
+            Moment::Ns(ns) => Stamp::new(self.clock.now().epoch, ns),
+        }
+    }
+}
+
+/// A record in hand, read where it lies: its writer goes round it. Dropped, the writer may have its place; so do not
+/// keep it for long.
+///
+/// ```
+/// use rohrpost_modules::runtime::{Record, Unreadable};
+/// use rohrpost_modules::schema::View;
+/// use rohrpost_modules::types::Pose;
+///
+/// fn heading_rad(record: &Record<'_, Pose>) -> Result<f64, Unreadable> {
+///     Ok(record.read()?.heading_rad)
+/// }
+///
+/// /// Decodes the fields alone; bytes stay where they are.
+/// fn look<T: View>(record: &Record<'_, T>, see: impl Fn(T::View<'_>)) -> Result<(), Unreadable> {
+///     see(record.view()?);
+///     Ok(())
+/// }
+/// ```
+pub struct Record<'a, T> {
+    held: HeldRecord<'a>,
+    source: &'a Source,
+    data: PhantomData<fn() -> T>,
+}
+
+impl<'a, T: Data> Record<'a, T> {
+    fn new((held, source): (HeldRecord<'a>, &'a Source)) -> Self {
+        Self { held, source, data: PhantomData }
+    }
+
+    /// What is said of it: sequence, stamp, when it was written.
+    pub fn info(&self) -> RecordInfo {
+        self.held.info()
+    }
+
+    /// When it was true, with the epoch of system time.
+    pub fn stamp(&self) -> Stamp {
+        let stamp = self.info().stamp;
+        Stamp::new(stamp.epoch, stamp.ns)
+    }
+
+    /// When it was true, ns since 1970.
+    pub fn stamp_ns(&self) -> u64 {
+        self.stamp().ns
+    }
+
+    /// The value.
+    ///
+    /// # Errors
+    /// It is not what the interface says.
+    pub fn read(&self) -> Result<T, Unreadable> {
+        self.decode()
+    }
+
+    /// The value, with its bytes where they lie.
+    ///
+    /// # Errors
+    /// It is not what the interface says.
+    pub fn view(&self) -> Result<T::View<'_>, Unreadable>
+    where
+        T: View,
+    {
+        self.decode()
+    }
+
+    /// The value, in postcard.
+    pub fn bytes(&self) -> &[u8] {
+        self.held.body()
+    }
+
+    fn decode<'r, V: serde::Deserialize<'r>>(&'r self) -> Result<V, Unreadable> {
+        let id = self.source.id;
+        postcard::from_bytes(self.bytes()).map_err(|error| Unreadable::new(id.name, id.number, error))
+    }
+}

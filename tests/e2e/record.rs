@@ -1,0 +1,99 @@
+//! `rohrpost record`: files of a recording at the command line.
+
+use crate::harness::Place;
+use rohrpost::schema::{Field, Members, Named, Type};
+use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Ten seconds of two channels, 1700000000 s after 1970.
+fn recording(place: &Place, stem: &str) -> PathBuf {
+    let session = Session { node: "base".into(), ..Session::default() };
+    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), stem) }, session).unwrap();
+    let ty = Type::Struct(Named::new("Pace", Members::Fields(vec![Field::new("speed", Type::U8)])));
+    let mut channels = ["motor.0", "motor.1"].map(|name| {
+        let spec = ChannelSpec { name, item: "pace", ty: &ty, texts: BTreeMap::new() };
+        writer.channel(&spec).unwrap()
+    });
+    for number in 0..1_000_u32 {
+        let arrival_ns = 1_700_000_000_000_000_000 + u64::from(number) * 10_000_000;
+        let message = Message { arrival_ns, stamp_ns: arrival_ns, epoch: 1, sequence: number, data: &[number as u8] };
+        writer.write(channels[0], &message).unwrap();
+        channels.reverse();
+    }
+    writer.count_lost(channels[0], 3);
+    writer.finish().1.unwrap();
+    place.path(&format!("{stem}-0001.mcap"))
+}
+
+/// A recording in which each name and text is this one.
+pub(crate) fn recording_that_says(place: &Place, text: &str, ty: &Type) -> PathBuf {
+    let texts = BTreeMap::from([(text.to_owned(), text.to_owned())]);
+    let session = Session { node: text.into(), versions: texts.clone(), configuration: texts.clone() };
+    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), "odd") }, session).unwrap();
+    let channel = writer.channel(&ChannelSpec { name: text, item: text, ty, texts }).unwrap();
+    let message = Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: 0, data: text.as_bytes() };
+    writer.write(channel, &message).unwrap();
+    writer.finish().1.unwrap();
+    place.path("odd-0001.mcap")
+}
+
+#[test]
+fn a_recording_is_described_cut_merged_and_recovered() {
+    let place = Place::new();
+    let path = recording(&place, "base");
+    let file = path.to_str().unwrap();
+    let text = place.say(&["record", "info", file]).ok();
+    for words in [
+        ": 1000 messages, ",
+        "closed (ended)",
+        "3 messages are lost",
+        "from 1700000000.000000000 to 1700000009.990000000, 9.990 s",
+        "node base",
+    ] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+    let row = text.lines().find(|line| line.starts_with("motor.0/pace ")).unwrap();
+    assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["motor.0/pace", "500", "50.0", "3", "{speed:", "u8}"]);
+    let told = place.say(&["record", "info", file, "--json"]).json();
+    assert_eq!((&told["messages"], &told["lost"], &told["is_closed"]), (&1000.into(), &3.into(), &true.into()));
+    assert_eq!(told["channels"][1]["topic"], "motor.1/pace");
+    let part = place.path("part.mcap");
+    let part = part.to_str().unwrap();
+    let times = ["--from", "+1s", "--until", "-2.99s", "--json"];
+    let told = place.say(&[&["record", "cut", file, part, "motor.1"], &times[..]].concat()).json();
+    assert_eq!(told["messages"], 300);
+    let other = recording(&place, "arm");
+    let all = place.path("all.mcap");
+    let all = all.to_str().unwrap();
+    let text = place.say(&["record", "merge", all, file, other.to_str().unwrap()]).ok();
+    assert!(text.starts_with(&format!("{all}: 2000 messages, ")), "{text}");
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+    assert!(place.say(&["record", "info", file]).ok().contains("not closed: if nothing writes it any more"));
+    let text = place.say(&["record", "recover", file]).ok();
+    let recovered = place.path("base-0001.recovered.mcap");
+    assert!(text.starts_with(&format!("{}: 1000 messages of {file}, ", recovered.display())), "{text}");
+    assert_eq!(place.say(&["record", "info", recovered.to_str().unwrap(), "--json"]).json()["messages"], 1000);
+}
+
+#[test]
+fn mistakes_with_recordings_are_explained() {
+    let place = Place::new();
+    let path = recording(&place, "base");
+    let file = path.to_str().unwrap();
+    let part = place.path("part.mcap");
+    let part = part.to_str().unwrap();
+    for (arguments, words) in [
+        (&["record", "cut", file, part, "motor.7"][..], "has no `motor.7`; it has motor.0/pace, motor.1/pace"),
+        (&["record", "cut", file, file], "is there already; remove it, or name another file"),
+        (&["record", "merge", file, file], "is there already"),
+        (&["record", "info", "/dev/null/none"], "cannot read"),
+        (&["record", "cut", file, part, "--from", "-1s", "--until", "+1s"], "the time range is empty"),
+    ] {
+        let told = place.say(arguments).fails();
+        assert!(told.contains(words), "{arguments:?}: {told}");
+    }
+    let said = place.say(&["record", "cut", file, part, "--from", "noon"]);
+    assert!(said.code == Some(2) && said.err.contains("before the end (-10s)"), "{said:?}");
+}
