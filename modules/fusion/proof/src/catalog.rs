@@ -110,7 +110,7 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         file: "sorted",
         from: "|by_ns| by_ns >= self.lateness_ns)",
         to: "|by_ns| by_ns + if broken!(records_settle_too_early) { 2 } else { 0 } >= self.lateness_ns)",
-        promise: TWO,
+        promise: "matching::a_set_waits_for_a_better_record_that_may_still_come",
     },
     Mistake {
         name: "memory_has_no_bound",

@@ -121,6 +121,20 @@ fn the_nearest_are_joined_and_the_rest_is_counted() {
 }
 
 #[test]
+fn a_set_waits_for_a_better_record_that_may_still_come() {
+    let mut matcher = matcher::<2>(&[0, 10], 4, 20);
+    for (stream, ns, sequence) in [(0, 95, 0), (0, 200, 1), (1, 96, 0), (1, 104, 1)] {
+        matcher.push(stream, Stamp::new(1, ns), sequence, sequence).unwrap();
+        // 96 is 8 before the newest, so 95 may come as long as it is less than 10 before it.
+        assert_eq!(matcher.next_set(), None, "after {ns} of stream {stream}");
+    }
+    matcher.push(1, Stamp::new(1, 95), 2, 2).unwrap();
+    assert_eq!(matcher.next_set(), None);
+    matcher.push(1, Stamp::new(1, 105), 3, 3).unwrap();
+    assert_eq!(matcher.next_set().map(|set| set.map(|record| record.value)), Some([0, 2]));
+}
+
+#[test]
 fn a_silent_stream_is_named_and_memory_stays_bounded() {
     let mut matcher = matcher::<3>(&[0, 0, 5], 4, 10);
     assert_eq!(matcher.missing(), None, "nothing waits");

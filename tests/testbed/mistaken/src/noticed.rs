@@ -8,6 +8,9 @@ use std::collections::BTreeSet;
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
 
+/// Where the random cases of proptest begin. They are the same in each run: a mistake that they notice is noticed always.
+const CASES: &str = "1";
+
 /// What came of a copied test.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Verdict {
@@ -21,6 +24,7 @@ enum Verdict {
 fn run(test: &str, mistake: Option<&str>) -> Verdict {
     let mut command = Command::new(std::env::current_exe().expect("a test has a file"));
     command.args(["--exact", test, "--ignored", "--test-threads=1"]).env_remove(MISTAKE_VARIABLE);
+    command.env("PROPTEST_RNG_SEED", CASES);
     mistake.map(|name| command.env(MISTAKE_VARIABLE, name));
     let output = command.stdin(Stdio::null()).output().expect("a test can be run");
     let text = String::from_utf8_lossy(&output.stdout);
