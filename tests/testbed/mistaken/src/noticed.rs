@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
 
-/// Where the random cases of proptest begin. They are the same in each run: a mistake that they notice is noticed always.
+/// Where the random cases of proptest begin: the same in each run, so a mistake that they notice is noticed always.
 const CASES: &str = "1";
 
 /// What came of a copied test.
