@@ -1,4 +1,4 @@
-//! `cargo run --release -p rohrpost-bench -- local`, `streams`, `lan`, `tdma` or `tcp`.
+//! `cargo run --release -p rohrpost-bench -- local`, `streams`, `recording`, `lan`, `tdma` or `tcp`.
 
 use clap::{Parser, Subcommand};
 use rohrpost_bench::cases::Case;
@@ -25,6 +25,9 @@ enum Command {
     Local(Run),
     /// Streams between processes of one computer.
     Streams(Run),
+    /// Recordings: the recorder beside the crate that it writes with.
+    #[cfg(feature = "recording")]
+    Recording(Run),
     /// Packages between nodes, over routers: two network namespaces of this computer.
     #[cfg(feature = "lan")]
     Lan(Run),
@@ -68,6 +71,8 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Local(run) => measure(&run, &cases::all()),
         Command::Streams(run) => measure(&run, &cases::streams::all()),
+        #[cfg(feature = "recording")]
+        Command::Recording(run) => measure(&run, &cases::recording::all()),
         #[cfg(feature = "lan")]
         Command::Lan(run) => {
             rohrpost_bench::lan::prepare();

@@ -2,6 +2,7 @@
 //! but for what waited longer than it may while there was no router, or no slot.
 
 mod losses;
+mod waits;
 
 use crate::harness::{Place, Robot, lacks_namespaces, runs, signal, wait};
 use crate::process::{Running, Said};
@@ -15,6 +16,7 @@ use rohrpost::wire::{append, from_bytes};
 use rohrpost_testbed::stalls::{Late, unless_stalled};
 use std::path::Path;
 use std::time::{Duration, Instant};
+use waits::Waits;
 
 const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo-tdma.toml");
 const NODES: [&str; 3] = ["base", "brain", "desk"];
@@ -125,13 +127,13 @@ fn killed_again(place: &Place) -> Option<Killed> {
         let master = wait("one master", || settled(&robots, ran_ms));
         let (robot, router) = (&robots[master], format!("router.{master}"));
         let pid = robot.pid(&router);
-        let ran = Instant::now();
+        let (waits, ran) = (Waits::above(pid), Instant::now());
         signal(pid, Signal::SIGKILL);
         let dead = Instant::now();
-        robot.wait_restarted(&router, pid);
+        let waited = waits.until_it_is_back(robot.wait_restarted(&router, pid).pid);
         wait("one master again", || settled(&robots, ran_ms));
         let left_out = most_left_out(before, master, wait("slots", || left_out_so_far(&robots)));
-        kills.push(Kill { looked, ran, dead, settled: Instant::now(), left_out });
+        kills.push(Kill { looked, ran, dead, settled: Instant::now(), left_out, waited });
     }
     drop(robots);
     demo.signal(Signal::SIGINT);
@@ -176,13 +178,15 @@ fn ended_well(place: &Place, arguments: &[&str]) -> Option<(Said, Kill, Before)>
     let pid = |node: usize| robots[node].process(&format!("router.{node}")).map(|router| router.pid);
     let pids = wait("routers", || Some([pid(0)?, pid(1)?, pid(2)?]));
     let is_dead = |node: &usize| pid(*node) != Some(pids[*node]) || !runs(pids[*node]);
-    let (mut ran, mut lost, mut left_out) = (Instant::now(), Before::new(), [0; 3]);
+    let above = || pids.map(Waits::above);
+    let (mut ran, mut waits, mut lost, mut left_out) = (Instant::now(), above(), Before::new(), [0; 3]);
     let node = wait("a router dies", || {
-        let (lost_now, left_out_now, now) = (lost_so_far(&robots), left_out_so_far(&robots), Instant::now());
+        let (lost_now, left_out_now) = (lost_so_far(&robots), left_out_so_far(&robots));
+        let (waits_now, now) = (above(), Instant::now());
         if let Some(node) = [0, 1, 2].into_iter().find(is_dead) {
             return Some(node);
         }
-        ran = now;
+        (ran, waits) = (now, waits_now);
         left_out = left_out_now.unwrap_or(left_out);
         if let Some(now) = lost_now {
             lost = now;
@@ -190,8 +194,10 @@ fn ended_well(place: &Place, arguments: &[&str]) -> Option<(Said, Kill, Before)>
         assert!(demo.ended().is_none(), "no router died: {}", demo.out());
         None
     });
-    let (dead, mut last) = (Instant::now(), left_out);
+    let (dead, mut last, mut waited) = (Instant::now(), left_out, None);
     wait("one master again", || {
+        let back = pid(node).filter(|pid| *pid != pids[node]);
+        waited = waited.or(back.map(|pid| waits[node].until_it_is_back(pid)));
         last = left_out_so_far(&robots).unwrap_or(last);
         let is_over = dead.elapsed() > WATCHED || demo.ended().is_some();
         settled(&robots, SETTLED_MS).map(drop).or(is_over.then_some(()))
@@ -201,7 +207,8 @@ fn ended_well(place: &Place, arguments: &[&str]) -> Option<(Said, Kill, Before)>
     let said = demo.said();
     assert_eq!(said.code, Some(0), "{said:?}");
     let left_out = most_left_out(left_out, node, last);
-    Some((said, Kill { looked: ran, ran, dead, settled, left_out }, lost))
+    let waited = waited.unwrap_or_default();
+    Some((said, Kill { looked: ran, ran, dead, settled, left_out, waited }, lost))
 }
 
 #[test]

@@ -10,6 +10,8 @@ mod many;
 mod memory;
 mod proof;
 mod rates;
+#[cfg(feature = "recording")]
+pub mod recording;
 mod rivals;
 mod startup;
 pub mod streams;

@@ -6,7 +6,7 @@
 //!            ▼                           ▼
 //!     counted as lost             Status; again, with a new file
 //!
-//! cut, killed, damaged file ─▶ recover ─▶ whole file ─▶ info, cut, merge, Reader
+//! cut, killed, damaged file ─▶ recover ─▶ whole file ─▶ info, cut, merge, Reader ─▶ Player: what is due, and when
 //! ```
 //!
 //! [`Writer::write`] takes as long as copying the message, whatever the disk does. What does not fit the bounded queue
@@ -63,6 +63,7 @@ mod info;
 mod merge;
 mod options;
 mod output;
+mod player;
 mod read;
 mod reader;
 mod recorder;
@@ -81,6 +82,7 @@ pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
 pub use merge::{MergeError, merge};
 pub use options::{Options, Session};
+pub use player::{Cue, Player};
 pub use reader::{Reader, RecordedChannel, is_closed};
 pub use recover::{RecoverError, Recovered, recover, recovered_path};
 pub use rewrite::{Progress, RewriteError};

@@ -52,6 +52,8 @@ pub struct Reader {
     contents: Contents,
     channels: BTreeMap<u16, Arc<RecordedChannel>>,
     found: Option<Found>,
+    /// The message that was found is still to be read.
+    is_ahead: bool,
 }
 
 impl Reader {
@@ -60,7 +62,7 @@ impl Reader {
     /// # Errors
     /// When it is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Ok(Self { contents: Contents::open(path)?, channels: BTreeMap::new(), found: None })
+        Ok(Self { contents: Contents::open(path)?, channels: BTreeMap::new(), found: None, is_ahead: false })
     }
 
     /// The next message; none at the end.
@@ -69,6 +71,34 @@ impl Reader {
     /// When the file is damaged here. A file that was not closed ends with an error if it ends inside of a record.
     #[expect(clippy::should_implement_trait, reason = "a message is borrowed from the reader")]
     pub fn next(&mut self) -> Result<Option<(Arc<RecordedChannel>, Message<'_>)>, ReadError> {
+        self.advance()?;
+        Ok(self.present())
+    }
+
+    /// Goes on behind the messages that arrived before this time: the next one arrived at it or later. Where time
+    /// stepped back, that is the first such message in the order of the file. False if there is none.
+    ///
+    /// # Errors
+    /// As of [`Self::next`].
+    pub fn seek(&mut self, arrival_ns: u64) -> Result<bool, ReadError> {
+        self.contents = self.contents.from_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
+        loop {
+            self.advance()?;
+            match &self.found {
+                Some(found) if found.header.log_time < arrival_ns => {}
+                found => {
+                    self.is_ahead = found.is_some();
+                    return Ok(self.is_ahead);
+                }
+            }
+        }
+    }
+
+    /// Goes to the next message, unless a search has gone there already.
+    pub(crate) fn advance(&mut self) -> Result<(), ReadError> {
+        if std::mem::take(&mut self.is_ahead) {
+            return Ok(());
+        }
         self.found = None;
         while let Some(item) = self.contents.next()? {
             match item {
@@ -80,7 +110,12 @@ impl Reader {
                 Item::Metadata(_) => {}
             }
         }
-        let Some(found) = &self.found else { return Ok(None) };
+        Ok(())
+    }
+
+    /// The message that came last.
+    pub(crate) fn present(&mut self) -> Option<(Arc<RecordedChannel>, Message<'_>)> {
+        let found = self.found.as_ref()?;
         let Found { header, channel, .. } = found;
         let recorded = self.channels.entry(header.channel_id).or_insert_with(|| Arc::new(recorded(channel)));
         let message = Message {
@@ -90,7 +125,7 @@ impl Reader {
             sequence: header.sequence,
             data: self.contents.data(found),
         };
-        Ok(Some((recorded.clone(), message)))
+        Some((recorded.clone(), message))
     }
 
     /// Whether the end was reached, and the file was closed there.

@@ -15,7 +15,6 @@ const CALL: Duration = Duration::from_millis(200);
 /// The pilot sends its motor a call no more often.
 const CALL_EACH: Duration = Duration::from_millis(90);
 /// Data that waited longer in the kernel for an absent router are not delivered; so it is to be there again before.
-/// Builds beside make 250 ms of it.
 const DATA: Duration = Duration::from_nanos(SOCKET_MAX_NS);
 
 /// Losses that modules have counted so far: the module that counts, the other one, and whether they are data.
@@ -33,6 +32,8 @@ pub(super) struct Kill {
     pub(super) settled: Instant,
     /// Slots that one node left out from its death until then, at most.
     pub(super) left_out: u64,
+    /// How long what brings it back had no processor meanwhile.
+    pub(super) waited: Duration,
 }
 
 impl Kill {
@@ -42,14 +43,17 @@ impl Kill {
     }
 }
 
-/// How long each router was away, as the demo says. One that was away for longer than data wait is late.
+/// How long each router was away, as the demo says. One that was away for longer than data wait is late, unless that is
+/// how long it, and what brings it back, waited for a processor.
 fn check_away(said: &str, kills: &[Kill]) -> Result<Vec<Duration>, Late> {
     let away = away(said);
     assert_eq!(away.len(), kills.len(), "{said}");
     for (kill, away) in kills.iter().zip(&away) {
-        if *away > DATA {
-            let what = format!("a router was away for {away:?}, {DATA:?} at most");
-            return Err(kill.late(what, kill.dead + *away, *away - DATA));
+        let beyond = away.saturating_sub(DATA + kill.waited);
+        if !beyond.is_zero() {
+            let waited = kill.waited;
+            let what = format!("a router was away for {away:?}, {DATA:?} at most and {waited:?} without a processor");
+            return Err(kill.late(what, kill.dead + *away, beyond));
         }
     }
     Ok(away)
@@ -163,7 +167,9 @@ fn sample(away: &str, commands: u64, data: u64) -> String {
 #[test]
 fn a_loss_that_nothing_explains_is_found_however_many_slots_were_left_out() {
     let (now, ms) = (Instant::now(), Duration::from_millis);
-    let kill = |left_out| Kill { looked: now, ran: now, dead: now + ms(1), settled: now + ms(2000), left_out };
+    let kill_after =
+        |left_out, waited| Kill { looked: now, ran: now, dead: now + ms(1), settled: now + ms(2000), left_out, waited };
+    let kill = |left_out| kill_after(left_out, ms(0));
     let check = |away, commands, data, left_out| {
         let said = sample(away, commands, data);
         let late = |late: Late| (late.by, late.until - late.since);
@@ -179,6 +185,8 @@ fn a_loss_that_nothing_explains_is_found_however_many_slots_were_left_out() {
     assert_eq!(check("300 ms", 2, 0, 0), Ok(Ok(())));
     assert_eq!(check("400 ms", 0, 0, 0), Ok(Ok(())));
     assert_eq!(check("450 ms", 0, 0, 0), Ok(Err((ms(50), ms(451)))), "a restart that takes too long fails by itself");
+    let waited = |ms_waited| check_losses(&sample("450 ms", 0, 0), &[kill_after(0, ms(ms_waited))], &Before::new());
+    assert_eq!([49, 50].map(|ms_waited| waited(ms_waited).map_err(|late| late.by)), [Err(ms(1)), Ok(())]);
     assert_eq!(check("44 ms", 1, 0, 40), Ok(Err(slots)), "a stall has to explain the slots");
     assert_eq!(check("44 ms", 0, 1, 80), Ok(Err(slots)));
     let before = Before::from([(("pilot.0".into(), "motor.0".into(), false), 1)]);

@@ -5,7 +5,8 @@ use crate::format::op;
 use crate::read::chunk;
 use crate::read::definitions::{Definition, Definitions};
 use crate::read::frames::{Frames, Step};
-use mcap::records::{Header, MessageHeader, Metadata, Record};
+use crate::read::index::Index;
+use mcap::records::{ChunkIndex, Header, MessageHeader, Metadata, Record};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -82,6 +83,22 @@ impl Contents {
             begins: 0,
             ending: None,
         }
+    }
+
+    /// The same file, from the first chunk on of which the index says this; from its beginning if it has no index.
+    pub(crate) fn from_first_chunk(&self, is_it: impl Fn(&ChunkIndex) -> bool) -> Result<Self, ReadError> {
+        let mut frames = Frames::open(self.path())?;
+        let index = match Index::read(&mut frames) {
+            Ok(index) if !index.chunks.is_empty() => index,
+            Ok(_) | Err(ReadError::NotClosed { .. }) => return Self::open(self.path()),
+            Err(error) => return Err(error),
+        };
+        // Behind the last one there is nothing but the index.
+        let behind = |chunk: &ChunkIndex| chunk.chunk_start_offset + chunk.chunk_length;
+        let first = index.chunks.iter().find(|chunk| is_it(chunk)).map(|chunk| chunk.chunk_start_offset);
+        let at = first.or_else(|| index.chunks.last().map(behind)).unwrap_or_default();
+        frames.seek(at)?;
+        Ok(Self::new(frames, index.definitions))
     }
 
     pub(crate) fn path(&self) -> &Path {

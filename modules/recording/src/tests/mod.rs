@@ -5,6 +5,7 @@ mod damaged;
 mod disks;
 mod failing;
 mod merging;
+mod playing;
 mod support;
 mod telling;
 mod written;

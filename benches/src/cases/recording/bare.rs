@@ -1,0 +1,41 @@
+//! The crate `mcap` with a loop around it: the same chunks, compressed and checked alike, synced at the end.
+
+use super::source::{CHUNK_BYTES, NAME, Source};
+use crate::harness::Failure;
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// As our recorder has it.
+const ZSTD_LEVEL: u32 = 1;
+
+/// Writes all, and closes the file.
+pub(super) fn write(folder: &Path, source: &Source) -> Result<(), Failure> {
+    try_write(folder, source).map_err(|error| Failure::of("mcap", error))
+}
+
+fn try_write(folder: &Path, source: &Source) -> Result<(), Box<dyn std::error::Error>> {
+    let options = WriteOptions::new()
+        .compression(Some(Compression::Zstd))
+        .compression_level(ZSTD_LEVEL)
+        .compression_threads(0)
+        .chunk_size(Some(CHUNK_BYTES))
+        .disable_seeking(true);
+    let mut writer = options.create(BufWriter::new(File::create(folder.join("bench.mcap"))?))?;
+    let schema = writer.add_schema("bytes", "bytes", &[])?;
+    let topic = format!("{}/{}", NAME.0, NAME.1);
+    let channel_id = writer.add_channel(schema, &topic, "postcard", &BTreeMap::new())?;
+    for (sequence, data) in source.all() {
+        let now_ns = u64::from(sequence) * 1000;
+        writer.write_to_known_channel(
+            &MessageHeader { channel_id, sequence, log_time: now_ns, publish_time: now_ns },
+            data,
+        )?;
+    }
+    writer.finish()?;
+    writer.into_inner().into_inner()?.sync_all()?;
+    Ok(())
+}

@@ -1,0 +1,39 @@
+//! Our recorder: a queue, and a thread that writes.
+
+use super::source::{NAME, Source};
+use crate::harness::Failure;
+use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+use rohrpost_schema::Type;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+/// So many bytes may wait for the thread: a quarter of what the queue takes, so nothing is lost.
+const WAITING_MAX: usize = 8 << 20;
+/// How many come between two looks at what waits.
+const LOOK_EACH: usize = 2 << 20;
+const NAP: Duration = Duration::from_micros(200);
+
+/// Writes all, and closes the file.
+pub(super) fn write(folder: &Path, source: &Source) -> Result<(), Failure> {
+    let start = |error| Failure::of("starting a recording", error);
+    let options = Options { leave_bytes: 0, ..Options::new(folder, "bench") };
+    let mut writer = Writer::start(options, Session::default()).map_err(start)?;
+    let ty = Type::List(Box::new(Type::U8));
+    let spec = ChannelSpec { name: NAME.0, item: NAME.1, ty: &ty, texts: BTreeMap::new() };
+    let channel = writer.channel(&spec).map_err(|error| Failure::of("a channel", error))?;
+    let mut unseen = 0;
+    for (sequence, data) in source.all() {
+        unseen += data.len();
+        if unseen >= LOOK_EACH {
+            unseen = 0;
+            while writer.status().waiting as usize * data.len() > WAITING_MAX {
+                std::thread::sleep(NAP);
+            }
+        }
+        let now_ns = u64::from(sequence) * 1000;
+        let message = Message { arrival_ns: now_ns, stamp_ns: now_ns, epoch: 1, sequence, data };
+        writer.write(channel, &message).map_err(|error| Failure::of("writing", error))?;
+    }
+    writer.finish().1.map_err(|error| Failure::of("closing the recording", error))
+}

@@ -1,0 +1,55 @@
+//! The cases of recordings, run small: every contender records what it should, every line says what it has to, and
+//! nothing is left behind.
+
+#![allow(clippy::unwrap_used, reason = "these are tests")]
+
+mod support;
+
+use nix::sys::signal::Signal;
+use support::{are_gone, bench, children, interrupt, left_behind, prefix, rows, run, signal, wait_for};
+
+const SIZES: [u64; 4] = [100, 1000, 62_000, 4 << 20];
+
+#[test]
+fn every_contender_records_all_and_every_line_is_complete() {
+    let (output, prefix) = run("recording", &["--quick", "--json"]);
+    let all = rows(&output);
+    for case in ["recorded", "recorded, processor"] {
+        for bytes in SIZES {
+            let of: Vec<_> = all.iter().filter(|row| row["case"] == case && row["bytes"] == bytes).collect();
+            assert_eq!(of.len(), 2, "{case} {bytes}: {of:?}");
+            assert!(of[0]["contender"] == "rohrpost" && of[0]["vs"] == "mcap" && of[1]["contender"] == "mcap");
+        }
+    }
+    assert_eq!(all.len(), 2 * SIZES.len(), "a case is not in the table above");
+    assert_eq!(left_behind(&prefix), [""; 0]);
+}
+
+/// What one turn needs: its process, and the folder with the recording.
+fn a_turn(child: &std::process::Child) -> Vec<String> {
+    let mut pids = Vec::new();
+    wait_for("a turn", || {
+        pids = children(child);
+        pids.len() == 1 && !left_behind(&prefix(child)).is_empty()
+    });
+    pids
+}
+
+#[test]
+fn an_interrupt_leaves_nothing() {
+    let child = bench("recording", &["--rounds", "1000"]).spawn().unwrap();
+    let (pids, prefix) = (a_turn(&child), prefix(&child));
+    interrupt(child, &pids);
+    assert_eq!(left_behind(&prefix), [""; 0]);
+}
+
+#[test]
+fn what_a_killed_run_left_goes_with_the_next_one() {
+    let mut child = bench("recording", &["--rounds", "1000"]).spawn().unwrap();
+    let (pids, prefix) = (a_turn(&child), prefix(&child));
+    signal(&child, Signal::SIGKILL);
+    child.wait().unwrap();
+    wait_for("the process to end", || are_gone(&pids));
+    assert!(run("recording", &["--quick", "--only", "processor"]).0.status.success());
+    assert_eq!(left_behind(&prefix), [""; 0]);
+}

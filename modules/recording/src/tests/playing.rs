@@ -1,0 +1,138 @@
+//! A replay has the recording's order and spacing, whatever the time does.
+
+use super::support::{Said, file_of, memory_folder, said};
+use crate::{Cue, Player, Reader};
+use std::path::{Path, PathBuf};
+
+/// What a replay did.
+#[derive(Debug, PartialEq, Eq)]
+enum Did {
+    Begun { system_ns: u64, epoch: u64 },
+    Played { at_ns: u64, topic: String, sequence: u32 },
+}
+
+/// Plays to the end, with a time that passes by `step_ns` wherever the player waits.
+fn play(player: &mut Player, step_ns: u64) -> Vec<Did> {
+    let (mut now_ns, mut did) = (0, Vec::new());
+    loop {
+        match player.poll(now_ns).unwrap() {
+            Cue::Begin { system_ns, epoch } => {
+                now_ns = system_ns;
+                did.push(Did::Begun { system_ns, epoch });
+            }
+            Cue::Message(channel, message) => {
+                let (topic, sequence) = (channel.topic.clone(), message.sequence);
+                did.push(Did::Played { at_ns: now_ns, topic, sequence });
+            }
+            Cue::Wait { until_ns } => {
+                assert!(until_ns > now_ns, "a wait of nothing");
+                now_ns += step_ns;
+            }
+            Cue::End => return did,
+        }
+    }
+}
+
+/// The same, as a recording tells it: a message is played at the first step of the time that is not before its arrival.
+fn course(all: &[Said], step_ns: u64) -> Vec<Did> {
+    let (mut time, mut did) = (None::<(u64, u64)>, Vec::new());
+    for said in all {
+        if time.is_none_or(|(_, epoch)| said.epoch > epoch) {
+            time = Some((said.arrival_ns, said.epoch));
+            did.push(Did::Begun { system_ns: said.arrival_ns, epoch: said.epoch });
+        }
+        let (now_ns, epoch) = time.unwrap();
+        let is_late = said.epoch < epoch || said.arrival_ns <= now_ns;
+        let at_ns = if is_late { now_ns } else { now_ns + (said.arrival_ns - now_ns).div_ceil(step_ns) * step_ns };
+        time = Some((at_ns, epoch));
+        did.push(Did::Played { at_ns, topic: said.topic.clone(), sequence: said.sequence });
+    }
+    did
+}
+
+fn two_files(folder: &Path, all: &[Said]) -> Vec<PathBuf> {
+    let (one, other) = all.split_at(all.len() / 2);
+    vec![file_of(folder, "a", one), file_of(folder, "b", other)]
+}
+
+/// Messages of 700 B, several chunks of them, with a step of time back, which one channel learns of later.
+fn with_a_step() -> Vec<Said> {
+    let mut all = said(6_000, 700);
+    for said in &mut all[4_000..] {
+        (said.arrival_ns, said.epoch) = (said.arrival_ns - 30_000, 2);
+    }
+    all[4_001].epoch = 1;
+    all
+}
+
+#[test]
+fn messages_are_played_in_order_when_they_are_due_and_time_steps_where_it_stepped() {
+    let (folder, all) = (memory_folder(), with_a_step());
+    let files = two_files(folder.path(), &all);
+    for step_ns in [1, 7, 10, 1_000] {
+        let did = play(&mut Player::new(files.clone(), |_| true), step_ns);
+        assert!(did == course(&all, step_ns), "by steps of {step_ns} ns");
+    }
+}
+
+#[test]
+fn what_is_not_chosen_is_left_out() {
+    let (folder, all) = (memory_folder(), with_a_step());
+    let files = two_files(folder.path(), &all);
+    let chosen: Vec<Said> = all.into_iter().filter(|said| said.topic == "laser.1/scan").collect();
+    let did = play(&mut Player::new(files.clone(), |channel| channel.name == "laser.1"), 10);
+    assert!(did == course(&chosen, 10));
+    assert_eq!(play(&mut Player::new(files, |_| false), 10), []);
+}
+
+#[test]
+fn a_replay_goes_on_at_any_time_of_any_file() {
+    let (folder, all) = (memory_folder(), with_a_step());
+    let mut player = Player::new(two_files(folder.path(), &all), |_| true);
+    let last_ns = all.iter().map(|said| said.arrival_ns).max().unwrap();
+    for at_ns in [0, 1_000, 1_001, 20_995, 31_000, 31_001, 40_989, last_ns] {
+        let first = all.iter().position(|said| said.arrival_ns >= at_ns).unwrap();
+        assert!(player.seek(at_ns).unwrap());
+        assert!(play(&mut player, 1_000) == course(&all[first..], 1_000), "from {at_ns} on");
+    }
+    assert!(!player.seek(last_ns + 1).unwrap());
+    assert!(matches!(player.poll(0).unwrap(), Cue::End));
+}
+
+#[test]
+fn a_file_without_an_index_is_searched_from_its_beginning() {
+    let (folder, all) = (memory_folder(), said(6_000, 700));
+    let path = file_of(folder.path(), "a", &all);
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 20]).unwrap();
+    let mut reader = Reader::open(&path).unwrap();
+    for number in [5_000, 10] {
+        assert!(reader.seek(all[number].arrival_ns).unwrap());
+        assert_eq!(reader.next().unwrap().unwrap().1.data, all[number].data);
+        assert_eq!(reader.next().unwrap().unwrap().1.data, all[number + 1].data);
+    }
+}
+
+#[test]
+fn behind_damage_a_replay_goes_on() {
+    let (folder, all) = (memory_folder(), said(6_000, 700));
+    let files = two_files(folder.path(), &all);
+    let mut bytes = std::fs::read(&files[0]).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x55;
+    std::fs::write(&files[0], bytes).unwrap();
+    let mut player = Player::new(files, |_| true);
+    let (mut played, mut errors) = (0, 0);
+    loop {
+        match player.poll(u64::MAX) {
+            Ok(Cue::Message(..)) => played += 1,
+            Ok(Cue::End) => break,
+            Ok(_) => {}
+            Err(error) => {
+                assert!(error.to_string().contains("damaged at byte"), "{error}");
+                errors += 1;
+            }
+        }
+    }
+    assert!(errors == 1 && (3_000..6_000).contains(&played), "{played} of 6000, {errors} errors");
+}
