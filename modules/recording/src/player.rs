@@ -34,8 +34,8 @@ pub enum Cue<'a> {
     End,
 }
 
-/// Plays recordings: in their order, as far apart as they came. It has no clock: the time is told, so it may pass at any
-/// pace, or stand.
+/// Plays recordings: in their order, as far apart as they came. It has no clock: the time is told, so it may pass at
+/// any pace, or stand.
 ///
 /// ```
 /// # use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
@@ -71,7 +71,8 @@ pub struct Player {
 }
 
 impl Player {
-    /// At the beginning of these files, which are played one after the other. Channels that are not chosen are left out.
+    /// At the beginning of these files, which are played one after the other. Channels that are not chosen are left
+    /// out.
     pub fn new(files: Vec<PathBuf>, plays: impl Fn(&RecordedChannel) -> bool + Send + 'static) -> Self {
         Self { files, plays: Box::new(plays), reader: None, ended: 0, is_ahead: false, epoch: None }
     }
@@ -99,8 +100,8 @@ impl Player {
         Ok(Cue::Message(channel, message))
     }
 
-    /// Goes to the first message that arrived at this time or later, in the order of the files; with 0 to the beginning.
-    /// Time begins anew there. False if there is none: then it is at the end.
+    /// Goes to the first message that arrived at this time or later, in the order of the files; with 0 to the
+    /// beginning. Time begins anew there. False if there is none: then it is at the end.
     ///
     /// # Errors
     /// When a file cannot be read, or is damaged where it was searched.

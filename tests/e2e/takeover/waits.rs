@@ -1,8 +1,8 @@
 //! How long what brings a router back has waited for a processor.
 //!
 //! Launch has no real time, and neither has a router before it gives itself some: beside other programs they take
-//! turns. The kernel counts for each thread how long it was ready and did not run (`schedstat`), so a return that is late
-//! is explained by that, and by no more than that.
+//! turns. The kernel counts for each thread how long it was ready and did not run (`schedstat`), so a return that is
+//! late is explained by that, and by no more than that.
 
 use std::time::Duration;
 
