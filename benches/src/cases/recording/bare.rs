@@ -1,6 +1,6 @@
 //! The crate `mcap` with a loop around it: the same chunks, compressed and checked alike, synced at the end.
 
-use super::source::{CHUNK_BYTES, NAME, Source};
+use super::workload::{CHUNK_BYTES, NAME, Workload};
 use crate::harness::Failure;
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
@@ -13,11 +13,11 @@ use std::path::Path;
 const ZSTD_LEVEL: u32 = 1;
 
 /// Writes all, and closes the file.
-pub(super) fn write(folder: &Path, source: &Source) -> Result<(), Failure> {
-    try_write(folder, source).map_err(|error| Failure::of("mcap", error))
+pub(super) fn write(folder: &Path, workload: &Workload) -> Result<(), Failure> {
+    try_write(folder, workload).map_err(|error| Failure::of("mcap", error))
 }
 
-fn try_write(folder: &Path, source: &Source) -> Result<(), Box<dyn std::error::Error>> {
+fn try_write(folder: &Path, workload: &Workload) -> Result<(), Box<dyn std::error::Error>> {
     let options = WriteOptions::new()
         .compression(Some(Compression::Zstd))
         .compression_level(ZSTD_LEVEL)
@@ -28,7 +28,7 @@ fn try_write(folder: &Path, source: &Source) -> Result<(), Box<dyn std::error::E
     let schema = writer.add_schema("bytes", "bytes", &[])?;
     let topic = format!("{}/{}", NAME.0, NAME.1);
     let channel_id = writer.add_channel(schema, &topic, "postcard", &BTreeMap::new())?;
-    for (sequence, data) in source.all() {
+    for (sequence, data) in workload.all() {
         let now_ns = u64::from(sequence) * 1000;
         writer.write_to_known_channel(
             &MessageHeader { channel_id, sequence, log_time: now_ns, publish_time: now_ns },

@@ -2,16 +2,16 @@
 
 mod bare;
 mod recorder;
-mod source;
+mod workload;
 
 use super::Case;
 use crate::harness::{Failure, Scratch, sample_in_child};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use nix::sys::resource::{UsageWho, getrusage};
-use source::Source;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use workload::Workload;
 
 /// A speed, a line of output, a scan of a laser, a picture.
 const SIZES: [usize; 4] = [100, 1000, 62_000, 4 << 20];
@@ -26,12 +26,12 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
     let cases = |figure| SIZES.map(|bytes| -> Box<dyn Case> { Box::new(Recorded { bytes, figure }) });
-    cases(Figure::Rate).into_iter().chain(cases(Figure::ProcessorTime)).collect()
+    cases(TurnFigure::Rate).into_iter().chain(cases(TurnFigure::ProcessorTime)).collect()
 }
 
 /// What of a turn is told.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Figure {
+enum TurnFigure {
     Rate,
     ProcessorTime,
 }
@@ -39,47 +39,47 @@ enum Figure {
 /// As many messages as a turn has, one after the other, all in the file.
 struct Recorded {
     bytes: usize,
-    figure: Figure,
+    figure: TurnFigure,
 }
 
 impl Case for Recorded {
     fn name(&self) -> String {
         match self.figure {
-            Figure::Rate => "recorded".into(),
-            Figure::ProcessorTime => "recorded, processor".into(),
+            TurnFigure::Rate => "recorded".into(),
+            TurnFigure::ProcessorTime => "recorded, processor".into(),
         }
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let turn_bytes = if settings.quick { QUICK_BYTES } else { TURN_BYTES };
         let messages = settings.count(TURN_MESSAGES.min(turn_bytes / self.bytes));
-        let turn = |write: fn(&Path, &Source) -> Result<(), Failure>| {
+        let turn = |write: fn(&Path, &Workload) -> Result<(), Failure>| {
             move || {
                 let folder = Scratch::new()?;
-                let source = Source { bytes: self.bytes, messages };
+                let workload = Workload { bytes: self.bytes, messages };
                 let samples = sample_in_child(PATIENCE, |samples| {
-                    source.prepare();
+                    workload.prepare();
                     let (began, began_cpu) = (Instant::now(), processor_time()?);
-                    write(&folder.directory(), &source)?;
+                    write(&folder.directory(), &workload)?;
                     samples.push(began.elapsed().as_secs_f64());
                     samples.push((processor_time()? - began_cpu).as_secs_f64());
                     Ok(())
                 })?;
-                source.check(&folder.directory())?;
+                workload.check(&folder.directory())?;
                 let [seconds, processor_s] = samples[..] else {
                     return Err(Failure::Failed(format!("{} figures of a turn, not 2", samples.len())));
                 };
                 Ok(match self.figure {
-                    Figure::Rate => (self.bytes * messages) as f64 / 1e6 / seconds,
-                    Figure::ProcessorTime => processor_s * 1e6 / messages as f64,
+                    TurnFigure::Rate => (self.bytes * messages) as f64 / 1e6 / seconds,
+                    TurnFigure::ProcessorTime => processor_s * 1e6 / messages as f64,
                 })
             }
         };
         let contenders =
             [Contender::single("rohrpost", turn(recorder::write)), Contender::single("mcap", turn(bare::write))];
         let (unit, target) = match self.figure {
-            Figure::Rate => ("MB/s", Target::AtLeast(0.9)),
-            Figure::ProcessorTime => ("us", Target::AtMost(1.2)),
+            TurnFigure::Rate => ("MB/s", Target::AtLeast(0.9)),
+            TurnFigure::ProcessorTime => ("us", Target::AtMost(1.2)),
         };
         let versus = Versus { name: contenders[1].name, p50: Some(target), p99: None };
         let subject = Subject { case: self.name(), bytes: Some(self.bytes), unit };

@@ -1,6 +1,6 @@
 //! Our recorder: a queue, and a thread that writes.
 
-use super::source::{NAME, Source};
+use super::workload::{NAME, Workload};
 use crate::harness::Failure;
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::Type;
@@ -15,7 +15,7 @@ const LOOK_EACH: usize = 2 << 20;
 const NAP: Duration = Duration::from_micros(200);
 
 /// Writes all, and closes the file.
-pub(super) fn write(folder: &Path, source: &Source) -> Result<(), Failure> {
+pub(super) fn write(folder: &Path, workload: &Workload) -> Result<(), Failure> {
     let start = |error| Failure::of("starting a recording", error);
     let options = Options { leave_bytes: 0, ..Options::new(folder, "bench") };
     let mut writer = Writer::start(options, Session::default()).map_err(start)?;
@@ -23,7 +23,7 @@ pub(super) fn write(folder: &Path, source: &Source) -> Result<(), Failure> {
     let spec = ChannelSpec { name: NAME.0, item: NAME.1, ty: &ty, texts: BTreeMap::new() };
     let channel = writer.channel(&spec).map_err(|error| Failure::of("a channel", error))?;
     let mut unseen = 0;
-    for (sequence, data) in source.all() {
+    for (sequence, data) in workload.all() {
         unseen += data.len();
         if unseen >= LOOK_EACH {
             unseen = 0;

@@ -13,13 +13,13 @@ pub(super) const NAME: (&str, &str) = ("laser.0", "scan");
 pub(super) const CHUNK_BYTES: u64 = 1 << 20;
 
 /// The messages of a turn.
-pub(super) struct Source {
+pub(super) struct Workload {
     /// Of each message.
     pub(super) bytes: usize,
     pub(super) messages: usize,
 }
 
-impl Source {
+impl Workload {
     /// Makes the bytes, so that it is not measured.
     pub(super) fn prepare(&self) {
         noise();
