@@ -7,6 +7,8 @@ use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::Definition;
 use crate::read::frames::Frames;
 use crate::read::index::Index;
+use crate::read::selected::Selected;
+use crate::selection::{SelectError, Selection};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,11 +27,20 @@ pub struct RecordedChannel {
     pub ty: Option<Type>,
     /// `postcard` in our files.
     pub message_encoding: String,
+    /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
+    pub schema_encoding: String,
     /// What else was said when it was recorded.
     pub texts: BTreeMap<String, String>,
 }
 
-/// Reads a file from its beginning, with one chunk in memory. It need not be closed, but undamaged so far.
+impl RecordedChannel {
+    /// Whether it was drawn of another channel, for other programs: replay leaves it out.
+    pub fn is_drawn(&self) -> bool {
+        self.texts.contains_key(key::DRAWN)
+    }
+}
+
+/// Reads a file, or a part of it, with one chunk in memory.
 ///
 /// ```
 /// # use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
@@ -49,18 +60,37 @@ pub struct RecordedChannel {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Reader {
-    contents: Contents,
+    source: Source,
     channels: BTreeMap<u16, Arc<RecordedChannel>>,
     found: Option<Found>,
 }
 
+/// What is read.
+enum Source {
+    /// From its beginning on.
+    Whole(Contents),
+    Part(Selected),
+}
+
 impl Reader {
-    /// At the first message.
+    /// At the first message. The file need not be closed, but undamaged so far.
     ///
     /// # Errors
     /// When it is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Ok(Self { contents: Contents::open(path)?, channels: BTreeMap::new(), found: None })
+        Ok(Self::of(Source::Whole(Contents::open(path)?)))
+    }
+
+    /// At the first message of those that are selected of a closed file. Chunks without any of them are not read.
+    ///
+    /// # Errors
+    /// When it is no MCAP file, was not closed, or has no such name.
+    pub fn select(path: &Path, selection: &Selection) -> Result<Self, SelectError> {
+        Ok(Self::of(Source::Part(Selected::open(path, selection)?)))
+    }
+
+    fn of(source: Source) -> Self {
+        Self { source, channels: BTreeMap::new(), found: None }
     }
 
     /// The next message; none at the end.
@@ -69,17 +99,7 @@ impl Reader {
     /// When the file is damaged here. A file that was not closed ends with an error if it ends inside of a record.
     #[expect(clippy::should_implement_trait, reason = "a message is borrowed from the reader")]
     pub fn next(&mut self) -> Result<Option<(Arc<RecordedChannel>, Message<'_>)>, ReadError> {
-        self.found = None;
-        while let Some(item) = self.contents.next()? {
-            match item {
-                Item::Message(found) => {
-                    self.found = Some(found);
-                    break;
-                }
-                Item::Damaged(at, what) => return Err(self.contents.damaged(at, what)),
-                Item::Metadata(_) => {}
-            }
-        }
+        self.found = self.source.next()?;
         let Some(found) = &self.found else { return Ok(None) };
         let Found { header, channel, .. } = found;
         let recorded = self.channels.entry(header.channel_id).or_insert_with(|| Arc::new(recorded(channel)));
@@ -88,14 +108,49 @@ impl Reader {
             stamp_ns: header.publish_time,
             epoch: channel.epoch().unwrap_or_default(),
             sequence: header.sequence,
-            data: self.contents.data(found),
+            data: self.source.data(found),
         };
         Ok(Some((recorded.clone(), message)))
     }
 
-    /// Whether the end was reached, and the file was closed there.
+    /// So many bytes are read, of so many.
+    pub fn progress(&self) -> (u64, u64) {
+        match &self.source {
+            Source::Whole(contents) => (contents.at(), contents.file_bytes()),
+            Source::Part(selected) => (selected.at(), selected.file_bytes()),
+        }
+    }
+
+    /// Whether the end was reached, and the file was closed there. What is [selected](Reader::select) is of such a file.
     pub fn is_closed(&self) -> bool {
-        self.contents.ending() == Some(Ending::Closed)
+        match &self.source {
+            Source::Whole(contents) => contents.ending() == Some(Ending::Closed),
+            Source::Part(_) => true,
+        }
+    }
+}
+
+impl Source {
+    fn next(&mut self) -> Result<Option<Found>, ReadError> {
+        let contents = match self {
+            Self::Whole(contents) => contents,
+            Self::Part(selected) => return selected.next(),
+        };
+        while let Some(item) = contents.next()? {
+            match item {
+                Item::Message(found) => return Ok(Some(found)),
+                Item::Damaged(at, what) => return Err(contents.damaged(at, what)),
+                Item::Metadata(_) => {}
+            }
+        }
+        Ok(None)
+    }
+
+    fn data(&self, found: &Found) -> &[u8] {
+        match self {
+            Self::Whole(contents) => contents.data(found),
+            Self::Part(selected) => selected.data(found),
+        }
     }
 }
 
@@ -107,6 +162,7 @@ fn recorded(channel: &Definition) -> RecordedChannel {
         item: text(key::ITEM),
         ty: channel.schema.ty(),
         message_encoding: channel.message_encoding.clone(),
+        schema_encoding: channel.schema.encoding.clone(),
         texts: channel.texts.clone(),
     }
 }
