@@ -80,11 +80,11 @@ fn drawn_text(to: &Path, told: &Drawn) -> String {
     }
     let mut left_out = |counts: &BTreeMap<String, u64>, why: &str| {
         for (topic, count) in counts {
-            text.push_str(&format!("\n{count} messages of {topic} are not drawn: {why}"));
+            text.push_str(&format!("\n{topic}: {count} not drawn: {why}"));
         }
     };
-    left_out(&told.not_drawn, "what they say contradicts itself, or is nowhere");
-    left_out(&told.too_long, "above 64 KiB they would be in the file twice; leave out --with-original");
+    left_out(&told.not_drawn, "the value contradicts itself, or is nowhere");
+    left_out(&told.too_long, "above 64 KiB it would be in the file twice; leave out --with-original");
     if !told.without.is_empty() {
         text.push_str(&format!("\nnot drawn, as there is no picture of them: {}", told.without.join(", ")));
     }

@@ -30,7 +30,8 @@ pub enum CutError {
 pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progress<'_>) -> Result<(u64, u64), CutError> {
     let mut selected = Selected::open(path, selection)?;
     let mut new = Rewriter::create(to)?;
-    selected.each_metadata(|its| Ok::<_, CutError>(new.metadata(&its.name, its.metadata).map_err(RewriteError::from)?))?;
+    selected
+        .each_metadata(|its| Ok::<_, CutError>(new.metadata(&its.name, its.metadata).map_err(RewriteError::from)?))?;
     new.metadata(metadata::CUT, selection.about(path)).map_err(RewriteError::from)?;
     for (id, channel) in selected.channels() {
         new.channel(0, id, channel).map_err(RewriteError::from)?;

@@ -60,13 +60,13 @@ impl RecordedChannel {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Reader {
-    source: Source,
+    source: ReaderSource,
     channels: BTreeMap<u16, Arc<RecordedChannel>>,
     found: Option<Found>,
 }
 
 /// What is read.
-enum Source {
+enum ReaderSource {
     /// From its beginning on.
     Whole(Contents),
     Part(Selected),
@@ -78,7 +78,7 @@ impl Reader {
     /// # Errors
     /// When it is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Ok(Self::of(Source::Whole(Contents::open(path)?)))
+        Ok(Self::of(ReaderSource::Whole(Contents::open(path)?)))
     }
 
     /// At the first message of those that are selected of a closed file. Chunks without any of them are not read.
@@ -86,10 +86,10 @@ impl Reader {
     /// # Errors
     /// When it is no MCAP file, was not closed, or has no such name.
     pub fn select(path: &Path, selection: &Selection) -> Result<Self, SelectError> {
-        Ok(Self::of(Source::Part(Selected::open(path, selection)?)))
+        Ok(Self::of(ReaderSource::Part(Selected::open(path, selection)?)))
     }
 
-    fn of(source: Source) -> Self {
+    fn of(source: ReaderSource) -> Self {
         Self { source, channels: BTreeMap::new(), found: None }
     }
 
@@ -116,21 +116,22 @@ impl Reader {
     /// So many bytes are read, of so many.
     pub fn progress(&self) -> (u64, u64) {
         match &self.source {
-            Source::Whole(contents) => (contents.at(), contents.file_bytes()),
-            Source::Part(selected) => (selected.at(), selected.file_bytes()),
+            ReaderSource::Whole(contents) => (contents.at(), contents.file_bytes()),
+            ReaderSource::Part(selected) => (selected.at(), selected.file_bytes()),
         }
     }
 
-    /// Whether the end was reached, and the file was closed there. What is [selected](Reader::select) is of such a file.
+    /// Whether the end was reached, and the file was closed there. What is [selected](Reader::select) always is of a
+    /// closed one.
     pub fn is_closed(&self) -> bool {
         match &self.source {
-            Source::Whole(contents) => contents.ending() == Some(Ending::Closed),
-            Source::Part(_) => true,
+            ReaderSource::Whole(contents) => contents.ending() == Some(Ending::Closed),
+            ReaderSource::Part(_) => true,
         }
     }
 }
 
-impl Source {
+impl ReaderSource {
     fn next(&mut self) -> Result<Option<Found>, ReadError> {
         let contents = match self {
             Self::Whole(contents) => contents,

@@ -45,6 +45,7 @@ fn each_kind_of_sight_is_drawn_and_marked() {
         ("camera.1/image/compressed", "foxglove.CompressedImage"),
         ("depth.0/points/points", "foxglove.PointCloud"),
         ("laser.0/scan/points", "foxglove.PointCloud"),
+        ("laser.1/scan/points", "foxglove.PointCloud"),
         ("mapper.0/pose/pose", "foxglove.PoseInFrame"),
         ("mapper.0/pose/transform", "foxglove.FrameTransform"),
         ("odometry.0/odometry/pose", "foxglove.PoseInFrame"),
@@ -84,7 +85,7 @@ fn what_is_drawn_keeps_its_times() {
             copied += 1;
         }
     }
-    assert_eq!((copied, drawn), (9, 10));
+    assert_eq!((copied, drawn), (10, 11));
 }
 
 #[test]
@@ -100,10 +101,10 @@ fn cut_and_merge_keep_what_is_drawn_and_drawing_again_does_not_double_it() {
     }
     let other = record(drawing.folder.path(), "other", &sights());
     let merged = file("merged.mcap");
-    assert_eq!(merge(&[drawing.to.clone(), other], &merged, &mut |_, _| {}).unwrap().0, 28);
+    assert_eq!(merge(&[drawing.to.clone(), other], &merged, &mut |_, _| {}).unwrap().0, 31);
     let again = file("again.mcap");
     let told = draw(&drawing.to, &again, &Selection::default(), true, &mut |_, _| {}).unwrap();
-    assert_eq!((told.messages, &told.drawn), (19, &drawing.told.drawn));
+    assert_eq!((told.messages, &told.drawn), (21, &drawing.told.drawn));
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Files of recordings, ours and others': described, read, recovered, cut, merged and drawn, or what is wrong with them.
+//! Files of recordings, ours and others': described, read, recovered, cut, merged and drawn, or what is wrong with
+//! them.
 
 use rohrpost_recording::{Reader, Selection, cut, draw, info, merge, recover};
 use std::path::{Path, PathBuf};

@@ -37,7 +37,12 @@ type FieldTable = &'static [(&'static str, i32, FieldKind)];
 const STAMP: (&str, i32, FieldKind) = ("timestamp", 1, FieldKind::One(TIMESTAMP));
 
 const VECTOR3: FieldTable = &[("x", 1, FieldKind::Double), ("y", 2, FieldKind::Double), ("z", 3, FieldKind::Double)];
-const QUATERNION: FieldTable = &[("x", 1, FieldKind::Double), ("y", 2, FieldKind::Double), ("z", 3, FieldKind::Double), ("w", 4, FieldKind::Double)];
+const QUATERNION: FieldTable = &[
+    ("x", 1, FieldKind::Double),
+    ("y", 2, FieldKind::Double),
+    ("z", 3, FieldKind::Double),
+    ("w", 4, FieldKind::Double),
+];
 const POSE: FieldTable =
     &[("position", 1, FieldKind::One("foxglove.Vector3")), ("orientation", 2, FieldKind::One("foxglove.Quaternion"))];
 const PACKED_ELEMENT_FIELD: FieldTable = &[
@@ -78,9 +83,12 @@ impl Kind {
                 ("step", 5, FieldKind::Fixed32),
                 ("data", 6, FieldKind::Bytes),
             ],
-            Self::Compressed => {
-                &[STAMP, ("frame_id", 4, FieldKind::Text), ("data", 2, FieldKind::Bytes), ("format", 3, FieldKind::Text)]
-            }
+            Self::Compressed => &[
+                STAMP,
+                ("frame_id", 4, FieldKind::Text),
+                ("data", 2, FieldKind::Bytes),
+                ("format", 3, FieldKind::Text),
+            ],
             Self::Log => &[
                 STAMP,
                 ("level", 2, FieldKind::Choice("foxglove.Log.Level")),
@@ -108,7 +116,8 @@ pub(crate) fn descriptor_set() -> Vec<u8> {
             _ => {}
         }
     }
-    let drawn = FileDescriptorProto { dependency: vec![TIMESTAMP_FILE.into()], ..file("foxglove.proto", PACKAGE, messages) };
+    let drawn =
+        FileDescriptorProto { dependency: vec![TIMESTAMP_FILE.into()], ..file("foxglove.proto", PACKAGE, messages) };
     FileDescriptorSet { file: vec![timestamp(), drawn] }.encode_to_vec()
 }
 

@@ -29,7 +29,8 @@ impl Index {
     pub(crate) fn describes_all_channels(&self) -> bool {
         let counts = &self.statistics.channel_message_counts;
         let counted = counts.values().try_fold(0_u64, |sum, count| sum.checked_add(*count));
-        counted == Some(self.statistics.message_count) && counts.keys().all(|id| self.definitions.channel(*id).is_some())
+        counted == Some(self.statistics.message_count)
+            && counts.keys().all(|id| self.definitions.channel(*id).is_some())
     }
 
     /// Whether it says of each channel with messages in which chunks they are.

@@ -2,9 +2,7 @@
 
 use rohrpost_modules::common::OutputLevel;
 use rohrpost_modules::output::OutputLine;
-use rohrpost_modules::types::{
-    Bytes, Image, ImageFormat, LaserScan, Odometry, PointCloud, PointFormat, Pose, Twist,
-};
+use rohrpost_modules::types::{Bytes, Image, ImageFormat, LaserScan, Odometry, PointCloud, PointFormat, Pose, Twist};
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::{Data, Type};
 use std::collections::BTreeMap;
@@ -25,9 +23,9 @@ pub(crate) fn pose(x_m: f64, y_m: f64, heading_rad: f64) -> Pose {
     Pose { x_m, y_m, heading_rad }
 }
 
-/// Beams forward, left, back and right; forward and right hit something.
+/// Beams forward, left, back and right; only the first hits something.
 pub(crate) fn scan(pose: Option<Pose>) -> LaserScan {
-    let ranges_m = vec![2.0, f32::NAN, 30.0, 1.0];
+    let ranges_m = vec![2.0, f32::NAN, 30.0, f32::INFINITY];
     LaserScan { start_rad: 0.0, step_rad: FRAC_PI_2, range_max_m: 10.0, ranges_m, pose }
 }
 
@@ -62,6 +60,7 @@ pub(crate) fn sights() -> Vec<Sight> {
         sight("mapper.0", "pose", &pose(3.0, 4.0, 0.0)),
         sight("pilot.0", "path", &vec![pose(0.0, 0.0, 0.0), pose(1.0, 0.5, quarter)]),
         sight("laser.0", "scan", &scan(None)),
+        sight("laser.1", "scan", &scan(Some(pose(5.0, 6.0, quarter)))),
         sight("depth.0", "points", &cloud()),
         sight("camera.0", "image", &picture()),
         sight("camera.1", "image", &jpeg),

@@ -17,9 +17,11 @@ fn python_finds_each_drawn_channel_with_its_content() {
         "mapper.0/pose/transform: foxglove.FrameTransform mapper.0 in world at (3 4 0) turned (0 0 0.000 1.000)".into(),
         "mapper.0/pose/pose: foxglove.PoseInFrame in world at (3 4 0) turned (0 0 0.000 1.000)".into(),
         format!(
-            "pilot.0/path/poses: foxglove.PosesInFrame in world at (0 0 0) turned (0 0 0.000 1.000), (1 0.5 0) {quarter}"
+            "pilot.0/path/poses: foxglove.PosesInFrame in world at (0 0 0) turned (0 0 0.000 1.000), \
+             (1 0.5 0) {quarter}"
         ),
-        "laser.0/scan/points: foxglove.PointCloud in odometry.0: (x=2 y=0 z=0) (x=0 y=-1 z=0)".into(),
+        "laser.0/scan/points: foxglove.PointCloud in odometry.0: (x=2 y=0 z=0)".into(),
+        "laser.1/scan/points: foxglove.PointCloud in world: (x=5 y=8 z=0)".into(),
         "depth.0/points/points: foxglove.PointCloud in odometry.0: \
          (x=1 y=2 z=3 red=255 green=0 blue=0 alpha=255)"
             .into(),

@@ -1,7 +1,8 @@
 //! Python's reader of MCAP, which others wrote, reads whole and recovered files, with all checksums, and counts alike.
-//! It decodes what is drawn, and its writer makes files that are listed here.
+//! It decodes what is drawn, and its writer makes files that are listed here. Rerun's converter finds what is drawn,
+//! too.
 //!
-//! `cargo xtask test --all` installs it and names the interpreter.
+//! `cargo xtask test --all` installs both and names the programs.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -9,6 +10,7 @@
 mod common;
 mod drawn;
 mod foreign;
+mod rerun;
 #[path = "../common/sights.rs"]
 mod sights;
 
