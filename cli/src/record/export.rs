@@ -5,6 +5,7 @@ use super::part::PartArguments;
 use super::progress::ProgressLine;
 use crate::terminal::{Failure, say};
 use crate::units::size;
+use rohrpost::output::plain;
 use rohrpost_recording::{Drawn, Reader, Selection};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -71,24 +72,21 @@ fn draw(file: &Path, to: &Path, selection: &Selection, with_original: bool) -> R
 }
 
 fn drawn_text(to: &Path, told: &Drawn) -> String {
-    let mut text = format!("{}: {} messages, {}", to.display(), told.messages, size(told.bytes));
-    for (topic, count) in &told.drawn {
-        text.push_str(&format!("\n{topic}: {count}"));
-    }
+    let mut lines = vec![format!("{}: {} messages, {}", to.display(), told.messages, size(told.bytes))];
+    lines.extend(told.drawn.iter().map(|(topic, count)| format!("{topic}: {count}")));
     if let Some(carrier) = &told.carrier {
-        text.push_str(&format!("\nscans and points without a place of their own are on {carrier}"));
+        lines.push(format!("scans and points without a place of their own are on {carrier}"));
     }
     let mut left_out = |counts: &BTreeMap<String, u64>, why: &str| {
-        for (topic, count) in counts {
-            text.push_str(&format!("\n{topic}: {count} not drawn: {why}"));
-        }
+        lines.extend(counts.iter().map(|(topic, count)| format!("{topic}: {count} not drawn: {why}")));
     };
     left_out(&told.not_drawn, "the value contradicts itself, or is nowhere");
     left_out(&told.too_long, "above 64 KiB it would be in the file twice; leave out --with-original");
     if !told.without.is_empty() {
-        text.push_str(&format!("\nnot drawn, as there is no picture of them: {}", told.without.join(", ")));
+        lines.push(format!("not drawn, as there is no picture of them: {}", told.without.join(", ")));
     }
-    text
+    // Texts of others would make lines of their own.
+    lines.iter().map(|line| plain::line(line)).collect::<Vec<_>>().join("\n")
 }
 
 fn write_json(file: &Path, to: &Path, selection: &Selection) -> Result<ExitCode, Failure> {

@@ -27,7 +27,7 @@ pub enum SelectError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A typing mistake would make an empty file.
-    #[error("the recording has no `{name}`; it has {}", there.join(", "))]
+    #[error("the recording has no `{name}`; it has {}", listed(there))]
     NoName {
         /// What was asked for.
         name: String,
@@ -83,6 +83,11 @@ impl Selection {
         }
         texts
     }
+}
+
+/// Topics in one line: those of others may hold ends of lines.
+pub(crate) fn listed(topics: &[String]) -> String {
+    topics.iter().map(|topic| topic.escape_debug().to_string()).collect::<Vec<_>>().join(", ")
 }
 
 fn is_of(channel: &Definition, name: &str) -> bool {

@@ -22,7 +22,7 @@ use crate::format::{MESSAGE_ENCODING, key, metadata};
 use crate::read::definitions::{Definition, SchemaText};
 use crate::read::selected::Selected;
 use crate::rewrite::{Progress, RewriteError, Rewriter};
-use crate::selection::{SelectError, Selection};
+use crate::selection::{SelectError, Selection, listed};
 use crate::shape::Shape;
 use kind::Kind;
 use one::{Origin, draw_one};
@@ -72,7 +72,7 @@ pub enum DrawError {
     /// There would be an empty file.
     #[error(
         "nothing of it can be drawn; poses, odometry, scans, points, images and output lines are drawn, and it has {}",
-        there.join(", ")
+        listed(there)
     )]
     Nothing {
         /// Topics that were selected.
