@@ -56,7 +56,7 @@ pub(crate) fn run(data: &[u8]) {
             Err(error) => refused(&files, &error),
         }
         let to = files.to("drawn.mcap");
-        match draw(&files.path, &to, &selection, data.len() % 2 == 0, &mut |_, _| {}) {
+        match draw(&files.path, &to, &selection, data.len().is_multiple_of(2), &mut |_, _| {}) {
             Ok(told) => files.check(&to, told.messages, told.bytes),
             Err(error) => refused(&files, &error),
         }
