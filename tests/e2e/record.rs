@@ -134,8 +134,8 @@ fn a_recording_is_exported_for_others_to_draw() {
     let to = to.to_str().unwrap();
     let text = place.say(&["record", "export", file, to, "--format", "drawn"]).ok();
     for words in [
-        ": 18 messages, ",
-        "\nmapper.0/pose/pose: 9\nmapper.0/pose/transform: 9\n",
+        ": 19 messages, ",
+        "\nmapper.0/pose/pose: 9\nmapper.0/pose/transform: 9\nworld/transform: 1\n",
         "are on mapper.0",
         "mapper.0/pose: 1 not drawn: ",
         "not drawn, as there is no picture of them: motor.0/speed",
@@ -153,7 +153,7 @@ fn a_recording_is_exported_for_others_to_draw() {
     let both = place.path("both.mcap");
     let with =
         ["record", "export", file, both.to_str().unwrap(), "--format", "drawn", "--with-original", "--rate", "5"];
-    assert!(place.say(&with).ok().contains(": 20 messages, "));
+    assert!(place.say(&with).ok().contains(": 21 messages, "));
 }
 
 #[test]

@@ -16,6 +16,11 @@ impl Kind {
     pub(crate) const ALL: [Self; 7] =
         [Self::Transform, Self::Pose, Self::Poses, Self::Points, Self::Image, Self::Compressed, Self::Log];
 
+    /// Whether it has a place in the world.
+    pub(crate) const fn is_in_space(self) -> bool {
+        matches!(self, Self::Transform | Self::Pose | Self::Poses | Self::Points)
+    }
+
     /// Foxglove's name for it, without its package.
     pub(crate) const fn message_name(self) -> &'static str {
         match self {

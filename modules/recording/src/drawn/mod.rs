@@ -17,15 +17,16 @@ mod poses;
 mod proto;
 mod schema;
 
-use crate::error::ReadError;
+use crate::error::{DiskError, ReadError};
 use crate::format::{MESSAGE_ENCODING, key, metadata};
+use crate::read::contents::Found;
 use crate::read::definitions::{Definition, SchemaText};
 use crate::read::selected::Selected;
 use crate::rewrite::{Progress, RewriteError, Rewriter};
 use crate::selection::{SelectError, Selection, listed};
 use crate::shape::Shape;
 use kind::Kind;
-use one::{Origin, draw_one};
+use one::{Origin, WORLD, draw_one, draw_world};
 use rohrpost_schema::{Type, decode};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -37,6 +38,7 @@ const TWICE_BYTES_MAX: usize = 64 << 10;
 /// Numbers of sources in the new file: what is copied, then what is drawn.
 const COPIED: usize = 0;
 const DRAWN: usize = 1;
+const WORLDS: usize = DRAWN + Kind::ALL.len();
 
 /// What was drawn.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -53,7 +55,7 @@ pub struct Drawn {
     pub too_long: BTreeMap<String, u64>,
     /// Topics of which nothing is drawn.
     pub without: Vec<String>,
-    /// The module that is taken to carry scanners: their points are in its frame. None: each is in its own.
+    /// The module that is taken to carry scanners: their points are in its frame. None: they are where the world begins.
     pub carrier: Option<String>,
 }
 
@@ -104,26 +106,7 @@ pub fn draw(
     new.metadata(metadata::DRAWN, selection.about(path)).map_err(RewriteError::from)?;
     while let Some(found) = selected.next()? {
         progress(selected.at(), selected.file_bytes());
-        let data = selected.data(&found);
-        let is_drawn = found.channel.texts.contains_key(key::DRAWN);
-        if with_original && !is_drawn {
-            new.message(COPIED, &found.channel, &found.header, data).map_err(RewriteError::from)?;
-        }
-        let Some(source) = drawing.sources.get_mut(&found.header.channel_id) else { continue };
-        let topic = || found.channel.topic.clone();
-        if with_original && data.len() > TWICE_BYTES_MAX {
-            *drawing.told.too_long.entry(topic()).or_default() += 1;
-            continue;
-        }
-        let Some(messages) = source.draw(data, found.header.publish_time, drawing.told.carrier.as_deref()) else {
-            *drawing.told.not_drawn.entry(topic()).or_default() += 1;
-            continue;
-        };
-        for (kind, message) in messages {
-            let channel = source.channel(kind, &found.channel, &drawing.schema);
-            *drawing.told.drawn.entry(channel.topic.clone()).or_default() += 1;
-            new.message(DRAWN + kind as usize, channel, &found.header, &message).map_err(RewriteError::from)?;
-        }
+        drawing.message(&found, selected.data(&found), with_original, &mut new).map_err(RewriteError::from)?;
     }
     let messages = new.messages();
     Ok(Drawn { bytes: new.finish()?, messages, ..drawing.told })
@@ -134,6 +117,8 @@ struct Drawing {
     sources: BTreeMap<u16, DrawnChannel>,
     /// Of all kinds.
     schema: Vec<u8>,
+    /// It is said where the world is.
+    has_world: bool,
     told: Drawn,
 }
 
@@ -148,7 +133,12 @@ struct DrawnChannel {
 
 impl Drawing {
     fn new(selected: &Selected) -> Result<Self, DrawError> {
-        let mut drawing = Self { sources: BTreeMap::new(), schema: schema::descriptor_set(), told: Drawn::default() };
+        let mut drawing = Self {
+            sources: BTreeMap::new(),
+            schema: schema::descriptor_set(),
+            has_world: false,
+            told: Drawn::default(),
+        };
         for (id, channel) in selected.channels().filter(|(_, its)| !its.texts.contains_key(key::DRAWN)) {
             match DrawnChannel::of(channel) {
                 Some(source) => drop(drawing.sources.insert(id, source)),
@@ -164,6 +154,41 @@ impl Drawing {
         drawing.told.carrier = of(Shape::Odometry).or_else(|| of(Shape::Pose)).cloned();
         Ok(drawing)
     }
+
+    fn message(
+        &mut self,
+        found: &Found,
+        data: &[u8],
+        with_original: bool,
+        new: &mut Rewriter,
+    ) -> Result<(), DiskError> {
+        let Found { channel, header, .. } = found;
+        if with_original && !channel.texts.contains_key(key::DRAWN) {
+            new.message(COPIED, channel, header, data)?;
+        }
+        let Some(source) = self.sources.get_mut(&header.channel_id) else { return Ok(()) };
+        let count = |counts: &mut BTreeMap<String, u64>, topic: &str| *counts.entry(topic.into()).or_default() += 1;
+        if with_original && data.len() > TWICE_BYTES_MAX {
+            count(&mut self.told.too_long, &channel.topic);
+            return Ok(());
+        }
+        let Some(messages) = source.draw(data, header.publish_time, self.told.carrier.as_deref()) else {
+            count(&mut self.told.not_drawn, &channel.topic);
+            return Ok(());
+        };
+        if !self.has_world && messages.iter().any(|(kind, _)| kind.is_in_space()) {
+            self.has_world = true;
+            let world = drawn_channel(WORLD, Kind::Transform, channel, &self.schema);
+            count(&mut self.told.drawn, &world.topic);
+            new.message(WORLDS, &world, header, &draw_world(header.publish_time))?;
+        }
+        for (kind, message) in messages {
+            let drawn = source.channel(kind, channel, &self.schema);
+            count(&mut self.told.drawn, &drawn.topic);
+            new.message(DRAWN + kind as usize, drawn, header, &message)?;
+        }
+        Ok(())
+    }
 }
 
 impl DrawnChannel {
@@ -175,24 +200,27 @@ impl DrawnChannel {
 
     fn draw(&self, data: &[u8], stamp_ns: u64, carrier: Option<&str>) -> Option<Vec<(Kind, Vec<u8>)>> {
         let value = decode(&self.ty, data).ok()?;
-        let origin = Origin { module: &self.module, carrier: carrier.unwrap_or(&self.module), stamp_ns };
+        let origin = Origin { module: &self.module, carrier: carrier.unwrap_or(WORLD), stamp_ns };
         draw_one(self.shape, value, &origin)
     }
 
     fn channel(&mut self, kind: Kind, of: &Definition, schema: &[u8]) -> &Arc<Definition> {
-        self.kinds.entry(kind).or_insert_with(|| {
-            let mut texts = of.texts.clone();
-            texts.insert(key::DRAWN.into(), of.topic.clone());
-            Arc::new(Definition {
-                topic: format!("{}/{}", of.topic, kind.suffix()),
-                message_encoding: schema::MESSAGE_ENCODING.into(),
-                texts,
-                schema: Arc::new(SchemaText {
-                    name: format!("foxglove.{}", kind.message_name()),
-                    encoding: schema::SCHEMA_ENCODING.into(),
-                    data: schema.to_vec(),
-                }),
-            })
-        })
+        self.kinds.entry(kind).or_insert_with(|| drawn_channel(&of.topic, kind, of, schema))
     }
+}
+
+/// A channel below a topic, marked as drawn of another one.
+fn drawn_channel(topic: &str, kind: Kind, of: &Definition, schema: &[u8]) -> Arc<Definition> {
+    let mut texts = of.texts.clone();
+    texts.insert(key::DRAWN.into(), of.topic.clone());
+    Arc::new(Definition {
+        topic: format!("{topic}/{}", kind.suffix()),
+        message_encoding: schema::MESSAGE_ENCODING.into(),
+        texts,
+        schema: Arc::new(SchemaText {
+            name: format!("foxglove.{}", kind.message_name()),
+            encoding: schema::SCHEMA_ENCODING.into(),
+            data: schema.to_vec(),
+        }),
+    })
 }

@@ -14,6 +14,8 @@ use rohrpost_schema::Value;
 
 /// The frame in which poses are given.
 pub(crate) const WORLD: &str = "world";
+/// Rerun's name for the frame in which it shows a scene, if nobody says otherwise.
+const SHOWN: &str = "tf#/";
 
 /// Whence a value comes.
 pub(crate) struct Origin<'a> {
@@ -58,6 +60,12 @@ pub(crate) fn draw_one(shape: Shape, value: Value, origin: &Origin<'_>) -> Optio
     })
 }
 
+/// That the world is where Rerun looks: without it, a scene is empty there until its user names the frame.
+pub(crate) fn draw_world(stamp_ns: u64) -> Vec<u8> {
+    let origin = Origin { module: WORLD, carrier: WORLD, stamp_ns };
+    origin.transform(SHOWN, &PlanePose::ORIGIN).encode_to_vec()
+}
+
 impl Origin<'_> {
     fn timestamp(&self) -> Option<Timestamp> {
         const BILLION: u64 = 1_000_000_000;
@@ -65,16 +73,19 @@ impl Origin<'_> {
         Some(Timestamp { seconds: (self.stamp_ns / BILLION) as i64, nanos: (self.stamp_ns % BILLION) as i32 })
     }
 
-    fn pose(&self, pose: &PlanePose) -> Vec<(Kind, Vec<u8>)> {
-        let timestamp = self.timestamp();
-        let transform = FrameTransform {
-            timestamp,
-            parent_frame_id: WORLD.into(),
+    fn transform(&self, parent: &str, pose: &PlanePose) -> FrameTransform {
+        FrameTransform {
+            timestamp: self.timestamp(),
+            parent_frame_id: parent.into(),
             child_frame_id: self.module.into(),
             translation: Some(pose.translation()),
             rotation: Some(pose.rotation()),
-        };
-        let there = PoseInFrame { timestamp, frame_id: WORLD.into(), pose: Some(pose.in_space()) };
+        }
+    }
+
+    fn pose(&self, pose: &PlanePose) -> Vec<(Kind, Vec<u8>)> {
+        let transform = self.transform(WORLD, pose);
+        let there = PoseInFrame { timestamp: self.timestamp(), frame_id: WORLD.into(), pose: Some(pose.in_space()) };
         vec![(Kind::Transform, transform.encode_to_vec()), (Kind::Pose, there.encode_to_vec())]
     }
 

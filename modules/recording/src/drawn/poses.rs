@@ -13,6 +13,8 @@ pub(crate) struct PlanePose {
 }
 
 impl PlanePose {
+    pub(crate) const ORIGIN: Self = Self { x_m: 0.0, y_m: 0.0, heading_rad: 0.0 };
+
     pub(crate) fn of(value: Value) -> Option<Self> {
         let fields = ValueFields::of(value)?;
         let (x_m, y_m) = (fields.finite("x_m")?, fields.finite("y_m")?);

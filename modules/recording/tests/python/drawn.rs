@@ -12,6 +12,7 @@ fn python_finds_each_drawn_channel_with_its_content() {
     draw(&path, &to, &Selection::default(), false, &mut |_, _| {}).unwrap();
     let quarter = "turned (0 0 0.707 0.707)";
     let wanted = [
+        "world/transform: foxglove.FrameTransform world in tf#/ at (0 0 0) turned (0 0 0.000 1.000)".into(),
         format!("odometry.0/odometry/transform: foxglove.FrameTransform odometry.0 in world at (1.5 -2 0) {quarter}"),
         format!("odometry.0/odometry/pose: foxglove.PoseInFrame in world at (1.5 -2 0) {quarter}"),
         "mapper.0/pose/transform: foxglove.FrameTransform mapper.0 in world at (3 4 0) turned (0 0 0.000 1.000)".into(),

@@ -45,6 +45,9 @@ fn rerun_finds_each_drawn_channel_with_its_content() {
     rerun(&["mcap", "convert", "-o", rrd.to_str().unwrap()], &to);
     let all = entities(&rerun(&["rrd", "print", "-vvv"], &rrd));
     for (entity, component, wanted) in [
+        ("/world/transform", "Transform3D:translation", "[[0.0, 0.0, 0.0]]"),
+        ("/world/transform", "Transform3D:child_frame", "[world]"),
+        ("/world/transform", "Transform3D:parent_frame", "[tf#/]"),
         ("/odometry.0/odometry/transform", "Transform3D:translation", "[[1.5, -2.0, 0.0]]"),
         ("/odometry.0/odometry/transform", "Transform3D:quaternion", "[[0.0, 0.0, 0.70710677, 0.70710677]]"),
         ("/odometry.0/odometry/transform", "Transform3D:child_frame", "[odometry.0]"),
