@@ -91,7 +91,7 @@ fn recovered_text(file: &Path, told: &Recovered) -> String {
 
 pub(super) fn cut(arguments: &CutArguments) -> Result<ExitCode, Failure> {
     let CutArguments { file, to, names, part, json } = arguments;
-    let selection = part.of(file, names)?;
+    let selection = part.of(&rohrpost_recording::info(file)?, names);
     let mut line = ProgressLine::new();
     let told = rohrpost_recording::cut(file, to, &selection, &mut |read, all| line.tell(read, all));
     drop(line);

@@ -6,7 +6,7 @@ use super::progress::ProgressLine;
 use crate::terminal::{Failure, say};
 use crate::units::size;
 use rohrpost::output::plain;
-use rohrpost_recording::{Drawn, Reader, Selection};
+use rohrpost_recording::{DrawOptions, Drawn, Info, Reader, Selection};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -56,16 +56,31 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
     if *with_original && *format == ExportFormat::Json {
         return Err("--with-original is for --format drawn: JSON has what was recorded, and nothing else".into());
     }
-    let selection = Selection { period_ns: *rate, ..part.of(file, names)? };
+    let info = rohrpost_recording::info(file)?;
+    let selection = Selection { period_ns: *rate, ..part.of(&info, names) };
     match format {
-        ExportFormat::Drawn => draw(file, to, &selection, *with_original),
+        ExportFormat::Drawn => {
+            let options = DrawOptions { with_original: *with_original, classes: classes(&info) };
+            draw(file, to, &selection, &options)
+        }
         ExportFormat::Json => write_json(file, to, &selection),
     }
 }
 
-fn draw(file: &Path, to: &Path, selection: &Selection, with_original: bool) -> Result<ExitCode, Failure> {
+/// Names of classes, by the configuration that was recorded.
+fn classes(info: &Info) -> BTreeMap<u8, String> {
+    let files = info.configuration.values().filter_map(|text| text.parse::<toml::Table>().ok());
+    let all = files.filter_map(|mut file| match file.remove("classes")? {
+        toml::Value::Table(classes) => Some(classes),
+        _ => None,
+    });
+    let number = |class: &toml::Value| u8::try_from(class.get("id")?.as_integer()?).ok();
+    all.flatten().filter_map(|(name, class)| Some((number(&class)?, name))).collect()
+}
+
+fn draw(file: &Path, to: &Path, selection: &Selection, options: &DrawOptions) -> Result<ExitCode, Failure> {
     let mut line = ProgressLine::new();
-    let told = rohrpost_recording::draw(file, to, selection, with_original, &mut |read, all| line.tell(read, all));
+    let told = rohrpost_recording::draw(file, to, selection, options, &mut |read, all| line.tell(read, all));
     drop(line);
     say(drawn_text(to, &told?));
     Ok(ExitCode::SUCCESS)
@@ -112,6 +127,25 @@ fn write_json(file: &Path, to: &Path, selection: &Selection) -> Result<ExitCode,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rohrpost::schema::Type;
+    use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+
+    #[test]
+    fn classes_are_named_by_the_recorded_configuration() {
+        let place = tempfile::tempdir().unwrap();
+        let text = "system = 1\n[classes]\npilot = { id = 140, text = \"Drives\" }\nodd = 7\nhuge = { id = 300 }\n";
+        let configuration = [("robot.toml", text), ("other.toml", "no [ toml")];
+        let configuration = configuration.map(|(name, text)| (name.to_owned(), text.to_owned()));
+        let session = Session { configuration: configuration.into(), ..Session::default() };
+        let mut writer = Writer::start(Options::new(place.path(), "base"), session).unwrap();
+        let spec = ChannelSpec { name: "a.0", item: "b", ty: &Type::U8, texts: BTreeMap::new() };
+        let channel = writer.channel(&spec).unwrap();
+        let message = Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: 0, data: &[7] };
+        writer.write(channel, &message).unwrap();
+        writer.finish().1.unwrap();
+        let info = rohrpost_recording::info(&place.path().join("base-0001.mcap")).unwrap();
+        assert_eq!(classes(&info), BTreeMap::from([(140, "pilot".to_owned())]));
+    }
 
     #[test]
     fn a_rate_is_the_time_between_two_messages() {

@@ -1,9 +1,7 @@
 //! Which part of a recording is meant.
 
 use super::time::{RecordTime, parse_time};
-use crate::terminal::Failure;
-use rohrpost_recording::Selection;
-use std::path::Path;
+use rohrpost_recording::{Info, Selection};
 
 /// A time range.
 #[derive(clap::Args)]
@@ -18,13 +16,12 @@ pub(super) struct PartArguments {
 
 impl PartArguments {
     /// Of these names in a file.
-    pub(super) fn of(&self, file: &Path, names: &[String]) -> Result<Selection, Failure> {
-        let info = rohrpost_recording::info(file)?;
-        Ok(Selection {
-            from_ns: self.from.map(|time| time.in_file(&info)),
-            until_ns: self.until.map(|time| time.in_file(&info)),
+    pub(super) fn of(&self, info: &Info, names: &[String]) -> Selection {
+        Selection {
+            from_ns: self.from.map(|time| time.in_file(info)),
+            until_ns: self.until.map(|time| time.in_file(info)),
             names: names.to_vec(),
             ..Selection::default()
-        })
+        }
     }
 }

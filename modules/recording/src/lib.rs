@@ -84,7 +84,7 @@ mod writer;
 
 pub use batch::Message;
 pub use cut::{CutError, cut};
-pub use drawn::{DrawError, Drawn, draw};
+pub use drawn::{DrawError, DrawOptions, Drawn, draw};
 pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
 pub use merge::{MergeError, merge};

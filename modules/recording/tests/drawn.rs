@@ -6,7 +6,7 @@
 mod sights;
 
 use rohrpost_modules::types::{Bytes, Image, ImageFormat};
-use rohrpost_recording::{DrawError, Drawn, ReadError, Reader, RewriteError, SelectError, Selection};
+use rohrpost_recording::{DrawError, DrawOptions, Drawn, ReadError, Reader, RewriteError, SelectError, Selection};
 use rohrpost_recording::{cut, draw, info, merge};
 use sights::{Sight, line, pose, record, scan, sight, sights};
 use std::path::{Path, PathBuf};
@@ -23,13 +23,17 @@ impl Drawing {
         let folder = tempfile::tempdir().unwrap();
         let path = record(folder.path(), "base", sights);
         let to = folder.path().join("drawn.mcap");
-        let told = draw(&path, &to, selection, with_original, &mut |_, _| {}).unwrap();
+        let told = draw(&path, &to, selection, &options(with_original), &mut |_, _| {}).unwrap();
         Self { folder, to, told }
     }
 
     fn all(sights: &[Sight]) -> Self {
         Self::of(sights, &Selection::default(), false)
     }
+}
+
+fn options(with_original: bool) -> DrawOptions {
+    DrawOptions { with_original, ..DrawOptions::default() }
 }
 
 /// Topics of a file, with the name of each type.
@@ -105,7 +109,7 @@ fn cut_and_merge_keep_what_is_drawn_and_drawing_again_does_not_double_it() {
     let merged = file("merged.mcap");
     assert_eq!(merge(&[drawing.to.clone(), other], &merged, &mut |_, _| {}).unwrap().0, 32);
     let again = file("again.mcap");
-    let told = draw(&drawing.to, &again, &Selection::default(), true, &mut |_, _| {}).unwrap();
+    let told = draw(&drawing.to, &again, &Selection::default(), &options(true), &mut |_, _| {}).unwrap();
     assert_eq!((told.messages, &told.drawn), (22, &drawing.told.drawn));
 }
 
@@ -158,17 +162,18 @@ fn what_cannot_be_drawn_is_explained_and_makes_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = record(folder.path(), "base", &[sight("motor.0", "speed", &7_u8)]);
     let to = folder.path().join("drawn.mcap");
-    let drawn = |selection: &Selection, to: &Path| draw(&path, to, selection, false, &mut |_, _| {}).unwrap_err();
+    let drawn =
+        |selection: &Selection, to: &Path| draw(&path, to, selection, &options(false), &mut |_, _| {}).unwrap_err();
     let error = drawn(&Selection::default(), &to);
     assert!(matches!(&error, DrawError::Nothing { there } if there == &["motor.0/speed"]), "{error}");
     let error = drawn(&Selection { names: vec!["laser.0".into()], ..Selection::default() }, &to);
     assert!(matches!(error, DrawError::Select(SelectError::NoName { .. })), "{error}");
     let scans = record(folder.path(), "scans", &[sight("laser.0", "scan", &scan(None))]);
-    let error = draw(&scans, &path, &Selection::default(), false, &mut |_, _| {}).unwrap_err();
+    let error = draw(&scans, &path, &Selection::default(), &options(false), &mut |_, _| {}).unwrap_err();
     assert!(matches!(error, DrawError::Rewrite(RewriteError::Exists(_))), "{error}");
     let bytes = std::fs::read(&scans).unwrap();
     std::fs::write(&scans, &bytes[..bytes.len() - 1]).unwrap();
-    let error = draw(&scans, &to, &Selection::default(), false, &mut |_, _| {}).unwrap_err();
+    let error = draw(&scans, &to, &Selection::default(), &options(false), &mut |_, _| {}).unwrap_err();
     assert!(matches!(error, DrawError::Select(SelectError::Read(ReadError::NotClosed { .. }))), "{error}");
     assert!(!to.exists());
 }

@@ -1,7 +1,7 @@
 //! Files of recordings, ours and others': described, read, recovered, cut, merged and drawn, or what is wrong with
 //! them.
 
-use rohrpost_recording::{Reader, Selection, cut, draw, info, merge, recover};
+use rohrpost_recording::{DrawOptions, Reader, Selection, cut, draw, info, merge, recover};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -59,7 +59,8 @@ pub(crate) fn run(data: &[u8]) {
             Err(error) => refused(&files, &error),
         }
         let to = files.to("drawn.mcap");
-        match draw(&files.path, &to, &selection, data.len().is_multiple_of(2), &mut |_, _| {}) {
+        let options = DrawOptions { with_original: data.len().is_multiple_of(2), ..DrawOptions::default() };
+        match draw(&files.path, &to, &selection, &options, &mut |_, _| {}) {
             Ok(told) => files.check(&to, told.messages, told.bytes),
             Err(error) => refused(&files, &error),
         }

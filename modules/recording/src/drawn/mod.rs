@@ -40,6 +40,15 @@ const COPIED: usize = 0;
 const DRAWN: usize = 1;
 const WORLDS: usize = DRAWN + Kind::ALL.len();
 
+/// How it is drawn.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DrawOptions {
+    /// What was recorded is copied, too. A value that is longer than 64 KiB is then not drawn.
+    pub with_original: bool,
+    /// Names of classes by their numbers: output lines say which module they are of.
+    pub classes: BTreeMap<u8, String>,
+}
+
 /// What was drawn.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Drawn {
@@ -82,8 +91,7 @@ pub enum DrawError {
     },
 }
 
-/// Draws what is selected into a new file; `with_original` copies it there, too. A value that is longer than 64 KiB is
-/// then not drawn. What was drawn before is drawn anew.
+/// Draws what is selected into a new file. What was drawn before is drawn anew.
 ///
 /// # Errors
 /// When the file was not closed or is damaged, has no such name or nothing to draw, or the new one cannot be written.
@@ -91,14 +99,14 @@ pub fn draw(
     path: &Path,
     to: &Path,
     selection: &Selection,
-    with_original: bool,
+    options: &DrawOptions,
     progress: &mut Progress<'_>,
 ) -> Result<Drawn, DrawError> {
     let mut selected = Selected::open(path, selection)?;
     let mut drawing = Drawing::new(&selected)?;
     let mut new = Rewriter::create(to)?;
     selected.each_metadata(|its| {
-        if with_original || its.name != metadata::LOST {
+        if options.with_original || its.name != metadata::LOST {
             new.metadata(&its.name, its.metadata).map_err(RewriteError::from)?;
         }
         Ok::<_, DrawError>(())
@@ -106,7 +114,7 @@ pub fn draw(
     new.metadata(metadata::DRAWN, selection.about(path)).map_err(RewriteError::from)?;
     while let Some(found) = selected.next()? {
         progress(selected.at(), selected.file_bytes());
-        drawing.message(&found, selected.data(&found), with_original, &mut new).map_err(RewriteError::from)?;
+        drawing.message(&found, selected.data(&found), options, &mut new).map_err(RewriteError::from)?;
     }
     let messages = new.messages();
     Ok(Drawn { bytes: new.finish()?, messages, ..drawing.told })
@@ -159,20 +167,27 @@ impl Drawing {
         &mut self,
         found: &Found,
         data: &[u8],
-        with_original: bool,
+        options: &DrawOptions,
         new: &mut Rewriter,
     ) -> Result<(), DiskError> {
         let Found { channel, header, .. } = found;
-        if with_original && !channel.texts.contains_key(key::DRAWN) {
+        if options.with_original && !channel.texts.contains_key(key::DRAWN) {
             new.message(COPIED, channel, header, data)?;
         }
         let Some(source) = self.sources.get_mut(&header.channel_id) else { return Ok(()) };
         let count = |counts: &mut BTreeMap<String, u64>, topic: &str| *counts.entry(topic.into()).or_default() += 1;
-        if with_original && data.len() > TWICE_BYTES_MAX {
+        if options.with_original && data.len() > TWICE_BYTES_MAX {
             count(&mut self.told.too_long, &channel.topic);
             return Ok(());
         }
-        let Some(messages) = source.draw(data, header.publish_time, self.told.carrier.as_deref()) else {
+        let origin = Origin {
+            module: &source.module,
+            carrier: self.told.carrier.as_deref().unwrap_or(WORLD),
+            stamp_ns: header.publish_time,
+            classes: &options.classes,
+        };
+        let value = decode(&source.ty, data).ok();
+        let Some(messages) = value.and_then(|value| draw_one(source.shape, value, &origin)) else {
             count(&mut self.told.not_drawn, &channel.topic);
             return Ok(());
         };
@@ -196,12 +211,6 @@ impl DrawnChannel {
         let ty = channel.schema.ty().filter(|_| channel.message_encoding == MESSAGE_ENCODING)?;
         let module = channel.texts.get(key::NAME).unwrap_or(&channel.topic).clone();
         Some(Self { module, shape: Shape::of(&ty)?, ty, kinds: BTreeMap::new() })
-    }
-
-    fn draw(&self, data: &[u8], stamp_ns: u64, carrier: Option<&str>) -> Option<Vec<(Kind, Vec<u8>)>> {
-        let value = decode(&self.ty, data).ok()?;
-        let origin = Origin { module: &self.module, carrier: carrier.unwrap_or(WORLD), stamp_ns };
-        draw_one(self.shape, value, &origin)
     }
 
     fn channel(&mut self, kind: Kind, of: &Definition, schema: &[u8]) -> &Arc<Definition> {

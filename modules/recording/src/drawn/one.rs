@@ -11,6 +11,7 @@ use crate::shape::Shape;
 use prost::Message;
 use prost_types::Timestamp;
 use rohrpost_schema::Value;
+use std::collections::BTreeMap;
 
 /// The frame in which poses are given.
 pub(crate) const WORLD: &str = "world";
@@ -24,6 +25,8 @@ pub(crate) struct Origin<'a> {
     /// The module on which scanners are.
     pub(crate) carrier: &'a str,
     pub(crate) stamp_ns: u64,
+    /// Names of classes by their numbers.
+    pub(crate) classes: &'a BTreeMap<u8, String>,
 }
 
 /// Messages of a value. None if it contradicts itself, or is nowhere.
@@ -53,8 +56,10 @@ pub(crate) fn draw_one(shape: Shape, value: Value, origin: &Origin<'_>) -> Optio
         Shape::Line => {
             let mut line = ValueFields::of(value)?;
             let level = level(line.word("level")?).into();
-            let name = line.count("module").map(module_text)?;
-            let drawn = Log { timestamp, level, message: line.text("text")?, name };
+            let name = origin.module_text(line.count("module")?);
+            // Rerun shows the text alone.
+            let message = format!("{name}: {}", line.text("text")?);
+            let drawn = Log { timestamp, level, message, name };
             vec![(Kind::Log, drawn.encode_to_vec())]
         }
     })
@@ -62,7 +67,7 @@ pub(crate) fn draw_one(shape: Shape, value: Value, origin: &Origin<'_>) -> Optio
 
 /// That the world is where Rerun looks: without it, a scene is empty there until its user names the frame.
 pub(crate) fn draw_world(stamp_ns: u64) -> Vec<u8> {
-    let origin = Origin { module: WORLD, carrier: WORLD, stamp_ns };
+    let origin = Origin { module: WORLD, carrier: WORLD, stamp_ns, classes: &BTreeMap::new() };
     origin.transform(SHOWN, &PlanePose::ORIGIN).encode_to_vec()
 }
 
@@ -89,6 +94,12 @@ impl Origin<'_> {
         vec![(Kind::Transform, transform.encode_to_vec()), (Kind::Pose, there.encode_to_vec())]
     }
 
+    /// Class and instance, or all by their numbers.
+    fn module_text(&self, name: u32) -> String {
+        let [system, class, instance, _] = name.to_be_bytes();
+        self.classes.get(&class).map_or(format!("{system}.{class}.{instance}"), |class| format!("{class}.{instance}"))
+    }
+
     fn points(&self, points: PackedPoints) -> Vec<(Kind, Vec<u8>)> {
         let frame = if points.is_in_world { WORLD } else { self.carrier };
         let drawn = PointCloud { timestamp: self.timestamp(), frame_id: frame.into(), ..points.cloud };
@@ -104,10 +115,4 @@ fn level(word: &str) -> LogLevel {
         "debug" | "trace" => LogLevel::Debug,
         _ => LogLevel::Unknown,
     }
-}
-
-/// System, class and instance by their numbers: names of classes are in the configuration alone.
-fn module_text(name: u32) -> String {
-    let [system, class, instance, _] = name.to_be_bytes();
-    format!("{system}.{class}.{instance}")
 }

@@ -2,14 +2,14 @@
 
 use super::python;
 use super::sights::{record, sights};
-use rohrpost_recording::{Selection, draw};
+use rohrpost_recording::{DrawOptions, Selection, draw};
 
 #[test]
 fn python_finds_each_drawn_channel_with_its_content() {
     let folder = tempfile::tempdir().unwrap();
     let path = record(folder.path(), "base", &sights());
     let to = folder.path().join("drawn.mcap");
-    draw(&path, &to, &Selection::default(), false, &mut |_, _| {}).unwrap();
+    draw(&path, &to, &Selection::default(), &DrawOptions::default(), &mut |_, _| {}).unwrap();
     let quarter = "turned (0 0 0.707 0.707)";
     let wanted = [
         "world/transform: foxglove.FrameTransform world in tf#/ at (0 0 0) turned (0 0 0.000 1.000)".into(),
@@ -28,7 +28,7 @@ fn python_finds_each_drawn_channel_with_its_content() {
             .into(),
         "camera.0/image/image: foxglove.RawImage of camera.0: 2 by 2 rgb8, rows 0a141e28323c 46505a646e78".into(),
         "camera.1/image/compressed: foxglove.CompressedImage of camera.1: jpeg, b'a file'".into(),
-        "output.0/line/log: foxglove.Log WARNING of 1.140.3: battery low".into(),
+        "output.0/line/log: foxglove.Log WARNING of 1.140.3: 1.140.3: battery low".into(),
     ];
     assert_eq!(python("drawn.py", &[to]), wanted);
 }

@@ -1,7 +1,7 @@
 //! What is drawn, as Rerun's converter understands it: by content, as it also converts what it shows as bytes only.
 
 use super::sights::{record, sights};
-use rohrpost_recording::{Selection, draw};
+use rohrpost_recording::{DrawOptions, Selection, draw};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -41,7 +41,8 @@ fn rerun_finds_each_drawn_channel_with_its_content() {
     let folder = tempfile::tempdir().unwrap();
     let path = record(folder.path(), "base", &sights());
     let (to, rrd) = (folder.path().join("drawn.mcap"), folder.path().join("drawn.rrd"));
-    draw(&path, &to, &Selection::default(), false, &mut |_, _| {}).unwrap();
+    let options = DrawOptions { classes: BTreeMap::from([(140, "pilot".to_owned())]), ..DrawOptions::default() };
+    draw(&path, &to, &Selection::default(), &options, &mut |_, _| {}).unwrap();
     rerun(&["mcap", "convert", "-o", rrd.to_str().unwrap()], &to);
     let all = entities(&rerun(&["rrd", "print", "-vvv"], &rrd));
     for (entity, component, wanted) in [
@@ -65,7 +66,7 @@ fn rerun_finds_each_drawn_channel_with_its_content() {
         ("/camera.0/image/image", "Image:buffer", "[[10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 110, 120]]"),
         ("/camera.1/image/compressed", "EncodedImage:media_type", "[image/jpeg]"),
         ("/camera.1/image/compressed", "EncodedImage:blob", "[[97, 32, 102, 105, 108, 101]]"),
-        ("/output.0/line/log", "TextLog:text", "[battery low]"),
+        ("/output.0/line/log", "TextLog:text", "[pilot.3: battery low]"),
         ("/output.0/line/log", "TextLog:level", "[WARN]"),
     ] {
         let found = all.get(entity).and_then(|components| components.get(component));
