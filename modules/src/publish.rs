@@ -2,6 +2,7 @@
 
 use crate::common::Subscribe;
 use crate::places::Places;
+use crate::runtime::schedule::{ClockStep, Moment};
 use rohrpost_config::Principal;
 use rohrpost_mailbox::{Name, Priority};
 
@@ -39,8 +40,9 @@ pub(crate) struct SubscriptionEntry {
     pub(crate) asked: RequestOrigin,
     pub(crate) sequence: u32,
     pub(crate) missed: u32,
+    /// When its lease ends, by the monotonic clock.
     ends_ns: u64,
-    /// Next time a periodic one is due; 0 for those that want each value.
+    /// Next time a periodic one is due, by the clock of periods.
     due_ns: u64,
     /// Whether a value has come since the last was sent.
     fresh: bool,
@@ -75,17 +77,17 @@ impl Subscriptions {
         Self { list: Vec::new(), places, missed_before: 0 }
     }
 
-    /// Begins or renews; false when there is no place. Times are monotonic.
+    /// Begins or renews; false when there is no place.
     pub(crate) fn subscribe(
         &mut self,
         endpoint: usize,
         asked: RequestOrigin,
         mut wish: Subscribe,
-        now_ns: u64,
+        now: Moment,
     ) -> bool {
         wish.period_us = if wish.period_us == 0 { 0 } else { wish.period_us.max(PERIOD_MIN_US) };
+        let (now_ns, due_ns) = (now.monotonic_ns, now.work_ns);
         let ends_ns = now_ns.saturating_add(u64::from(wish.lease_ms.min(LEASE_MAX_MS)) * 1_000_000);
-        let due_ns = if wish.period_us == 0 { 0 } else { now_ns };
         // A new incarnation of the subscriber: nobody takes what its earlier incarnation asked for.
         self.retain(|s| s.asked.by != asked.by || s.asked.incarnation == asked.incarnation);
         if let Some(known) = self.list.iter_mut().find(|s| s.asked.to == asked.to && s.wish.id == wish.id) {
@@ -162,16 +164,18 @@ impl Subscriptions {
     }
 
     /// Delivers what is due and drops those with an ended lease.
-    pub(crate) fn tick(&mut self, now_ns: u64, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
+    pub(crate) fn tick(&mut self, now: Moment, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
+        let Moment { monotonic_ns: now_ns, work_ns } = now;
         if self.list.iter().any(|subscription| subscription.ends_ns <= now_ns) {
             self.retain(|subscription| subscription.ends_ns > now_ns);
         }
         let mut gone = false;
-        for subscription in self.list.iter_mut().filter(|s| s.due_ns != 0 && s.due_ns <= now_ns) {
-            let period_ns = u64::from(subscription.wish.period_us) * 1000;
+        for subscription in self.list.iter_mut().filter(|s| s.is_periodic() && s.due_ns <= work_ns) {
+            let period_ns = subscription.period_ns();
             // Periods that passed while nobody looked are missed too, but only the newest value is sent.
-            let passed = (now_ns - subscription.due_ns) / period_ns;
-            subscription.due_ns += (passed + 1) * period_ns;
+            let passed = (work_ns - subscription.due_ns) / period_ns;
+            let after_ns = (passed + 1).saturating_mul(period_ns);
+            subscription.due_ns = subscription.due_ns.saturating_add(after_ns);
             subscription.missed = subscription.missed.saturating_add(u32::try_from(passed).unwrap_or(u32::MAX));
             if std::mem::take(&mut subscription.fresh) {
                 gone |= !subscription.settle(deliver(subscription));
@@ -184,13 +188,34 @@ impl Subscriptions {
         }
     }
 
-    /// When [`Subscriptions::tick`] has something to do next, ns.
-    pub(crate) fn next_ns(&self) -> Option<u64> {
-        self.list.iter().map(|s| if s.due_ns == 0 { s.ends_ns } else { s.ends_ns.min(s.due_ns) }).min()
+    /// The clock of periods has stepped.
+    pub(crate) fn step(&mut self, step: ClockStep) {
+        for subscription in &mut self.list {
+            subscription.due_ns = step.moved(subscription.due_ns, subscription.period_ns());
+        }
+    }
+
+    /// When a lease ends next, by the monotonic clock.
+    pub(crate) fn lease_ns(&self) -> Option<u64> {
+        self.list.iter().map(|s| s.ends_ns).min()
+    }
+
+    /// When a periodic one is due next, by the clock of periods.
+    pub(crate) fn due_ns(&self) -> Option<u64> {
+        self.list.iter().filter(|s| s.is_periodic()).map(|s| s.due_ns).min()
     }
 }
 
 impl SubscriptionEntry {
+    /// Whether it wants the newest once a period, and not each value.
+    fn is_periodic(&self) -> bool {
+        self.wish.period_us != 0
+    }
+
+    fn period_ns(&self) -> u64 {
+        u64::from(self.wish.period_us) * 1000
+    }
+
     /// Notes a delivery; false when the subscriber is gone.
     fn settle(&mut self, delivery: Delivery) -> bool {
         match delivery {
@@ -216,6 +241,11 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
+    /// A moment at which both clocks say this.
+    fn at(ns: u64) -> Moment {
+        Moment { monotonic_ns: ns, work_ns: ns }
+    }
+
     fn wish(period_ms: u32) -> Subscribe {
         Subscribe { number: 1, id: 7, period_us: period_ms * 1000, lease_ms: 1000, mailbox: 2 }
     }
@@ -234,7 +264,7 @@ mod tests {
 
     fn subscribed(period_ms: u32) -> Subscriptions {
         let mut all = Subscriptions::new(&[]);
-        assert!(all.subscribe(0, asked(2), wish(period_ms), 1));
+        assert!(all.subscribe(0, asked(2), wish(period_ms), at(1)));
         all
     }
 
@@ -249,7 +279,7 @@ mod tests {
 
     fn tick(all: &mut Subscriptions, now_ns: u64) -> usize {
         let mut sent = 0;
-        all.tick(now_ns, |_| {
+        all.tick(at(now_ns), |_| {
             sent += 1;
             Delivery::Sent
         });
@@ -285,10 +315,51 @@ mod tests {
     }
 
     #[test]
+    fn periods_are_those_of_one_clock_and_leases_those_of_the_other() {
+        let mut all = Subscriptions::new(&[]);
+        assert!(all.subscribe(0, asked(2), wish(10), Moment { monotonic_ns: 1, work_ns: 500 * MS }));
+        assert_eq!((all.due_ns(), all.lease_ns()), (Some(500 * MS), Some(1000 * MS + 1)));
+        let mut sent = 0;
+        // At ten times the pace, for 100 ms; then time stands still, until the lease ends.
+        for monotonic_ms in 0..1001 {
+            publish(&mut all, || Delivery::Sent);
+            let work_ns = (500 + 10 * monotonic_ms.min(100)) * MS;
+            all.tick(Moment { monotonic_ns: monotonic_ms * MS, work_ns }, |_| {
+                sent += 1;
+                Delivery::Sent
+            });
+        }
+        assert_eq!((sent, all.missed(), all.len()), (101, 0, 1));
+        all.tick(Moment { monotonic_ns: 1001 * MS, work_ns: 1500 * MS }, |_| unreachable!("nothing is due"));
+        assert_eq!(all.len(), 0);
+    }
+
+    #[test]
+    fn a_step_of_the_clock_leaves_what_was_left_of_a_period_and_misses_nothing() {
+        for to_ns in [0, 1, 90 * MS, 3_600_000 * MS] {
+            let mut all = subscribed(10);
+            assert_eq!((publish(&mut all, || Delivery::Sent), tick(&mut all, 1)), (0, 1));
+            publish(&mut all, || Delivery::Sent);
+            // 4 ms of the period were over.
+            all.step(ClockStep { from_ns: 1 + 4 * MS, to_ns });
+            assert_eq!(all.due_ns(), Some(to_ns + 6 * MS), "to {to_ns}");
+            let at_once = |all: &mut Subscriptions, work_ns| {
+                let mut sent = 0;
+                all.tick(Moment { monotonic_ns: 2, work_ns }, |_| {
+                    sent += 1;
+                    Delivery::Sent
+                });
+                sent
+            };
+            assert_eq!((at_once(&mut all, to_ns), at_once(&mut all, to_ns + 6 * MS), all.missed()), (0, 1, 0));
+        }
+    }
+
+    #[test]
     fn a_lease_ends_unless_it_is_renewed() {
         let mut all = subscribed(0);
         tick(&mut all, 999 * MS);
-        assert!(all.subscribe(0, asked(2), wish(0), 999 * MS));
+        assert!(all.subscribe(0, asked(2), wish(0), at(999 * MS)));
         assert_eq!(all.len(), 1, "renewed, not doubled");
         tick(&mut all, 1500 * MS);
         assert_eq!(all.len(), 1);
@@ -299,7 +370,7 @@ mod tests {
     #[test]
     fn a_lease_is_a_minute_at_most_whatever_its_subscriber_says() {
         let mut all = Subscriptions::new(&[]);
-        assert!(all.subscribe(0, asked(2), Subscribe { lease_ms: u32::MAX, ..wish(0) }, 1));
+        assert!(all.subscribe(0, asked(2), Subscribe { lease_ms: u32::MAX, ..wish(0) }, at(1)));
         let minute_ns = 60_000 * MS;
         tick(&mut all, minute_ns);
         assert_eq!(all.len(), 1);
@@ -319,7 +390,7 @@ mod tests {
                     to: Name::new(1, class, 0, 2),
                     ..asked(2)
                 };
-                all.subscribe(0, asked, Subscribe { id: *id, lease_ms: u32::MAX, ..wish(0) }, 1)
+                all.subscribe(0, asked, Subscribe { id: *id, lease_ms: u32::MAX, ..wish(0) }, at(1))
             };
             (0..200).filter(places).count()
         };
@@ -329,16 +400,16 @@ mod tests {
         assert_eq!(take(&mut all, named, 140), OWN_SUBSCRIPTIONS);
         // Over, and not dropped yet.
         let again = RequestOrigin { principal: Principal::System(9), ..asked(2) };
-        assert!(all.subscribe(0, again, wish(0), 60_000 * MS + 1));
+        assert!(all.subscribe(0, again, wish(0), at(60_000 * MS + 1)));
     }
 
     #[test]
     fn a_subscriber_that_was_started_again_has_none_of_its_earlier_subscriptions() {
         let mut all = subscribed(0);
-        assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
+        assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, at(1)));
         publish(&mut all, || Delivery::Full);
         let later = RequestOrigin { incarnation: 6, ..asked(2) };
-        assert!(all.subscribe(0, later, Subscribe { number: 2, ..wish(0) }, 2));
+        assert!(all.subscribe(0, later, Subscribe { number: 2, ..wish(0) }, at(2)));
         let left: Vec<_> = all.list.iter().map(|s| (s.wish.number, s.asked.incarnation, s.sequence)).collect();
         assert_eq!((left, all.missed()), (vec![(2, 6, 0)], 2), "and its numbers begin at 0");
     }
@@ -347,7 +418,7 @@ mod tests {
     fn mailboxes_of_one_subscriber_have_ids_of_their_own() {
         let mut all = subscribed(0);
         let own = Name::new(1, 9, 0, 3);
-        assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, 1));
+        assert!(all.subscribe(0, asked(3), Subscribe { mailbox: 3, ..wish(0) }, at(1)));
         assert_eq!((all.len(), publish(&mut all, || Delivery::Sent)), (2, 2));
         all.unsubscribe(own, 7);
         assert_eq!((all.len(), all.list[0].asked.to.local()), (1, 2));
@@ -357,11 +428,11 @@ mod tests {
     fn no_period_is_too_short_to_live_with() {
         let mut all = Subscriptions::new(&[]);
         let hasty = Subscribe { period_us: 1, lease_ms: u32::MAX, ..wish(0) };
-        assert!(all.subscribe(0, asked(2), hasty, 1));
+        assert!(all.subscribe(0, asked(2), hasty, at(1)));
         let mut now_ns = 1;
         for _ in 0..1000 {
             tick(&mut all, now_ns);
-            let next_ns = all.next_ns().unwrap();
+            let next_ns = all.due_ns().unwrap();
             assert!(next_ns >= now_ns + 1000 * u64::from(PERIOD_MIN_US), "never due again at once");
             now_ns = next_ns;
         }
@@ -374,7 +445,8 @@ mod tests {
             let mut all = subscribed(period_ms);
             let now_ns = 1 + late_ms * MS;
             tick(&mut all, now_ns);
-            assert!(all.next_ns().is_none_or(|next_ns| next_ns > now_ns), "period {period_ms}, {late_ms} late");
+            let next_ns = [all.due_ns(), all.lease_ns()].into_iter().flatten().min();
+            assert!(next_ns.is_none_or(|next_ns| next_ns > now_ns), "period {period_ms}, {late_ms} late");
         }
     }
 

@@ -13,7 +13,7 @@ use crate::module::Module;
 use crate::output;
 use crate::publish::RequestOrigin;
 use rohrpost_config::Principal;
-use rohrpost_mailbox::{BODY_BYTES_MAX, Head, Label, Name, Options, SendError, Work, local, monotonic_ns};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Head, Label, Name, Options, SendError, Work, local};
 
 /// What is needed to run one command.
 pub(super) struct Hosted<'a, M> {
@@ -74,7 +74,7 @@ impl<M: Module> Hosted<'_, M> {
                 let (wish,): (Subscribe,) = read_arguments(call.arguments)?;
                 self.offer.require_data(wish.number)?;
                 let to = data_mailbox(call, wish.mailbox)?;
-                let now_ns = monotonic_ns();
+                let now = self.context.schedule.moment();
                 let subscriptions = &mut self.context.subscriptions;
                 let asked = RequestOrigin {
                     by: call.head.from,
@@ -84,7 +84,7 @@ impl<M: Module> Hosted<'_, M> {
                     priority: call.head.priority,
                     newest: call.head.options.has(Options::NEWEST),
                 };
-                let room = subscriptions.subscribe(self.index, asked, wish, now_ns);
+                let room = subscriptions.subscribe(self.index, asked, wish, now);
                 if room {
                     return Ok(());
                 }
