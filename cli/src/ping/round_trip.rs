@@ -44,6 +44,9 @@ impl RoundTrip {
                 before.epoch, there.epoch, after.epoch
             ));
         }
+        if one_clock && pace == 0.0 {
+            return Err("the time of this node stands still".into());
+        }
         let error_s = if one_clock {
             0.0
         } else {
