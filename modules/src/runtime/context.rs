@@ -1,6 +1,7 @@
 //! What a module can ask of its runtime.
 
 mod publishing;
+mod standing_in;
 mod streaming;
 mod subscribing;
 
@@ -47,6 +48,8 @@ pub struct Context {
     pub(crate) endpoints: Vec<Name>,
     /// For each endpoint the hash of the interface that the module serves there, if it serves one.
     served: Vec<Option<u32>>,
+    /// For each endpoint numbers and names of the data that it has without types, if it stands in for another module.
+    stood_in: Vec<Option<Vec<(u16, String)>>>,
     /// Numbers and names of the functions of all of them.
     pub(crate) functions: Vec<(u16, String)>,
     pub(crate) newest: Vec<Newest>,
@@ -93,6 +96,7 @@ impl Context {
             link: Rc::new(RefCell::new(link)),
             endpoints,
             served: Vec::new(),
+            stood_in: Vec::new(),
             functions: Vec::new(),
             newest: Vec::new(),
             streams: Vec::new(),
@@ -114,6 +118,7 @@ impl Context {
     /// Under its names the module serves these interfaces.
     pub(super) fn serves<M>(&mut self, endpoints: &[Endpoint<M>]) {
         self.served = endpoints.iter().map(|endpoint| endpoint.offer.serve.map(|_| endpoint.offer.hash)).collect();
+        self.stood_in = endpoints.iter().map(|endpoint| endpoint.offer.stands_in.clone()).collect();
         self.functions = endpoints.iter().flat_map(|endpoint| endpoint.offer.functions.iter().cloned()).collect();
     }
 

@@ -7,6 +7,23 @@ use std::sync::Arc;
 const MS: u64 = 1_000_000;
 const PERIOD: Duration = Duration::from_millis(50);
 
+const CONFIG: &str = r#"
+installation = "one"
+[system]
+name = "robot"
+id = 1
+[classes]
+pilot = { id = 140, text = "Steers" }
+tool = { id = 16, text = "By hand" }
+[nodes.main]
+[time]
+source = "SOURCE"
+[[module]]
+name = "pilot.0"
+program = "pilot"
+optional = true
+"#;
+
 /// A node and the writer of its time.
 struct Ground {
     _directory: tempfile::TempDir,
@@ -154,10 +171,7 @@ fn only_simulated_and_replayed_time_is_followed() {
     let ground = Ground::at(1000 * MS);
     let clock = SystemClock::open(&ground.node);
     for (time, follows) in [("local", false), ("simulation", true), ("log", true)] {
-        let text = format!(
-            "installation = \"one\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\ntool = {{ id = 16, text = \"By \
-             hand\" }}\n[nodes.main]\n[time]\nsource = \"{time}\"\n"
-        );
+        let text = CONFIG.replace("SOURCE", time);
         let installation = Installation::parse(&text, std::path::Path::new("robot.toml")).unwrap();
         let moment = Schedule::new(&installation, &clock).moment();
         assert_eq!(moment.work_ns == 1000 * MS, follows, "{time}");

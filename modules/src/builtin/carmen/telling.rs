@@ -64,20 +64,31 @@ mod tests {
     use super::*;
     use std::path::Path;
 
+    const CONFIG: &str = r#"
+installation = "one"
+[system]
+name = "robot"
+id = 1
+[classes]
+player = { id = 170, text = "Plays" }
+tool = { id = 16, text = "By hand" }
+[nodes.main]
+[time]
+source = "SOURCE"
+[[module]]
+name = "player.3"
+builtin = "carmen"
+settings = { file = "a.log" }
+[[module]]
+name = "player.1"
+builtin = "carmen"
+settings = { file = "a.log" }
+"#;
+
     #[test]
     fn the_first_player_of_a_node_tells_the_time_if_that_is_a_logs() {
-        let player = |instance| {
-            format!(
-                "[[module]]\nname = \"player.{instance}\"\nbuiltin = \"carmen\"\nsettings = {{ file = \"a.log\" }}\n"
-            )
-        };
         for (source, expected) in [("log", [true, false]), ("local", [false; 2]), ("simulation", [false; 2])] {
-            let text = format!(
-                "installation = \"one\"\n[system]\nname = \"robot\"\nid = 1\n[classes]\nplayer = {{ id = 170, text = \
-                 \"Plays\" }}\n[nodes.main]\n[time]\nsource = \"{source}\"\n{}{}",
-                player(3),
-                player(1)
-            );
+            let text = CONFIG.replace("SOURCE", source);
             let installation = Installation::parse(&text, Path::new("robot.toml")).unwrap();
             let tells = [3, 1].map(|instance| tells_time(&installation, Name::new(1, 170, instance, 0)));
             assert_eq!(tells, expected, "{source}");

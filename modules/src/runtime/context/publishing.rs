@@ -34,7 +34,7 @@ impl Context {
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
         let at = self.newest_at(endpoint, &port)?;
         let newest = &mut self.newest[at];
-        (newest.name, newest.stamp_ns) = (port.name, stamp_ns);
+        (newest.name, newest.stamp_ns) = (port.name.into(), stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);
         let (all, _, mut outlet) = self.split();
         outlet.published(&all[at].published());
