@@ -198,9 +198,18 @@ fn programs_with_the_types_take_a_stand_in_for_the_module() {
 fn a_module_stands_in_for_its_own_names_by_descriptions_of_their_class() {
     let motors = r#"["motor.0", "motor.bin"], ["laser.0", "laser.bin"]"#;
     for (described, expected) in [
-        (format!("{motors}, [\"laser.2\", \"laser.bin\"]"), "`laser.2`, a module of class `laser`, but it does not have"),
-        (format!("{motors}, [\"laser.1\", \"motor.bin\"]"), "`laser.1`, a module of class `motor`, but that name is of"),
-        (format!("{motors}, [\"motor.0\", \"motor.bin\"]"), "`motor.0`, a module of class `motor`, but it does so twice"),
+        (
+            format!("{motors}, [\"laser.2\", \"laser.bin\"]"),
+            "`laser.2`, a module of class `laser`, but it does not have",
+        ),
+        (
+            format!("{motors}, [\"laser.1\", \"motor.bin\"]"),
+            "`laser.1`, a module of class `motor`, but that name is of",
+        ),
+        (
+            format!("{motors}, [\"motor.0\", \"motor.bin\"]"),
+            "`motor.0`, a module of class `motor`, but it does so twice",
+        ),
         (motors.into(), "`laser.1` is an alias of `player.0`, but that program has no interface of class `laser`"),
     ] {
         let refused = run_started::<Player>(Place::described(&described).start()).unwrap_err();

@@ -48,13 +48,7 @@ pub(crate) struct Offer<M> {
 
 impl<M> Endpoint<M> {
     /// `named`: callers that always find a place.
-    pub(crate) fn new(
-        name: Name,
-        class: &str,
-        commands: Receiver,
-        named: &[Principal],
-        served: Offered<M>,
-    ) -> Self {
+    pub(crate) fn new(name: Name, class: &str, commands: Receiver, named: &[Principal], served: Offered<M>) -> Self {
         let (serve, description, stands_in) = match served {
             Offered::Types(Served { description, serve, .. }) => (Some(serve), description, None),
             Offered::Description(description) => {

@@ -57,10 +57,12 @@ impl Ground {
 
 /// Ticks that are due now.
 fn ticks(schedule: &mut Schedule) -> usize {
-    (0..100).take_while(|_| {
-        let (now, _) = schedule.look();
-        schedule.take_tick(now)
-    }).count()
+    (0..100)
+        .take_while(|_| {
+            let (now, _) = schedule.look();
+            schedule.take_tick(now)
+        })
+        .count()
 }
 
 #[test]

@@ -46,7 +46,9 @@ impl Telling {
 fn set_pace(keeper: &mut Option<TimeKeeper>, pace: f64) -> bool {
     let Some(keeper) = keeper else { return false };
     if !keeper.set_pace(pace) {
-        tracing::error!("time goes on at its old pace: this computer was too busy to change it; switch off and on again");
+        tracing::error!(
+            "time goes on at its old pace: this computer was too busy to change it; switch off and on again"
+        );
     }
     true
 }
