@@ -1,9 +1,9 @@
 //! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed. Each record has its own time, also one that
 //! stands behind later ones in the log.
 //!
-//! Under `source = "log"` the first player of a node tells the node's time ([`telling`]): it begins with the log's first
-//! record, passes at the chosen speed, and stands still while the player is off. Elsewhere, and for a second player,
-//! records are moved into the present.
+//! Under `source = "log"` the first player of a node tells the node's time ([`telling`]): it begins with the log's
+//! first record, passes at the chosen speed, and stands still while the player is off. Elsewhere, and for a second
+//! player, records are moved into the present.
 
 mod telling;
 

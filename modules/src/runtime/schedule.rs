@@ -119,8 +119,8 @@ impl Schedule {
         Some(step)
     }
 
-    /// Whether it is time for a tick. Time must have passed the moment at which it is due: while time stands still there
-    /// is none, whatever was switched on meanwhile.
+    /// Whether it is time for a tick. Time must have passed the moment at which it is due: while time stands still
+    /// there is none, whatever was switched on meanwhile.
     pub(crate) fn take_tick(&mut self, now: Moment) -> bool {
         let Some(ticks) = self.ticks.as_mut().filter(|ticks| ticks.due_ns < now.work_ns) else { return false };
         // Ticks that were slept through are not made up for; the grid stays where it was.
