@@ -2,7 +2,7 @@
 
 use crate::common::Subscribe;
 use crate::places::Places;
-use crate::runtime::schedule::{ClockStep, Moment};
+use crate::runtime::schedule::{ClockStep, WorkMoment};
 use rohrpost_config::Principal;
 use rohrpost_mailbox::{Name, Priority};
 
@@ -83,7 +83,7 @@ impl Subscriptions {
         endpoint: usize,
         asked: RequestOrigin,
         mut wish: Subscribe,
-        now: Moment,
+        now: WorkMoment,
     ) -> bool {
         wish.period_us = if wish.period_us == 0 { 0 } else { wish.period_us.max(PERIOD_MIN_US) };
         let (now_ns, due_ns) = (now.monotonic_ns, now.work_ns);
@@ -164,8 +164,8 @@ impl Subscriptions {
     }
 
     /// Delivers what is due and drops those with an ended lease.
-    pub(crate) fn tick(&mut self, now: Moment, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
-        let Moment { monotonic_ns: now_ns, work_ns } = now;
+    pub(crate) fn tick(&mut self, now: WorkMoment, mut deliver: impl FnMut(&SubscriptionEntry) -> Delivery) {
+        let WorkMoment { monotonic_ns: now_ns, work_ns } = now;
         if self.list.iter().any(|subscription| subscription.ends_ns <= now_ns) {
             self.retain(|subscription| subscription.ends_ns > now_ns);
         }

@@ -3,8 +3,8 @@ use super::*;
 const MS: u64 = 1_000_000;
 
 /// A moment at which both clocks say this.
-fn at(ns: u64) -> Moment {
-    Moment { monotonic_ns: ns, work_ns: ns }
+fn at(ns: u64) -> WorkMoment {
+    WorkMoment { monotonic_ns: ns, work_ns: ns }
 }
 
 fn wish(period_ms: u32) -> Subscribe {
@@ -78,20 +78,20 @@ fn a_period_delivers_the_newest_once_or_counts_a_miss() {
 #[test]
 fn periods_are_those_of_one_clock_and_leases_those_of_the_other() {
     let mut all = Subscriptions::new(&[]);
-    assert!(all.subscribe(0, asked(2), wish(10), Moment { monotonic_ns: 1, work_ns: 500 * MS }));
+    assert!(all.subscribe(0, asked(2), wish(10), WorkMoment { monotonic_ns: 1, work_ns: 500 * MS }));
     assert_eq!((all.due_ns(), all.lease_ns()), (Some(500 * MS), Some(1000 * MS + 1)));
     let mut sent = 0;
     // At ten times the pace, for 100 ms; then time stands still, until the lease ends.
     for monotonic_ms in 0..1001 {
         publish(&mut all, || Delivery::Sent);
         let work_ns = (500 + 10 * monotonic_ms.min(100)) * MS;
-        all.tick(Moment { monotonic_ns: monotonic_ms * MS, work_ns }, |_| {
+        all.tick(WorkMoment { monotonic_ns: monotonic_ms * MS, work_ns }, |_| {
             sent += 1;
             Delivery::Sent
         });
     }
     assert_eq!((sent, all.missed(), all.len()), (101, 0, 1));
-    all.tick(Moment { monotonic_ns: 1001 * MS, work_ns: 1500 * MS }, |_| unreachable!("nothing is due"));
+    all.tick(WorkMoment { monotonic_ns: 1001 * MS, work_ns: 1500 * MS }, |_| unreachable!("nothing is due"));
     assert_eq!(all.len(), 0);
 }
 
@@ -106,7 +106,7 @@ fn a_step_of_the_clock_leaves_what_was_left_of_a_period_and_misses_nothing() {
         assert_eq!(all.due_ns(), Some(to_ns + 6 * MS), "to {to_ns}");
         let at_once = |all: &mut Subscriptions, work_ns| {
             let mut sent = 0;
-            all.tick(Moment { monotonic_ns: 2, work_ns }, |_| {
+            all.tick(WorkMoment { monotonic_ns: 2, work_ns }, |_| {
                 sent += 1;
                 Delivery::Sent
             });

@@ -1,5 +1,5 @@
-//! A node whose time is that of a log: ticks at the log's pace, none before it begins nor while it stands still, and
-//! from its beginning again when it is played anew.
+//! A log as the time of a node: ticks come at the log's pace, none before it begins nor while it stands still, and from
+//! its beginning again when it is played anew.
 
 use crate::harness::{Place, Robot, probe, wait};
 use crate::probe::ProbingInterface;

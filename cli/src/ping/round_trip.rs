@@ -155,4 +155,11 @@ mod tests {
         let round_trip = RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, true, 2.0).unwrap();
         assert_eq!((round_trip.there_s, round_trip.back_s), (50e-6, 100e-6));
     }
+
+    #[test]
+    fn a_time_that_stands_still_tells_no_one_way_times() {
+        let still = time(0, 1, 0, "log");
+        let round_trip = RoundTrip::new(&Moments { before: &still, there: &still, after: &still }, true, 0.0);
+        assert_eq!(round_trip, Err("the time of this node stands still".into()));
+    }
 }

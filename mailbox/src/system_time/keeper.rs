@@ -70,8 +70,8 @@ impl TimeKeeper {
         Ok(keeper)
     }
 
-    /// Opens the page of a node whose time another process is to begin: the player of a log. Until it does there is no
-    /// time: it stands still next to 0 in an epoch of its own, with a bound that says that nobody knows it.
+    /// Opens the page of a node for a time that another process is to begin: the player of a log. Until it does there
+    /// is no time: it stands still next to 0 in an epoch of its own, with a bound that says that nobody knows it.
     ///
     /// # Errors
     /// When the page cannot be made.

@@ -23,7 +23,7 @@ const BILLION: u64 = 1_000_000_000;
 
 /// A moment by both clocks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Moment {
+pub(crate) struct WorkMoment {
     /// For leases and timeouts: the computer's monotonic clock.
     pub(crate) monotonic_ns: u64,
     /// For ticks and periods of data.
@@ -92,18 +92,18 @@ impl Schedule {
     }
 
     /// What both clocks say.
-    pub(crate) fn moment(&self) -> Moment {
+    pub(crate) fn moment(&self) -> WorkMoment {
         let monotonic_ns = monotonic_ns();
         let work_ns = self.node.as_ref().map_or(monotonic_ns, |clock| clock.now().ns);
-        Moment { monotonic_ns, work_ns }
+        WorkMoment { monotonic_ns, work_ns }
     }
 
     /// Looks at the clocks; if that of periods has stepped since, ticks are moved, and the rest is to be.
-    pub(crate) fn look(&mut self) -> (Moment, Option<ClockStep>) {
+    pub(crate) fn look(&mut self) -> (WorkMoment, Option<ClockStep>) {
         let monotonic_ns = monotonic_ns();
-        let Some(clock) = &self.node else { return (Moment { monotonic_ns, work_ns: monotonic_ns }, None) };
+        let Some(clock) = &self.node else { return (WorkMoment { monotonic_ns, work_ns: monotonic_ns }, None) };
         let (epoch, work_ns) = seen(clock);
-        (Moment { monotonic_ns, work_ns }, self.see(epoch, work_ns))
+        (WorkMoment { monotonic_ns, work_ns }, self.see(epoch, work_ns))
     }
 
     /// Within an epoch time does not go back; a writer that lets it go back must not stop the ticks for ever.
@@ -121,7 +121,7 @@ impl Schedule {
 
     /// Whether it is time for a tick. Time must have passed the moment at which it is due: while time stands still
     /// there is none, whatever was switched on meanwhile.
-    pub(crate) fn take_tick(&mut self, now: Moment) -> bool {
+    pub(crate) fn take_tick(&mut self, now: WorkMoment) -> bool {
         let Some(ticks) = self.ticks.as_mut().filter(|ticks| ticks.due_ns < now.work_ns) else { return false };
         // Ticks that were slept through are not made up for; the grid stays where it was.
         let passed = (now.work_ns - ticks.due_ns) / ticks.period_ns;

@@ -113,7 +113,7 @@ fn a_step_leaves_what_was_left_of_the_period() {
 fn a_writer_that_lets_time_go_back_within_its_epoch_stops_no_ticks() {
     let mut schedule = Ground::at(1000 * MS).schedule();
     assert_eq!(schedule.see(1, 5000 * MS), None);
-    assert!(schedule.take_tick(Moment { monotonic_ns: 0, work_ns: 5000 * MS }));
+    assert!(schedule.take_tick(WorkMoment { monotonic_ns: 0, work_ns: 5000 * MS }));
     assert!(schedule.see(1, 10 * MS).is_some());
     assert!(schedule.tick_ns().unwrap() <= 60 * MS);
 }
@@ -165,7 +165,7 @@ fn a_wait_is_bounded_only_where_time_may_change_its_pace() {
     assert_eq!(schedule.look().1, None);
     let due_ns = schedule.tick_ns().unwrap();
     assert!((now_ns..=monotonic_ns()).contains(&due_ns), "ticks are by the computer's clock now");
-    assert!(schedule.take_tick(Moment { monotonic_ns: due_ns + 1, work_ns: due_ns + 1 }));
+    assert!(schedule.take_tick(WorkMoment { monotonic_ns: due_ns + 1, work_ns: due_ns + 1 }));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::interface::DataPort;
 use crate::publish::{Delivery, SubscriptionEntry, Subscriptions};
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::{Newest, Published};
-use crate::runtime::schedule::Moment;
+use crate::runtime::schedule::WorkMoment;
 use crate::runtime::stream::OwnStream;
 use rohrpost_config::ClassTable;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Label, Name, Options, Publications, SendError, SystemClock, Type, local};
@@ -110,7 +110,7 @@ impl Context {
     }
 
     /// Looks at the clocks, and delivers periodic data that is due.
-    pub(crate) fn deliver_due(&mut self) -> Moment {
+    pub(crate) fn deliver_due(&mut self) -> WorkMoment {
         let (now, step) = self.schedule.look();
         if let Some(step) = step {
             self.subscriptions.step(step);
