@@ -14,7 +14,7 @@ use rohrpost::{
 };
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
 use rohrpost_mailbox::local;
-use rohrpost_recording::{ChannelError, ChannelId, ChannelSpec, Message, Writer};
+use rohrpost_recording::{ChannelError, ChannelId, ChannelSpec, Message, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -55,7 +55,7 @@ struct Tap {
     least: Option<OutputLevel>,
     /// None: not yet, or it cannot be opened.
     source: Option<Source>,
-    /// Why it could not be opened, so that it is told once.
+    /// Why it could not be opened, or a message of it not be recorded, so that it is told once.
     refusal: String,
     /// Of the present writer.
     channel: Option<ChannelId>,
@@ -105,11 +105,7 @@ impl Taps {
     /// Subscribes to what modules offer that run by now. Nobody is waited for.
     pub(super) fn find(&mut self, context: &mut Context, writer: &mut Writer) -> Result<(), ModuleError> {
         let node = context.link().borrow().participant().node().clone();
-        for at in 0..self.sources.len() {
-            let source = &mut self.sources[at];
-            if source.has_answered {
-                continue;
-            }
+        for source in self.sources.iter_mut().filter(|source| !source.has_answered) {
             let description = match source.own {
                 Some(host) if runs(&node, host) => noted(&node, source.from),
                 Some(_) => None,
@@ -117,7 +113,6 @@ impl Taps {
             };
             let Some(description) = description else { continue };
             source.has_answered = true;
-            let source = &self.sources[at];
             let mut taps = source.taps(&self.recording, &description);
             for tap in &mut taps {
                 tap.channel = Some(tap.open_channel(writer)?);
@@ -144,8 +139,13 @@ impl Taps {
         };
         let sequence = data.head.sequence;
         let message = Message { arrival_ns: now.ns, stamp_ns, epoch, sequence, data: data.value };
-        // What is refused is counted, and told with the reason by `Health`.
-        let _ = writer.write(channel, &message);
+        // What is refused is counted; that the queue is full, tells `Health` with the reason.
+        if let Err(error @ WriteError::Long(_)) = writer.write(channel, &message)
+            && tap.refusal.is_empty()
+        {
+            tap.refusal = error.to_string();
+            tracing::error!("{}/{}: {}", tap.module, tap.item.field.name, tap.refusal);
+        }
     }
 }
 
@@ -228,7 +228,10 @@ impl Tap {
             }
         };
         match opened {
-            Ok(source) => self.source = Some(source),
+            Ok(source) => {
+                self.source = Some(source);
+                self.refusal.clear();
+            }
             Err(ContextError::Read(error)) => {
                 let text = error.to_string();
                 if self.refusal != text {
