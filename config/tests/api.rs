@@ -13,6 +13,7 @@ use std::time::Duration;
 
 const FULL: &str = include_str!("full.toml");
 const DEMO: &str = include_str!("../demo.toml");
+const RECORD: &str = include_str!("record.toml");
 
 fn parse(text: &str) -> Installation {
     Installation::parse(text, Path::new("conf/full.toml")).unwrap_or_else(|errors| panic!("{errors}"))
@@ -26,7 +27,7 @@ fn every_key_arrives() {
     assert_eq!(full.scheduling(Class(159)), Scheduling::Normal { nice: 0 });
     assert_eq!(full.scheduling(Class(160)), Scheduling::Fifo { priority: 1 });
     let address = Some([10, 0, 0, 1].into());
-    let base = Node { name: "base".into(), reach: Reach::Lan, address, mode: 0o770, tools: 0..=15, line: 22 };
+    let base = Node { name: "base".into(), reach: Reach::Lan, address, mode: 0o770, tools: 0..=15, line: 21 };
     assert_eq!(full.node("base"), Some(&base));
     assert_eq!(full.time, TimeSource::Master { masters: vec![1, 0], interval: Duration::from_millis(500) });
     let network = full.network.unwrap();
@@ -63,7 +64,7 @@ fn every_key_arrives() {
 
 #[test]
 fn what_is_recorded_is_found_by_module_and_item_and_is_called() {
-    let full = parse(FULL);
+    let full = parse(RECORD);
     let record = full.record.as_ref().unwrap();
     assert_eq!(record.directory, Path::new("conf/recordings"));
     assert_eq!((record.output, record.rotate_size, record.leave_free), (Some(Level::Warn), 100 << 20, 1 << 30));
@@ -84,7 +85,7 @@ fn what_is_recorded_is_found_by_module_and_item_and_is_called() {
     let mut calls: Vec<String> = recorder.calls.iter().map(|name| full.classes.format(*name)).collect();
     calls.sort();
     assert_eq!(calls, ["laser.0", "mapper.0", "motor.0", "output.0"], "subscribing is a command");
-    assert_eq!(parse(DEMO).record, None);
+    assert_eq!(parse(FULL).record, None);
 }
 
 #[test]
