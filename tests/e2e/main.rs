@@ -47,6 +47,7 @@ mod probe;
 mod process;
 mod readme;
 mod record;
+mod recorded;
 mod restart;
 mod screen;
 mod start;
