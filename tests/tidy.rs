@@ -89,7 +89,6 @@ const LONG: &[(&str, usize)] = &[
     ("mailbox/src/node.rs", 425),
     ("mailbox/src/sender.rs", 425),
     ("mailbox/src/slots.rs", 423),
-    ("mailbox/src/system_time.rs", 422),
     ("modules/src/call/deduplicator_simulation.rs", 403),
     ("modules/src/output/way.rs", 438),
     ("modules/tests/launch.rs", 404),

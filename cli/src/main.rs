@@ -29,6 +29,7 @@ mod keys;
 mod launch;
 mod list;
 mod log;
+mod logd;
 mod look;
 mod mailbox;
 mod manager;

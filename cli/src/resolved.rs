@@ -4,7 +4,8 @@
 
 use rohrpost::Name;
 use rohrpost_config::{
-    Installation, MailboxSpec, Module, Program, Reach, RestartPolicy, Scheduling, Start, StreamSpec, TimeSource, bounds,
+    Installation, Level, MailboxSpec, Module, Program, Reach, RecordedItems, Recording, RestartPolicy, Sampling,
+    Scheduling, Start, StreamSpec, TimeSource, bounds,
 };
 use rohrpost_mailbox::LAYOUT_VERSION;
 use rohrpost_network::{Bound, FlowBound, Network, Tdma};
@@ -85,6 +86,7 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
             "ring": output.ring, "file": output.file,
         },
         "gui": show.collect::<Vec<_>>(),
+        "record": installation.record.as_ref().map(|it| record(installation, it)),
         "flows": flows.collect::<Vec<_>>(),
         "access": access.collect::<Vec<_>>(),
     })
@@ -144,6 +146,26 @@ fn stream(spec: &StreamSpec) -> Value {
     json!({
         "record": spec.record_bytes, "keep": spec.keep, "readers": spec.readers, "late_ms": ms(spec.late),
         "memory": spec.memory(),
+    })
+}
+
+fn record(installation: &Installation, record: &Recording) -> Value {
+    let items = |all: &[RecordedItems]| -> Vec<Value> {
+        let item = |items: &RecordedItems| {
+            let name = items.text(&installation.classes);
+            match items.sampling {
+                Sampling::Each => json!({ "name": name }),
+                Sampling::Every(every) => json!({ "name": name, "every": every }),
+                Sampling::Rate(rate_hz) => json!({ "name": name, "rate_hz": rate_hz }),
+            }
+        };
+        all.iter().map(item).collect()
+    };
+    json!({
+        "directory": record.directory, "streams": items(&record.streams), "data": items(&record.data),
+        "output": record.output.map(Level::as_str), "rotate_size": record.rotate_size,
+        "rotate_after_ms": ms(record.rotate_after), "leave_free": record.leave_free, "flush_ms": ms(record.flush),
+        "sync_ms": ms(record.sync),
     })
 }
 

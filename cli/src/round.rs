@@ -41,10 +41,10 @@ pub(super) struct Round {
 
 impl Rounds {
     /// Finds the installation; if it has no router to ask, `alone` says what to look at instead.
-    pub(super) fn begin(&self, alone: &str, has: impl Fn(&Installation) -> bool) -> Result<Round, Failure> {
+    pub(super) fn begin(&self, alone: impl Fn(&Installation) -> Option<String>) -> Result<Round, Failure> {
         let running = self.target.find()?;
-        if !has(&running.installation) {
-            return Err(alone.into());
+        if let Some(instead) = alone(&running.installation) {
+            return Err(instead.into());
         }
         let (interval, stop) = (seconds(self.interval)?, Stop::new()?);
         let tool = running.join(PATIENCE)?;

@@ -4,7 +4,7 @@ use super::round::{Round, Rounds};
 use super::table::{table, time};
 use crate::terminal::{Failure, say};
 use rohrpost::interfaces::{BeyondLink, BeyondTime, ClockRole, ClockState, RouterInterface, TcpInterface};
-use rohrpost_config::Reach;
+use rohrpost_config::{Installation, Reach, TimeSource};
 use rohrpost_mailbox::SystemClock;
 use serde::Serialize;
 use std::process::ExitCode;
@@ -49,8 +49,7 @@ struct NodeTimes {
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let alone = "this installation has one node, and its own clock is the time; `rohrpost top` shows it";
-    let mut round = rounds.begin(alone, |installation| installation.nodes.len() > 1)?;
+    let mut round = rounds.begin(alone)?;
     let clock = SystemClock::open(&round.running.node);
     let agree = loop {
         let told = round.nodes().into_iter().map(|node| ask(&mut round, &clock, node)).collect();
@@ -62,6 +61,17 @@ pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure>
     };
     round.close();
     Ok(if agree || rounds.watch { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Where the time of an installation of one node comes from; none of several.
+fn alone(installation: &Installation) -> Option<String> {
+    let time = match installation.time {
+        TimeSource::Local | TimeSource::Master { .. } => "its own clock is the time",
+        TimeSource::Simulation { .. } => "its time is that of the simulation",
+        TimeSource::Log => "its time is that of the log that is played there",
+    };
+    let instead = || format!("this installation has one node, and {time}; `rohrpost top` shows it");
+    (installation.nodes.len() <= 1).then(instead)
 }
 
 fn ask(round: &mut Round, clock: &SystemClock, node: String) -> NodeTime {

@@ -1,6 +1,7 @@
 //! Explains an installation in words: the page that `rohrpost check` prints, readable at 100 columns.
 
 mod memory;
+mod record;
 mod slots;
 mod timeline;
 
@@ -37,6 +38,7 @@ pub fn explain(installation: &Installation, node: Option<&str>) -> String {
     }
     page.slots();
     page.output();
+    page.record();
     page.gui();
     page.flows();
     page.at_worst();

@@ -7,6 +7,7 @@ use crate::gui::Gui;
 use crate::module::Module;
 use crate::node::{self, Node, System};
 use crate::output::{Level, Output};
+use crate::record::Recording;
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tcp::Tcp;
@@ -53,6 +54,8 @@ pub struct Installation {
     pub output: Output,
     /// What the GUI draws.
     pub gui: Gui,
+    /// What is recorded; none if nothing is.
+    pub record: Option<Recording>,
     /// Regular traffic between modules.
     pub flows: Vec<Flow>,
     /// Where values of parameters are saved, if anywhere.

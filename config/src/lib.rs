@@ -60,6 +60,7 @@ mod plan;
 mod principal;
 mod program;
 mod reader;
+mod record;
 mod saved;
 mod scheduling;
 mod settings;
@@ -80,13 +81,16 @@ pub use gui::{Gui, Show};
 pub use installation::Installation;
 pub use keys::{KEY_BYTES, Key, Keys, KeysError, check_secret};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX, TRANSIT};
-pub use module::{BUILTINS, Module, Program, Restart, RestartPolicy, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER};
+pub use module::{
+    BUILTINS, Module, Program, RECORDER, Restart, RestartPolicy, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER,
+};
 pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};
 pub use plan::bounds;
 pub use principal::Principal;
 pub use program::{MissingProgram, find_program};
 pub use reader::{is_word as is_class_name, nearest};
+pub use record::{RecordedItems, Recording, Sampling};
 pub use rohrpost_mailbox::OverflowPolicy;
 pub use saved::{Saved, SavedValue};
 pub use scheduling::{FIFO_MAX, Scheduling};

@@ -13,6 +13,7 @@ use crate::network;
 use crate::node::{self, Node, System};
 use crate::output::Output;
 use crate::reader::{Reader, Section};
+use crate::record::{self, Recording};
 use crate::saved::Saved;
 use crate::scheduling::SchedulingRule;
 use crate::tcp::{self, Tcp};
@@ -92,11 +93,13 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let directory = Directory::read(&sections, &classes, &router_names);
     let context = Context { directory: &directory, nodes: &nodes };
     let read = sections.into_iter().enumerate().filter_map(|(index, section)| context.read(section, index));
-    let (modules, lines): (Vec<Module>, Vec<_>) = routers.into_iter().chain(read).unzip();
+    let (mut modules, mut lines): (Vec<Module>, Vec<_>) = routers.into_iter().chain(read).unzip();
 
     let access = Access::read_all(file.section("access", "[access]"), &classes);
     let output = Output::read(file.section("output", "[output]"), &directory, &folder);
     let gui = Gui::read(file.section("gui", "[gui]"), &directory);
+    let record = Recording::read(file.section("record", "[record]"), &directory, &folder);
+    record::connect(record.as_ref(), &file, &classes, &mut modules, &mut lines);
     let flow_sections = self::sections(&file, "flow").into_iter();
     let flows = flow_sections.filter_map(|section| Flow::read(section, &directory)).collect();
     file.finish();
@@ -121,6 +124,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         access,
         output,
         gui,
+        record,
         flows,
         parameters,
         saved: None,

@@ -16,8 +16,10 @@ use std::time::Duration;
 pub const TCP_CLIENT: &str = "tcp-client";
 /// The built-in module that is the server.
 pub const TCP_ROUTER: &str = "tcp-router";
+/// The built-in module that records.
+pub const RECORDER: &str = "logd";
 /// The modules that the `rohrpost` program itself contains.
-pub const BUILTINS: [&str; 5] = ["sim", "carmen", "mapper", "pilot", "output"];
+pub const BUILTINS: [&str; 6] = ["sim", "carmen", "mapper", "pilot", "output", RECORDER];
 
 /// What runs as a module.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -89,6 +89,11 @@ impl Level {
     pub fn as_str(self) -> &'static str {
         LEVELS[self as usize].0
     }
+
+    /// The level that a word of the file is.
+    pub(crate) fn from_word(word: &str) -> Option<Self> {
+        LEVELS.iter().find(|(known, _)| *known == word).map(|(_, level)| *level)
+    }
 }
 
 impl Output {

@@ -1,8 +1,8 @@
 //! What other crates rely on when they use an installation.
 
 use rohrpost_config::{
-    Installation, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RestartPolicy, Scheduling, Start,
-    StreamSpec, TimeSource, explain,
+    Installation, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RecordedItems, RestartPolicy, Sampling,
+    Scheduling, Start, StreamSpec, TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -13,6 +13,7 @@ use std::time::Duration;
 
 const FULL: &str = include_str!("full.toml");
 const DEMO: &str = include_str!("../demo.toml");
+const RECORD: &str = include_str!("record.toml");
 
 fn parse(text: &str) -> Installation {
     Installation::parse(text, Path::new("conf/full.toml")).unwrap_or_else(|errors| panic!("{errors}"))
@@ -59,6 +60,32 @@ fn every_key_arrives() {
     assert_eq!(full.flows[1].deadline, full.flows[1].period, "without a deadline, the next package's time");
     assert_eq!(full.gui.show[0].rate, None);
     assert_eq!(full.gui.show[1].rate, Some(0.5));
+}
+
+#[test]
+fn what_is_recorded_is_found_by_module_and_item_and_is_called() {
+    let full = parse(RECORD);
+    let record = full.record.as_ref().unwrap();
+    assert_eq!(record.directory, Path::new("conf/recordings"));
+    assert_eq!((record.output, record.rotate_size, record.leave_free), (Some(Level::Warn), 100 << 20, 1 << 30));
+    let ms = Duration::from_millis;
+    assert_eq!((record.rotate_after, record.flush, record.sync), (ms(600_000), ms(200), ms(1000)));
+    let name = |text: &str| full.classes.parse_module(text).unwrap();
+    let sampling = |items: Option<&RecordedItems>| items.map(|items| items.sampling);
+    for (module, item, stream, datum) in [
+        ("laser.0", "scan", Some(Sampling::Each), Some(Sampling::Rate(2.5))),
+        ("motor.0", "image", Some(Sampling::Every(10)), Some(Sampling::Rate(2.5))),
+        ("mapper.0", "pose", None, Some(Sampling::Each)),
+        ("mapper.0", "map", None, Some(Sampling::Rate(2.5))),
+    ] {
+        let found = (sampling(record.stream(name(module), item)), sampling(record.datum(name(module), item)));
+        assert_eq!(found, (stream, datum), "{module}/{item}");
+    }
+    let recorder = full.module(name("logd.0")).unwrap();
+    let mut calls: Vec<String> = recorder.calls.iter().map(|name| full.classes.format(*name)).collect();
+    calls.sort();
+    assert_eq!(calls, ["laser.0", "mapper.0", "motor.0", "output.0"], "subscribing is a command");
+    assert_eq!(parse(FULL).record, None);
 }
 
 #[test]

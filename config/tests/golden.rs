@@ -50,6 +50,7 @@ fn files_that_ship_load_and_explain_themselves() {
         "tests/tdma.toml",
         "tests/tcp.toml",
         "tests/beyond.toml",
+        "tests/record.toml",
         "tests/full.toml",
     ] {
         let text = fs::read_to_string(folder().join(file)).unwrap();
@@ -87,12 +88,14 @@ fn programs_that_are_not_here_are_named_for_their_node() {
 fn manual_names_every_key_and_its_example_loads() {
     let manual = fs::read_to_string(folder().join("../docs/src/configuration.md")).unwrap();
     let read = |file: &str| fs::read_to_string(folder().join("tests").join(file)).unwrap();
-    let (full, tcp) = (read("full.toml"), read("tcp.toml"));
+    let (full, tcp, record) = (read("full.toml"), read("tcp.toml"), read("record.toml"));
     let modules = full.split_once("[[module]]").unwrap().1;
     let beyond = tcp.split_once("[tcp]").unwrap().1;
+    let recorded = record.split_once("\n[record]\n").unwrap().1;
     let keys = modules
         .lines()
         .chain(beyond.lines())
+        .chain(recorded.lines())
         .filter(|line| !line.starts_with("settings"))
         .filter_map(|line| line.split_once(" = "));
     for (key, _) in keys {

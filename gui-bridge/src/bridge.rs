@@ -16,7 +16,7 @@ use rohrpost::interfaces::{CollectorInterface, CollectorProxy};
 use rohrpost::survey::{Standing, Survey};
 use rohrpost::{Context, Module, ModuleError, Name, Received};
 use rohrpost_config::{MailboxSpec, ROUTER};
-use rohrpost_mailbox::{Latency, ModuleState, Node, OverflowPolicy, Shape};
+use rohrpost_mailbox::{Latency, ModuleState, Node, OverflowPolicy, Shape, TimeSource};
 use serde::Deserialize;
 use std::marker::PhantomData;
 use std::path::PathBuf;
@@ -75,6 +75,8 @@ pub struct Bridge<V> {
     subjects: Subjects,
     /// None while switched off.
     scene: Option<Scene>,
+    /// The scene was opened before the log began that is the node's time.
+    awaits_time: bool,
     /// Drawings that were switched off and are being ended.
     ending: Vec<StreamSupervisor>,
     turn: Turn,
@@ -121,12 +123,15 @@ impl<V: Views> Module for Bridge<V> {
         context.open_mailbox(NEWEST, newest)?;
         let subjects = Subjects::new(V::make(), context, intake);
         let nodes = Nodes::new(node.clone(), &node_name, context.installation());
+        // People look at it also while the robot's time stands still.
+        context.use_computer_clock();
         context.set_period(if nodes.are_several() { COLLECT_PERIOD } else { SURVEY_PERIOD });
         Ok(Self {
             sink,
             rate_hz,
             subjects,
             scene: None,
+            awaits_time: false,
             ending: Vec::new(),
             turn: Turn::default(),
             collector: None,
@@ -141,6 +146,7 @@ impl<V: Views> Module for Bridge<V> {
 
     fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let now_ns = context.now().ns;
+        self.awaits_time = !has_time(context);
         let name = &context.installation().name;
         let scene = Scene::open_in_turn(name, self.sink.clone(), self.rate_hz, now_ns, self.turn.clone())?;
         self.scene.insert(scene).arrange(self.subjects.layout());
@@ -158,6 +164,7 @@ impl<V: Views> Module for Bridge<V> {
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        self.look_whether_time_began(context);
         self.nodes.collect(context);
         if let Some(scene) = &mut self.scene {
             self.subjects.look(scene, context);
@@ -183,6 +190,7 @@ impl<V: Views> Module for Bridge<V> {
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
+        self.look_whether_time_began(context);
         if let Some(scene) = &mut self.scene {
             self.subjects.draw(scene, context, data);
         }
@@ -210,7 +218,23 @@ impl<V> Drop for Bridge<V> {
     }
 }
 
+/// Whether the log has begun that is the node's time; of any other time, true.
+fn has_time(context: &Context) -> bool {
+    context.clock().record().is_none_or(|record| record.source != TimeSource::Log || record.is_known())
+}
+
 impl<V> Bridge<V> {
+    /// What is drawn of a log begins at robot time 0.
+    fn look_whether_time_began(&mut self, context: &Context) {
+        if !self.awaits_time || !has_time(context) {
+            return;
+        }
+        self.awaits_time = false;
+        if let Some(scene) = &mut self.scene {
+            scene.begin_at(context.now().ns);
+        }
+    }
+
     /// Looks for what has begun to run since the last time.
     fn find(&mut self, context: &mut Context, survey: &Survey) -> Result<(), ModuleError> {
         let collector = context.installation().classes.id(CollectorInterface::CLASS);

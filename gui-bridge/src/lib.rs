@@ -26,7 +26,6 @@
 mod blueprint;
 mod bridge;
 mod charts;
-mod description_request;
 mod error;
 mod feeder;
 mod files;

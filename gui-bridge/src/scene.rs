@@ -115,6 +115,12 @@ impl Scene {
         scene
     }
 
+    /// Robot time 0 is this system time: of a robot that had none before, since its log had not begun.
+    pub(crate) fn begin_at(&mut self, system_time_ns: u64) {
+        self.start_ns = system_time_ns;
+        self.set_time(system_time_ns);
+    }
+
     /// What is drawn from now on happens at this system time.
     pub fn set_time(&mut self, system_time_ns: u64) {
         self.time_ns = system_time_ns;

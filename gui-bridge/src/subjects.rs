@@ -1,12 +1,11 @@
 //! What the bridge draws of which module: wanted by the configuration, described by the module, drawn by a view.
 
 use crate::blueprint::Layout;
-use crate::description_request::DescriptionRequest;
 use crate::ring::Ring;
 use crate::view::{Datum, View, Wish};
 use crate::{Scene, views};
 use rohrpost::common::DataHead;
-use rohrpost::description::noted;
+use rohrpost::description::{DescriptionRequest, noted};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
 use rohrpost::schema::{DataItem, DataKind, Description};

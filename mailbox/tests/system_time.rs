@@ -141,6 +141,26 @@ fn a_node_that_awaits_a_master_has_its_time_or_says_that_nobody_knows() {
 }
 
 #[test]
+fn a_node_that_awaits_its_log_has_no_time_until_a_player_begins_it_and_not_that_of_an_earlier_player() {
+    let ground = Ground::new();
+    let node = ground.node();
+    let awaits = TimeKeeper::await_source(&node, TimeSource::Log).unwrap();
+    let clock = SystemClock::open(&node);
+    let record = clock.record().unwrap();
+    assert_eq!((record.epoch, record.source, record.is_known()), (0, TimeSource::Log, false));
+    assert_eq!((clock.now().ns, clock.at(monotonic_ns() + 1_000_000_000).ns), (1, 1), "it stands still");
+    let mut player = TimeKeeper::begin(&node, TimeSource::Log, 9_000, 2.0).unwrap();
+    let played = clock.record().unwrap();
+    assert_eq!((played.epoch, played.is_known()), (1, true));
+    assert!(player.set_pace(0.0));
+    assert!(clock.record().unwrap().is_known(), "time that stands still is a time");
+    drop((awaits, player));
+    let _again = TimeKeeper::await_source(&node, TimeSource::Log).unwrap();
+    let record = clock.record().unwrap();
+    assert_eq!((record.epoch, record.is_known(), clock.now().ns), (2, false, 1));
+}
+
+#[test]
 fn what_was_seen_of_the_clocks_is_left_to_the_next_writer() {
     let ground = Ground::new();
     let mut keeper = TimeKeeper::resume(&ground.node()).unwrap();

@@ -1,4 +1,8 @@
-//! What modules note of themselves on their node.
+//! What modules say of themselves: noted on their own node, and asked for from others.
+
+mod request;
+
+pub use request::DescriptionRequest;
 
 use rohrpost_mailbox::{Name, Node, local};
 use rohrpost_schema::Description;

@@ -28,6 +28,27 @@ pub trait Serve<M>: Interface {
     fn serve(module: &mut M, function: u16, arguments: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault>;
 }
 
+/// A name under which a module stands in for another one, of which it has the description and no types: a player of
+/// recordings, say. See [`crate::Module::stand_ins`].
+#[derive(Clone, Debug)]
+pub struct StandIn {
+    /// The module's own name, or one of its aliases.
+    pub name: Name,
+    /// What the other one serves there. Callers and subscribers take the one for the other, since the hash is the same.
+    pub description: Description,
+}
+
+/// A command to a name under which a module stands in for another one.
+#[derive(Clone, Copy, Debug)]
+pub struct StandInCommand<'a> {
+    /// The name.
+    pub to: Name,
+    /// The function's number; it is one of the description.
+    pub number: u16,
+    /// Postcard of all arguments.
+    pub arguments: &'a [u8],
+}
+
 /// One kind of data of an interface.
 pub struct DataPort<T> {
     /// The interface's class.

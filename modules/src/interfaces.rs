@@ -1,10 +1,12 @@
 //! Interfaces behind which hardware, simulation and logs are interchangeable (seed 002, 5.2), and those of the built-in
 //! modules.
 
+mod recorder;
 mod router;
 mod slots;
 mod tcp;
 
+pub use recorder::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecorderProxy, RecordingState};
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkCounters,
     LinkState, Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SocketFailure,

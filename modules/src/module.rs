@@ -1,9 +1,11 @@
 //! What a module's author writes: a struct, its interface, and what it does when it is switched on, off, ticked or
 //! given data.
 
-use crate::interface::Interfaces;
+use crate::call::Fault;
+use crate::interface::{Interfaces, StandIn, StandInCommand};
 use crate::parameter::ParameterSet;
 use crate::runtime::{Context, Received};
+use rohrpost_config::Installation;
 use rohrpost_mailbox::Ready;
 use serde::de::DeserializeOwned;
 use std::fmt;
@@ -75,6 +77,30 @@ pub trait Module: Sized {
     /// The module is switched off and in error.
     fn tick(&mut self, _context: &mut Context) -> Result<(), ModuleError> {
         Ok(())
+    }
+
+    /// Names under which it stands in for other modules by their descriptions, without their types. It publishes there
+    /// by [`Context::publish_as`]; commands come to [`Module::stand_in_command`]. Called before `new`, since mailboxes
+    /// and streams are made of it. Each is a name of this module, and of the class that the description says.
+    ///
+    /// # Errors
+    /// Ends the process, as an error of [`Module::new`] does.
+    fn stand_ins(_settings: &Self::Settings, _installation: &Installation) -> Result<Vec<StandIn>, ModuleError> {
+        Ok(Vec::new())
+    }
+
+    /// Takes a command to a module that it stands in for, while it is on; the result's postcard is appended to the
+    /// reply.
+    ///
+    /// # Errors
+    /// What the caller is told; as long as the module does not take commands, that nobody runs them.
+    fn stand_in_command(
+        &mut self,
+        _context: &mut Context,
+        _command: &StandInCommand<'_>,
+        _reply: &mut Vec<u8>,
+    ) -> Result<(), Fault> {
+        Err(Fault::ModuleError("another module stands in for this one, and runs no commands".into()))
     }
 
     /// Its settings that may change while it runs: `Some(&mut self.settings)`, if their struct has

@@ -97,6 +97,42 @@ fn settings_of_builtin_modules_are_checked_before_anything_runs() {
 }
 
 #[test]
+fn what_is_to_be_recorded_of_builtin_modules_is_checked_before_anything_runs() {
+    let place = Place::new();
+    let head = WRONG.split_once("[[module]]").unwrap().0.replace("mapper =", "logd = { id = 24 }\nmapper =");
+    let modules = r#"[[module]]
+name = "laser.0"
+builtin = "sim"
+settings = { map = "building.map" }
+[[module]]
+name = "mapper.0"
+builtin = "mapper"
+calls = ["laser.0", "odometry.0"]
+settings = { laser = "laser.0", odometry = "odometry.0" }
+[[module]]
+name = "odometry.0"
+program = "./wheels"
+[[module]]
+name = "logd.0"
+builtin = "logd"
+settings = { folder = "recordings" }
+[record]
+directory = "recordings"
+streams = ["laser.0/scna", "mapper.0/pose", "odometry.0/anything", "mapper.0/*"]
+data = ["mapper.0/grid", "laser.0/scan"]
+"#;
+    std::fs::write(place.path("wrong.toml"), head + modules).unwrap();
+    let expected = [
+        "29: module `logd.0`: it has no settings; write `folder` into [record]",
+        "32: [record]: `laser.0` has no stream `scna`; did you mean `scan`?",
+        "32: [record]: `mapper.0` has no stream `pose`; these are data, name them in `data`",
+        "33: [record]: `mapper.0` has no data `grid`; it has map, pose",
+    ];
+    let told = place.say(&["check", "wrong.toml"]).fails();
+    assert_eq!(told.trim_end().lines().collect::<Vec<_>>(), expected.map(|line| format!("wrong.toml:{line}")));
+}
+
+#[test]
 fn what_a_file_means_can_be_read_by_programs() {
     let place = Place::new();
     // All keys; the builtin mapper does not know its settings.

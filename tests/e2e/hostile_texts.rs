@@ -198,6 +198,8 @@ fn no_tool_lets_a_module_drive_the_terminal() {
     let tried: &[&[&str]] = &[
         &["record", "info", recording],
         &["record", "cut", recording, &place.path("cut.mcap").display().to_string(), HOSTILE],
+        &["record", "export", recording, &place.path("drawn.mcap").display().to_string(), "--format", "drawn"],
+        &["record", "export", recording, "-", "--format", "json"],
         &["call", "probe.0"],
         &["call", "probe.0", "tells"],
         &["call", "probe.0", "fails"],
@@ -263,6 +265,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["list", "--json"],
         &["top", "--once", "--json"],
         &["record", "info", recording, "--json"],
+        &["record", "export", recording, "-", "--format", "json"],
     ] {
         let said = place.say(words);
         assert_plain(words, &said.out);

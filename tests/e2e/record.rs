@@ -1,7 +1,8 @@
 //! `rohrpost record`: files of a recording at the command line.
 
 use crate::harness::Place;
-use rohrpost::schema::{Field, Members, Named, Type};
+use rohrpost::schema::{Field, Members, Named, Schema, Type};
+use rohrpost::types::Pose;
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -77,6 +78,84 @@ fn a_recording_is_described_cut_merged_and_recovered() {
     assert_eq!(place.say(&["record", "info", recovered.to_str().unwrap(), "--json"]).json()["messages"], 1000);
 }
 
+/// Poses, ten a second for a second; the heading of the last one is no number.
+fn poses(place: &Place) -> PathBuf {
+    let session = Session { node: "base".into(), ..Session::default() };
+    let options = Options { leave_bytes: 0, ..Options::new(place.path(""), "poses") };
+    let mut writer = Writer::start(options, session).unwrap();
+    let spec = ChannelSpec { name: "mapper.0", item: "pose", ty: &Pose::schema(), texts: BTreeMap::new() };
+    let pose = writer.channel(&spec).unwrap();
+    let speed = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
+    let speed = writer.channel(&speed).unwrap();
+    for number in 0..10_u32 {
+        let stamp_ns = 1_700_000_000_000_000_000 + u64::from(number) * 100_000_000;
+        let heading_rad = if number == 9 { f64::NAN } else { 0.0 };
+        let data = [f64::from(number), 0.5, heading_rad].map(f64::to_le_bytes).concat();
+        let message = Message { arrival_ns: stamp_ns + 7, stamp_ns, epoch: 3, sequence: number, data: &data };
+        writer.write(pose, &message).unwrap();
+        writer.write(speed, &Message { data: &[7], ..message }).unwrap();
+    }
+    writer.finish().1.unwrap();
+    place.path("poses-0001.mcap")
+}
+
+#[test]
+fn a_recording_is_exported_as_json() {
+    let place = Place::new();
+    let file = poses(&place);
+    let (file, to) = (file.to_str().unwrap(), place.path("poses.jsonl"));
+    let to = to.to_str().unwrap();
+    let export = ["record", "export", file, to, "--format", "json", "--names", "mapper.0"];
+    let text = place.say(&export).ok();
+    assert!(text.starts_with(&format!("{to}: 10 messages, ")), "{text}");
+    let text = std::fs::read_to_string(to).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 10, "{text}");
+    assert_eq!(
+        lines[1],
+        r#"{"topic":"mapper.0/pose","stamp_ns":1700000000100000000,"epoch":3,"arrival_ns":1700000000100000007,"#
+            .to_owned()
+            + r#""sequence":1,"value":{"x_m":1.0,"y_m":0.5,"heading_rad":0.0}}"#
+    );
+    assert!(lines[9].ends_with(r#""value":{"x_m":9.0,"y_m":0.5,"heading_rad":"NaN"}}"#), "{}", lines[9]);
+    assert!(place.say(&export).fails().contains("is there already"));
+    let part = ["record", "export", file, "-", "--format", "json", "--from", "+0.5s", "--rate", "5"];
+    let text = place.say(&part).ok();
+    let topics = text.lines().map(|line| line.split('"').nth(3).unwrap_or_default());
+    let count = |topic: &str| topics.clone().filter(|its| *its == topic).count();
+    assert_eq!((count("mapper.0/pose"), count("motor.0/speed")), (3, 3), "{text}");
+}
+
+#[test]
+fn a_recording_is_exported_for_others_to_draw() {
+    let place = Place::new();
+    let file = poses(&place);
+    let (file, to) = (file.to_str().unwrap(), place.path("drawn.mcap"));
+    let to = to.to_str().unwrap();
+    let text = place.say(&["record", "export", file, to, "--format", "drawn"]).ok();
+    for words in [
+        ": 19 messages, ",
+        "\nmapper.0/pose/pose: 9\nmapper.0/pose/transform: 9\nworld/transform: 1\n",
+        "are on mapper.0",
+        "mapper.0/pose: 1 not drawn: ",
+        "not drawn, as there is no picture of them: motor.0/speed",
+    ] {
+        assert!(text.contains(words), "no `{words}` in:\n{text}");
+    }
+    let text = place.say(&["record", "info", to]).ok();
+    assert!(text.contains("foxglove.FrameTransform protobuf, drawn of mapper.0/pose"), "{text}");
+    let told = place.say(&["record", "info", to, "--json"]).json();
+    assert_eq!(told["channels"][0]["drawn_of"], "mapper.0/pose");
+    assert!(
+        place.say(&["record", "export", to, "-", "--format", "json"]).ok().is_empty(),
+        "it is not what was recorded"
+    );
+    let both = place.path("both.mcap");
+    let with =
+        ["record", "export", file, both.to_str().unwrap(), "--format", "drawn", "--with-original", "--rate", "5"];
+    assert!(place.say(&with).ok().contains(": 21 messages, "));
+}
+
 #[test]
 fn mistakes_with_recordings_are_explained() {
     let place = Place::new();
@@ -90,10 +169,17 @@ fn mistakes_with_recordings_are_explained() {
         (&["record", "merge", file, file], "is there already"),
         (&["record", "info", "/dev/null/none"], "cannot read"),
         (&["record", "cut", file, part, "--from", "-1s", "--until", "+1s"], "the time range is empty"),
+        (&["record", "export", file, part, "--format", "drawn"], "nothing of it can be drawn; poses, "),
+        (&["record", "export", file, part, "--format", "json", "--names", "motor.7"], "has no `motor.7`; it has "),
+        (&["record", "export", file, file, "--format", "json"], "is there already; remove it, or name another file"),
+        (&["record", "export", file, part, "--format", "json", "--with-original"], "is for --format drawn"),
     ] {
         let told = place.say(arguments).fails();
         assert!(told.contains(words), "{arguments:?}: {told}");
     }
     let said = place.say(&["record", "cut", file, part, "--from", "noon"]);
     assert!(said.code == Some(2) && said.err.contains("before the end (-10s)"), "{said:?}");
+    let said = place.say(&["record", "export", file, part, "--format", "drawn", "--rate", "0"]);
+    assert!(said.code == Some(2) && said.err.contains("from 0.001 to 1000000 a second"), "{said:?}");
+    assert!(!std::path::Path::new(part).exists());
 }

@@ -122,11 +122,15 @@ fn drawings() -> Result<(), Failure> {
     )
 }
 
-/// By the makers of the format, in Python: it says whether others can read what is written here.
+/// By the makers of the format, in Python: it says whether others can read what is written here. And by Rerun, whether
+/// it shows what is drawn.
 fn recordings() -> Result<(), Failure> {
-    let python = venv::mcap()?;
+    let (python, rerun) = (venv::mcap()?, venv::venv()?.rerun);
     let test = ["test", "--package", "rohrpost-recording", "--features", "python-tests", "--test", "python"];
-    cargo::run("testing recordings with Python's reader", tests(&test).env("ROHRPOST_MCAP_PYTHON", python))
+    cargo::run(
+        "testing recordings with Python's reader and Rerun's converter",
+        tests(&test).env("ROHRPOST_MCAP_PYTHON", python).env("ROHRPOST_RERUN", rerun),
+    )
 }
 
 /// `cargo clippy` would check all of Rerun once more, 2.5 minutes, since it shares nothing with a build. As the

@@ -10,8 +10,8 @@ use std::process::Command;
 
 /// The package and its version, as `gui-bridge/Cargo.toml` has it.
 const PACKAGE: &str = "rerun-sdk==0.36.3";
-/// The library of the makers of the format, in Python, with what it needs to decompress.
-const MCAP_PACKAGE: &str = "mcap==1.6.0";
+/// The library of the makers of the format, in Python, with what it needs to decompress, and to decode protobuf.
+const MCAP_PACKAGES: &str = "mcap==1.6.0 mcap-protobuf-support==0.6.0 protobuf==7.36.2";
 
 /// A Python with Rerun in it.
 pub(crate) struct Venv {
@@ -33,13 +33,13 @@ pub(crate) fn venv() -> Result<Venv, Failure> {
 
 /// A Python that reads MCAP files; finds it, or makes it.
 pub(crate) fn mcap() -> Result<PathBuf, Failure> {
-    python_with("venv-mcap", MCAP_PACKAGE, "a reader of MCAP files", |_| Ok(()))
+    python_with("venv-mcap", MCAP_PACKAGES, "a reader of MCAP files", |_| Ok(()))
 }
 
-/// The interpreter of an environment with a package.
+/// The interpreter of an environment with packages, which stand in one line.
 fn python_with(
     name: &str,
-    package: &str,
+    packages: &str,
     what: &str,
     then: impl Fn(&Path) -> Result<(), Failure>,
 ) -> Result<PathBuf, Failure> {
@@ -47,7 +47,7 @@ fn python_with(
     let python = folder.join("bin").join("python");
     // Written last: a folder without it was interrupted.
     let stamp = folder.join("rohrpost-stamp");
-    if std::fs::read_to_string(&stamp).is_ok_and(|made| made == package) {
+    if std::fs::read_to_string(&stamp).is_ok_and(|made| made == packages) {
         return Ok(python);
     }
     let why = format!("making a Python environment in target/{name}");
@@ -55,10 +55,12 @@ fn python_with(
         .map_err(|failure| format!("{failure}; on Debian: apt-get install -y python3-venv"))?;
     cargo::run(
         &format!("installing {what} in it"),
-        Command::new(&python).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", package]),
+        Command::new(&python)
+            .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
+            .args(packages.split(' ')),
     )?;
     then(&python)?;
-    std::fs::write(&stamp, package).map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
+    std::fs::write(&stamp, packages).map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
     Ok(python)
 }
 

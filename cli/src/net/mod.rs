@@ -51,8 +51,10 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(Arguments { rounds }: &Arguments) -> Result<ExitCode, Failure> {
-    let alone = "this installation has one node, and so no routers; `rohrpost list` shows what runs";
-    let mut round = rounds.begin(alone, |installation| installation.network.is_some() || installation.tcp.is_some())?;
+    let mut round = rounds.begin(|installation| {
+        let alone = "this installation has one node, and so no routers; `rohrpost list` shows what runs";
+        (installation.network.is_none() && installation.tcp.is_none()).then(|| alone.into())
+    })?;
     let mut before = look(&mut round);
     let mut vocabulary = Vocabulary::default();
     let mut wait = LOOK_AGAIN;

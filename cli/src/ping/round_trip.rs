@@ -44,6 +44,9 @@ impl RoundTrip {
                 before.epoch, there.epoch, after.epoch
             ));
         }
+        if one_clock && pace == 0.0 {
+            return Err("the time of this node stands still".into());
+        }
         let error_s = if one_clock {
             0.0
         } else {
@@ -151,5 +154,12 @@ mod tests {
         let (before, there, after) = (time(0, 1, 0, "local"), time(100, 1, 0, "local"), time(300, 1, 0, "local"));
         let round_trip = RoundTrip::new(&Moments { before: &before, there: &there, after: &after }, true, 2.0).unwrap();
         assert_eq!((round_trip.there_s, round_trip.back_s), (50e-6, 100e-6));
+    }
+
+    #[test]
+    fn a_time_that_stands_still_tells_no_one_way_times() {
+        let still = time(0, 1, 0, "log");
+        let round_trip = RoundTrip::new(&Moments { before: &still, there: &still, after: &still }, true, 0.0);
+        assert_eq!(round_trip, Err("the time of this node stands still".into()));
     }
 }

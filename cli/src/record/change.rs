@@ -1,10 +1,10 @@
 //! `record recover`, `record cut` and `record merge`: new files from old ones.
 
+use super::part::PartArguments;
 use super::progress::ProgressLine;
-use super::time::{RecordTime, parse_time};
 use crate::terminal::{Failure, say};
 use crate::units::size;
-use rohrpost_recording::{Recovered, Selection};
+use rohrpost_recording::Recovered;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -29,12 +29,8 @@ pub(super) struct CutArguments {
     to: PathBuf,
     /// Names (laser.0) or topics (laser.0/scan) to keep; all, if none is named.
     names: Vec<String>,
-    /// What arrived from then on: seconds since 1970, from the begin (+10s), or before the end (-10s).
-    #[arg(long, value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
-    from: Option<RecordTime>,
-    /// What arrived before then.
-    #[arg(long, value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
-    until: Option<RecordTime>,
+    #[command(flatten)]
+    part: PartArguments,
     /// One JSON object.
     #[arg(long)]
     json: bool,
@@ -94,13 +90,8 @@ fn recovered_text(file: &Path, told: &Recovered) -> String {
 }
 
 pub(super) fn cut(arguments: &CutArguments) -> Result<ExitCode, Failure> {
-    let CutArguments { file, to, names, from, until, json } = arguments;
-    let info = rohrpost_recording::info(file)?;
-    let selection = Selection {
-        from_ns: from.map(|time| time.in_file(&info)),
-        until_ns: until.map(|time| time.in_file(&info)),
-        names: names.clone(),
-    };
+    let CutArguments { file, to, names, part, json } = arguments;
+    let selection = part.of(&rohrpost_recording::info(file)?, names);
     let mut line = ProgressLine::new();
     let told = rohrpost_recording::cut(file, to, &selection, &mut |read, all| line.tell(read, all));
     drop(line);

@@ -6,6 +6,7 @@ use crate::terminal::{Failure, complain, say};
 use crate::units::size;
 use rohrpost::output::plain;
 use rohrpost::schema::describe_type;
+use rohrpost_recording::format::PROFILE;
 use rohrpost_recording::{ChannelInfo, Info};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -58,6 +59,10 @@ fn text(info: &Info) -> String {
         let epochs = info.epochs.iter().map(|its| format!("{} ({} messages)", its.epoch, its.messages));
         lines.push(format!("system time stepped; epochs: {}", epochs.collect::<Vec<_>>().join(", ")));
     }
+    if info.profile != PROFILE {
+        let profile = if info.profile.is_empty() { "no profile" } else { &info.profile };
+        lines.push(format!("not one of ours: {profile}, written by {}", info.library));
+    }
     let session = info.session.iter().map(|(key, text)| format!("{key} {text}"));
     if !info.session.is_empty() {
         lines.push(session.collect::<Vec<_>>().join(", "));
@@ -79,11 +84,22 @@ fn text(info: &Info) -> String {
 /// Messages a second, over the time in which they came.
 fn rate(channel: &ChannelInfo) -> Option<f64> {
     let ns = channel.last_ns?.checked_sub(channel.first_ns?).filter(|ns| *ns > 0)?;
-    Some((channel.messages - 1) as f64 * 1e9 / ns as f64)
+    Some(channel.messages.saturating_sub(1) as f64 * 1e9 / ns as f64)
 }
 
+/// Of others the name, and how values and types are written.
 fn type_text(channel: &ChannelInfo) -> String {
-    channel.ty.as_ref().map_or_else(|| channel.type_name.clone(), describe_type)
+    let ChannelInfo { ty, type_name, message_encoding, schema_encoding, drawn_of, .. } = channel;
+    match ty {
+        Some(ty) => describe_type(ty),
+        None => {
+            let words = [type_name.as_str(), message_encoding, schema_encoding];
+            let mut words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).collect();
+            words.dedup();
+            let drawn = drawn_of.as_ref().map_or(String::new(), |topic| format!(", drawn of {topic}"));
+            format!("{}{drawn}", words.join(" "))
+        }
+    }
 }
 
 fn as_json(info: &Info) -> Value {
@@ -91,6 +107,7 @@ fn as_json(info: &Info) -> Value {
         json!({
             "topic": channel.topic, "name": channel.name, "item": channel.item, "type_name": channel.type_name,
             "type": channel.ty.as_ref().map(describe_type), "message_encoding": channel.message_encoding,
+            "schema_encoding": channel.schema_encoding, "drawn_of": channel.drawn_of,
             "messages": channel.messages, "lost": channel.lost, "first_ns": channel.first_ns,
             "last_ns": channel.last_ns,
         })
@@ -102,7 +119,8 @@ fn as_json(info: &Info) -> Value {
     let others = info.others.iter().map(|(name, texts)| json!({"name": name, "texts": texts}));
     json!({
         "path": info.path, "bytes": info.bytes, "is_closed": info.is_closed, "closed_because": info.closed_because,
-        "library": info.library, "chunks": info.chunks, "messages": info.messages, "lost": info.lost,
+        "library": info.library, "profile": info.profile, "chunks": info.chunks, "messages": info.messages,
+        "lost": info.lost,
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
         "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),

@@ -1,7 +1,10 @@
-//! `rohrpost record`: files of recordings, described, made whole, cut and merged. Looks at no running node.
+//! `rohrpost record`: files of recordings, described, made whole, cut, merged and exported. Looks at no running node.
 
 mod change;
+mod export;
 mod info;
+mod jsonl;
+mod part;
 mod progress;
 mod time;
 
@@ -15,7 +18,10 @@ use std::process::ExitCode;
   rohrpost record cut base-0001.mcap part.mcap --from +10s --until +20s
   rohrpost record cut base-0001.mcap scans.mcap laser.0 odometry.0/pose
   rohrpost record merge all.mcap base-0001.mcap base-0002.mcap arm-0001.mcap
-No file is ever changed or overwritten. Rerun, Foxglove and other programs read the files, too (MCAP).")]
+  rohrpost record export base-0001.mcap drawn.mcap --format drawn --rate 10; rerun drawn.mcap
+  rohrpost record export base-0001.mcap - --format json --names pilot.0
+No file is ever changed or overwritten. Other programs read the files, too (MCAP); Rerun and Foxglove draw what is
+exported.")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     action: RecordCommand,
@@ -31,6 +37,8 @@ enum RecordCommand {
     Cut(change::CutArguments),
     /// Copy several files into a new one, ordered by time of arrival.
     Merge(change::MergeArguments),
+    /// Make a file for others: what Rerun and Foxglove draw, or JSON.
+    Export(export::ExportArguments),
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -39,5 +47,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         RecordCommand::Recover(arguments) => change::recover(arguments),
         RecordCommand::Cut(arguments) => change::cut(arguments),
         RecordCommand::Merge(arguments) => change::merge(arguments),
+        RecordCommand::Export(arguments) => export::run(arguments),
     }
 }

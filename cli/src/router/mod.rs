@@ -77,6 +77,7 @@ impl Module for RouterModule {
             Some(keys) => Shell::start_sealed(parts, keys)?,
             None => Shell::start(parts)?,
         };
+        context.use_computer_clock();
         context.set_period(PERIOD);
         Ok(Self { shell })
     }

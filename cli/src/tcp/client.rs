@@ -69,6 +69,7 @@ impl Module for ClientModule {
             keeps_time: is_beyond,
             impair,
         })?;
+        context.use_computer_clock();
         context.set_period(PERIOD);
         Ok(Self { shell, node: node_name, server })
     }

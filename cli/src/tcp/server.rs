@@ -55,6 +55,7 @@ impl Module for ServerModule {
         let faults = Arc::new(Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
         let shell = ServerShell::start(ServerParts { address, settings, faults, seal, names, node: &node })?;
+        context.use_computer_clock();
         context.set_period(PERIOD);
         Ok(Self { shell, address, began_ns: monotonic_ns() })
     }

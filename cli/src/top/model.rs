@@ -48,6 +48,8 @@ pub(super) struct TimeNow {
     pub(super) time_source: &'static str,
     /// Its seconds per second of this computer.
     pub(super) time_pace: f64,
+    /// Whether its source has told it: a log that has not begun has not.
+    pub(super) time_known: bool,
 }
 
 /// Everything that is shown.

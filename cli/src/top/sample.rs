@@ -51,6 +51,7 @@ pub(super) fn put_together(
         time_ns: clock.now().ns,
         time_source: record.map_or("local", |record| record.source.name()),
         time_pace: record.map_or(1.0, |record| record.pace_ppb as f64 / 1e9),
+        time_known: record.is_none_or(|record| record.is_known()),
     };
     let launched = running.node.launcher().is_some();
     Sample { survey, silent, lines, time, launched }

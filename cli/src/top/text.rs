@@ -2,7 +2,7 @@
 
 use super::super::table;
 use super::columns::{Column, short};
-use super::model::Model;
+use super::model::{Model, TimeNow};
 use rohrpost::output::{iso, plain};
 use rohrpost::survey::Standing;
 
@@ -56,9 +56,10 @@ pub(super) fn head(model: &Model) -> [String; 2] {
         1 => format!("{}.{}", model.installation, model.nodes[0]),
         several => format!("{}: {several} nodes", model.installation),
     };
-    let mut first = vec![whole, date(model.time.time_ns)];
-    let pace = if model.time.time_pace == 1.0 { String::new() } else { format!(" x {}", model.time.time_pace) };
-    first.push(format!("{}{pace}", model.time.time_source));
+    let TimeNow { time_ns, time_source, time_pace, time_known } = model.time;
+    let date = if time_known { date(time_ns) } else { "no time yet".into() };
+    let pace = if time_pace == 1.0 || !time_known { String::new() } else { format!(" x {time_pace}") };
+    let mut first = vec![whole, date, format!("{time_source}{pace}")];
     if !model.launched {
         first.push("NOT LAUNCHED".into());
     }

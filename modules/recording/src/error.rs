@@ -155,11 +155,14 @@ pub enum Damage {
     #[error("a chunk cannot be decompressed")]
     Compression,
     /// Written by another program.
-    #[error("a chunk is compressed by `{0}`; only zstd is read here")]
+    #[error("a chunk is compressed by `{0}`; zstd and lz4 are read here")]
     ForeignCompression(String),
     /// Its channel is not described before it.
     #[error("a message of channel {0}, which is not described")]
     UnknownChannel(u16),
+    /// Its schema is not described before it.
+    #[error("a channel of schema {0}, which is not described")]
+    UnknownSchema(u16),
     /// Described twice, and not in the same way.
     #[error("channel or schema {0} is described twice, differently")]
     Redefined(u16),

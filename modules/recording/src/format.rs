@@ -36,6 +36,8 @@ pub mod metadata {
     pub const RECOVERED: &str = "rohrpost.recovered";
     /// The file was made by `cut`: from which, and what was taken.
     pub const CUT: &str = "rohrpost.cut";
+    /// The file was made by `draw`: from which, and what was taken.
+    pub const DRAWN: &str = "rohrpost.drawn";
     /// The file was made by `merge`: a number and a name for each.
     pub const MERGED: &str = "rohrpost.merged";
 }
@@ -48,6 +50,8 @@ pub mod key {
     pub const ITEM: &str = "item";
     /// Of system time. A step begins another channel of the same topic, so each message says its epoch.
     pub const EPOCH: &str = "epoch";
+    /// Of a channel that was drawn of another one, for other programs: the topic of that.
+    pub const DRAWN: &str = "drawn";
 }
 
 /// Operation codes of records.

@@ -24,6 +24,8 @@ pub struct Info {
     pub closed_because: Option<String>,
     /// Which program wrote it.
     pub library: String,
+    /// Of which kind it is: `rohrpost` in our files, `ros2` in those of rosbag2.
+    pub profile: String,
     /// Where it is not readable: looked for in files that were not closed.
     pub damages: Vec<(u64, Damage)>,
     /// Chunks.
@@ -61,8 +63,12 @@ pub struct ChannelInfo {
     pub type_name: String,
     /// Its type, if it is one of ours.
     pub ty: Option<Type>,
+    /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
+    pub schema_encoding: String,
     /// `postcard` in our files.
     pub message_encoding: String,
+    /// The topic that it was drawn of for other programs, if it was.
+    pub drawn_of: Option<String>,
     /// Messages.
     pub messages: u64,
     /// Messages that should be here, and are not.
@@ -86,15 +92,15 @@ pub struct EpochInfo {
     pub messages: u64,
 }
 
-/// Reads the index of a closed file, and all of a file that is not.
+/// Reads the index of a closed file; all of a file that is not, or that has no index of its messages, as others write.
 ///
 /// # Errors
 /// When it is no MCAP file, or its index is damaged.
 pub fn info(path: &Path) -> Result<Info, ReadError> {
     let mut frames = Frames::open(path)?;
     match Index::read(&mut frames) {
-        Ok(index) => from_index(frames, &index),
-        Err(ReadError::NotClosed { .. }) => from_all(path),
+        Ok(index) if index.knows_all_channels() => from_index(frames, &index),
+        Ok(_) | Err(ReadError::NotClosed { .. }) => from_all(path),
         Err(error) => Err(error),
     }
 }
@@ -179,9 +185,10 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         is_closed: false,
         closed_because: None,
         library: contents.header().map(|header| header.library.clone()).unwrap_or_default(),
+        profile: contents.header().map(|header| header.profile.clone()).unwrap_or_default(),
         damages: Vec::new(),
         chunks: 0,
-        messages: tallies.values().map(|tally| tally.messages).sum(),
+        messages: sum(tallies.values().map(|tally| tally.messages)),
         lost: 0,
         first_ns: None,
         last_ns: None,
@@ -213,7 +220,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         times = wider(times, its_times);
         if let Some(epoch) = channel.epoch().filter(|_| messages > 0) {
             let tally = epochs.entry(epoch).or_default();
-            tally.messages += messages;
+            tally.messages = tally.messages.saturating_add(messages);
             tally.widen(its_times);
         }
     }
@@ -223,7 +230,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         channel.lost = *count;
     }
     (info.first_ns, info.last_ns) = times.unzip();
-    info.lost = lost.values().sum();
+    info.lost = sum(lost.values().copied());
     info.channels = channels.into_values().collect();
     let epoch_info = |(epoch, Tally { messages, times }): (u64, Tally)| {
         let (first_ns, last_ns) = times.unzip();
@@ -233,6 +240,11 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
     info
 }
 
+/// Files may claim any count.
+fn sum(counts: impl Iterator<Item = u64>) -> u64 {
+    counts.fold(0, u64::saturating_add)
+}
+
 /// A topic has a channel for each epoch.
 fn add(info: &mut ChannelInfo, channel: &Definition, messages: u64, times: Option<(u64, u64)>) {
     let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
@@ -240,7 +252,9 @@ fn add(info: &mut ChannelInfo, channel: &Definition, messages: u64, times: Optio
     (info.name, info.item) = (text(key::NAME), text(key::ITEM));
     info.type_name.clone_from(&channel.schema.name);
     info.ty = channel.schema.ty();
+    info.schema_encoding.clone_from(&channel.schema.encoding);
     info.message_encoding.clone_from(&channel.message_encoding);
-    info.messages += messages;
+    info.drawn_of = channel.texts.get(key::DRAWN).cloned();
+    info.messages = info.messages.saturating_add(messages);
     (info.first_ns, info.last_ns) = wider(info.first_ns.zip(info.last_ns), times).unzip();
 }

@@ -7,6 +7,7 @@
 //!     counted as lost             Status; again, with a new file
 //!
 //! cut, killed, damaged file ─▶ recover ─▶ whole file ─▶ info, cut, merge, Reader ─▶ Player: what is due, and when
+//!                                                   └─▶ draw: for Rerun and Foxglove
 //! ```
 //!
 //! [`Writer::write`] takes as long as copying the message, whatever the disk does. What does not fit the bounded queue
@@ -45,7 +46,9 @@
 //! - **Each file stands alone:** session, configuration, types and channels are in each; counts of lost messages are
 //!   those since its beginning.
 //! - **A failed file is cut back** to its last whole chunk, so that no message is in two files.
-//! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut` and `merge`.
+//! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut`, `merge` and `draw`.
+//! - **What other programs draw is made afterwards** ([`draw`]), in channels that say so: Rerun shows postcard as bytes
+//!   only. Replay leaves these channels out; `cut` and `merge` keep them.
 //!
 //! Knows no mailbox, no module and no clock but that of its periods: times are arguments.
 
@@ -55,6 +58,7 @@ mod batch;
 mod current;
 mod cut;
 mod disk;
+mod drawn;
 mod error;
 mod file;
 pub mod format;
@@ -70,6 +74,8 @@ mod recorder;
 mod recover;
 mod rewrite;
 mod rotate;
+mod selection;
+mod shape;
 mod shared;
 mod status;
 #[cfg(test)]
@@ -77,7 +83,8 @@ mod tests;
 mod writer;
 
 pub use batch::Message;
-pub use cut::{CutError, Selection, cut};
+pub use cut::{CutError, cut};
+pub use drawn::{DrawError, DrawOptions, Drawn, draw};
 pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
 pub use merge::{MergeError, merge};
@@ -87,5 +94,6 @@ pub use reader::{Reader, RecordedChannel, is_closed};
 pub use recover::{RecoverError, Recovered, recover, recovered_path};
 pub use rewrite::{Progress, RewriteError};
 pub use rotate::Rotation;
+pub use selection::{SelectError, Selection};
 pub use status::{ChannelStatus, Failures, Problem, Status};
 pub use writer::{ChannelError, ChannelId, ChannelSpec, StartError, WriteError, Writer};

@@ -70,7 +70,10 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
         for (id, channel) in source.contents.definitions().channels() {
             new.channel(source.number, id, &unified(channel, &types)).map_err(RewriteError::from)?;
         }
-        source.lost.into_iter().for_each(|(topic, count)| *lost.entry(topic).or_default() += count);
+        for (topic, count) in source.lost {
+            let all = lost.entry(topic).or_default();
+            *all = all.saturating_add(count);
+        }
     }
     if !lost.is_empty() {
         let texts = lost.into_iter().map(|(topic, count)| (topic, count.to_string()));

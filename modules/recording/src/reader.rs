@@ -7,6 +7,8 @@ use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::Definition;
 use crate::read::frames::Frames;
 use crate::read::index::Index;
+use crate::read::selected::Selected;
+use crate::selection::{SelectError, Selection};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,11 +27,20 @@ pub struct RecordedChannel {
     pub ty: Option<Type>,
     /// `postcard` in our files.
     pub message_encoding: String,
+    /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
+    pub schema_encoding: String,
     /// What else was said when it was recorded.
     pub texts: BTreeMap<String, String>,
 }
 
-/// Reads a file from its beginning, with one chunk in memory. It need not be closed, but undamaged so far.
+impl RecordedChannel {
+    /// Whether it was drawn of another channel, for other programs: replay leaves it out.
+    pub fn is_drawn(&self) -> bool {
+        self.texts.contains_key(key::DRAWN)
+    }
+}
+
+/// Reads a file, or a part of it, with one chunk in memory.
 ///
 /// ```
 /// # use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
@@ -49,20 +60,39 @@ pub struct RecordedChannel {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Reader {
-    contents: Contents,
+    source: ReaderSource,
     channels: BTreeMap<u16, Arc<RecordedChannel>>,
     found: Option<Found>,
     /// The message that was found is still to be read.
     is_ahead: bool,
 }
 
+/// What is read.
+enum ReaderSource {
+    /// From its beginning on.
+    Whole(Contents),
+    Part(Selected),
+}
+
 impl Reader {
-    /// At the first message.
+    /// At the first message. The file need not be closed, but undamaged so far.
     ///
     /// # Errors
     /// When it is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Ok(Self { contents: Contents::open(path)?, channels: BTreeMap::new(), found: None, is_ahead: false })
+        Ok(Self::of(ReaderSource::Whole(Contents::open(path)?)))
+    }
+
+    /// At the first message of those that are selected of a closed file. Chunks without any of them are not read.
+    ///
+    /// # Errors
+    /// When it is no MCAP file, was not closed, or has no such name.
+    pub fn select(path: &Path, selection: &Selection) -> Result<Self, SelectError> {
+        Ok(Self::of(ReaderSource::Part(Selected::open(path, selection)?)))
+    }
+
+    fn of(source: ReaderSource) -> Self {
+        Self { source, channels: BTreeMap::new(), found: None, is_ahead: false }
     }
 
     /// The next message; none at the end.
@@ -76,12 +106,16 @@ impl Reader {
     }
 
     /// Goes on behind the messages that arrived before this time: the next one arrived at it or later. Where time
-    /// stepped back, that is the first such message in the order of the file. False if there is none.
+    /// stepped back, that is the first such message in the order of the file. False if there is none. What is
+    /// [selected](Reader::select) goes forward only.
     ///
     /// # Errors
     /// As of [`Self::next`].
     pub fn seek(&mut self, arrival_ns: u64) -> Result<bool, ReadError> {
-        self.contents = self.contents.from_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
+        if let ReaderSource::Whole(contents) = &mut self.source {
+            *contents = contents.from_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
+            self.is_ahead = false;
+        }
         loop {
             self.advance()?;
             match &self.found {
@@ -96,19 +130,9 @@ impl Reader {
 
     /// Goes to the next message, unless a search has gone there already.
     pub(crate) fn advance(&mut self) -> Result<(), ReadError> {
-        if std::mem::take(&mut self.is_ahead) {
-            return Ok(());
-        }
-        self.found = None;
-        while let Some(item) = self.contents.next()? {
-            match item {
-                Item::Message(found) => {
-                    self.found = Some(found);
-                    break;
-                }
-                Item::Damaged(at, what) => return Err(self.contents.damaged(at, what)),
-                Item::Metadata(_) => {}
-            }
+        if !std::mem::take(&mut self.is_ahead) {
+            self.found = None;
+            self.found = self.source.next()?;
         }
         Ok(())
     }
@@ -123,14 +147,50 @@ impl Reader {
             stamp_ns: header.publish_time,
             epoch: channel.epoch().unwrap_or_default(),
             sequence: header.sequence,
-            data: self.contents.data(found),
+            data: self.source.data(found),
         };
         Some((recorded.clone(), message))
     }
 
-    /// Whether the end was reached, and the file was closed there.
+    /// So many bytes are read, of so many.
+    pub fn progress(&self) -> (u64, u64) {
+        match &self.source {
+            ReaderSource::Whole(contents) => (contents.at(), contents.file_bytes()),
+            ReaderSource::Part(selected) => (selected.at(), selected.file_bytes()),
+        }
+    }
+
+    /// Whether the end was reached, and the file was closed there. What is [selected](Reader::select) always is of a
+    /// closed one.
     pub fn is_closed(&self) -> bool {
-        self.contents.ending() == Some(Ending::Closed)
+        match &self.source {
+            ReaderSource::Whole(contents) => contents.ending() == Some(Ending::Closed),
+            ReaderSource::Part(_) => true,
+        }
+    }
+}
+
+impl ReaderSource {
+    fn next(&mut self) -> Result<Option<Found>, ReadError> {
+        let contents = match self {
+            Self::Whole(contents) => contents,
+            Self::Part(selected) => return selected.next(),
+        };
+        while let Some(item) = contents.next()? {
+            match item {
+                Item::Message(found) => return Ok(Some(found)),
+                Item::Damaged(at, what) => return Err(contents.damaged(at, what)),
+                Item::Metadata(_) => {}
+            }
+        }
+        Ok(None)
+    }
+
+    fn data(&self, found: &Found) -> &[u8] {
+        match self {
+            Self::Whole(contents) => contents.data(found),
+            Self::Part(selected) => selected.data(found),
+        }
     }
 }
 
@@ -142,6 +202,7 @@ fn recorded(channel: &Definition) -> RecordedChannel {
         item: text(key::ITEM),
         ty: channel.schema.ty(),
         message_encoding: channel.message_encoding.clone(),
+        schema_encoding: channel.schema.encoding.clone(),
         texts: channel.texts.clone(),
     }
 }

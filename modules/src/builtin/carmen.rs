@@ -1,5 +1,11 @@
 //! `carmen`: plays a CARMEN log as wheels and scanner, at a chosen speed. Each record has its own time, also one that
 //! stands behind later ones in the log.
+//!
+//! Under `source = "log"` the first player of a node tells the node's time ([`telling`]): it begins with the log's
+//! first record, passes at the chosen speed, and stands still while the player is off. Elsewhere, and for a second
+//! player, records are moved into the present.
+
+mod telling;
 
 use super::settings::{self, RefusedSetting, Settings as _};
 use crate::interfaces::{Laser, LaserInterface, Player, PlayerInterface, Progress, Wheels, WheelsInterface};
@@ -11,6 +17,7 @@ use rohrpost_mailbox::SystemTime;
 use serde::Deserialize;
 use std::io::BufRead;
 use std::time::Duration;
+use telling::Telling;
 
 /// Records played in one tick at most: a log that is behind catches up in pieces, and commands are heard in between.
 const AT_ONCE_MAX: usize = 64;
@@ -46,7 +53,10 @@ fn one() -> f64 {
 
 pub(super) struct Carmen {
     playback: Playback<Box<dyn BufRead + Send>>,
+    /// Seconds of the log in a second of system time.
     speed: f64,
+    /// If the log is the node's time: its writer.
+    telling: Option<Telling>,
     /// Read from the log and not yet due.
     next: Option<Due>,
     /// System time at which the log began, ns; pauses move it on. None before the module was first on.
@@ -67,15 +77,19 @@ impl Module for Carmen {
         let mut reading = carmen::Settings::default();
         reading.range_max_m = settings.range_max_m.unwrap_or(reading.range_max_m);
         let reader = carmen::open(&context.path(&settings.file), reading)?;
-        let playback = Playback::new(reader, settings.speed)?;
-        context.set_period(TICK);
+        let telling = Telling::of(context, settings.speed);
+        let speed = if telling.is_some() { 1.0 } else { settings.speed };
+        let playback = Playback::new(reader, speed)?;
+        context.set_period(TICK.mul_f64(settings.speed / speed));
         tracing::info!("plays {} at {} times its speed", settings.file, settings.speed);
-        let (speed, progress) = (settings.speed, Progress::default());
-        let looked = context.now();
-        Ok(Self { playback, speed, next: None, start_ns: None, paused_ns: None, looked, progress })
+        let (looked, progress) = (context.now(), Progress::default());
+        Ok(Self { playback, speed, telling, next: None, start_ns: None, paused_ns: None, looked, progress })
     }
 
     fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        if self.telling.is_some() {
+            return self.let_time_pass(context);
+        }
         if let (Some(start_ns), Some(paused_ns)) = (self.start_ns, self.paused_ns.take()) {
             self.start_ns = Some(start_ns + self.now_ns(context).saturating_sub(paused_ns));
         }
@@ -83,6 +97,9 @@ impl Module for Carmen {
     }
 
     fn off(&mut self, context: &mut Context) {
+        if let Some(telling) = &mut self.telling {
+            return telling.pause();
+        }
         self.paused_ns = Some(self.now_ns(context));
     }
 
@@ -112,6 +129,25 @@ impl Module for Carmen {
 }
 
 impl Carmen {
+    /// Begins the node's time with the first record, or goes on.
+    fn let_time_pass(&mut self, context: &Context) -> Result<(), ModuleError> {
+        let Some(telling) = &mut self.telling else { return Ok(()) };
+        if telling.goes_on() {
+            return Ok(());
+        }
+        // What has no stamp is not played.
+        for due in self.playback.by_ref() {
+            let due = due?;
+            if let Some(stamp_s) = due.record.stamp_s() {
+                self.start_ns = Some(telling.begin(context, stamp_s)?);
+                (self.next, self.looked) = (Some(due), context.now());
+                return Ok(());
+            }
+        }
+        self.finish();
+        Ok(())
+    }
+
     /// System time. After a step of it, the log goes on from where it was.
     fn now_ns(&mut self, context: &Context) -> u64 {
         let last = std::mem::replace(&mut self.looked, context.now());

@@ -2,12 +2,13 @@
 //! modules, so it is here that both meet.
 
 use super::{Builtin, description};
-use rohrpost_config::{Installation, Module, Problem, Program, Show, nearest};
-use rohrpost_schema::Description;
+use rohrpost_config::{Installation, Module, Problem, Program, RECORDER, RecordedItems, Show, nearest};
+use rohrpost_mailbox::Name;
+use rohrpost_schema::{DataKind, Description};
 use std::collections::BTreeSet;
 
 /// Everything that built-in modules would refuse, by their settings, by what they call, by the sections of their
-/// streams and by what the GUI is to show of them. What programs of one's own would refuse only they know.
+/// streams, and by what is to be shown and recorded of them. What programs of one's own would refuse only they know.
 pub fn check(installation: &Installation) -> Vec<Problem> {
     let mut problems = Vec::new();
     for module in &installation.modules {
@@ -16,6 +17,11 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
         problems.extend(unknown_streams(installation, module, name));
     }
     problems.extend(installation.gui.show.iter().filter_map(|show| data_of(installation, show)));
+    if let Some(record) = &installation.record {
+        problems.extend(installation.modules.iter().filter_map(|module| settings_of_recorder(installation, module)));
+        let streams = record.streams.iter().filter_map(|items| item_of(installation, items, true));
+        problems.extend(streams.chain(record.data.iter().filter_map(|items| item_of(installation, items, false))));
+    }
     problems
 }
 
@@ -51,12 +57,45 @@ fn unknown_streams(installation: &Installation, module: &Module, builtin: &str) 
     module.streams.keys().filter(|stream| !known.contains(stream.as_str())).map(problem).collect()
 }
 
+/// What a built-in module offers under this name.
+fn description_of(installation: &Installation, name: Name) -> Option<Description> {
+    let Program::Builtin(builtin) = &installation.module(name)?.program else { return None };
+    description(builtin, installation.classes.name(name.class())?)
+}
+
+/// The recorder has its section in place of settings.
+fn settings_of_recorder(installation: &Installation, module: &Module) -> Option<Problem> {
+    let is_it = module.program == Program::Builtin(RECORDER.into());
+    let key = module.settings.keys().next().filter(|_| is_it)?;
+    let name = installation.classes.format(module.name);
+    let line = Some(installation.settings_line(module, key));
+    Some(Problem { line, message: format!("module `{name}`: it has no settings; write `{key}` into [record]") })
+}
+
+/// What is to be recorded of a built-in module, and that has no such stream or data. Its streams are data, too.
+fn item_of(installation: &Installation, items: &RecordedItems, is_stream: bool) -> Option<Problem> {
+    let (from, wanted) = (items.from?, items.item.as_ref()?);
+    let description = description_of(installation, from)?;
+    let is_it = |kind: DataKind| !is_stream || kind == DataKind::Stream;
+    if description.data_item(wanted).is_some_and(|item| is_it(item.kind)) {
+        return None;
+    }
+    let fits = description.data.iter().filter(|item| is_it(item.kind));
+    let names: Vec<&str> = fits.map(|item| item.field.name.as_str()).collect();
+    let what = if is_stream { "stream" } else { "data" };
+    let right = match (nearest(wanted, names.iter().copied()), &names[..]) {
+        _ if description.data_item(wanted).is_some() => "these are data, name them in `data`".into(),
+        (Some(name), _) => format!("did you mean `{name}`?"),
+        (None, []) => "it has none; drop the entry".into(),
+        (None, names) => format!("it has {}", names.join(", ")),
+    };
+    let from = installation.classes.format(from);
+    Some(Problem { line: Some(items.line), message: format!("[record]: `{from}` has no {what} `{wanted}`; {right}") })
+}
+
 /// What the GUI is to show of a built-in module, and that has no such data.
 fn data_of(installation: &Installation, show: &Show) -> Option<Problem> {
-    let module = installation.module(show.from)?;
-    let class = installation.classes.name(show.from.class())?;
-    let Program::Builtin(builtin) = &module.program else { return None };
-    let description = description(builtin, class)?;
+    let description = description_of(installation, show.from)?;
     let data = show.data.as_ref()?;
     if description.data_item(data).is_some() {
         return None;

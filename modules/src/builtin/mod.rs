@@ -11,10 +11,12 @@ mod sim;
 pub use check::{check, check_saved};
 
 use crate::interface::{Interface, Interfaces};
-use crate::interfaces::{RouterInterface, TcpInterface};
+use crate::interfaces::{RecorderInterface, RouterInterface, TcpInterface};
 use crate::module::Module;
 use crate::runtime::{Start, StartError, run_started};
-use rohrpost_config::{Installation, Module as Configured, Problem, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER};
+use rohrpost_config::{
+    Installation, Module as Configured, Problem, RECORDER, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER,
+};
 use rohrpost_schema::Description;
 
 /// What can be done with a built-in module.
@@ -47,23 +49,24 @@ impl Builtin {
 /// Runs a built-in module by its name in the configuration (`builtin = "sim"`).
 ///
 /// # Errors
-/// None for an unknown name; else what starting it brought.
+/// None for a name that has no program here; else what starting it brought.
 pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
     Some((Builtin::find(name)?.run)(start))
 }
 
 /// The built-in module that is called so or offers the interface of a class; none if nothing is built in for it.
 pub fn of_class(class: &str) -> Option<&'static str> {
-    let all = ["sim", "carmen", "mapper", "pilot", "output", ROUTER, TCP_CLIENT, TCP_ROUTER];
+    let all = ["sim", "carmen", "mapper", "pilot", "output", RECORDER, ROUTER, TCP_CLIENT, TCP_ROUTER];
     all.into_iter().find(|builtin| *builtin == class || description(builtin, class).is_some())
 }
 
 /// What a built-in module offers under the name of a class, its own or an alias's; none if it knows no such class.
 pub fn description(builtin: &str, class: &str) -> Option<Description> {
-    // The programs of these are not here: this crate knows no network.
+    // The programs of these are not here: this crate knows no network and no file of a recording.
     let beyond_here = match builtin {
         ROUTER => Some(RouterInterface::description()),
         TCP_CLIENT | TCP_ROUTER => Some(TcpInterface::description()),
+        RECORDER => Some(RecorderInterface::description()),
         _ => None,
     };
     if beyond_here.is_some() {

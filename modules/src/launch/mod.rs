@@ -389,7 +389,8 @@ fn begin_time(node: &Arc<Node>, installation: &Installation, name: &str) -> Resu
         // time, launch itself included. Another launch must not begin another epoch: all nodes would have to.
         ConfiguredTime::Master { .. } => return TimeKeeper::await_master(node),
         ConfiguredTime::Simulation { speed } => (TimeSource::Simulation, speed),
-        ConfiguredTime::Log => (TimeSource::Log, 1.0),
+        // The module that plays the log tells its time; until then the node has none.
+        ConfiguredTime::Log => return TimeKeeper::await_source(node, TimeSource::Log),
     };
     TimeKeeper::begin(node, source, realtime_ns(), pace)
 }

@@ -1,6 +1,7 @@
 //! What a module can ask of its runtime.
 
 mod publishing;
+mod standing_in;
 mod streaming;
 mod subscribing;
 
@@ -11,6 +12,7 @@ use super::error::ContextError;
 use super::follow::Followings;
 use super::newest::Newest;
 use super::refusals::Refusals;
+use super::schedule::Schedule;
 use super::stream::{FollowedStreams, OwnStreams};
 use crate::call::{Caller, Link};
 use crate::interface::Proxy;
@@ -25,11 +27,7 @@ use std::os::fd::AsFd;
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-/// Shorter ones leave no time for anything else; longer ones are never.
-const PERIOD_MIN: Duration = Duration::from_micros(10);
-const PERIOD_MAX: Duration = Duration::from_secs(86_400);
+use std::time::Duration;
 
 /// A module's connection to its node: proxies, subscriptions, publishing, time, settings.
 ///
@@ -50,6 +48,8 @@ pub struct Context {
     pub(crate) endpoints: Vec<Name>,
     /// For each endpoint the hash of the interface that the module serves there, if it serves one.
     served: Vec<Option<u32>>,
+    /// For each endpoint numbers and names of the data that it has without types, if it stands in for another module.
+    stood_in: Vec<Option<Vec<(u16, String)>>>,
     /// Numbers and names of the functions of all of them.
     pub(crate) functions: Vec<(u16, String)>,
     pub(crate) newest: Vec<Newest>,
@@ -71,8 +71,8 @@ pub struct Context {
     open: Vec<u8>,
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
-    pub(crate) period: Option<Duration>,
-    pub(crate) next_tick: Option<Instant>,
+    /// When ticks and periods are due.
+    pub(crate) schedule: Schedule,
     scratch: Vec<u8>,
 }
 
@@ -89,12 +89,14 @@ impl Context {
         let followings = Followings::of(link.incarnation());
         let named: Vec<Principal> = endpoints.iter().flat_map(|endpoint| installation.callers(*endpoint)).collect();
         let subscriptions = Subscriptions::new(&named);
+        let schedule = Schedule::new(&installation, &clock);
         Self {
             me,
             installation,
             link: Rc::new(RefCell::new(link)),
             endpoints,
             served: Vec::new(),
+            stood_in: Vec::new(),
             functions: Vec::new(),
             newest: Vec::new(),
             streams: Vec::new(),
@@ -108,8 +110,7 @@ impl Context {
             taking: vec![(local::DATA, data.full == OverflowPolicy::Latest)],
             open: Vec::new(),
             watches: None,
-            period: None,
-            next_tick: None,
+            schedule,
             scratch: Vec::new(),
         }
     }
@@ -117,6 +118,7 @@ impl Context {
     /// Under its names the module serves these interfaces.
     pub(super) fn serves<M>(&mut self, endpoints: &[Endpoint<M>]) {
         self.served = endpoints.iter().map(|endpoint| endpoint.offer.serve.map(|_| endpoint.offer.hash)).collect();
+        self.stood_in = endpoints.iter().map(|endpoint| endpoint.offer.stands_in.clone()).collect();
         self.functions = endpoints.iter().flat_map(|endpoint| endpoint.offer.functions.iter().cloned()).collect();
     }
 
@@ -184,6 +186,9 @@ impl Context {
     /// Asks for [`crate::Module::tick`] once in this time, from now on; at least 10 µs, at most a day. Ticks that come
     /// too late because the one before took too long are left out.
     ///
+    /// Where time is simulated or replayed, this is that time: at ten times the pace there are ten times as many ticks
+    /// a second, and none while it stands still.
+    ///
     /// ```
     /// # use rohrpost_modules::runtime::Context;
     /// fn tick_at_50_hz(context: &mut Context) {
@@ -191,8 +196,21 @@ impl Context {
     /// }
     /// ```
     pub fn set_period(&mut self, period: Duration) {
-        self.period = Some(period.clamp(PERIOD_MIN, PERIOD_MAX));
-        self.next_tick = Some(Instant::now());
+        self.schedule.set_period(period);
+    }
+
+    /// Ticks, and periods of the data that it publishes, go by the computer's clock from now on, also where time is
+    /// simulated or replayed: for a module that serves the computer and not the robot, such as a router or a display.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Context;
+    /// fn look_at_the_disk_each_second(context: &mut Context) {
+    ///     context.use_computer_clock();
+    ///     context.set_period(std::time::Duration::from_secs(1));
+    /// }
+    /// ```
+    pub fn use_computer_clock(&mut self) {
+        self.schedule.use_computer_clock();
     }
 
     /// A proxy of the module that a setting names, such as `motor.0`.

@@ -6,7 +6,17 @@ use crate::call::Fault;
 use crate::interface::{ServeFunction, Served};
 use rohrpost_config::Principal;
 use rohrpost_mailbox::{Name, Receiver};
-use rohrpost_schema::Description;
+use rohrpost_schema::{DataKind, Description};
+
+/// What a module has under a name.
+pub(crate) enum Offered<M> {
+    /// An interface with its types.
+    Types(Served<M>),
+    /// The description of a module that it stands in for.
+    Description(Description),
+    /// Only the common functions.
+    Nothing,
+}
 
 /// One endpoint. A module without further endpoints has this one.
 pub(crate) struct Endpoint<M> {
@@ -25,8 +35,10 @@ pub(crate) struct Offer<M> {
     pub(crate) streams: Vec<StreamItem>,
     /// The interface is another than the one that was served under this name before, as far as is known.
     pub(crate) is_new: bool,
-    /// None: the module serves no interface under this name, only the common functions.
+    /// None: the module serves no interface of its own under this name.
     pub(crate) serve: Option<ServeFunction<M>>,
+    /// Numbers and names of the data that the module publishes here without their types.
+    pub(crate) stands_in: Option<Vec<(u16, String)>>,
     pub(crate) hash: u32,
     /// Numbers of its functions, and what they are called.
     pub(crate) functions: Vec<(u16, String)>,
@@ -36,16 +48,15 @@ pub(crate) struct Offer<M> {
 
 impl<M> Endpoint<M> {
     /// `named`: callers that always find a place.
-    pub(crate) fn new(
-        name: Name,
-        class: &str,
-        commands: Receiver,
-        named: &[Principal],
-        served: Option<Served<M>>,
-    ) -> Self {
-        let (serve, description) = match served {
-            Some(Served { description, serve, .. }) => (Some(serve), description),
-            None => (None, bare(class)),
+    pub(crate) fn new(name: Name, class: &str, commands: Receiver, named: &[Principal], served: Offered<M>) -> Self {
+        let (serve, description, stands_in) = match served {
+            Offered::Types(Served { description, serve, .. }) => (Some(serve), description, None),
+            Offered::Description(description) => {
+                let data = description.data.iter().filter(|item| item.kind == DataKind::Data);
+                let data = data.map(|item| (item.number, item.field.name.clone())).collect();
+                (None, description, Some(data))
+            }
+            Offered::Nothing => (None, bare(class), None),
         };
         let hash = description.hash();
         let idempotent = description.functions.iter().filter(|f| f.idempotent).map(|f| f.number).collect();
@@ -60,7 +71,7 @@ impl<M> Endpoint<M> {
             // On a full /dev/shm, say: a module that could take its mailboxes over goes on all the same.
             tracing::warn!("{name}: tools cannot describe it: {error}");
         }
-        let offer = Offer { idempotent, data, streams, is_new, serve, hash, functions, description };
+        let offer = Offer { idempotent, data, streams, is_new, serve, stands_in, hash, functions, description };
         Self { name, command_server: CommandServer::new(commands, named), offer }
     }
 }

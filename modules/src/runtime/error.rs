@@ -65,6 +65,21 @@ pub enum StartError {
     /// A stream that cannot be made; the text names it as the configuration does.
     #[error("{0}")]
     Stream(String),
+    /// A name that the module cannot stand in for.
+    #[error(
+        "the program of `{module}` stands in for `{name}`, a module of class `{class}`, but {why}; it stands in for \
+         names of its own, each of the class that its description says"
+    )]
+    StandIn {
+        /// The module.
+        module: String,
+        /// For which it stands in.
+        name: String,
+        /// As the description has it.
+        class: String,
+        /// What is wrong.
+        why: &'static str,
+    },
     /// Launch is gone.
     #[error("launch, process {0}, ended before this module began")]
     Orphan(u32),
@@ -91,6 +106,7 @@ impl StartError {
             | Self::NoModule(..)
             | Self::Settings(_)
             | Self::Endpoint(..)
+            | Self::StandIn { .. }
             | Self::NoStream { .. }
             | Self::Interface { .. } => Self::CONFIGURATION,
             Self::Node(_)
@@ -143,6 +159,14 @@ pub enum ContextError {
         class: &'static str,
         /// The module or endpoint.
         module: String,
+    },
+    /// Data of a module that this one does not stand in for, or that the description does not have.
+    #[error("this module does not stand in for {module} with data or a stream of number {number}")]
+    NotStoodIn {
+        /// As which it was to be published.
+        module: String,
+        /// Number of the data.
+        number: u16,
     },
     /// The value cannot be written as postcard.
     #[error("data `{0}` cannot be written: {1}")]

@@ -9,11 +9,12 @@ use super::refusals::Cause;
 use super::server::{Command, CommandHandler, admit, read_arguments, write_result};
 use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
+use crate::interface::StandInCommand;
 use crate::module::Module;
 use crate::output;
 use crate::publish::RequestOrigin;
 use rohrpost_config::Principal;
-use rohrpost_mailbox::{BODY_BYTES_MAX, Head, Label, Name, Options, SendError, Work, local, monotonic_ns};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Head, Label, Name, Options, SendError, Work, local};
 
 /// What is needed to run one command.
 pub(super) struct Hosted<'a, M> {
@@ -35,6 +36,9 @@ impl<M: Module> CommandHandler for Hosted<'_, M> {
             return self.common(call, reply);
         }
         self.life.require_on()?;
+        if self.offer.stands_in.is_some() {
+            return self.stand_in(call, reply);
+        }
         let serve = self.offer.serve.ok_or(Fault::Unknown(call.number))?;
         let part = |module: &mut M, _: &mut Context| serve(module, call.number, call.arguments, reply);
         self.life.work(Work::Function(call.number), self.context, part)
@@ -54,6 +58,16 @@ impl<M: Module> CommandHandler for Hosted<'_, M> {
 }
 
 impl<M: Module> Hosted<'_, M> {
+    fn stand_in(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
+        if !self.offer.functions.iter().any(|(number, _)| *number == call.number) {
+            return Err(Fault::Unknown(call.number));
+        }
+        let (to, number) = (self.context.endpoints[self.index], call.number);
+        let command = StandInCommand { to, number, arguments: call.arguments };
+        let part = |module: &mut M, context: &mut Context| module.stand_in_command(context, &command, reply);
+        self.life.work(Work::Function(number), self.context, part)
+    }
+
     fn common(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
         match call.number {
             common::ON => {
@@ -74,7 +88,7 @@ impl<M: Module> Hosted<'_, M> {
                 let (wish,): (Subscribe,) = read_arguments(call.arguments)?;
                 self.offer.require_data(wish.number)?;
                 let to = data_mailbox(call, wish.mailbox)?;
-                let now_ns = monotonic_ns();
+                let now = self.context.schedule.moment();
                 let subscriptions = &mut self.context.subscriptions;
                 let asked = RequestOrigin {
                     by: call.head.from,
@@ -84,7 +98,7 @@ impl<M: Module> Hosted<'_, M> {
                     priority: call.head.priority,
                     newest: call.head.options.has(Options::NEWEST),
                 };
-                let room = subscriptions.subscribe(self.index, asked, wish, now_ns);
+                let room = subscriptions.subscribe(self.index, asked, wish, now);
                 if room {
                     return Ok(());
                 }

@@ -83,7 +83,7 @@ impl<M: Module> Incarnation<M> {
         }
         self.enter(ModuleState::On);
         tracing::info!("is on");
-        context.next_tick = context.period.map(|_| Instant::now());
+        context.schedule.restart();
         // Asked for before the answer goes out: a tool that switches modules on one after the other knows which one
         // subscribes to which.
         context.followings.renew(&mut context.link.borrow_mut(), Instant::now());

@@ -22,6 +22,7 @@ mod parameters;
 mod received;
 pub(crate) mod refusals;
 mod runner;
+pub(crate) mod schedule;
 pub(crate) mod server;
 mod start;
 mod stream;

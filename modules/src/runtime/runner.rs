@@ -209,18 +209,13 @@ impl<M: Module> Running<M> {
     }
 
     fn periodic(&mut self) {
-        let now = Instant::now();
         // Also while it is off: late answers must not wait for ever in front of its sleep.
         self.context.link.borrow_mut().collect();
         if self.life.state == ModuleState::On {
-            self.context.followings.renew(&mut self.context.link.borrow_mut(), now);
+            self.context.followings.renew(&mut self.context.link.borrow_mut(), Instant::now());
         }
-        self.context.deliver_due(monotonic_ns());
-        let (Some(period), Some(due)) = (self.context.period, self.context.next_tick) else { return };
-        if self.life.state == ModuleState::On && due <= now {
-            // Ticks that were slept through are not made up for; the grid stays where it was.
-            let passed = (now - due).as_nanos() / period.as_nanos();
-            self.context.next_tick = Some(due + period * (u32::try_from(passed).unwrap_or(u32::MAX - 1) + 1));
+        let moment = self.context.deliver_due();
+        if self.life.state == ModuleState::On && self.context.schedule.take_tick(moment) {
             let result = self.life.work(Work::Tick, &mut self.context, M::tick);
             self.life.check(result, &mut self.context);
         }
@@ -248,17 +243,24 @@ impl<M: Module> Running<M> {
         }
     }
 
+    /// When there is a tick, a delivery or the end of a lease next.
+    fn next_periodic(&self) -> Option<Instant> {
+        let (now_ns, context) = (monotonic_ns(), &self.context);
+        let (lease, delivery) = (context.subscriptions.lease_ns(), context.subscriptions.due_ns());
+        let tick = context.schedule.tick_ns().filter(|_| self.is_on());
+        let due = tick.into_iter().chain(delivery).min();
+        let waits = [due.map(|ns| context.schedule.wait_ns(now_ns, ns)), lease.map(|ns| ns.saturating_sub(now_ns))];
+        waits.into_iter().flatten().min().map(|ns| Instant::now() + Duration::from_nanos(ns))
+    }
+
     /// Until a package comes, a descriptor is ready, something is due, or it is told to stop. How long it slept.
     fn sleep(&mut self) -> Duration {
         let on = self.is_on();
-        let tick = self.context.next_tick.filter(|_| on);
         let renewal = self.context.followings.next().filter(|_| on);
-        let now_ns = monotonic_ns();
-        let delivery = self.context.subscriptions.next_ns();
-        let delivery = delivery.map(|ns| Instant::now() + Duration::from_nanos(ns.saturating_sub(now_ns)));
+        let periodic = self.next_periodic();
         let output = output::retry_at();
         let stream = self.context.followed_streams.retry().filter(|_| on);
-        let deadline = [tick, renewal, delivery, output, stream].into_iter().flatten().min();
+        let deadline = [renewal, periodic, output, stream].into_iter().flatten().min();
         let mut link = self.context.link.borrow_mut();
         let mut sources = empty(std::mem::take(&mut self.sources));
         sources.extend(self.endpoints.iter_mut().map(|endpoint| source(&mut endpoint.command_server.commands)));

@@ -1,14 +1,15 @@
 //! From a command line or launch's environment to a running module.
 
 use super::context::Context;
-use super::endpoint::Endpoint;
+use super::endpoint::{Endpoint, Offered};
 use super::error::StartError;
 use super::incarnation::Incarnation;
 use super::parameters;
 use super::runner::{Running, served};
 use super::stream::{self, ServedStreams};
 use crate::call::Link;
-use crate::module::Module;
+use crate::interface::StandIn;
+use crate::module::{Module, ModuleError};
 use crate::output;
 use nix::sys::signal::Signal;
 use rohrpost_config::{Installation, MailboxSpec, Scheduling, Start as StartState};
@@ -127,17 +128,23 @@ impl Start {
                 StartError::Mailbox(text)
             })
         };
+        let settings = installation.settings_as(module)?;
+        let mut stand_ins = stand_ins::<M>(&settings, &installation, module)?;
         let mut served = served::<M>();
         let mut endpoints = Vec::new();
         for name in module.names() {
             let class = installation.classes.name(name.class()).unwrap_or_default().to_owned();
-            let at = served.iter().position(|served| served.class == class);
-            if at.is_none() && name != module.name {
-                return Err(StartError::Endpoint(installation.classes.format(name), text, class));
-            }
+            let described = stand_ins.iter().position(|stand_in| stand_in.name == name);
+            let typed = served.iter().position(|served| served.class == class);
+            let offered = match (described, typed) {
+                (Some(at), _) => Offered::Description(stand_ins.swap_remove(at).description),
+                (None, Some(at)) => Offered::Types(served.swap_remove(at)),
+                (None, None) if name == module.name => Offered::Nothing,
+                (None, None) => return Err(StartError::Endpoint(installation.classes.format(name), text, class)),
+            };
             let commands = receiver(name.with_local(local::COMMANDS), &module.mailboxes.commands)?;
             let named = installation.callers(name);
-            endpoints.push(Endpoint::new(name, &class, commands, &named, at.map(|at| served.swap_remove(at))));
+            endpoints.push(Endpoint::new(name, &class, commands, &named, offered));
         }
         if let Some(left) = served.iter().find(|served| !served.is_optional) {
             let names: Vec<String> =
@@ -150,7 +157,6 @@ impl Start {
         let clock = SystemClock::open(&node);
         let names = endpoints.iter().map(|endpoint: &Endpoint<M>| endpoint.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock, data.shape());
-        let settings = installation.settings_as(module)?;
         context.serves(&endpoints);
         let streams_of = |endpoint| {
             let Endpoint { name, offer, .. }: &Endpoint<M> = endpoint;
@@ -169,6 +175,31 @@ impl Start {
         let life = Incarnation::new(made, participant, module.busy_after);
         Ok(Running { life, endpoints, data, context, stop, turn_on, by_hand, spin, sources: Vec::new() })
     }
+}
+
+/// For what the module stands in: names of its own, each of the class that its description says.
+fn stand_ins<M: Module>(
+    settings: &M::Settings,
+    installation: &Installation,
+    module: &rohrpost_config::Module,
+) -> Result<Vec<StandIn>, StartError> {
+    let text = |name| installation.classes.format(name);
+    let failed = |error: ModuleError| StartError::Module(text(module.name), error.to_string());
+    let stand_ins = M::stand_ins(settings, installation).map_err(failed)?;
+    for (at, StandIn { name, description }) in stand_ins.iter().enumerate() {
+        let why = if !module.names().any(|own| own == *name) {
+            "it does not have that name"
+        } else if installation.classes.name(name.class()) != Some(description.class.as_str()) {
+            "that name is of another class"
+        } else if stand_ins[..at].iter().any(|earlier| earlier.name == *name) {
+            "it does so twice"
+        } else {
+            continue;
+        };
+        let (module, class) = (text(module.name), description.class.clone());
+        return Err(StartError::StandIn { module, name: text(*name), class, why });
+    }
+    Ok(stand_ins)
 }
 
 /// A mailbox's shape, as the configuration has it.

@@ -23,6 +23,7 @@ mod members;
 mod names;
 mod parameters;
 mod planted;
+mod recordings;
 mod routers;
 mod seals;
 mod segments;
@@ -40,7 +41,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 16] = [
+pub const TARGETS: [Target; 17] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -50,6 +51,7 @@ pub const TARGETS: [Target; 16] = [
     Target { name: "lines", run: lines::run },
     Target { name: "logs", run: logs::run },
     Target { name: "maps", run: maps::run },
+    Target { name: "recordings", run: recordings::run },
     Target { name: "segments", run: segments::run },
     Target { name: "frames", run: frames::run },
     Target { name: "routers", run: routers::run },

@@ -162,7 +162,12 @@ fn sample(installation: &Installation, at_ns: u64, counts: &[Counts]) -> Sample 
     let lines = module_lines(installation, &survey, None);
     Sample {
         lines: counts.iter().zip(lines).map(|(counts, seen)| line(counts, seen)).collect(),
-        time: TimeNow { time_ns: 1_795_257_612_000_000_000, time_source: "simulation", time_pace: 2.0 },
+        time: TimeNow {
+            time_ns: 1_795_257_612_000_000_000,
+            time_source: "simulation",
+            time_pace: 2.0,
+            time_known: true,
+        },
         launched: true,
         silent: Vec::new(),
         survey,

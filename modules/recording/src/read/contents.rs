@@ -94,7 +94,7 @@ impl Contents {
             Err(error) => return Err(error),
         };
         // Behind the last one there is nothing but the index.
-        let behind = |chunk: &ChunkIndex| chunk.chunk_start_offset + chunk.chunk_length;
+        let behind = |chunk: &ChunkIndex| chunk.chunk_start_offset.saturating_add(chunk.chunk_length);
         let first = index.chunks.iter().find(|chunk| is_it(chunk)).map(|chunk| chunk.chunk_start_offset);
         let at = first.or_else(|| index.chunks.last().map(behind)).unwrap_or_default();
         frames.seek(at)?;
@@ -174,18 +174,21 @@ impl Contents {
         }
     }
 
+    /// Reads on from there, where a record of the file begins.
+    pub(crate) fn go_to(&mut self, at: u64) -> Result<(), ReadError> {
+        self.in_chunk = None;
+        self.frames.seek(at)
+    }
+
     /// Reads which program wrote it: the first record.
     pub(crate) fn read_header(&mut self) -> Result<(), ReadError> {
-        self.frames.seek(mcap::MAGIC.len() as u64)?;
-        self.in_chunk = None;
+        self.go_to(mcap::MAGIC.len() as u64)?;
         self.next_outside().map(drop)
     }
 
     /// The metadata there.
     pub(crate) fn metadata_at(&mut self, at: u64) -> Result<Metadata, ReadError> {
-        self.frames.seek(at)?;
-        self.in_chunk = None;
-        self.begins = at;
+        self.go_to(at)?;
         match self.next_outside()? {
             Some(Item::Metadata(metadata)) => Ok(metadata),
             _ => Err(self.damaged(at, Damage::Record { op: op::METADATA_INDEX })),

@@ -1,7 +1,7 @@
 //! Channels and their types, as a file describes them.
 
 use crate::error::Damage;
-use crate::format::{SCHEMA_ENCODING, key, op};
+use crate::format::{SCHEMA_ENCODING, key};
 use mcap::records::Record;
 use rohrpost_schema::{Type, describe_type};
 use std::collections::BTreeMap;
@@ -77,7 +77,7 @@ impl Definitions {
             Record::Channel(channel) => {
                 let schema = match channel.schema_id {
                     0 => Arc::default(),
-                    id => self.schemas.get(&id).cloned().ok_or(Damage::Record { op: op::CHANNEL })?,
+                    id => self.schemas.get(&id).cloned().ok_or(Damage::UnknownSchema(id))?,
                 };
                 let mcap::records::Channel { id, topic, message_encoding, metadata: texts, .. } = channel;
                 insert(&mut self.channels, id, Arc::new(Definition { topic, message_encoding, texts, schema }))

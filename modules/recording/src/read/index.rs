@@ -19,6 +19,29 @@ pub(crate) struct Index {
 }
 
 impl Index {
+    /// Whether each message is in a chunk that is listed here. Others may write no chunks, or list none.
+    pub(crate) fn knows_all_chunks(&self) -> bool {
+        let listed = self.chunks.len() as u64;
+        listed == u64::from(self.statistics.chunk_count) && (listed > 0 || self.statistics.message_count == 0)
+    }
+
+    /// Whether each channel with messages is described here. Others may not describe them again.
+    pub(crate) fn describes_all_channels(&self) -> bool {
+        let counts = &self.statistics.channel_message_counts;
+        let counted = counts.values().try_fold(0_u64, |sum, count| sum.checked_add(*count));
+        counted == Some(self.statistics.message_count)
+            && counts.keys().all(|id| self.definitions.channel(*id).is_some())
+    }
+
+    /// Whether it says of each channel with messages in which chunks they are.
+    pub(crate) fn knows_all_channels(&self) -> bool {
+        let has_offset = |id: &u16| self.chunks.iter().any(|chunk| chunk.message_index_offsets.contains_key(id));
+        let mut counts = self.statistics.channel_message_counts.iter();
+        self.knows_all_chunks()
+            && self.describes_all_channels()
+            && counts.all(|(id, messages)| *messages == 0 || has_offset(id))
+    }
+
     /// Reads it, checked by its sum.
     pub(crate) fn read(frames: &mut Frames) -> Result<Self, ReadError> {
         let not_closed = ReadError::NotClosed { path: Shown(frames.path().to_owned()) };
@@ -83,7 +106,11 @@ impl Reading {
 
     fn record(&mut self, op: u8, body: &[u8]) -> Result<(), Damage> {
         match op {
-            op::SCHEMA | op::CHANNEL => return self.definitions.add(op, body),
+            op::SCHEMA | op::CHANNEL => match self.definitions.add(op, body) {
+                // Others may describe channels here again and schemas not.
+                Err(Damage::UnknownSchema(_)) => return Ok(()),
+                told => return told,
+            },
             op::CHUNK_INDEX | op::METADATA_INDEX | op::STATISTICS => {}
             _ => return Ok(()),
         }

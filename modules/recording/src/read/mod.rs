@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Frames ──record by record──▶ chunk::unpack ──▶ Contents ──messages, metadata, damage──▶ recover, merge, info
-//!        └─from the end──────▶ Index ──which chunk is where──▶ Contents ──▶ cut, info
+//!        └─from the end──────▶ Index ──which chunk is where──▶ Selected ──▶ cut, draw, Reader
 //! ```
 //!
 //! `mcap` parses records. Framing and chunks are done here: its readers stop at the first damaged chunk, and trust a
@@ -13,3 +13,4 @@ pub(crate) mod contents;
 pub(crate) mod definitions;
 pub(crate) mod frames;
 pub(crate) mod index;
+pub(crate) mod selected;

@@ -1,7 +1,9 @@
 //! A file cut anywhere is recovered to what was before the cut; a part is taken by time and name.
 
 use super::support::{Said, file_of, memory_folder, read, said};
-use crate::{CutError, ReadError, RecoverError, RewriteError, Selection, cut, info, recover, recovered_path};
+use crate::{
+    CutError, ReadError, RecoverError, RewriteError, SelectError, Selection, cut, info, recover, recovered_path,
+};
 use std::path::Path;
 
 /// Recovers bytes as a file, and reads it.
@@ -84,7 +86,12 @@ fn a_part_is_taken_by_time_and_name() {
         (vec!["laser.0/scan".to_owned(), "laser.2".to_owned()], "a topic and a name"),
     ] {
         let to = folder.path().join("part.mcap");
-        let selection = Selection { from_ns: Some(from_ns), until_ns: Some(until_ns), names: names.clone() };
+        let selection = Selection {
+            from_ns: Some(from_ns),
+            until_ns: Some(until_ns),
+            names: names.clone(),
+            ..Selection::default()
+        };
         let (messages, bytes) = cut(&path, &to, &selection, &mut |_, _| {}).unwrap();
         let is_wanted = |said: &&Said| names.is_empty() || names.iter().any(|name| said.topic.starts_with(name));
         let wanted: Vec<Said> = all[1_000..2_000].iter().filter(is_wanted).cloned().collect();
@@ -106,12 +113,13 @@ fn a_part_that_cannot_be_is_explained() {
     let error = cut(&path, &to, &selection, &mut |_, _| {}).unwrap_err();
     assert_eq!(error.to_string(), "the recording has no `lasr.0`; it has laser.0/scan, laser.1/scan, laser.2/scan");
     let selection = Selection { from_ns: Some(5), until_ns: Some(5), ..Selection::default() };
-    assert!(matches!(cut(&path, &to, &selection, &mut |_, _| {}), Err(CutError::NoTime { from_ns: 5, until_ns: 5 })));
+    let error = cut(&path, &to, &selection, &mut |_, _| {}).unwrap_err();
+    assert!(matches!(error, CutError::Select(SelectError::NoTime { from_ns: 5, until_ns: 5 })), "{error}");
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
     let error = cut(&path, &to, &Selection::default(), &mut |_, _| {}).unwrap_err();
-    assert!(matches!(&error, CutError::Read(ReadError::NotClosed { .. })), "{error}");
+    assert!(matches!(&error, CutError::Select(SelectError::Read(ReadError::NotClosed { .. }))), "{error}");
     assert!(!to.exists());
     let error = cut(&path, &path, &Selection::default(), &mut |_, _| {}).unwrap_err();
-    assert!(matches!(error, CutError::Read(_) | CutError::Rewrite(RewriteError::Exists(_))), "{error}");
+    assert!(matches!(error, CutError::Select(_) | CutError::Rewrite(RewriteError::Exists(_))), "{error}");
 }

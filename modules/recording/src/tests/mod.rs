@@ -4,6 +4,7 @@ mod cutting;
 mod damaged;
 mod disks;
 mod failing;
+mod foreign;
 mod merging;
 mod playing;
 mod support;

@@ -1,11 +1,18 @@
 //! Python's reader of MCAP, which others wrote, reads whole and recovered files, with all checksums, and counts alike.
+//! It decodes what is drawn, and its writer makes files that are listed here. Rerun's converter finds what is drawn,
+//! too.
 //!
-//! `cargo xtask test --all` installs it and names the interpreter.
+//! `cargo xtask test --all` installs both and names the programs.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 #[path = "../common/mod.rs"]
 mod common;
+mod drawn;
+mod foreign;
+mod rerun;
+#[path = "../common/sights.rs"]
+mod sights;
 
 use common::{Running, busy_options, channels, in_role, recover_all, session, with_message};
 use rohrpost_recording::{Options, Selection, Writer, cut, info, merge};
@@ -36,18 +43,18 @@ fn role() {
     }
 }
 
-/// What Python says of files: messages of each topic in the stream, and in the statistics.
-fn python(files: &[PathBuf]) -> Vec<String> {
+/// What a script says of files.
+fn python(script: &str, files: &[PathBuf]) -> Vec<String> {
     let python = std::env::var_os(PYTHON);
     let python =
         python.unwrap_or_else(|| panic!("{PYTHON} is not set; run `cargo xtask test --all`, which installs it"));
-    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/read.py");
-    let told = Command::new(python).arg("-B").arg(page).args(files).output().unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
+    let told = Command::new(python).arg("-B").arg(script).args(files).output().unwrap();
     assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
     String::from_utf8(told.stdout).unwrap().lines().map(String::from).collect()
 }
 
-/// The same by us.
+/// What `read.py` says, by us: messages of each topic.
 fn ours(path: &Path) -> String {
     let told = info(path).unwrap();
     let channels = told.channels.iter().map(|channel| format!(" {}={}", channel.topic, channel.messages));
@@ -78,7 +85,7 @@ fn check_killed() {
     cut(&merged, &part, &selection, &mut |_, _| {}).unwrap();
     files.extend([merged, part]);
     let wanted: Vec<String> = files.iter().map(|path| ours(path)).collect();
-    assert_eq!(python(&files), wanted);
+    assert_eq!(python("read.py", &files), wanted);
 }
 
 #[test]
@@ -88,5 +95,5 @@ fn python_reads_a_file_without_messages() {
     channels(&mut writer);
     writer.finish().1.unwrap();
     let path = folder.path().join("base-0001.mcap");
-    assert_eq!(python(&[path]), ["0"]);
+    assert_eq!(python("read.py", &[path]), ["0"]);
 }

@@ -7,6 +7,7 @@ use crate::interface::DataPort;
 use crate::publish::{Delivery, SubscriptionEntry, Subscriptions};
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::{Newest, Published};
+use crate::runtime::schedule::WorkMoment;
 use crate::runtime::stream::OwnStream;
 use rohrpost_config::ClassTable;
 use rohrpost_mailbox::{BODY_BYTES_MAX, Label, Name, Options, Publications, SendError, SystemClock, Type, local};
@@ -33,7 +34,7 @@ impl Context {
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
         let at = self.newest_at(endpoint, &port)?;
         let newest = &mut self.newest[at];
-        (newest.name, newest.stamp_ns) = (port.name, stamp_ns);
+        (newest.name, newest.stamp_ns) = (port.name.into(), stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);
         let (all, _, mut outlet) = self.split();
         outlet.published(&all[at].published());
@@ -108,15 +109,20 @@ impl Context {
         newest_of(&self.newest, &self.streams, endpoint, number)
     }
 
-    /// Delivers periodic data that is due.
-    pub(crate) fn deliver_due(&mut self, now_ns: u64) {
+    /// Looks at the clocks, and delivers periodic data that is due.
+    pub(crate) fn deliver_due(&mut self) -> WorkMoment {
+        let (now, step) = self.schedule.look();
+        if let Some(step) = step {
+            self.subscriptions.step(step);
+        }
         let (all, streams, link, endpoints) = (&self.newest, &self.streams, &self.link, &self.endpoints);
         let classes = &self.installation.classes;
-        self.subscriptions.tick(now_ns, |to| match newest_of(all, streams, to.endpoint, to.wish.number) {
+        self.subscriptions.tick(now, |to| match newest_of(all, streams, to.endpoint, to.wish.number) {
             Some(newest) => deliver(link, classes, endpoints, &newest, to),
             // Fresh, so there is one.
             None => Delivery::Sent,
         });
+        now
     }
 }
 

@@ -132,10 +132,7 @@ impl Context {
     /// [`ContextError::FarStream`] for a module of another node, and [`ContextError::Read`] when all seats of the
     /// stream are taken.
     pub fn stream_untyped(&mut self, from: Name, item: &DataItem, interface: u32) -> Result<Stream<()>, ContextError> {
-        let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
-        let beyond = (from.system() != self.me.system()).then_some("?");
-        let reader = self.open_known(known, from, beyond, || self.installation.classes.format(from))?;
-        Ok(Stream::new(reader, self.clock.clone()))
+        Ok(Stream::new(self.open_untyped(from, item, interface)?, self.clock.clone()))
     }
 
     /// Follows a stream of another module of this node: each record comes to [`crate::Module::received`], while this
@@ -166,6 +163,41 @@ impl Context {
     ) -> Result<StreamSubscription<T>, ContextError> {
         let reader = self.open_stream(&port, module)?;
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
+    }
+
+    /// The same of a stream of which the type is known by its description alone, as in [`Context::stream_untyped`]:
+    /// each record's bytes come in `data.value`.
+    ///
+    /// ```
+    /// # use rohrpost_mailbox::Name;
+    /// # use rohrpost_modules::runtime::{Context, ContextError, StreamSubscription};
+    /// # use rohrpost_modules::schema::Description;
+    /// fn follow_all(
+    ///     context: &mut Context,
+    ///     from: Name,
+    ///     description: &Description,
+    /// ) -> Result<Vec<StreamSubscription<()>>, ContextError> {
+    ///     let follow = |item| context.subscribe_stream_untyped(from, item, description.hash());
+    ///     description.streams().map(follow).collect()
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Context::stream_untyped`].
+    pub fn subscribe_stream_untyped(
+        &mut self,
+        from: Name,
+        item: &DataItem,
+        interface: u32,
+    ) -> Result<StreamSubscription<()>, ContextError> {
+        let reader = self.open_untyped(from, item, interface)?;
+        self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
+    }
+
+    fn open_untyped(&self, from: Name, item: &DataItem, interface: u32) -> Result<CheckedReader, ContextError> {
+        let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
+        let beyond = (from.system() != self.me.system()).then_some("?");
+        self.open_known(known, from, beyond, || self.installation.classes.format(from))
     }
 
     fn open_stream<T>(&self, port: &StreamPort<T>, module: &str) -> Result<CheckedReader, ContextError> {

@@ -69,6 +69,16 @@ impl<'a, T: Data> OpenValue<'a, T> {
         Ok(())
     }
 
+    /// Puts in a value that is postcard already.
+    pub(in crate::runtime) fn put_bytes(&mut self, bytes: &[u8]) -> Result<(), ContextError> {
+        let Some(room) = self.record.body_mut().get_mut(..bytes.len()) else {
+            return Err(self.explain(EncodeError::TooLarge(bytes.len())).into());
+        };
+        room.copy_from_slice(bytes);
+        self.len = Some(bytes.len());
+        Ok(())
+    }
+
     /// Puts a value in, in place of what was put in before; `len` bytes of its last field are to be filled in what this
     /// returns. What they are at first is not told. In `value` that field, of type [`rohrpost_schema::Bytes`], is
     /// empty.

@@ -1,9 +1,10 @@
 //! Asks a module of another node what it offers, part by part, and waits for nothing.
 
-use rohrpost::common::{DESCRIBE, DescriptionPart, HASH};
-use rohrpost::schema::Description;
-use rohrpost::wire::{append, from_bytes};
-use rohrpost::{Context, Name};
+use crate::common::{DESCRIBE, DescriptionPart, HASH};
+use crate::runtime::Context;
+use crate::wire::{append, from_bytes};
+use rohrpost_mailbox::Name;
+use rohrpost_schema::Description;
 use std::time::Duration;
 
 /// Each part comes within this time, or all is asked for anew.
@@ -12,8 +13,17 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const BYTES_MAX: u32 = 1 << 20;
 
 /// A description that is being asked for.
+///
+/// ```
+/// use rohrpost_mailbox::Name;
+/// use rohrpost_modules::{description::DescriptionRequest, runtime::Context};
+///
+/// fn class_of(request: &mut DescriptionRequest, context: &Context, module: Name) -> Option<String> {
+///     Some(request.poll(context, module)?.class) // none: not yet
+/// }
+/// ```
 #[derive(Default)]
-pub(crate) struct DescriptionRequest {
+pub struct DescriptionRequest {
     bytes: Vec<u8>,
     /// The call that is under way.
     call: Option<u32>,
@@ -21,7 +31,7 @@ pub(crate) struct DescriptionRequest {
 
 impl DescriptionRequest {
     /// The description, when it is there. Asks for what is missing; after a failure, for all of it.
-    pub(crate) fn poll(&mut self, context: &Context, module: Name) -> Option<Description> {
+    pub fn poll(&mut self, context: &Context, module: Name) -> Option<Description> {
         let mut link = context.link().borrow_mut();
         link.collect();
         loop {

@@ -1,0 +1,73 @@
+//! Files that an earlier run could not close: whole files are made of them, in a thread of its own. They stay as they
+//! are.
+
+use rohrpost_recording::{is_closed, recover as recovered, recovered_path};
+use std::ffi::OsStr;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Begins. What is there now is looked at, and no file that comes later.
+///
+/// # Errors
+/// When there is no thread.
+pub(super) fn recover(directory: &Path, stem: &str) -> io::Result<()> {
+    let files = files(directory, stem);
+    if files.is_empty() {
+        return Ok(());
+    }
+    let work = move || files.iter().filter(|file| is_leftover(file)).for_each(|file| make_whole(file));
+    std::thread::Builder::new().name("recovering".into()).spawn(work).map(drop)
+}
+
+/// Files of recordings of a stem, in order; none of a folder that cannot be read, which the writer will tell.
+fn files(directory: &Path, stem: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let is_one = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).is_some_and(|name| is_file(name, stem));
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_one).collect();
+    files.sort();
+    files
+}
+
+/// `STEM-0001.mcap`, and not what was recovered of it.
+fn is_file(name: &str, stem: &str) -> bool {
+    let number = name.strip_prefix(stem).and_then(|rest| rest.strip_prefix('-')?.strip_suffix(".mcap"));
+    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+/// Whether its writer did not close it, and nothing was made of it yet. A file without a beginning has nothing in it.
+fn is_leftover(file: &Path) -> bool {
+    !recovered_path(file).exists() && matches!(is_closed(file), Ok(false))
+}
+
+fn make_whole(file: &Path) {
+    let name = file.display();
+    match recovered(file, &recovered_path(file), &mut |_, _| {}) {
+        Ok(made) => tracing::info!(
+            "{name} was not closed: {} messages of it are in {}",
+            made.messages,
+            made.path.file_name().unwrap_or_default().to_string_lossy()
+        ),
+        Err(error) => tracing::error!("{name} was not closed, and is not recovered: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_recordings_are_told_from_others() {
+        for (name, is_one) in [
+            ("base-0001.mcap", true),
+            ("base-12345.mcap", true),
+            ("base-0001.recovered.mcap", false),
+            ("base-0001.recovered.mcap.part", false),
+            ("base-.mcap", false),
+            ("base-arm-0001.mcap", false),
+            ("arm-0001.mcap", false),
+            ("base-0001", false),
+        ] {
+            assert_eq!(is_file(name, "base"), is_one, "{name}");
+        }
+    }
+}

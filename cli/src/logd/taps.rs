@@ -1,0 +1,267 @@
+//! What is recorded of which module: wanted by the configuration, described by the module, subscribed to.
+
+use super::sampler::{Numbering, Sampler};
+use rohrpost::common::OutputLevel;
+use rohrpost::description::{DescriptionRequest, noted};
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::CollectorInterface;
+use rohrpost::output::OutputLine;
+use rohrpost::schema::{DataItem, DataKind, Description};
+use rohrpost::wire::from_bytes;
+use rohrpost::{
+    Context, ContextError, ModuleError, ModuleState, Moment, Name, Node, Rate, Received, StreamSubscription,
+    Subscription, SystemTime,
+};
+use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
+use rohrpost_mailbox::local;
+use rohrpost_recording::{ChannelError, ChannelId, ChannelSpec, Message, WriteError, Writer};
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// The collector's data: lines of output.
+const LINE: &str = "line";
+
+/// All that is recorded.
+pub(super) struct Taps {
+    recording: Recording,
+    sources: Vec<SourceModule>,
+    taps: Vec<Tap>,
+}
+
+/// A module of which something is wanted.
+struct SourceModule {
+    from: Name,
+    /// As the configuration has it.
+    name: String,
+    /// The module of its process, if that is on this node.
+    own: Option<Name>,
+    /// It has described itself.
+    has_answered: bool,
+    asking: DescriptionRequest,
+}
+
+/// One item of a module.
+struct Tap {
+    from: Name,
+    module: String,
+    item: DataItem,
+    /// Hash of its interface.
+    interface: u32,
+    /// What its channel says besides.
+    texts: BTreeMap<String, String>,
+    sampling: Sampling,
+    sampler: Sampler,
+    /// Lines of output: from this level on.
+    least: Option<OutputLevel>,
+    /// None: not yet, or it cannot be opened.
+    source: Option<Source>,
+    /// Why it could not be opened, or a message of it not be recorded, so that it is told once.
+    refusal: String,
+    /// Of the present writer.
+    channel: Option<ChannelId>,
+}
+
+/// How values come.
+enum Source {
+    Data(Subscription<()>),
+    Stream(StreamSubscription<()>),
+}
+
+impl Taps {
+    /// What the configuration names, as seen from module `own` on its node.
+    pub(super) fn new(installation: &Installation, recording: Recording, own: Name, node: &str) -> Self {
+        let source = |from: Name| {
+            let host = installation.module(from).filter(|host| host.node == node);
+            SourceModule {
+                from,
+                name: installation.classes.format(from),
+                own: host.map(|host| host.name),
+                has_answered: false,
+                asking: DescriptionRequest::default(),
+            }
+        };
+        let others = installation.modules.iter().filter(|module| module.name != own);
+        let names = others.flat_map(|module| module.names().map(move |name| (name, module.is_in_file())));
+        let entries = || recording.streams.iter().chain(&recording.data);
+        let collector = recording.output.and_then(|_| installation.classes.id(CollectorInterface::CLASS));
+        // `*` are those of the file; routers have to be named.
+        let is_wanted = |(name, is_in_file): &(Name, bool)| {
+            Some(name.class()) == collector
+                || entries().any(|entry| entry.from.map_or(*is_in_file, |from| from == *name))
+        };
+        let sources = names.filter(is_wanted).map(|(name, _)| source(name)).collect();
+        Self { recording, sources, taps: Vec::new() }
+    }
+
+    /// A recording begins: what is known already has its channels from the first file on.
+    pub(super) fn begin(&mut self, writer: &mut Writer) -> Result<(), ChannelError> {
+        for tap in &mut self.taps {
+            tap.sampler.begin();
+            tap.channel = Some(tap.open_channel(writer)?);
+        }
+        Ok(())
+    }
+
+    /// Subscribes to what modules offer that run by now. Nobody is waited for.
+    pub(super) fn find(&mut self, context: &mut Context, writer: &mut Writer) -> Result<(), ModuleError> {
+        let node = context.link().borrow().participant().node().clone();
+        for source in self.sources.iter_mut().filter(|source| !source.has_answered) {
+            let description = match source.own {
+                Some(host) if runs(&node, host) => noted(&node, source.from),
+                Some(_) => None,
+                None => source.asking.poll(context, source.from),
+            };
+            let Some(description) = description else { continue };
+            source.has_answered = true;
+            let mut taps = source.taps(&self.recording, &description);
+            for tap in &mut taps {
+                tap.channel = Some(tap.open_channel(writer)?);
+            }
+            self.taps.extend(taps);
+        }
+        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context))
+    }
+
+    /// Records a value that came, if it is to be.
+    pub(super) fn take(&mut self, writer: &mut Writer, now: &SystemTime, data: &Received<'_>) {
+        let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
+        let Some(channel) = tap.channel else { return };
+        let (lost, is_chosen) = tap.sampler.note(&data.head, Instant::now());
+        if lost > 0 {
+            writer.count_lost(channel, lost);
+        }
+        if !is_chosen || !tap.is_important(data) {
+            return;
+        }
+        let (epoch, stamp_ns) = match data.moment() {
+            Moment::Stamp(stamp) => (stamp.epoch, stamp.ns),
+            Moment::Ns(ns) => (now.epoch, ns),
+        };
+        let sequence = data.head.sequence;
+        let message = Message { arrival_ns: now.ns, stamp_ns, epoch, sequence, data: data.value };
+        // What is refused is counted; that the queue is full, tells `Health` with the reason.
+        if let Err(error @ WriteError::Long(_)) = writer.write(channel, &message)
+            && tap.refusal.is_empty()
+        {
+            tap.refusal = error.to_string();
+            tracing::error!("{}/{}: {}", tap.module, tap.item.field.name, tap.refusal);
+        }
+    }
+}
+
+impl SourceModule {
+    /// What is to be recorded of what the module offers.
+    fn taps(&self, recording: &Recording, description: &Description) -> Vec<Tap> {
+        let has = |items: &&RecordedItems, is_stream: bool| {
+            let Some(wanted) = items.item.as_ref().filter(|_| items.from == Some(self.from)) else { return true };
+            description.data_item(wanted).is_some_and(|item| !is_stream || item.kind == DataKind::Stream)
+        };
+        let missing = recording.streams.iter().filter(|items| !has(items, true)).map(|items| ("stream", items));
+        let missing =
+            missing.chain(recording.data.iter().filter(|items| !has(items, false)).map(|items| ("data", items)));
+        for (what, items) in missing {
+            let (name, wanted) = (&self.name, items.item.as_deref().unwrap_or_default());
+            let known: Vec<&str> = description.data.iter().map(|item| item.field.name.as_str()).collect();
+            tracing::warn!(
+                "{name} has no {what} `{wanted}` to record; of streams and data it has: {}",
+                known.join(", ")
+            );
+        }
+        description.data.iter().filter_map(|item| self.tap(recording, description, item)).collect()
+    }
+
+    fn tap(&self, recording: &Recording, description: &Description, item: &DataItem) -> Option<Tap> {
+        let name = &item.field.name;
+        let is_stream = item.kind == DataKind::Stream;
+        let is_line = description.class == CollectorInterface::CLASS && name == LINE;
+        let ring = recording.stream(self.from, name).filter(|_| is_stream && self.own.is_some());
+        // `*` is not meant for streams, which may have records that fit no package.
+        let named = |items: &&RecordedItems| !is_stream || items.item.is_some();
+        let (sampling, numbering) = match (ring, recording.datum(self.from, name).filter(named)) {
+            _ if is_line => recording.output.map(|_| (Sampling::Each, Numbering::Packages))?,
+            (Some(items), _) => (items.sampling, Numbering::Records),
+            (None, Some(items)) => (items.sampling, Numbering::Packages),
+            (None, None) => return None,
+        };
+        let interface = description.hash();
+        let texts = [
+            ("class", description.class.clone()),
+            ("interface", format!("{interface:08x}")),
+            ("number", item.number.to_string()),
+            ("sampling", sampling.to_string()),
+        ];
+        Some(Tap {
+            from: self.from,
+            module: self.name.clone(),
+            item: item.clone(),
+            interface,
+            texts: texts.into_iter().map(|(key, text)| (key.to_owned(), text)).collect(),
+            sampling,
+            sampler: Sampler::new(sampling, numbering),
+            least: recording.output.filter(|_| is_line).map(|level| OutputLevel::ALL[level as usize]),
+            source: None,
+            refusal: String::new(),
+            channel: None,
+        })
+    }
+}
+
+impl Tap {
+    fn open_channel(&self, writer: &mut Writer) -> Result<ChannelId, ChannelError> {
+        let (name, item) = (&self.module, &self.item.field);
+        writer.channel(&ChannelSpec { name, item: &item.name, ty: &item.ty, texts: self.texts.clone() })
+    }
+
+    /// Subscribes. A stream that has no seat left is tried again.
+    fn open(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        let opened = match (self.sampler.numbering(), self.sampling) {
+            (Numbering::Records, _) => {
+                context.subscribe_stream_untyped(self.from, &self.item, self.interface).map(Source::Stream)
+            }
+            (Numbering::Packages, sampling) => {
+                let rate = match sampling {
+                    Sampling::Rate(rate_hz) => Rate::hz(rate_hz)?,
+                    Sampling::Each | Sampling::Every(_) => Rate::Each,
+                };
+                let number = self.item.number;
+                context.subscribe_untyped(local::DATA, self.from, number, self.interface, rate).map(Source::Data)
+            }
+        };
+        match opened {
+            Ok(source) => {
+                self.source = Some(source);
+                self.refusal.clear();
+            }
+            Err(ContextError::Read(error)) => {
+                let text = error.to_string();
+                if self.refusal != text {
+                    tracing::error!("{}/{} is not recorded yet: {text}", self.module, self.item.field.name);
+                    self.refusal = text;
+                }
+            }
+            Err(error) => return Err(error.into()),
+        }
+        Ok(())
+    }
+
+    fn has_brought(&self, data: &Received<'_>) -> bool {
+        match &self.source {
+            Some(Source::Data(subscription)) => data.is_of(subscription),
+            Some(Source::Stream(subscription)) => data.is_of(subscription),
+            None => false,
+        }
+    }
+
+    /// A line of output may be less important than those that are wanted. One that cannot be read is kept: it is what
+    /// came.
+    fn is_important(&self, data: &Received<'_>) -> bool {
+        let Some(least) = self.least else { return true };
+        from_bytes::<OutputLine>(data.value).map_or(true, |line| line.level <= least)
+    }
+}
+
+/// Whether the process of a module runs, and is not about to begin or to end: what it noted of itself is true then.
+fn runs(node: &Node, host: Name) -> bool {
+    let is_it = |state: Option<ModuleState>| matches!(state, Some(ModuleState::On | ModuleState::Off));
+    node.participants().iter().any(|process| process.module == host && is_it(process.state))
+}

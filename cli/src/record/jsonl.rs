@@ -1,0 +1,187 @@
+//! Messages as JSON, one object a line.
+
+use crate::terminal::{Failure, say};
+use rohrpost::schema::{Value, decode};
+use rohrpost_recording::{Message, RecordedChannel};
+use serde::Serialize;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A message. Numbers that JSON does not have are texts in its value: `"NaN"`, `"inf"`, `"-inf"`.
+#[derive(Serialize)]
+struct JsonMessage<'a> {
+    topic: &'a str,
+    stamp_ns: u64,
+    epoch: u64,
+    arrival_ns: u64,
+    sequence: u32,
+    #[serde(flatten)]
+    content: JsonContent<'a>,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum JsonContent<'a> {
+    Value {
+        value: Value,
+    },
+    /// Of others, if it is JSON already.
+    Json {
+        value: serde_json::Value,
+    },
+    /// What is not known, or not what its description says.
+    Bytes {
+        unreadable: String,
+        encoding: &'a str,
+        hex: String,
+    },
+}
+
+/// Where they are written.
+pub(super) enum JsonLines {
+    /// Each as it comes.
+    Stdout,
+    File(JsonFile),
+}
+
+/// A file in the making. It gets its name once it is whole; dropped before, it leaves nothing.
+pub(super) struct JsonFile {
+    out: BufWriter<File>,
+    part: PathBuf,
+    to: PathBuf,
+    messages: u64,
+    bytes: u64,
+    is_whole: bool,
+}
+
+impl JsonLines {
+    /// A new file, or the standard output for `-`.
+    pub(super) fn create(to: &Path) -> Result<Self, Failure> {
+        if to == Path::new("-") {
+            return Ok(Self::Stdout);
+        }
+        if to.symlink_metadata().is_ok() {
+            return Err(format!("{}: is there already; remove it, or name another file", to.display()).into());
+        }
+        let mut part = to.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        // What an interrupted one left. Not through a link, which `create_new` would refuse, too.
+        let _ = std::fs::remove_file(&part);
+        let file = File::create_new(&part).map_err(|error| format!("{}: {error}", part.display()))?;
+        let out = BufWriter::new(file);
+        Ok(Self::File(JsonFile { out, part, to: to.to_owned(), messages: 0, bytes: 0, is_whole: false }))
+    }
+
+    /// Writes a message; false when nobody reads any more.
+    pub(super) fn add(&mut self, channel: &RecordedChannel, message: &Message<'_>) -> Result<bool, Failure> {
+        let line = serde_json::to_string(&json_message(channel, message))?;
+        match self {
+            Self::Stdout => Ok(say(line)),
+            Self::File(file) => {
+                file.add(&line).map_err(|error| format!("{}: {error}", file.part.display()))?;
+                Ok(true)
+            }
+        }
+    }
+
+    /// Ends it; messages and bytes of a file.
+    pub(super) fn finish(self) -> Result<Option<(u64, u64)>, Failure> {
+        let Self::File(mut file) = self else { return Ok(None) };
+        file.finish().map_err(|error| format!("{}: {error}", file.to.display()))?;
+        Ok(Some((file.messages, file.bytes)))
+    }
+}
+
+impl JsonFile {
+    fn add(&mut self, line: &str) -> io::Result<()> {
+        writeln!(self.out, "{line}")?;
+        self.messages += 1;
+        self.bytes += line.len() as u64 + 1;
+        Ok(())
+    }
+
+    fn finish(&mut self) -> io::Result<()> {
+        self.out.flush()?;
+        self.out.get_ref().sync_all()?;
+        std::fs::rename(&self.part, &self.to)?;
+        self.is_whole = true;
+        Ok(())
+    }
+}
+
+impl Drop for JsonFile {
+    fn drop(&mut self) {
+        if !self.is_whole {
+            let _ = std::fs::remove_file(&self.part);
+        }
+    }
+}
+
+fn json_message<'a>(channel: &'a RecordedChannel, message: &Message<'_>) -> JsonMessage<'a> {
+    let Message { arrival_ns, stamp_ns, epoch, sequence, data } = *message;
+    let content = content(channel, data);
+    JsonMessage { topic: &channel.topic, stamp_ns, epoch, arrival_ns, sequence, content }
+}
+
+fn content<'a>(channel: &'a RecordedChannel, data: &[u8]) -> JsonContent<'a> {
+    let encoding = channel.message_encoding.as_str();
+    let unreadable = match (&channel.ty, encoding) {
+        (Some(ty), "postcard") => match decode(ty, data) {
+            Ok(value) => return JsonContent::Value { value },
+            Err(error) => error.to_string(),
+        },
+        (_, "json") => match serde_json::from_slice(data) {
+            Ok(value) => return JsonContent::Json { value },
+            Err(error) => error.to_string(),
+        },
+        _ => "its type is not described in a way that is read here".to_owned(),
+    };
+    let hex = data.iter().map(|byte| format!("{byte:02x}")).collect();
+    JsonContent::Bytes { unreadable, encoding, hex }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rohrpost::schema::{Field, Members, Named, Type};
+    use std::collections::BTreeMap;
+
+    fn channel(ty: Option<Type>, encoding: &str) -> RecordedChannel {
+        RecordedChannel {
+            topic: "laser.0/scan".into(),
+            name: "laser.0".into(),
+            item: "scan".into(),
+            ty,
+            message_encoding: encoding.into(),
+            schema_encoding: String::new(),
+            texts: BTreeMap::new(),
+        }
+    }
+
+    fn line(channel: &RecordedChannel, data: &[u8]) -> String {
+        let message = Message { arrival_ns: 12, stamp_ns: 10, epoch: 1, sequence: 3, data };
+        serde_json::to_string(&json_message(channel, &message)).unwrap()
+    }
+
+    #[test]
+    fn numbers_that_json_does_not_have_are_texts() {
+        let field = Field::new("ranges", Type::Array(4, Box::new(Type::F32)));
+        let ty = Type::Struct(Named::new("Scan", Members::Fields(vec![field])));
+        let data: Vec<u8> =
+            [1.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY].iter().flat_map(|range| range.to_le_bytes()).collect();
+        let head = r#"{"topic":"laser.0/scan","stamp_ns":10,"epoch":1,"arrival_ns":12,"sequence":3,"#;
+        let told = line(&channel(Some(ty.clone()), "postcard"), &data);
+        assert_eq!(told, format!(r#"{head}"value":{{"ranges":[1.5,"NaN","inf","-inf"]}}}}"#));
+        let told = line(&channel(Some(ty), "postcard"), &data[1..]);
+        assert!(told.starts_with(&format!(r#"{head}"unreadable":""#)) && told.contains(r#""hex":"00c03f"#), "{told}");
+    }
+
+    #[test]
+    fn what_others_wrote_is_told_as_json_or_as_bytes() {
+        assert!(line(&channel(None, "json"), br#"{"x": [1]}"#).ends_with(r#""value":{"x":[1]}}"#));
+        let told = line(&channel(None, "cdr"), &[0, 1, 0xfe]);
+        assert!(told.ends_with(r#""encoding":"cdr","hex":"0001fe"}"#), "{told}");
+    }
+}

@@ -1,0 +1,53 @@
+//! What is recorded, in words.
+
+use super::Page;
+use crate::module::{Program, RECORDER};
+use crate::output::Level;
+use crate::record::{RecordedItems, Sampling};
+use crate::units::{duration_text, size_text};
+
+impl Page<'_> {
+    pub(super) fn record(&mut self) {
+        let Some(record) = &self.installation.record else { return };
+        let is_it = |program: &Program| *program == Program::Builtin(RECORDER.into());
+        let recorder = self.installation.modules.iter().find(|module| is_it(&module.program));
+        self.line("");
+        self.line("Recording");
+        self.line("");
+        if let Some(module) = recorder {
+            let (name, node) = (self.name(module.name), &module.node);
+            let directory = record.directory.display();
+            self.entry("by", &format!("{name}, on node {node}; its files are {directory}/{node}-0001.mcap and so on"));
+        }
+        let items = |page: &Self, all: &[RecordedItems]| {
+            let texts: Vec<String> = all.iter().map(|items| page.recorded(items)).collect();
+            if texts.is_empty() { "none".into() } else { texts.join("; ") }
+        };
+        let (streams, data) = (items(self, &record.streams), items(self, &record.data));
+        self.entry("streams", &streams);
+        self.entry("data", &data);
+        let output = match record.output {
+            None => "no lines".into(),
+            Some(Level::Trace) => "all lines".into(),
+            Some(level) => format!("lines of level {} and above", level.as_str()),
+        };
+        self.entry("output", &output);
+        let (size, age) = (size_text(record.rotate_size), duration_text(record.rotate_after));
+        let free = size_text(record.leave_free);
+        self.entry("files", &format!("a new one after {size} or {age}; {free} of the disk stay free"));
+        let (flush, sync) = (duration_text(record.flush), duration_text(record.sync));
+        self.entry("may lose", &format!("the last {flush} if it is killed, {sync} more if the power fails"));
+    }
+
+    fn recorded(&self, items: &RecordedItems) -> String {
+        let what = match (items.from, items.item.is_some()) {
+            (None, _) => "all of all modules".into(),
+            (Some(from), false) => format!("all of {}", self.name(from)),
+            (Some(_), true) => items.text(&self.installation.classes),
+        };
+        match items.sampling {
+            Sampling::Each => what,
+            sampling => format!("{what} ({sampling})"),
+        }
+    }
+}

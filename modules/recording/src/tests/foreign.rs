@@ -1,0 +1,130 @@
+//! Files of other programs: listed, whatever they hold and however they are packed.
+
+use super::support::memory_folder;
+use crate::read::chunk;
+use crate::{Damage, Info, Reader, Selection, cut, info};
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+/// As rosbag2, and others, describe channels: topic, type, schema encoding, message encoding.
+const CHANNELS: [(&str, &str, &str, &str); 4] = [
+    ("/imu", "sensor_msgs/msg/Imu", "ros2msg", "cdr"),
+    ("/pose", "foxglove.PoseInFrame", "protobuf", "protobuf"),
+    ("/state", "State", "jsonschema", "json"),
+    ("/untyped", "", "", "raw"),
+];
+
+/// Forty messages, a microsecond apart, of all channels in turn.
+fn write(path: &Path, options: WriteOptions) {
+    let mut writer = options.profile("ros2").library("other 1.0").create(std::fs::File::create(path).unwrap()).unwrap();
+    let ids = CHANNELS.map(|(topic, name, schema_encoding, encoding)| {
+        let schema = if name.is_empty() { 0 } else { writer.add_schema(name, schema_encoding, b"text").unwrap() };
+        writer.add_channel(schema, topic, encoding, &BTreeMap::new()).unwrap()
+    });
+    for number in 0..40_u32 {
+        let log_time = 1_000 * u64::from(number);
+        let channel_id = ids[number as usize % 4];
+        let header = MessageHeader { channel_id, sequence: number, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&header, &[number as u8; 100]).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn check(info: &Info, case: &str) {
+    assert_eq!((info.messages, info.lost, info.damages.len(), info.is_closed), (40, 0, 0, true), "{case}");
+    assert_eq!((info.profile.as_str(), info.library.as_str()), ("ros2", "other 1.0"), "{case}");
+    assert_eq!((info.first_ns, info.last_ns), (Some(0), Some(39_000)), "{case}");
+    let channels: Vec<_> = info.channels.iter().collect();
+    assert_eq!(channels.len(), CHANNELS.len(), "{case}");
+    for (number, (channel, wanted)) in channels.into_iter().zip(CHANNELS).enumerate() {
+        let said = (channel.topic.as_str(), channel.type_name.as_str());
+        let encodings = (channel.schema_encoding.as_str(), channel.message_encoding.as_str());
+        assert_eq!((said, encodings), ((wanted.0, wanted.1), (wanted.2, wanted.3)), "{case}");
+        assert_eq!((channel.messages, &channel.ty, &channel.drawn_of), (10, &None, &None), "{case}");
+        let first_ns = 1_000 * number as u64;
+        assert_eq!((channel.first_ns, channel.last_ns), (Some(first_ns), Some(first_ns + 36_000)), "{case}");
+    }
+}
+
+#[test]
+fn channels_types_encodings_counts_and_times_of_others_are_told() {
+    let folder = memory_folder();
+    let cases = [
+        ("zstd", WriteOptions::new().compression(Some(Compression::Zstd)).chunk_size(Some(500))),
+        ("packed by nothing", WriteOptions::new().compression(None).chunk_size(Some(500))),
+        ("no chunks", WriteOptions::new().use_chunks(false)),
+        ("no index of messages", WriteOptions::new().emit_message_indexes(false)),
+        ("no index of chunks", WriteOptions::new().emit_chunk_indexes(false)),
+        ("no statistics", WriteOptions::new().emit_statistics(false)),
+        ("nothing described again", WriteOptions::new().repeat_channels(false).repeat_schemas(false)),
+        ("no schema described again", WriteOptions::new().repeat_schemas(false)),
+        ("no summary", WriteOptions::new().emit_summary_records(false).emit_summary_offsets(false)),
+    ];
+    for (number, (case, options)) in cases.into_iter().enumerate() {
+        let path = folder.path().join(format!("{number}.mcap"));
+        write(&path, options);
+        check(&info(&path).unwrap_or_else(|error| panic!("{case}: {error}")), case);
+        let mut reader = Reader::open(&path).unwrap();
+        let mut messages = 0;
+        while let Some((channel, message)) = reader.next().unwrap() {
+            assert_eq!((message.data.len(), channel.is_drawn()), (100, false), "{case}");
+            messages += 1;
+        }
+        assert!(messages == 40 && reader.is_closed(), "{case}: {messages}");
+    }
+}
+
+/// Also where the index does not say where messages are, or of which channels.
+#[test]
+fn a_part_of_a_file_of_others_is_taken() {
+    let folder = memory_folder();
+    let cases = [
+        WriteOptions::new().chunk_size(Some(500)),
+        WriteOptions::new().use_chunks(false),
+        WriteOptions::new().emit_message_indexes(false),
+        WriteOptions::new().emit_chunk_indexes(false),
+        WriteOptions::new().repeat_channels(false).repeat_schemas(false),
+        WriteOptions::new().repeat_schemas(false),
+    ];
+    for (case, options) in cases.into_iter().enumerate() {
+        let file = |kind: &str| folder.path().join(format!("{kind}{case}.mcap"));
+        write(&file("whole"), options);
+        let selection = Selection { from_ns: Some(20_000), names: vec!["/imu".into()], ..Selection::default() };
+        assert_eq!(cut(&file("whole"), &file("part"), &selection, &mut |_, _| {}).unwrap().0, 5, "{case}");
+        let channels = info(&file("part")).unwrap().channels;
+        assert_eq!((channels[0].topic.as_str(), channels[0].messages, channels.len()), ("/imu", 5, 1), "{case}");
+    }
+}
+
+/// A chunk's body, as the format has it.
+fn chunk_of(records: &[u8], claimed: u64, compression: &str, packed: &[u8]) -> Vec<u8> {
+    let mut body = [0; 16].to_vec();
+    body.extend(claimed.to_le_bytes());
+    body.extend(crc32fast::hash(records).to_le_bytes());
+    body.extend((compression.len() as u32).to_le_bytes());
+    body.extend(compression.bytes());
+    body.extend((packed.len() as u64).to_le_bytes());
+    body.extend(packed);
+    body
+}
+
+#[test]
+fn chunks_packed_by_lz4_are_read_and_others_are_named() {
+    let records: Vec<u8> = (0..100_000_u32).flat_map(|number| (number / 7).to_le_bytes()).collect();
+    let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
+    encoder.write_all(&records).unwrap();
+    let packed = encoder.finish().unwrap();
+    let len = records.len() as u64;
+    let mut found = Vec::new();
+    assert_eq!(chunk::unpack(&chunk_of(&records, len, "lz4", &packed), &mut found), Ok(()));
+    assert!(found == records);
+    for (claimed, packed) in [(len - 1, &packed[..]), (len + 1, &packed), (len, &packed[..packed.len() / 2])] {
+        let told = chunk::unpack(&chunk_of(&records, claimed, "lz4", packed), &mut found);
+        assert!(matches!(told, Err(Damage::ChunkSum | Damage::Compression)) && found.is_empty(), "{told:?}");
+    }
+    let told = chunk::unpack(&chunk_of(&records, len, "bz2", &packed), &mut found);
+    assert_eq!(told, Err(Damage::ForeignCompression("bz2".into())));
+}

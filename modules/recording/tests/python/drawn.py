@@ -1,0 +1,58 @@
+"""Decodes what is drawn by the descriptions in the file alone; a line for each message, with its content."""
+
+import struct
+import sys
+
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+NUMBERS = {1: "B", 7: "f"}
+
+
+def motion(place, turn):
+    return f"({place.x:g} {place.y:g} {place.z:g}) turned ({turn.x:g} {turn.y:g} {turn.z:.3f} {turn.w:.3f})"
+
+
+def pose(its):
+    return motion(its.position, its.orientation)
+
+
+def points(cloud):
+    count, rest = divmod(len(cloud.data), cloud.point_stride)
+    assert rest == 0, f"{rest} bytes behind the last point"
+
+    def point(number):
+        at = number * cloud.point_stride
+        fields = ((its.name, struct.unpack_from("<" + NUMBERS[its.type], cloud.data, at + its.offset)[0])
+                  for its in cloud.fields)
+        return "(" + " ".join(f"{name}={round(value, 5) + 0:g}" for name, value in fields) + ")"
+
+    return " ".join(point(number) for number in range(count))
+
+
+def content(name, its):
+    match name:
+        case "foxglove.FrameTransform":
+            return f"{its.child_frame_id} in {its.parent_frame_id} at {motion(its.translation, its.rotation)}"
+        case "foxglove.PoseInFrame":
+            return f"in {its.frame_id} at {pose(its.pose)}"
+        case "foxglove.PosesInFrame":
+            return f"in {its.frame_id} at {', '.join(map(pose, its.poses))}"
+        case "foxglove.PointCloud":
+            return f"in {its.frame_id}: {points(its)}"
+        case "foxglove.RawImage":
+            rows = its.data[: its.step].hex(), its.data[its.step :].hex()
+            return f"of {its.frame_id}: {its.width} by {its.height} {its.encoding}, rows {' '.join(rows)}"
+        case "foxglove.CompressedImage":
+            return f"of {its.frame_id}: {its.format}, {its.data}"
+        case "foxglove.Log":
+            level = its.DESCRIPTOR.fields_by_name["level"].enum_type.values_by_number[its.level].name
+            return f"{level} of {its.name}: {its.message}"
+
+
+for path in sys.argv[1:]:
+    with open(path, "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        for schema, channel, message, its in reader.iter_decoded_messages(log_time_order=False):
+            assert its.timestamp.ToNanoseconds() == message.publish_time, channel.topic
+            print(f"{channel.topic}: {schema.name} {content(schema.name, its)}")

@@ -1,0 +1,72 @@
+//! Publishing as another module, by its description.
+
+use super::Context;
+use crate::runtime::error::ContextError;
+use crate::runtime::newest::Newest;
+use crate::runtime::stream::{OpenValue, OwnStream};
+use rohrpost_mailbox::{Name, Stamp};
+
+impl Context {
+    /// Publishes a value as the module that this one stands in for under the name `from`
+    /// ([`crate::Module::stand_ins`]). Its item `number` is data, or a stream, of which this is the next record. The
+    /// value is postcard of the type that the description says; nobody looks whether it is.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError};
+    /// # use rohrpost_mailbox::Name;
+    /// /// Something that was recorded of a module.
+    /// struct Recorded {
+    ///     from: Name,
+    ///     number: u16,
+    ///     stamp_ns: u64,
+    ///     value: Vec<u8>,
+    /// }
+    ///
+    /// fn play(context: &mut Context, recorded: &Recorded) -> Result<(), ContextError> {
+    ///     context.publish_as(recorded.from, recorded.number, recorded.stamp_ns, &recorded.value)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// [`ContextError::NotStoodIn`], or [`ContextError::Record`]: too large for the stream, or too late.
+    pub fn publish_as(&mut self, from: Name, number: u16, stamp_ns: u64, value: &[u8]) -> Result<(), ContextError> {
+        let endpoint = self.endpoints.iter().position(|name| *name == from.module());
+        let stood_in = endpoint.and_then(|endpoint| Some((endpoint, self.stood_in.get(endpoint)?.as_ref()?)));
+        let Some((endpoint, data)) = stood_in else { return Err(self.not_stood_in(from, number)) };
+        if let Some(at) = self.streams.iter().position(|stream| stream.is(endpoint, number)) {
+            return self.write_as(at, stamp_ns, value);
+        }
+        let known = self.newest.iter().position(|newest| (newest.endpoint, newest.number) == (endpoint, number));
+        let at = match (known, data.iter().find(|(item, _)| *item == number)) {
+            (Some(at), _) => at,
+            (None, None) => return Err(self.not_stood_in(from, number)),
+            (None, Some((_, name))) => {
+                self.newest.push(Newest { endpoint, number, name: name.clone().into(), ..Newest::default() });
+                self.newest.len() - 1
+            }
+        };
+        let newest = &mut self.newest[at];
+        newest.stamp_ns = stamp_ns;
+        newest.value.clear();
+        newest.value.extend_from_slice(value);
+        let (all, _, mut outlet) = self.split();
+        outlet.published(&all[at].published());
+        Ok(())
+    }
+
+    /// The next record of a stream.
+    fn write_as(&mut self, at: usize, stamp_ns: u64, value: &[u8]) -> Result<(), ContextError> {
+        let stamp = Stamp { epoch: self.clock.now().epoch, ns: stamp_ns };
+        let (_, streams, outlet) = self.split();
+        let OwnStream { about, writer } = &mut streams[at];
+        let record = writer.begin(stamp).map_err(|error| about.explain(error))?;
+        let mut open = OpenValue::<()>::new(record, stamp_ns, about, outlet);
+        open.put_bytes(value)?;
+        open.finish().map(drop)
+    }
+
+    #[cold]
+    fn not_stood_in(&self, from: Name, number: u16) -> ContextError {
+        ContextError::NotStoodIn { module: self.installation.classes.format(from.module()), number }
+    }
+}

@@ -1,0 +1,150 @@
+//! A log as the time of a node: ticks come at the log's pace, none before it begins nor while it stands still, and from
+//! its beginning again when it is played anew.
+
+use crate::harness::{Place, Robot, probe, wait};
+use crate::probe::ProbingInterface;
+use crate::process::Running;
+use rohrpost::ToolLink;
+use rohrpost::common::GET_DATA;
+use rohrpost::wire::{append, from_bytes};
+use rohrpost_mailbox::{SystemClock, TimeSource, monotonic_ns};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// When the log begins, s after 1970.
+const BEGIN_S: u64 = 1_000_000_000;
+/// Of the probe's ticks, in the node's time.
+const PERIOD_NS: u64 = 250_000_000;
+const PATIENCE: Duration = Duration::from_secs(20);
+
+const HEAD: &str = r#"
+installation = "test"
+[system]
+name = "robot"
+id = 1
+[classes]
+player = { id = 170 }
+odometry = { id = 160 }
+laser = { id = 150 }
+probe = { id = 96 }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+[nodes.main]
+[time]
+source = "log"
+"#;
+
+/// A robot with a probe and a player of a log that lasts longer than any test.
+fn robot(place: &Place, speed: f64, player_keys: &str) -> (Running, Robot, PathBuf) {
+    let line = |s: u64| format!("ODOM 0 0 0 0 0 0 {}.0 host 0\n", BEGIN_S + s);
+    std::fs::write(place.path("long.log"), (0..50_000).map(line).collect::<String>()).unwrap();
+    let player = format!(
+        "[[module]]\nname = \"player.0\"\naliases = [\"odometry.0\", \"laser.0\"]\nbuiltin = \"carmen\"\n\
+         settings = {{ file = \"long.log\", speed = {speed:?} }}\n{player_keys}\n"
+    );
+    let config = place.path("test.toml");
+    std::fs::write(&config, [HEAD, &probe("probe.0", "rate-hz = 4.0", ""), &player].concat()).unwrap();
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    (launch, robot, config)
+}
+
+/// A tick of the probe: which one, and when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Beat {
+    number: u64,
+    stamp_ns: u64,
+}
+
+/// The probe's last tick, if there was one.
+fn beat(robot: &Robot, tool: &mut ToolLink) -> Option<Beat> {
+    let port = ProbingInterface::BEAT;
+    let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+    let newest = tool.call(robot.name("probe.0"), GET_DATA, (port.hash)(), write, |bytes| from_bytes(bytes));
+    newest.ok().map(|(stamp_ns, number)| Beat { number, stamp_ns })
+}
+
+/// The same, when the probe has done all that was due before.
+fn settled(robot: &Robot, tool: &mut ToolLink) -> Option<Beat> {
+    for _ in 0..2 {
+        tool.status(robot.name("probe.0")).unwrap();
+    }
+    beat(robot, tool)
+}
+
+#[test]
+fn ticks_come_at_the_pace_of_the_log() {
+    for (speed, periods) in [(1.0, 8), (10.0, 80)] {
+        let place = Place::new();
+        let (mut launch, robot, _) = robot(&place, speed, "");
+        let mut tool = robot.tool(PATIENCE);
+        let record = SystemClock::open(&robot.node).record().unwrap();
+        assert_eq!((record.source, record.pace_ppb), (TimeSource::Log, (speed * 1e9) as u64));
+        let first = wait("a first tick", || beat(&robot, &mut tool));
+        assert!(first.stamp_ns >= BEGIN_S * 1_000_000_000, "{first:?}");
+        let last = wait("ticks", || {
+            beat(&robot, &mut tool).filter(|last| last.stamp_ns >= first.stamp_ns + periods * PERIOD_NS)
+        });
+        let (ticks, passed) = (last.number - first.number, (last.stamp_ns - first.stamp_ns).div_ceil(PERIOD_NS));
+        // A busy computer leaves some out. By the computer's clock there would be a tenth at ten times the pace.
+        assert!((passed / 2..=passed).contains(&ticks), "{ticks} ticks in {passed} periods at {speed}");
+        tool.close();
+        launch.stop();
+        place.assert_empty();
+    }
+}
+
+#[test]
+fn there_is_no_tick_while_the_log_stands_still_and_they_go_on_after_a_step_back() {
+    let place = Place::new();
+    let (mut launch, robot, _) = robot(&place, 10.0, "restart = \"always\"");
+    let (mut tool, clock) = (robot.tool(PATIENCE), SystemClock::open(&robot.node));
+    wait("a first tick", || beat(&robot, &mut tool));
+    place.say(&["call", "player.0", "off"]).ok();
+    assert_eq!(clock.record().unwrap().pace_ppb, 0);
+    let (before, at_ns) = (settled(&robot, &mut tool).unwrap(), clock.now().ns);
+    // Time for 20 ticks, if it passed.
+    let since_ns = monotonic_ns();
+    wait("half a second of the computer", || (monotonic_ns() - since_ns > 2 * PERIOD_NS).then_some(()));
+    assert_eq!((settled(&robot, &mut tool), clock.now().ns), (Some(before), at_ns));
+    place.say(&["call", "player.0", "on"]).ok();
+    let after = wait("ticks go on", || beat(&robot, &mut tool).filter(|beat| beat.number >= before.number + 3));
+    assert!(after.stamp_ns >= at_ns);
+    let epoch = clock.record().unwrap().epoch;
+    let pid = robot.pid("player.0");
+    place.say(&["restart", "player.0"]).ok();
+    robot.wait_restarted("player.0", pid);
+    let again = wait("ticks from the beginning", || {
+        beat(&robot, &mut tool).filter(|beat| beat.stamp_ns < after.stamp_ns && beat.number > after.number + 1)
+    });
+    assert_eq!(clock.record().unwrap().epoch, epoch + 1, "{again:?}");
+    tool.close();
+    launch.stop();
+    place.assert_empty();
+}
+
+#[test]
+fn before_the_log_begins_there_is_no_time_and_tools_say_so() {
+    let place = Place::new();
+    let (mut launch, robot, _) = robot(&place, 2.0, "start = \"off\"");
+    let mut tool = robot.tool(PATIENCE);
+    assert_eq!(settled(&robot, &mut tool), None);
+    let record = SystemClock::open(&robot.node).record().unwrap();
+    assert_eq!((record.source, record.pace_ppb, record.is_known()), (TimeSource::Log, 0, false));
+    let top = || place.say(&["top", "--once"]).ok();
+    assert!(top().contains("no time yet   log\n"), "{}", top());
+    let json = place.say(&["top", "--json", "--interval", "0.1"]).json();
+    assert_eq!(json["time_known"], false, "{json}");
+    let told = place.say(&["time"]).fails();
+    assert!(told.contains("its time is that of the log that is played there"), "{told}");
+    let told = place.say(&["ping", "probe.0", "--count", "1"]).ok();
+    assert!(told.contains("the time of this node stands still"), "{told}");
+    place.say(&["call", "player.0", "on"]).ok();
+    wait("a first tick", || beat(&robot, &mut tool));
+    assert!(top().contains("log x 2\n"), "{}", top());
+    tool.close();
+    launch.stop();
+    place.assert_empty();
+}

@@ -1,0 +1,339 @@
+//! The built-in module `logd` on a running node: all that was sent is in its files, or counted; they are whole, also
+//! after it was killed; and a disk that is not there is told, and disturbs nobody.
+
+use crate::harness::{OUTPUT, Place, Robot, signal, wait};
+use crate::process::Running;
+use nix::sys::signal::Signal;
+use rohrpost::serde::Deserialize;
+use rohrpost::wire::from_bytes;
+use rohrpost::{Context, Module, ModuleError, data};
+use rohrpost_mailbox::StreamId;
+use rohrpost_recording::{Reader, info, is_closed};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+/// Not a test: a module that launch starts. Run as a test it ends at once.
+#[test]
+fn feeder() {
+    if std::env::var_os("ROHRPOST_MODULE").is_some() {
+        let code = rohrpost::run::<Feeder>();
+        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
+    }
+}
+
+/// Larger than what data mailboxes take.
+#[data]
+struct Frame {
+    number: u64,
+    bytes: Vec<u8>,
+}
+
+const FRAME_BYTES: usize = 10_000;
+
+/// Publishes as much as it is told to: numbers from 1 on.
+#[rohrpost::interface(class = "feeder")]
+trait Feeding {
+    /// Sends so many more of each item.
+    #[command(16)]
+    fn feed(&mut self, count: u64);
+
+    /// Values of each item sent so far; none while more are to be sent.
+    #[command(17, idempotent)]
+    fn fed(&mut self) -> Option<u64>;
+
+    /// As data.
+    #[data(1)]
+    fn count() -> u64;
+
+    /// As a stream.
+    #[stream(2)]
+    fn frame() -> Frame;
+}
+
+#[derive(Deserialize, Default)]
+#[serde(crate = "rohrpost::serde", deny_unknown_fields, default)]
+struct FeederSettings {}
+
+struct Feeder {
+    wanted: u64,
+    sent: u64,
+}
+
+impl Module for Feeder {
+    type Settings = FeederSettings;
+    type Interfaces = FeedingInterface;
+
+    fn new(_: FeederSettings, context: &mut Context) -> Result<Self, ModuleError> {
+        context.set_period(Duration::from_millis(1));
+        Ok(Self { wanted: 0, sent: 0 })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        if self.sent < self.wanted {
+            let number = self.sent + 1;
+            context.publish_now(FeedingInterface::COUNT, &number)?;
+            context.write_now(FeedingInterface::FRAME, &Frame { number, bytes: vec![7; FRAME_BYTES] })?;
+            self.sent = number;
+        }
+        Ok(())
+    }
+}
+
+impl Feeding for Feeder {
+    fn feed(&mut self, count: u64) {
+        self.wanted += count;
+    }
+
+    fn fed(&mut self) -> Option<u64> {
+        (self.sent == self.wanted).then_some(self.sent)
+    }
+}
+
+const HEAD: &str = r#"
+installation = "test"
+[system]
+name = "robot"
+id = 1
+[classes]
+feeder = { id = 96 }
+output = { id = 32 }
+logd = { id = 24 }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+[nodes.main]
+"#;
+
+const LOGD: &str = r#"
+[[module]]
+name = "logd.0"
+builtin = "logd"
+stop-within = "60 s"
+[module.mailbox.data]
+slots = 1024
+"#;
+
+const RECORD: &str = r#"
+[record]
+directory = "recordings"
+streams = ["feeder.0/*", { name = "feeder.1/frame", every = 7 }]
+data = ["*", { name = "feeder.1/count", every = 10 }]
+output = "info"
+leave-free = "0 B"
+flush = "20 ms"
+sync = "100 ms"
+"#;
+
+fn feeder_entry(number: u8) -> String {
+    let program = format!("{:?}", std::env::current_exe().unwrap());
+    format!(
+        "[[module]]\nname = \"feeder.{number}\"\nprogram = [{program}, \"--exact\", \"recorded::feeder\", \
+         \"--nocapture\"]\n[module.stream.frame]\nrecord = \"16 KiB\"\nkeep = 512\n"
+    )
+}
+
+fn launched(place: &Place, record: &str) -> (Running, Robot) {
+    let config = place.path("test.toml");
+    let text = [HEAD, OUTPUT, LOGD, &feeder_entry(0), &feeder_entry(1), record].concat();
+    std::fs::write(&config, text).unwrap();
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    (launch, robot)
+}
+
+fn call(place: &Place, module: &str, function: &[&str]) -> Value {
+    place.say(&[&["call", module, "--json"], function].concat()).json()
+}
+
+/// Feeds, and waits until all is sent. What was sent so far.
+fn feed(place: &Place, module: &str, count: u64) -> u64 {
+    place.say(&["call", module, "feed", &count.to_string()]).ok();
+    wait(format!("{module} has sent"), || call(place, module, &["fed"]).as_u64())
+}
+
+/// What became of a channel's messages: in files, and lost.
+fn accounts(place: &Place) -> BTreeMap<String, (u64, u64)> {
+    let page = call(place, "logd.0", &["channels", "0"]);
+    let channel = |its: &Value| {
+        let count = |key: &str| its[key].as_u64().unwrap();
+        (its["topic"].as_str().unwrap().to_owned(), (count("written"), count("lost")))
+    };
+    page["channels"].as_array().unwrap().iter().map(channel).collect()
+}
+
+/// Feeds one by one until the recorder has something of each item: from then on nothing may be missing without being
+/// counted.
+fn feed_until_recorded(place: &Place, module: &str) {
+    wait(format!("{module} is recorded"), || {
+        feed(place, module, 1);
+        let accounts = accounts(place);
+        let has = |item: &str| accounts.get(&format!("{module}/{item}")).is_some_and(|(written, _)| *written > 0);
+        (has("count") && has("frame")).then_some(())
+    });
+}
+
+/// Messages of a topic in a file, also in one that is being written.
+fn messages<T>(file: &Path, topic: &str, read: impl Fn(&[u8]) -> T) -> Vec<T> {
+    let mut messages = Vec::new();
+    let Ok(mut reader) = Reader::open(file) else { return messages };
+    while let Ok(Some((channel, message))) = reader.next() {
+        if channel.topic == topic {
+            messages.push(read(message.data));
+        }
+    }
+    messages
+}
+
+/// Numbers of all values of a topic.
+fn numbers(file: &Path, topic: &str) -> Vec<u64> {
+    let numbers = messages(file, topic, |bytes| {
+        if topic.ends_with("/count") {
+            return from_bytes(bytes).unwrap();
+        }
+        let frame: Frame = from_bytes(bytes).unwrap();
+        assert_eq!(frame.bytes, [7; FRAME_BYTES]);
+        frame.number
+    });
+    assert!(numbers.is_sorted_by(|a, b| a < b), "{topic}: {numbers:?}");
+    numbers
+}
+
+/// Texts of the recorded lines of output.
+fn lines(file: &Path) -> Vec<String> {
+    messages(file, "output.0/line", |bytes| from_bytes::<rohrpost::output::OutputLine>(bytes).unwrap().text)
+}
+
+/// Waits until all values of a topic, one in `every`, are in files or lost, from the first one in this file on.
+fn wait_for_all(place: &Place, file: &Path, topic: &str, last: u64, every: u64) {
+    wait(format!("all of {topic} are recorded"), || {
+        let first = *numbers(file, topic).first()?;
+        let (written, lost) = *accounts(place).get(topic)?;
+        (written + lost > (last - first) / every).then_some(())
+    });
+}
+
+/// From the first one that is there to the last one that was sent, each is in the file or counted as lost.
+#[track_caller]
+fn assert_all_there(file: &Path, topic: &str, last: u64, every: u64) -> Vec<u64> {
+    let (info, numbers) = (info(file).unwrap(), numbers(file, topic));
+    let channel = info.channels.iter().find(|channel| channel.topic == topic).unwrap();
+    let first = numbers.first().copied().unwrap();
+    let sent = (last - first) / every + 1;
+    assert_eq!(numbers.len() as u64 + channel.lost, sent, "{topic} from {first} to {last}: {numbers:?}");
+    assert!(numbers.iter().all(|number| (number - first).is_multiple_of(every)), "{topic}: {numbers:?}");
+    numbers
+}
+
+#[test]
+fn what_is_named_is_recorded_and_each_value_is_in_the_file_or_counted() {
+    /// Of the second feeder one in ten and one in seven are wanted, by the numbers of packages and records.
+    const TOPICS: [(&str, u64); 4] =
+        [("feeder.0/count", 1), ("feeder.0/frame", 1), ("feeder.1/count", 10), ("feeder.1/frame", 7)];
+    let place = Place::new();
+    let (mut launch, robot) = launched(&place, RECORD);
+    let file = place.path("recordings/main-0001.mcap");
+    ["feeder.0", "feeder.1"].iter().for_each(|module| feed_until_recorded(&place, module));
+    let last: Vec<u64> = ["feeder.0", "feeder.1"].iter().map(|module| feed(&place, module, 400)).collect();
+    let last = |topic: &str| last[usize::from(topic.starts_with("feeder.1"))];
+    for (topic, every) in TOPICS {
+        wait_for_all(&place, &file, topic, last(topic), every);
+    }
+    let state = call(&place, "logd.0", &["recording"]);
+    assert_eq!((&state["problem"], state["file"].is_string()), (&Value::Null, true), "{state:#}");
+    place.say(&["call", "feeder.0", "off"]).ok();
+    wait("a line", || lines(&file).iter().any(|line| line == "is off").then_some(()));
+    drop(robot);
+    launch.stop();
+
+    let info = info(&file).unwrap();
+    assert_eq!((info.is_closed, info.closed_because.as_deref()), (true, Some("ended")));
+    for (topic, every) in TOPICS {
+        assert_all_there(&file, topic, last(topic), every);
+    }
+    assert_eq!(info.session["node"], "main");
+    assert!(info.configuration["test.toml"].contains("[record]"), "{:?}", info.configuration);
+    let said = place.say(&["record", "info", file.to_str().unwrap()]).ok();
+    for words in ["feeder.0/frame", "{number: u64, bytes: ", "output.0/line", "closed (ended)"] {
+        assert!(said.contains(words), "no `{words}` in:\n{said}");
+    }
+}
+
+#[test]
+fn a_recorder_that_is_killed_goes_on_and_makes_a_whole_file_of_what_it_had() {
+    let place = Place::new();
+    let (mut launch, robot) = launched(&place, RECORD);
+    let [torn, recovered, next] =
+        ["main-0001", "main-0001.recovered", "main-0002"].map(|name| place.path(&format!("recordings/{name}.mcap")));
+    feed_until_recorded(&place, "feeder.0");
+    let before = feed(&place, "feeder.0", 200);
+    let topics = ["feeder.0/count", "feeder.0/frame"];
+    topics.iter().for_each(|topic| wait_for_all(&place, &torn, topic, before, 1));
+    let known = accounts(&place);
+    let pid = robot.pid("logd.0");
+    signal(pid, Signal::SIGKILL);
+    robot.wait_restarted("logd.0", pid);
+    feed_until_recorded(&place, "feeder.0");
+    let last = feed(&place, "feeder.0", 200);
+    topics.iter().for_each(|topic| wait_for_all(&place, &next, topic, last, 1));
+    wait("the first file is recovered", || recovered.exists().then_some(()));
+    drop(robot);
+    launch.stop();
+
+    assert!(!is_closed(&torn).unwrap() && is_closed(&recovered).unwrap());
+    assert_eq!(info(&next).unwrap().closed_because.as_deref(), Some("ended"));
+    for topic in topics {
+        let (written, _) = known[topic];
+        let first = numbers(&recovered, topic);
+        assert!(first.len() as u64 >= written && first.last() == Some(&before), "{topic}: {written} of {first:?}");
+        let later = assert_all_there(&next, topic, last, 1);
+        assert!(later[0] > before, "{topic}: {} behind {before}", later[0]);
+    }
+}
+
+#[test]
+fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
+    let place = Place::new();
+    let (mut launch, robot) = launched(&place, &RECORD.replace("\"recordings\"", "\"disk/recordings\""));
+    let errors = || place.say(&["log", "--timeout", "60", "--level", "error"]).out;
+    let told = wait("an error", || Some(errors()).filter(|lines| lines.contains("records nothing: ")));
+    assert!(told.contains("/disk/recordings") && told.contains(": is gone; make the folder again"), "{told}");
+    let frames = StreamId { name: robot.name("feeder.0"), number: FeedingInterface::FRAME.number };
+    wait("the recorder has subscribed", || {
+        let status = place.say(&["status", "feeder.0", "--json"]).json();
+        let readers = robot.node.inspect_stream(frames).unwrap()?.readers;
+        (status[0]["subscribers"] == 1 && readers == 1).then_some(())
+    });
+    // Nobody else notices, and what comes meanwhile waits in memory.
+    feed(&place, "feeder.0", 100);
+    assert_eq!(place.say(&["status", "feeder.0", "--json"]).json()[0]["missed"], 0);
+    assert!(call(&place, "logd.0", &["recording"])["file"].is_null());
+    std::fs::create_dir_all(place.path("disk/recordings")).unwrap();
+    let file = place.path("disk/recordings/main-0001.mcap");
+    for topic in ["feeder.0/count", "feeder.0/frame"] {
+        wait_for_all(&place, &file, topic, 100, 1);
+    }
+    wait("a line", || lines(&file).iter().any(|line| line.starts_with("records again; ")).then_some(()));
+    drop(robot);
+    launch.stop();
+    for topic in ["feeder.0/count", "feeder.0/frame"] {
+        assert_eq!(numbers(&file, topic), (1..=100).collect::<Vec<u64>>(), "{topic}");
+    }
+}
+
+#[test]
+fn the_example_of_the_book_is_right() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |file: &str| std::fs::read_to_string(root.join(file)).unwrap();
+    let page = read("docs/src/recording.md");
+    let example = page.split("```toml\n[classes]\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let (class, modules) = example.split_once("\n\n").unwrap();
+    let demo = read("config/demo.toml").replacen("[nodes.main]", &format!("{class}\n\n[nodes.main]"), 1);
+    let place = Place::new();
+    std::fs::write(place.path("demo.toml"), format!("{demo}\n{modules}")).unwrap();
+    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
+    let explained = place.say(&["check", "demo.toml"]).ok();
+    assert!(explained.contains("\nRecording\n"), "{explained}");
+}
