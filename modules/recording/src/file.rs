@@ -105,7 +105,7 @@ impl OpenFile {
             return Err(DiskError::Gone { path: Shown(self.path.clone()) });
         }
         if !self.has_synced_name {
-            disk.sync_folder(self.path.parent().unwrap_or(Path::new("."))).map_err(failed)?;
+            disk.sync_folder(folder_of(&self.path)).map_err(failed)?;
             self.has_synced_name = true;
         }
         Ok(())
@@ -135,8 +135,24 @@ impl OpenFile {
     }
 }
 
+/// Where a file is; of a bare name the present folder.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// `mcap` says that writing failed, the output knows why.
 fn explain(output: &Output, path: &Path, error: McapError) -> DiskError {
     let cause = output.sink().take_error();
     DiskError::new("write", path, cause.unwrap_or_else(|| io::Error::other(error)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bare_name_is_in_the_present_folder() {
+        let folders = ["part.mcap", "./part.mcap", "a/part.mcap", "/part.mcap"].map(|path| folder_of(Path::new(path)));
+        assert_eq!(folders, [".", ".", "a", "/"].map(Path::new));
+    }
 }

@@ -64,8 +64,7 @@ pub struct Drawn {
     pub too_long: BTreeMap<String, u64>,
     /// Topics of which nothing is drawn.
     pub without: Vec<String>,
-    /// The module that is taken to carry scanners: their points are in its frame. None: they are where the world
-    /// begins.
+    /// The module that is taken to carry scanners: their points are in its frame. None: they are in that of the world.
     pub carrier: Option<String>,
 }
 
