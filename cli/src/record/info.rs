@@ -12,6 +12,9 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// Some messages at once have no rate.
+const SHORTEST_NS: u64 = 1_000_000_000;
+
 #[derive(clap::Args)]
 pub(super) struct RecordingInfoArguments {
     /// Recordings.
@@ -81,9 +84,9 @@ fn text(info: &Info) -> String {
     format!("{}\n\n{}", lines.join("\n"), table(["topic", ">messages", ">per s", ">lost", "type"], rows))
 }
 
-/// Messages a second, over the time in which they came.
+/// Messages a second, over the time in which they came, if that is a second or more.
 fn rate(channel: &ChannelInfo) -> Option<f64> {
-    let ns = channel.last_ns?.checked_sub(channel.first_ns?).filter(|ns| *ns > 0)?;
+    let ns = channel.last_ns?.checked_sub(channel.first_ns?).filter(|ns| *ns >= SHORTEST_NS)?;
     Some(channel.messages.saturating_sub(1) as f64 * 1e9 / ns as f64)
 }
 
