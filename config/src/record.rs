@@ -137,7 +137,7 @@ fn nearest_entry<'e>(entries: &'e [RecordedItems], from: Name, item: &str) -> Op
     let has = |entry: &&RecordedItems| {
         entry.from.is_none_or(|name| name == from) && entry.item.as_ref().is_none_or(|name| name == item)
     };
-    entries.iter().filter(has).max_by_key(|entry| (entry.item.is_some(), entry.from.is_some()))
+    entries.iter().filter(has).max_by_key(|entry| entry.exactness())
 }
 
 fn output(item: &Item<'_>) -> Option<Option<Level>> {
@@ -161,6 +161,12 @@ fn at_least_a_second(item: &Item<'_>, example: &str) -> Option<Duration> {
 }
 
 impl RecordedItems {
+    /// How exactly it names an item: the item itself goes before its module, and that before all. The greater one
+    /// counts.
+    pub fn exactness(&self) -> (bool, bool) {
+        (self.item.is_some(), self.from.is_some())
+    }
+
     /// As the file writes it.
     pub fn text(&self, classes: &ClassTable) -> String {
         let item = self.item.as_deref().unwrap_or("*");

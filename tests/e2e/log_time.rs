@@ -89,7 +89,7 @@ fn ticks_come_at_the_pace_of_the_log() {
         });
         let (ticks, passed) = (last.number - first.number, (last.stamp_ns - first.stamp_ns).div_ceil(PERIOD_NS));
         // A busy computer leaves some out. By the computer's clock there would be a tenth at ten times the pace.
-        assert!((passed / 2..=passed).contains(&ticks), "{ticks} ticks in {passed} periods at {speed}");
+        assert!((passed / 5..=passed).contains(&ticks), "{ticks} ticks in {passed} periods at {speed}");
         tool.close();
         launch.stop();
         place.assert_empty();

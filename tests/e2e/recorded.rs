@@ -337,3 +337,15 @@ fn the_example_of_the_book_is_right() {
     let explained = place.say(&["check", "demo.toml"]).ok();
     assert!(explained.contains("\nRecording\n"), "{explained}");
 }
+
+/// Then there is no time at which anything could arrive, but the recorder does its work.
+#[test]
+fn before_a_log_begins_modules_are_found_and_nothing_is_recorded() {
+    let place = Place::new();
+    let (mut launch, _) = launched(&place, &["[time]\nsource = \"log\"\n", RECORD].concat());
+    // Of two feeders, and the collector's lines.
+    wait("all is found", || (accounts(&place).len() == 5).then_some(()));
+    assert!(accounts(&place).values().all(|account| *account == (0, 0)), "{:?}", accounts(&place));
+    launch.stop();
+    place.assert_empty();
+}

@@ -1,21 +1,23 @@
 //! Files that an earlier run could not close: whole files are made of them, in a thread of its own. They stay as they
 //! are.
 
+use nix::sys::statvfs::statvfs;
 use rohrpost_recording::{is_closed, recover as recovered, recovered_path};
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Begins. What is there now is looked at, and no file that comes later.
+/// Begins. What is there now is looked at, and no file that comes later. Of the disk so much is left as recordings
+/// leave.
 ///
 /// # Errors
 /// When there is no thread.
-pub(super) fn recover(directory: &Path, stem: &str) -> io::Result<()> {
+pub(super) fn recover(directory: &Path, stem: &str, leave_bytes: u64) -> io::Result<()> {
     let files = files(directory, stem);
     if files.is_empty() {
         return Ok(());
     }
-    let work = move || files.iter().filter(|file| is_leftover(file)).for_each(|file| make_whole(file));
+    let work = move || files.iter().filter(|file| is_leftover(file)).for_each(|file| make_whole(file, leave_bytes));
     std::thread::Builder::new().name("recovering".into()).spawn(work).map(drop)
 }
 
@@ -39,8 +41,14 @@ fn is_leftover(file: &Path) -> bool {
     !recovered_path(file).exists() && matches!(is_closed(file), Ok(false))
 }
 
-fn make_whole(file: &Path) {
+fn make_whole(file: &Path, leave_bytes: u64) {
     let name = file.display();
+    if !has_room_for(file, leave_bytes) {
+        tracing::error!(
+            "{name} was not closed, and a whole file has no room beside it; make some, then `rohrpost record recover`"
+        );
+        return;
+    }
     match recovered(file, &recovered_path(file), &mut |_, _| {}) {
         Ok(made) => tracing::info!(
             "{name} was not closed: {} messages of it are in {}",
@@ -51,9 +59,23 @@ fn make_whole(file: &Path) {
     }
 }
 
+/// Whether its disk can take the file once more. What cannot be asked is tried.
+fn has_room_for(file: &Path, leave_bytes: u64) -> bool {
+    let (Ok(its), Ok(disk)) = (file.metadata(), statvfs(file)) else { return true };
+    disk.blocks_available().saturating_mul(disk.fragment_size()) >= its.len().saturating_add(leave_bytes)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_to_be_left_free_is_left() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        assert!(has_room_for(file.path(), 0));
+        assert!(!has_room_for(file.path(), u64::MAX));
+        assert!(has_room_for(Path::new("/nowhere"), u64::MAX), "what is wrong with it, is told when it is tried");
+    }
 
     #[test]
     fn files_of_recordings_are_told_from_others() {

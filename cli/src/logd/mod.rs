@@ -20,6 +20,7 @@ use health::Health;
 use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
 use rohrpost::{Context, Module, ModuleError, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
+use rohrpost_mailbox::TimeSource;
 use rohrpost_recording::{Options, Rotation, Session, Status, Writer};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -58,10 +59,12 @@ impl Module for Logd {
         let node = node.ok_or_else(|| ModuleError::new("it is not in the configuration"))?.to_owned();
         make(&recording.directory);
         // Before there is a file of this run.
-        leftovers::recover(&recording.directory, &node)?;
+        leftovers::recover(&recording.directory, &node, recording.leave_free)?;
         let options = options(recording, &node);
         let session = session(installation, &node);
         let taps = Taps::new(installation, recording.clone(), context.me(), &node);
+        // It serves the computer's disk: also while the robot's time stands still.
+        context.use_computer_clock();
         context.set_period(PERIOD);
         Ok(Self { options, session, taps, writer: None, health: Health::default() })
     }
@@ -69,7 +72,7 @@ impl Module for Logd {
     fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
         let mut writer = Writer::start(self.options.clone(), self.session.clone())?;
         self.health = Health::default();
-        self.taps.begin(&mut writer)?;
+        self.taps.begin(&mut writer);
         self.taps.find(context, &mut writer)?;
         self.writer = Some(writer);
         Ok(())
@@ -97,7 +100,7 @@ impl Module for Logd {
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if let Some(writer) = &mut self.writer {
+        if let Some(writer) = self.writer.as_mut().filter(|_| has_begun(context)) {
             self.taps.take(writer, &context.now(), data);
         }
         Ok(())
@@ -121,6 +124,11 @@ impl Recorder for Logd {
         let rest = rest.map(|its| RecordedMessages { topic: its.topic, written: its.written, lost: its.lost });
         ChannelPage { total, channels: rest.take_while(fits).collect() }
     }
+}
+
+/// Whether there is a time at which something can arrive: that of a log begins with its player.
+fn has_begun(context: &Context) -> bool {
+    context.clock().record().is_none_or(|record| record.source != TimeSource::Log || record.is_known())
 }
 
 /// Makes the folder itself, and none above it: those may be where a disk is to be mounted.

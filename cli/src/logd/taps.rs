@@ -14,7 +14,7 @@ use rohrpost::{
 };
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
 use rohrpost_mailbox::local;
-use rohrpost_recording::{ChannelError, ChannelId, ChannelSpec, Message, WriteError, Writer};
+use rohrpost_recording::{ChannelId, ChannelSpec, Message, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -94,12 +94,11 @@ impl Taps {
     }
 
     /// A recording begins: what is known already has its channels from the first file on.
-    pub(super) fn begin(&mut self, writer: &mut Writer) -> Result<(), ChannelError> {
+    pub(super) fn begin(&mut self, writer: &mut Writer) {
         for tap in &mut self.taps {
             tap.sampler.begin();
-            tap.channel = Some(tap.open_channel(writer)?);
+            tap.open_channel(writer);
         }
-        Ok(())
     }
 
     /// Subscribes to what modules offer that run by now. Nobody is waited for.
@@ -114,9 +113,7 @@ impl Taps {
             let Some(description) = description else { continue };
             source.has_answered = true;
             let mut taps = source.taps(&self.recording, &description);
-            for tap in &mut taps {
-                tap.channel = Some(tap.open_channel(writer)?);
-            }
+            taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
         self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context))
@@ -179,6 +176,7 @@ impl SourceModule {
         let named = |items: &&RecordedItems| !is_stream || items.item.is_some();
         let (sampling, numbering) = match (ring, recording.datum(self.from, name).filter(named)) {
             _ if is_line => recording.output.map(|_| (Sampling::Each, Numbering::Packages))?,
+            (Some(ring), Some(items)) if items.exactness() > ring.exactness() => (items.sampling, Numbering::Packages),
             (Some(items), _) => (items.sampling, Numbering::Records),
             (None, Some(items)) => (items.sampling, Numbering::Packages),
             (None, None) => return None,
@@ -207,9 +205,14 @@ impl SourceModule {
 }
 
 impl Tap {
-    fn open_channel(&self, writer: &mut Writer) -> Result<ChannelId, ChannelError> {
+    /// Where it is recorded. A module that describes one name with two types is recorded without the second one.
+    fn open_channel(&mut self, writer: &mut Writer) {
         let (name, item) = (&self.module, &self.item.field);
-        writer.channel(&ChannelSpec { name, item: &item.name, ty: &item.ty, texts: self.texts.clone() })
+        let opened = writer.channel(&ChannelSpec { name, item: &item.name, ty: &item.ty, texts: self.texts.clone() });
+        if let Err(error) = &opened {
+            tracing::error!("{name}/{} is not recorded: {error}", item.name);
+        }
+        self.channel = opened.ok();
     }
 
     /// Subscribes. A stream that has no seat left is tried again.

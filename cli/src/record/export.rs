@@ -56,6 +56,9 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
     if *with_original && *format == ExportFormat::Json {
         return Err("--with-original is for --format drawn: JSON has what was recorded, and nothing else".into());
     }
+    if to.as_os_str() == "-" && *format == ExportFormat::Drawn {
+        return Err("an MCAP file cannot go to the standard output; name a file, such as drawn.mcap".into());
+    }
     let info = rohrpost_recording::info(file)?;
     let selection = Selection { period_ns: *rate, ..part.of(&info, names) };
     match format {

@@ -19,13 +19,12 @@ impl Page<'_> {
             let directory = record.directory.display();
             self.entry("by", &format!("{name}, on node {node}; its files are {directory}/{node}-0001.mcap and so on"));
         }
-        let items = |page: &Self, all: &[RecordedItems]| {
-            let texts: Vec<String> = all.iter().map(|items| page.recorded(items)).collect();
+        let items = |page: &Self, all: &[RecordedItems], of_all: &str| {
+            let texts: Vec<String> = all.iter().map(|items| page.recorded(items, of_all)).collect();
             if texts.is_empty() { "none".into() } else { texts.join("; ") }
         };
-        let (streams, data) = (items(self, &record.streams), items(self, &record.data));
-        self.entry("streams", &streams);
-        self.entry("data", &data);
+        self.entry("streams", &items(self, &record.streams, "all of all modules"));
+        self.entry("data", &items(self, &record.data, "all of all modules, but streams"));
         let output = match record.output {
             None => "no lines".into(),
             Some(Level::Trace) => "all lines".into(),
@@ -39,9 +38,10 @@ impl Page<'_> {
         self.entry("may lose", &format!("the last {flush} if it is killed, {sync} more if the power fails"));
     }
 
-    fn recorded(&self, items: &RecordedItems) -> String {
+    /// `of_all`: what an entry without a name means.
+    fn recorded(&self, items: &RecordedItems, of_all: &str) -> String {
         let what = match (items.from, items.item.is_some()) {
-            (None, _) => "all of all modules".into(),
+            (None, _) => of_all.into(),
             (Some(from), false) => format!("all of {}", self.name(from)),
             (Some(_), true) => items.text(&self.installation.classes),
         };

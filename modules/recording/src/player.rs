@@ -71,8 +71,8 @@ pub struct Player {
 }
 
 impl Player {
-    /// At the beginning of these files, which are played one after the other. Channels that are not chosen are left
-    /// out.
+    /// At the beginning of these files, which are played one after the other. They are those of one recording, in which
+    /// epochs go on from file to file. Channels that are not chosen are left out.
     pub fn new(files: Vec<PathBuf>, plays: impl Fn(&RecordedChannel) -> bool + Send + 'static) -> Self {
         Self { files, plays: Box::new(plays), reader: None, ended: 0, is_ahead: false, epoch: None }
     }

@@ -199,8 +199,9 @@ impl Context {
         self.schedule.set_period(period);
     }
 
-    /// Ticks, and periods of the data that it publishes, go by the computer's clock from now on, also where time is
-    /// simulated or replayed: for a module that serves the computer and not the robot, such as a router or a display.
+    /// Ticks, and periods of the data that it publishes, go by the computer's clock, also where time is simulated or
+    /// replayed: for a module that serves the computer and not the robot, such as a router or a display. To be called
+    /// in [`crate::Module::new`]: periods of earlier subscriptions would not be moved.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::Context;

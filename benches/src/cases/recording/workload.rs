@@ -1,4 +1,4 @@
-//! What is recorded: the same bytes for all, which compress as what sensors say does: to about two thirds.
+//! What is recorded: the same bytes for all, which compress as what sensors say does: to about a third.
 
 use crate::harness::Failure;
 use std::fs;

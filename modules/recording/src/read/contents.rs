@@ -89,7 +89,7 @@ impl Contents {
     pub(crate) fn from_first_chunk(&self, is_it: impl Fn(&ChunkIndex) -> bool) -> Result<Self, ReadError> {
         let mut frames = Frames::open(self.path())?;
         let index = match Index::read(&mut frames) {
-            Ok(index) if !index.chunks.is_empty() => index,
+            Ok(index) if index.knows_all_chunks() && index.describes_all_channels() => index,
             Ok(_) | Err(ReadError::NotClosed { .. }) => return Self::open(self.path()),
             Err(error) => return Err(error),
         };

@@ -74,6 +74,11 @@ fn channels_types_encodings_counts_and_times_of_others_are_told() {
             messages += 1;
         }
         assert!(messages == 40 && reader.is_closed(), "{case}: {messages}");
+        for from_ns in [20_000, 0, 39_000] {
+            assert!(reader.seek(from_ns).unwrap_or_else(|error| panic!("{case}: {error}")), "{case}");
+            assert_eq!(reader.next().unwrap().unwrap().1.arrival_ns, from_ns, "{case}");
+        }
+        assert!(!reader.seek(39_001).unwrap(), "{case}");
     }
 }
 
