@@ -113,7 +113,7 @@ impl Reader {
     /// As of [`Self::next`].
     pub fn seek(&mut self, arrival_ns: u64) -> Result<bool, ReadError> {
         if let ReaderSource::Whole(contents) = &mut self.source {
-            *contents = contents.from_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
+            *contents = contents.at_first_chunk(|chunk| chunk.message_end_time >= arrival_ns)?;
             self.is_ahead = false;
         }
         loop {

@@ -86,7 +86,7 @@ impl Contents {
     }
 
     /// The same file, from the first chunk on of which the index says this; from its beginning if it has no index.
-    pub(crate) fn from_first_chunk(&self, is_it: impl Fn(&ChunkIndex) -> bool) -> Result<Self, ReadError> {
+    pub(crate) fn at_first_chunk(&self, is_it: impl Fn(&ChunkIndex) -> bool) -> Result<Self, ReadError> {
         let mut frames = Frames::open(self.path())?;
         let index = match Index::read(&mut frames) {
             Ok(index) if index.knows_all_chunks() && index.describes_all_channels() => index,
