@@ -4,8 +4,10 @@
 use crate::harness::{OUTPUT, Place, Robot, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use rohrpost::common::GET_DATA;
+use rohrpost::interfaces::{RecorderInterface, RecordingState};
 use rohrpost::serde::Deserialize;
-use rohrpost::wire::from_bytes;
+use rohrpost::wire::{append, from_bytes};
 use rohrpost::{Context, Module, ModuleError, data};
 use rohrpost_mailbox::StreamId;
 use rohrpost_recording::{Reader, info, is_closed};
@@ -31,6 +33,8 @@ struct Frame {
 }
 
 const FRAME_BYTES: usize = 10_000;
+/// The recorder answers within this time.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Publishes as much as it is told to: numbers from 1 on.
 #[rohrpost::interface(class = "feeder")]
@@ -338,14 +342,23 @@ fn the_example_of_the_book_is_right() {
     assert!(explained.contains("\nRecording\n"), "{explained}");
 }
 
-/// Then there is no time at which anything could arrive, but the recorder does its work.
+/// Then there is no time at which anything could arrive, but the recorder does its work: it looks, and says how it is.
 #[test]
 fn before_a_log_begins_modules_are_found_and_nothing_is_recorded() {
     let place = Place::new();
-    let (mut launch, _) = launched(&place, &["[time]\nsource = \"log\"\n", RECORD].concat());
-    // Of two feeders, and the collector's lines.
-    wait("all is found", || (accounts(&place).len() == 5).then_some(()));
-    assert!(accounts(&place).values().all(|account| *account == (0, 0)), "{:?}", accounts(&place));
+    let (mut launch, robot) = launched(&place, &["[time]\nsource = \"log\"\n", RECORD].concat());
+    let mut tool = robot.tool(PATIENCE);
+    let port = RecorderInterface::STATE;
+    // Published with each look.
+    let state: RecordingState = wait("the recorder says how it is", || {
+        let write = |body: &mut Vec<u8>| append(body, &(port.number,));
+        let read = |bytes: &[u8]| from_bytes::<(u64, RecordingState)>(bytes);
+        let said = tool.call(robot.name("logd.0"), GET_DATA, (port.hash)(), write, read);
+        // Two feeders have two items each; and there are the collector's lines.
+        said.ok().map(|(_, state)| state).filter(|state| state.channels == 5)
+    });
+    assert_eq!((state.written, state.lost, state.waiting), (0, 0, 0), "{state:?}");
+    tool.close();
     launch.stop();
     place.assert_empty();
 }
