@@ -1,7 +1,6 @@
 //! A time in a recording, as people write it.
 
-use crate::stream::parse_stamp;
-use rohrpost_config::parse_duration;
+use crate::stream::{Offset, parse_offset, parse_stamp};
 use rohrpost_recording::Info;
 
 /// A time in a recording.
@@ -28,15 +27,10 @@ impl RecordTime {
 
 /// Reads seconds since 1970, or a duration with its sign.
 pub(super) fn parse_time(text: &str) -> Result<RecordTime, String> {
-    let ns = |text: &str| {
-        let time = parse_duration(text).map_err(|error| error.to_string())?;
-        u64::try_from(time.as_nanos()).map_err(|_| format!("`{text}` is too long"))
-    };
-    if let Some(after) = text.strip_prefix('+') {
-        return ns(after).map(RecordTime::FromBegin);
-    }
-    if let Some(before) = text.strip_prefix('-') {
-        return ns(before).map(RecordTime::BeforeEnd);
+    match parse_offset(text)? {
+        Some(Offset::After(ns)) => return Ok(RecordTime::FromBegin(ns)),
+        Some(Offset::Before(ns)) => return Ok(RecordTime::BeforeEnd(ns)),
+        None => {}
     }
     let wrong = "write seconds since 1970 (1700000000.25), from the begin (+10s), or before the end (-10s)";
     parse_stamp(text).map(RecordTime::At).map_err(|_| wrong.to_owned())

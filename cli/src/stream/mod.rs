@@ -19,7 +19,7 @@ mod write;
 
 use crate::terminal::Failure;
 pub(super) use choice::{completed_items, completed_names};
-pub(super) use stamp::{parse_stamp, stamp_text};
+pub(super) use stamp::{Offset, parse_offset, parse_stamp, stamp_text};
 use std::process::ExitCode;
 pub(super) use view::{StreamView, name_items, print_streams, stream_views};
 

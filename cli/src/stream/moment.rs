@@ -1,7 +1,6 @@
 //! A time to look for, as people and programs write it.
 
-use super::stamp::parse_stamp;
-use rohrpost_config::parse_duration;
+use super::stamp::{Offset, parse_offset, parse_stamp};
 use rohrpost_mailbox::Stamp;
 
 /// A time to look for in a stream.
@@ -30,15 +29,10 @@ impl StreamMoment {
 /// Reads a stamp in seconds, a whole number of nanoseconds, or a duration with its sign. A whole number that is too
 /// large for seconds is one of nanoseconds: those of each time later than 18.4 s after the beginning of 1970 are.
 pub(super) fn parse_moment(text: &str) -> Result<StreamMoment, String> {
-    let by_ns = |text: &str| {
-        let by = parse_duration(text).map_err(|error| error.to_string())?;
-        u64::try_from(by.as_nanos()).map_err(|_| format!("`{text}` is too long"))
-    };
-    if let Some(by) = text.strip_prefix('-') {
-        return by_ns(by).map(StreamMoment::BeforeNewest);
-    }
-    if let Some(by) = text.strip_prefix('+') {
-        return by_ns(by).map(StreamMoment::AfterNewest);
+    match parse_offset(text)? {
+        Some(Offset::Before(ns)) => return Ok(StreamMoment::BeforeNewest(ns)),
+        Some(Offset::After(ns)) => return Ok(StreamMoment::AfterNewest(ns)),
+        None => {}
     }
     let whole = || text.parse().ok().filter(|_| text.bytes().all(|digit| digit.is_ascii_digit()));
     parse_stamp(text).ok().or_else(whole).map(StreamMoment::At).ok_or_else(|| {

@@ -1,5 +1,7 @@
 //! Stamps as seconds with nine decimals, exact both ways.
 
+use rohrpost_config::parse_duration;
+
 const BILLION: u64 = 1_000_000_000;
 const DECIMALS: usize = 9;
 
@@ -19,6 +21,27 @@ pub(crate) fn parse_stamp(text: &str) -> Result<u64, String> {
     let seconds: u64 = seconds.parse().map_err(|_| wrong())?;
     let ns: u64 = format!("{decimals:0<DECIMALS$}").parse().map_err(|_| wrong())?;
     seconds.checked_mul(BILLION).and_then(|whole| whole.checked_add(ns)).ok_or_else(wrong)
+}
+
+/// How far a time is from another one, ns.
+pub(crate) enum Offset {
+    /// Before it: `-1.5s`.
+    Before(u64),
+    /// Behind it: `+1.5s`.
+    After(u64),
+}
+
+/// Reads a duration with its sign; none for a text that begins with no sign.
+pub(crate) fn parse_offset(text: &str) -> Result<Option<Offset>, String> {
+    let ns = |text: &str| {
+        let duration = parse_duration(text).map_err(|error| error.to_string())?;
+        u64::try_from(duration.as_nanos()).map_err(|_| format!("`{text}` is too long"))
+    };
+    match (text.strip_prefix('-'), text.strip_prefix('+')) {
+        (Some(before), _) => ns(before).map(|ns| Some(Offset::Before(ns))),
+        (_, Some(after)) => ns(after).map(|ns| Some(Offset::After(ns))),
+        (None, None) => Ok(None),
+    }
 }
 
 #[cfg(test)]
