@@ -28,6 +28,7 @@ mod lan;
 mod lan_tools;
 mod launch;
 mod lines;
+mod log_file;
 mod log_time;
 mod looks;
 mod mailbox;

@@ -263,6 +263,8 @@ fn what_is_named_is_recorded_and_each_value_is_in_the_file_or_counted() {
     for words in ["feeder.0/frame", "{number: u64, bytes: ", "output.0/line", "closed (ended)"] {
         assert!(said.contains(words), "no `{words}` in:\n{said}");
     }
+    let said = place.say(&["log", "--file", file.to_str().unwrap(), "--module", "feeder.0"]).ok();
+    assert!(said.ends_with(" info  main/feeder.0: is off\n"), "{said}");
 }
 
 #[test]
