@@ -60,7 +60,8 @@ pub(super) fn module(text: &str, running: &Running) -> Result<Name, Failure> {
 
 fn own_name(text: &str, name: Name, installation: &Installation) -> Result<Name, Failure> {
     let module = installation.module(name);
-    let module = module.ok_or_else(|| format!("{text} is a program run by hand, and sends no lines to the collector"))?;
+    let module =
+        module.ok_or_else(|| format!("{text} is a program run by hand, and sends no lines to the collector"))?;
     Ok(module.name)
 }
 
