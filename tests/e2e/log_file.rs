@@ -141,10 +141,8 @@ fn what_a_recording_lacks_is_told() {
 #[test]
 fn a_recording_without_lines_says_so() {
     let place = Place::new();
-    let session = Session {
-        configuration: BTreeMap::from([("test.toml".into(), CONFIG.into())]),
-        ..Session::default()
-    };
+    let session =
+        Session { configuration: BTreeMap::from([("test.toml".into(), CONFIG.into())]), ..Session::default() };
     let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), "a") }, session).unwrap();
     let speed = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
     writer.channel(&speed).unwrap();
