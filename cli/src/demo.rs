@@ -11,6 +11,7 @@ mod incarnations;
 mod losses;
 mod masters;
 mod nodes;
+mod recording;
 mod sealed_capture;
 mod takeover;
 
@@ -24,6 +25,7 @@ use asked::{FIRST_FUNCTION, map_line, running};
 use drawing::{drawing, drawn};
 use folder::Folder;
 pub(super) use folder::remove_abandoned;
+use recording::{DemoRecording, ONE_NODE};
 use rohrpost::Name;
 use rohrpost::common::State;
 use rohrpost::interface::Interface;
@@ -40,6 +42,9 @@ const SETTLE: Duration = Duration::from_secs(2);
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let long = arguments.seconds.map(super::units::seconds).transpose()?;
     if let Some(count) = arguments.nodes.filter(|count| *count > 1) {
+        if arguments.record.is_some() {
+            return Err(ONE_NODE.into());
+        }
         return nodes::run(arguments, count, long);
     }
     if arguments.gui == GuiConnection::Tcp {
@@ -49,6 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return Err("one node alone has no master to kill; use --nodes 3".into());
     }
     let folder = Folder::new()?;
+    let recording = arguments.record.as_deref().map(|to| DemoRecording::begin(to, arguments.overwrite)).transpose()?;
     let installation = Arc::new(copy::installation(arguments, folder.path())?);
     let node = choose_node(&installation, None)?.name.clone();
     let (drawing, begun) = (drawing(&installation), SystemTime::now());
@@ -59,10 +65,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let summary = summary(&mut launch);
     let code = end(launch, &speech);
     speech.settle();
+    let recorded = recording.map(DemoRecording::end);
     outcome?;
     let (text, well) = summary?;
     say(text.trim_end());
     drawn(drawing, begun);
+    if let Some(recorded) = recorded {
+        say(recorded?);
+    }
     Ok(if well { code } else { ExitCode::FAILURE })
 }
 

@@ -1,11 +1,13 @@
-//! `rohrpost log`: shows the output of modules, and sets its level.
+//! `rohrpost log`: shows the output of modules, also of recordings, and sets its level.
 
 mod arguments;
 mod filter;
 mod levels;
 mod reader;
+mod recorded;
+mod show;
 
-use crate::terminal::{Failure, complain, say};
+use crate::terminal::Failure;
 pub(super) use arguments::Arguments;
 use filter::Filter;
 use levels::Setting;
@@ -15,6 +17,7 @@ use rohrpost::Name;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
 use rohrpost::output::{Format, OutputLine};
+use show::Show;
 use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -23,11 +26,14 @@ use std::time::Duration;
 const POLL: Duration = Duration::from_millis(200);
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if !arguments.file.is_empty() {
+        return recorded::run(arguments);
+    }
     let running = arguments.target.find()?;
     let class = running.installation.classes.id(CollectorInterface::CLASS);
     let class = class.ok_or("the configuration has no class `output`, so nobody collects output")?;
     let collector = Name::new(running.installation.system.id, class.0, 0, 0);
-    let (settings, mut filter) = Filter::read(arguments, &running)?;
+    let (settings, mut filter) = Filter::read(arguments, &running.installation, &|text| running.module(text))?;
     let settings: Vec<Setting> =
         settings.iter().map(|(name, level)| Setting::read(name, level, &running)).collect::<Result<_, _>>()?;
     let since = arguments.since.as_deref().map(rohrpost_config::parse_duration).transpose()?;
@@ -55,13 +61,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let result = show.all(&mut reader, &mut tool);
     tool.close();
     result.map(|()| code)
-}
-
-/// The selected lines and their format.
-struct Show<'a> {
-    filter: Filter,
-    format: Format<'a>,
-    arguments: &'a Arguments,
 }
 
 impl Show<'_> {
@@ -110,18 +109,5 @@ impl Show<'_> {
                 return Ok(true);
             }
         }
-    }
-
-    fn line(&self, line: &OutputLine) -> bool {
-        say(if self.arguments.json { self.format.json(line) } else { self.format.short(line) })
-    }
-
-    /// A notice of the tool between the lines; programs get only lines.
-    fn note(&self, note: &str) -> bool {
-        if self.arguments.json {
-            complain(format_args!("… {note}"));
-            return true;
-        }
-        say(format_args!("… {note}"))
     }
 }

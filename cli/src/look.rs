@@ -14,6 +14,7 @@ use rohrpost::schema::Description;
 use rohrpost::serde::de::DeserializeOwned;
 use rohrpost::survey::{MailboxSnapshot, Scope, Snapshot, Survey, look_at_all};
 use rohrpost::wire::{append, from_bytes};
+use rohrpost_config::Installation;
 use rohrpost_mailbox::{InspectError, Name};
 
 impl Running {
@@ -167,12 +168,18 @@ impl Running {
         if is_other || self.is_known(module) || self.is_here(module) || self.is_hosted_beyond(module) {
             return Ok(module);
         }
-        let all: Vec<String> = self.installation.modules.iter().flat_map(|m| m.names()).map(|m| self.text(m)).collect();
-        Err(format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into())
+        Err(unknown_module(&self.installation, text))
     }
 
     /// Runs a query from the tool's place on its own node.
     fn ask<T>(&self, ask: impl FnOnce(&mut ToolLink) -> T) -> Result<T, Failure> {
         self.observer.with(|| self.join(PATIENCE), ask)
     }
+}
+
+/// The error for a name that no module of a configuration has.
+pub(super) fn unknown_module(installation: &Installation, text: &str) -> Failure {
+    let names = installation.modules.iter().flat_map(|module| module.names());
+    let all: Vec<String> = names.map(|name| installation.classes.format(name)).collect();
+    format!("the configuration has no module `{text}`; there are {}", all.join(", ")).into()
 }

@@ -43,6 +43,11 @@ impl Target {
         Self { config, node }
     }
 
+    /// The named configuration, if one is named.
+    pub(super) fn config(&self) -> Option<&Path> {
+        self.config.as_deref()
+    }
+
     /// Finds the selected node.
     pub(super) fn find(&self) -> Result<Running, Failure> {
         let only = self.node.as_deref();

@@ -18,6 +18,8 @@ const ROTATE_SIZE: RangeInclusive<u64> = 1 << 20..=1 << 40;
 /// Of everything, one in so many at the least.
 const EVERY_MAX: i64 = 1_000_000;
 const RATE_HZ: RangeInclusive<f64> = 0.001..=1000.0;
+/// How much is drawn of each item, unless the file says it.
+const DRAWN_HZ: f64 = 10.0;
 
 /// The section `[record]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +32,9 @@ pub struct Recording {
     pub data: Vec<RecordedItems>,
     /// Lines of output from this level on; none: no line.
     pub output: Option<Level>,
+    /// At most so many values a second of each item are in the files once more, as other programs draw them; none: not
+    /// one.
+    pub drawn: Option<f64>,
     /// A file gets no longer.
     pub rotate_size: u64,
     /// Nor older.
@@ -100,6 +105,7 @@ impl Recording {
             }
         }
         let output = section.get("output").and_then(|item| output(&item)).flatten();
+        let drawn = section.get("drawn").and_then(|item| drawn(&item)).flatten();
         let rotate_size = section.get("rotate-size").and_then(|item| item.size(ROTATE_SIZE, "1 GiB"));
         let rotate_after = section.get("rotate-after").and_then(|item| at_least_a_second(&item, "1 h"));
         let leave_free = section.get("leave-free").and_then(|item| item.size(0..=1 << 50, "256 MiB"));
@@ -112,6 +118,7 @@ impl Recording {
             streams,
             data,
             output,
+            drawn,
             rotate_size: rotate_size.unwrap_or(1 << 30),
             rotate_after: rotate_after.unwrap_or(Duration::from_secs(3600)),
             leave_free: leave_free.unwrap_or(256 << 20),
@@ -149,6 +156,13 @@ fn output(item: &Item<'_>) -> Option<Option<Level>> {
         (None, None) => {
             item.wrong("true, false, or the least important level: \"error\", \"warn\", \"info\", \"debug\", \"trace\"")
         }
+    }
+}
+
+fn drawn(item: &Item<'_>) -> Option<Option<f64>> {
+    match item.value.get_ref().as_bool() {
+        Some(is_drawn) => Some(is_drawn.then_some(DRAWN_HZ)),
+        None => item.number(RATE_HZ, "10.0").map(Some),
     }
 }
 

@@ -66,7 +66,7 @@ fn every_key_arrives() {
 fn what_is_recorded_is_found_by_module_and_item_and_is_called() {
     let full = parse(RECORD);
     let record = full.record.as_ref().unwrap();
-    assert_eq!(record.directory, Path::new("conf/recordings"));
+    assert_eq!((record.directory.as_path(), record.drawn), (Path::new("conf/recordings"), Some(5.0)));
     assert_eq!((record.output, record.rotate_size, record.leave_free), (Some(Level::Warn), 100 << 20, 1 << 30));
     let ms = Duration::from_millis;
     assert_eq!((record.rotate_after, record.flush, record.sync), (ms(600_000), ms(200), ms(1000)));

@@ -27,12 +27,12 @@ fn feeder() {
 
 /// Larger than what data mailboxes take.
 #[data]
-struct Frame {
-    number: u64,
-    bytes: Vec<u8>,
+pub(crate) struct Frame {
+    pub(crate) number: u64,
+    pub(crate) bytes: Vec<u8>,
 }
 
-const FRAME_BYTES: usize = 10_000;
+pub(crate) const FRAME_BYTES: usize = 10_000;
 /// The recorder answers within this time.
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -125,12 +125,13 @@ directory = "recordings"
 streams = ["feeder.0/*", { name = "feeder.1/frame", every = 7 }]
 data = ["*", { name = "feeder.1/count", every = 10 }]
 output = "info"
+drawn = true
 leave-free = "0 B"
 flush = "20 ms"
 sync = "100 ms"
 "#;
 
-fn feeder_entry(number: u8) -> String {
+pub(crate) fn feeder_entry(number: u8) -> String {
     let program = format!("{:?}", std::env::current_exe().unwrap());
     format!(
         "[[module]]\nname = \"feeder.{number}\"\nprogram = [{program}, \"--exact\", \"recorded::feeder\", \
@@ -153,7 +154,7 @@ fn call(place: &Place, module: &str, function: &[&str]) -> Value {
 }
 
 /// Feeds, and waits until all is sent. What was sent so far.
-fn feed(place: &Place, module: &str, count: u64) -> u64 {
+pub(crate) fn feed(place: &Place, module: &str, count: u64) -> u64 {
     place.say(&["call", module, "feed", &count.to_string()]).ok();
     wait(format!("{module} has sent"), || call(place, module, &["fed"]).as_u64())
 }
@@ -170,7 +171,7 @@ fn accounts(place: &Place) -> BTreeMap<String, (u64, u64)> {
 
 /// Feeds one by one until the recorder has something of each item: from then on nothing may be missing without being
 /// counted.
-fn feed_until_recorded(place: &Place, module: &str) {
+pub(crate) fn feed_until_recorded(place: &Place, module: &str) {
     wait(format!("{module} is recorded"), || {
         feed(place, module, 1);
         let accounts = accounts(place);
@@ -206,7 +207,7 @@ fn numbers(file: &Path, topic: &str) -> Vec<u64> {
 }
 
 /// Texts of the recorded lines of output.
-fn lines(file: &Path) -> Vec<String> {
+pub(crate) fn lines(file: &Path) -> Vec<String> {
     messages(file, "output.0/line", |bytes| from_bytes::<rohrpost::output::OutputLine>(bytes).unwrap().text)
 }
 
@@ -260,9 +261,13 @@ fn what_is_named_is_recorded_and_each_value_is_in_the_file_or_counted() {
     assert_eq!(info.session["node"], "main");
     assert!(info.configuration["test.toml"].contains("[record]"), "{:?}", info.configuration);
     let said = place.say(&["record", "info", file.to_str().unwrap()]).ok();
-    for words in ["feeder.0/frame", "{number: u64, bytes: ", "output.0/line", "closed (ended)"] {
+    for words in
+        ["feeder.0/frame", "{number: u64, bytes: ", "output.0/line", "drawn of output.0/line", "closed (ended)"]
+    {
         assert!(said.contains(words), "no `{words}` in:\n{said}");
     }
+    let said = place.say(&["log", "--file", file.to_str().unwrap(), "--module", "feeder.0"]).ok();
+    assert!(said.ends_with(" info  main/feeder.0: is off\n"), "{said}");
 }
 
 #[test]

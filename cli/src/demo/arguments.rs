@@ -7,6 +7,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   rohrpost demo                            a simulated robot drives and maps until Ctrl-C
   rohrpost demo --seconds 20
+  rohrpost demo --seconds 20 --record out.mcap
   rohrpost demo --log run.log.gz --speed 10
   rohrpost demo --nodes 3 --seconds 30 --impair loss=5%,delay=2ms,reorder=5%
   rohrpost demo --nodes 3 --secure --seconds 30
@@ -22,6 +23,12 @@ pub(crate) struct Arguments {
     /// Play this CARMEN log (also gzipped) instead of simulating.
     #[arg(long, value_name = "FILE")]
     pub(super) log: Option<PathBuf>,
+    /// Record all streams, data and output into this new file (see `rohrpost record`).
+    #[arg(long, value_name = "FILE")]
+    pub(super) record: Option<PathBuf>,
+    /// With --record: replace the file if it is there.
+    #[arg(long, requires = "record")]
+    pub(super) overwrite: bool,
     /// Playback speed; 1 is the speed of the recording.
     #[arg(long, default_value_t = 10.0, value_name = "X", requires = "log")]
     pub(super) speed: f64,

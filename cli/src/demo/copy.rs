@@ -3,6 +3,7 @@
 
 use super::arguments::{Arguments, GuiConnection};
 use super::drawing::GUI;
+use super::recording::{recorder, start_early};
 use crate::check;
 use crate::keys::certificates::{self, Renewal};
 use crate::terminal::Failure;
@@ -41,7 +42,8 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     if arguments.config.is_some() && !there {
         return Err(format!("{}: no such file", own.display()).into());
     }
-    if there && arguments.log.is_none() && !arguments.no_gui && !arguments.viewer && !arguments.secure {
+    let is_changed = arguments.no_gui || arguments.viewer || arguments.secure || arguments.record.is_some();
+    if there && arguments.log.is_none() && !is_changed {
         return Ok(check::load(&own)?);
     }
     let text = if there { std::fs::read_to_string(&own)? } else { text.to_owned() };
@@ -62,6 +64,9 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
         certificates::make(&installation, Renewal::Missing, DAYS)?;
     }
     installation.shown = shown;
+    if arguments.record.is_some() {
+        start_early(&mut installation);
+    }
     Ok(installation)
 }
 
@@ -97,7 +102,8 @@ fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Argume
             remove(modules, at);
         }
     }
-    Ok(document.to_string())
+    let recorder = arguments.record.as_deref().map(|to| recorder(&installation, to)).transpose()?;
+    Ok(document.to_string() + &recorder.unwrap_or_default())
 }
 
 /// Replaces a module by empty lines, so that the modules behind it keep their line numbers.
@@ -199,8 +205,31 @@ mod tests {
         }
         assert_eq!(line(&with, "gui.0"), line(&before, "gui.0"));
         assert_eq!(line(&without, "gui.0"), None);
+        let mut recorded = copied(&text, &["--record", "out.mcap"]);
+        for name in names {
+            assert_eq!(line(&recorded, name), line(&before, name), "{name}");
+        }
+        start_early(&mut recorded);
+        let names: Vec<_> = recorded.modules.iter().map(|its| recorded.classes.format(its.name)).collect();
+        assert_eq!(names[..3], ["output.0", "logd.0", "motor.0"], "it hears all others");
         let gui = with.module(with.classes.parse_module("gui.0").unwrap()).unwrap();
         assert_eq!(gui.settings.get("viewer").and_then(|viewer| viewer.as_str()), Some("window"));
+    }
+
+    #[test]
+    fn a_recorder_is_below_all_that_it_records() {
+        let recorded = copied(SIMULATION, &["--record", "out.mcap"]);
+        let [id] = recorded.classes.id("logd").into_iter().collect::<Vec<_>>()[..] else { panic!("no class") };
+        assert_eq!(id.0, 24);
+        let record = recorded.record.as_ref().unwrap();
+        assert!(record.directory.is_absolute() && record.directory.ends_with("out.mcap.part"), "{record:?}");
+        assert!(record.output.is_some());
+        let lower = SIMULATION.replace("output = { id = 32", "output = { id = 20");
+        assert_eq!(copied(&lower, &["--record", "out.mcap"]).classes.id("logd").unwrap().0, 19);
+        let line = TestArguments::parse_from(["demo", "--record", "out.mcap"]).arguments;
+        let own = format!("{SIMULATION}{}", recorder(&copied(SIMULATION, &[]), Path::new("own.mcap")).unwrap());
+        let error = rewritten(&own, Path::new("robot.toml"), None, &line).unwrap_err().to_string();
+        assert!(error.starts_with("robot.toml has a recorder of its own"), "{error}");
     }
 
     #[test]

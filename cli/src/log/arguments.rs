@@ -1,6 +1,7 @@
 //! The command line's options for lines and levels.
 
 use crate::target::Target;
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -10,10 +11,15 @@ use crate::target::Target;
   rohrpost log --module pilot.0 --text wall --since '5 min'
   rohrpost log --level pilot.0=debug     makes pilot.0 more verbose; with --follow, also shows it
   rohrpost log --level laser=error       limits all lasers to errors
-  rohrpost log --levels                  the level of each module")]
+  rohrpost log --levels                  the level of each module
+  rohrpost log --file main-0001.mcap --level warn --module pilot.0")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub(super) target: Target,
+    /// Show the lines of these recordings, in the order of their arrival, instead of asking a running node. Names are
+    /// those of the first file's configuration, or of --config.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["follow", "levels", "node", "timeout"])]
+    pub(super) file: Vec<PathBuf>,
     /// Go on with new lines until Ctrl-C.
     #[arg(long, short)]
     pub(super) follow: bool,
@@ -33,7 +39,7 @@ pub(crate) struct Arguments {
     /// Only lines that contain this text; case does not matter.
     #[arg(long)]
     pub(super) text: Option<String>,
-    /// Only lines of this last time, such as '5 min'.
+    /// Only lines of this last time, such as '5 min'; with --file, before the end of the recordings.
     #[arg(long, value_name = "DURATION")]
     pub(super) since: Option<String>,
     /// Only this many last lines.

@@ -7,6 +7,7 @@ use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::output::OutputLine;
+use rohrpost_config::Installation;
 use rohrpost_mailbox::Class;
 
 pub(super) struct Filter {
@@ -22,10 +23,11 @@ pub(super) struct Filter {
 type LevelAssignment<'a> = (&'a str, &'a str);
 
 impl Filter {
-    /// Parses the command line: levels to set, and lines to show.
+    /// Parses the command line: levels to set, and lines to show. `find` finds a module, alias or tool by its name.
     pub(super) fn read<'a>(
         arguments: &'a Arguments,
-        running: &Running,
+        installation: &Installation,
+        find: &dyn Fn(&str) -> Result<Name, Failure>,
     ) -> Result<(Vec<LevelAssignment<'a>>, Self), Failure> {
         let (settings, shown): (Vec<_>, Vec<_>) = arguments.level.iter().partition(|level| level.contains('='));
         let level = match shown[..] {
@@ -33,8 +35,9 @@ impl Filter {
             [level] => call::level_of(level)?,
             _ => return Err("--level selects lines twice; to set levels write --level NAME=LEVEL".into()),
         };
-        let modules = arguments.module.iter().map(|name| module(name, running)).collect::<Result<_, _>>()?;
-        let classes = arguments.class.iter().map(|name| class(name, running)).collect::<Result<_, _>>()?;
+        let own = |text: &String| own_name(text, find(text)?, installation);
+        let modules = arguments.module.iter().map(own).collect::<Result<_, _>>()?;
+        let classes = arguments.class.iter().map(|name| class(name, installation)).collect::<Result<_, _>>()?;
         let text = arguments.text.as_ref().map(|text| text.to_lowercase());
         let settings = settings.into_iter().filter_map(|setting| setting.split_once('=')).collect();
         Ok((settings, Self { level, modules, classes, text, since_ns: None }))
@@ -52,16 +55,18 @@ impl Filter {
 
 /// Resolves a module's own name or an alias: lines carry the module's own name.
 pub(super) fn module(text: &str, running: &Running) -> Result<Name, Failure> {
-    let name = running.module(text)?;
-    let module = running
-        .installation
-        .module(name)
-        .ok_or_else(|| format!("{text} is a program run by hand, and sends no lines to the collector"))?;
+    own_name(text, running.module(text)?, &running.installation)
+}
+
+fn own_name(text: &str, name: Name, installation: &Installation) -> Result<Name, Failure> {
+    let module = installation.module(name);
+    let module =
+        module.ok_or_else(|| format!("{text} is a program run by hand, and sends no lines to the collector"))?;
     Ok(module.name)
 }
 
-pub(super) fn class(text: &str, running: &Running) -> Result<Class, Failure> {
-    let classes = &running.installation.classes;
+pub(super) fn class(text: &str, installation: &Installation) -> Result<Class, Failure> {
+    let classes = &installation.classes;
     let class = classes.id(text).ok_or_else(|| {
         let all: Vec<&str> = classes.iter().map(|entry| entry.name.as_str()).collect();
         format!("no class `{text}`; there are {}", all.join(", "))

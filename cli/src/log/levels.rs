@@ -25,7 +25,7 @@ impl Setting {
         if name.contains('.') {
             return Ok(Self { modules: vec![filter::module(name, running)?], level });
         }
-        let class = filter::class(name, running)?;
+        let class = filter::class(name, &running.installation)?;
         let of_class = |module: &&Module| module.names().any(|name| name.class() == class);
         let nodes = running.shown();
         let meant = running.installation.modules.iter().filter(|module| nodes.contains(&module.node.as_str()));

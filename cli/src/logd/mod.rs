@@ -21,7 +21,7 @@ use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInte
 use rohrpost::{Context, Module, ModuleError, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
 use rohrpost_mailbox::TimeSource;
-use rohrpost_recording::{Options, Rotation, Session, Status, Writer};
+use rohrpost_recording::{DrawnBeside, Options, Rotation, Session, Status, Writer};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -60,7 +60,7 @@ impl Module for Logd {
         make(&recording.directory);
         // Before there is a file of this run.
         leftovers::recover(&recording.directory, &node, recording.leave_free)?;
-        let options = options(recording, &node);
+        let options = options(recording, installation, &node);
         let session = session(installation, &node);
         let taps = Taps::new(installation, recording.clone(), context.me(), &node);
         // It serves the computer's disk: also while the robot's time stands still.
@@ -137,8 +137,11 @@ fn make(directory: &Path) {
     let _ = std::fs::create_dir(directory);
 }
 
-fn options(recording: &Recording, node: &str) -> Options {
+fn options(recording: &Recording, installation: &Installation, node: &str) -> Options {
+    let classes = || installation.classes.iter().map(|entry| (entry.class.0, entry.name.clone())).collect();
+    let drawn = |rate_hz: f64| DrawnBeside { period_ns: (1e9 / rate_hz) as u64, classes: classes() };
     Options {
+        drawn: recording.drawn.map(drawn),
         rotation: Rotation { bytes_max: recording.rotate_size, age_max: recording.rotate_after },
         flush: recording.flush,
         sync: recording.sync,

@@ -47,12 +47,18 @@ fn text(info: &Info) -> String {
         (false, _) => "not closed: if nothing writes it any more, `rohrpost record recover` makes a whole file".into(),
     };
     let (path, bytes, chunks) = (info.path.display(), size(info.bytes), info.chunks);
-    let mut lines = vec![format!("{path}: {} messages, {bytes} in {chunks} chunks, {closed}", info.messages)];
+    let messages = messages_text(info);
+    let mut lines = vec![format!("{path}: {messages}, {bytes} in {chunks} chunks, {closed}")];
     if info.lost > 0 {
         lines.push(format!(
             "{} messages are lost: the disk was too slow, or they never came to the recorder",
             info.lost
         ));
+    }
+    if info.repeated > 0 {
+        let topics = info.channels.iter().filter(|channel| channel.repeated > 0).map(|channel| channel.topic.as_str());
+        let topics: Vec<&str> = topics.collect();
+        lines.push(format!("it begins with the newest of earlier, which is not counted, of {}", topics.join(", ")));
     }
     if let (Some(first), Some(last)) = (info.first_ns, info.last_ns) {
         let seconds = last.saturating_sub(first) as f64 / 1e9;
@@ -84,6 +90,16 @@ fn text(info: &Info) -> String {
     format!("{}\n\n{}", lines.join("\n"), table(["topic", ">messages", ">per s", ">lost", "type"], rows))
 }
 
+/// All messages; and how many are drawn of others, if they stand beside those.
+fn messages_text(info: &Info) -> String {
+    let of = |channel: &ChannelInfo| channel.drawn_of.as_ref().map(|_| channel.messages);
+    match (info.messages, info.channels.iter().filter_map(of).fold(0, u64::saturating_add)) {
+        (all, 0) => format!("{all} messages"),
+        (all, drawn) if drawn >= all => format!("{all} messages"),
+        (all, drawn) => format!("{all} messages ({drawn} of them drawn)"),
+    }
+}
+
 /// Messages a second, over the time in which they came, if that is a second or more.
 fn rate(channel: &ChannelInfo) -> Option<f64> {
     let ns = channel.last_ns?.checked_sub(channel.first_ns?).filter(|ns| *ns >= SHORTEST_NS)?;
@@ -111,7 +127,7 @@ fn as_json(info: &Info) -> Value {
             "topic": channel.topic, "name": channel.name, "item": channel.item, "type_name": channel.type_name,
             "type": channel.ty.as_ref().map(describe_type), "message_encoding": channel.message_encoding,
             "schema_encoding": channel.schema_encoding, "drawn_of": channel.drawn_of,
-            "messages": channel.messages, "lost": channel.lost, "first_ns": channel.first_ns,
+            "messages": channel.messages, "repeated": channel.repeated, "lost": channel.lost, "first_ns": channel.first_ns,
             "last_ns": channel.last_ns,
         })
     });
@@ -123,7 +139,7 @@ fn as_json(info: &Info) -> Value {
     json!({
         "path": info.path, "bytes": info.bytes, "is_closed": info.is_closed, "closed_because": info.closed_because,
         "library": info.library, "profile": info.profile, "chunks": info.chunks, "messages": info.messages,
-        "lost": info.lost,
+        "repeated": info.repeated, "lost": info.lost,
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
         "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),

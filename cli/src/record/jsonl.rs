@@ -16,6 +16,9 @@ struct JsonMessage<'a> {
     epoch: u64,
     arrival_ns: u64,
     sequence: u32,
+    /// It is of an earlier file; left out if it is not.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    repeated: bool,
     #[serde(flatten)]
     content: JsonContent<'a>,
 }
@@ -121,8 +124,8 @@ impl Drop for JsonFile {
 
 fn json_message<'a>(channel: &'a RecordedChannel, message: &Message<'_>) -> JsonMessage<'a> {
     let Message { arrival_ns, stamp_ns, epoch, sequence, data } = *message;
-    let content = content(channel, data);
-    JsonMessage { topic: &channel.topic, stamp_ns, epoch, arrival_ns, sequence, content }
+    let (repeated, content) = (channel.is_repeated(), content(channel, data));
+    JsonMessage { topic: &channel.topic, stamp_ns, epoch, arrival_ns, sequence, repeated, content }
 }
 
 fn content<'a>(channel: &'a RecordedChannel, data: &[u8]) -> JsonContent<'a> {

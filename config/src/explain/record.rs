@@ -31,6 +31,10 @@ impl Page<'_> {
             Some(level) => format!("lines of level {} and above", level.as_str()),
         };
         self.entry("output", &output);
+        if let Some(rate_hz) = record.drawn {
+            let drawn = format!("for other programs, at most {rate_hz} a second of each, beside what is recorded");
+            self.entry("drawn", &drawn);
+        }
         let (size, age) = (size_text(record.rotate_size), duration_text(record.rotate_after));
         let free = size_text(record.leave_free);
         self.entry("files", &format!("a new one after {size} or {age}; {free} of the disk stay free"));

@@ -1,11 +1,16 @@
 //! The file that is written now, with what the recorder knows of it.
 
-use crate::batch::Batch;
+use crate::batch::{Batch, Message};
 use crate::disk::Disk;
+use crate::drawn::DrawingBeside;
 use crate::error::DiskError;
 use crate::file::OpenFile;
-use crate::format::{MESSAGE_ENCODING, SCHEMA_ENCODING, VERSION, key, metadata};
-use crate::options::Session;
+use crate::format::{
+    CHUNK_BYTES_MAX, MESSAGE_ENCODING, MESSAGE_OVERHEAD_BYTES, SCHEMA_ENCODING, VERSION, key, metadata,
+};
+use crate::newest::Newest;
+use crate::options::{Options, Session};
+use crate::read::definitions::{Definition, SchemaText};
 use crate::status::ChannelState;
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
@@ -30,6 +35,11 @@ pub(crate) struct Current {
     /// Of those, how many came behind the last sync.
     pub(crate) unsynced: u64,
     described: Vec<Described>,
+    /// Of the present chunk, before compression.
+    chunk_bytes: usize,
+    drawing: Option<DrawingBeside>,
+    /// It has what came before it.
+    has_begun: bool,
     /// Losses of each channel that earlier files tell.
     lost_before: Vec<u64>,
     /// Losses that this one tells, too.
@@ -38,7 +48,7 @@ pub(crate) struct Current {
 }
 
 impl Current {
-    pub(crate) fn new(file: OpenFile, lost_before: Vec<u64>, now: Instant) -> Self {
+    pub(crate) fn new(file: OpenFile, options: &Options, lost_before: Vec<u64>, now: Instant) -> Self {
         Self {
             file,
             opened: now,
@@ -46,6 +56,9 @@ impl Current {
             messages: 0,
             unsynced: 0,
             described: Vec::new(),
+            chunk_bytes: 0,
+            drawing: options.drawn.as_ref().map(DrawingBeside::new),
+            has_begun: false,
             lost_told: lost_before.clone(),
             lost_before,
             epoch: None,
@@ -70,35 +83,102 @@ impl Current {
         }
         for channel in &channels[self.described.len()..] {
             let schema = self.file.schema(&channel.schema_name, SCHEMA_ENCODING, &channel.schema)?;
-            let id = channel_of_epoch(&mut self.file, channel, schema, epoch)?;
+            let id = self.channel(channel, schema, [(key::EPOCH, epoch.to_string())])?;
             self.described.push(Described { epoch, schema, id });
         }
         self.file.end_chunk()
     }
 
-    /// Writes messages as a chunk.
+    /// Begins with the newest message of each channel that would be missing for long, before the first messages.
+    pub(crate) fn begin(
+        &mut self,
+        newest: &Newest,
+        batch: &Batch,
+        channels: &[Arc<ChannelState>],
+    ) -> Result<(), DiskError> {
+        let Some((_, first)) = batch.messages().next().filter(|_| !self.has_begun) else { return Ok(()) };
+        self.has_begun = true;
+        let repeated = newest.before(&first);
+        if repeated.is_empty() {
+            return Ok(());
+        }
+        for (at, message) in repeated {
+            let texts = [(key::EPOCH, message.epoch.to_string()), (key::REPEATED, "true".to_owned())];
+            let id = self.channel(&channels[at], self.described[at].schema, texts)?;
+            // So that the file's time begins with what is new in it.
+            self.put(id, &Message { arrival_ns: first.arrival_ns, ..message })?;
+        }
+        self.end_chunk()
+    }
+
+    /// Writes messages as a chunk; with what is drawn of them these may be several.
     pub(crate) fn write(&mut self, batch: &Batch, channels: &[Arc<ChannelState>]) -> Result<(), DiskError> {
         for (at, message) in batch.messages() {
             if self.epoch != Some(message.epoch) {
                 self.tell_epoch(message.epoch, message.arrival_ns)?;
             }
-            let known = &mut self.described[at];
+            let mut known = self.described[at];
             if known.epoch != message.epoch {
-                known.id = channel_of_epoch(&mut self.file, &channels[at], known.schema, message.epoch)?;
                 known.epoch = message.epoch;
+                known.id = self.channel(&channels[at], known.schema, [(key::EPOCH, message.epoch.to_string())])?;
+                self.described[at] = known;
             }
-            let header = MessageHeader {
-                channel_id: known.id,
-                sequence: message.sequence,
-                log_time: message.arrival_ns,
-                publish_time: message.stamp_ns,
-            };
-            self.file.message(&header, message.data)?;
+            self.put(known.id, &message)?;
         }
-        self.file.end_chunk()?;
+        self.end_chunk()?;
         self.messages += batch.len() as u64;
         self.unsynced += batch.len() as u64;
         Ok(())
+    }
+
+    /// The same topic has a channel for each epoch, and for what is repeated: texts that it has besides.
+    fn channel<const N: usize>(
+        &mut self,
+        channel: &ChannelState,
+        schema: u16,
+        further: [(&str, String); N],
+    ) -> Result<u16, DiskError> {
+        let ChannelState { topic, schema_name, schema: data, texts, .. } = channel;
+        let mut texts = texts.clone();
+        texts.extend(further.map(|(key, text)| (key.to_owned(), text)));
+        let id = self.file.channel(schema, topic, MESSAGE_ENCODING, &texts)?;
+        if let Some(drawing) = self.drawing.as_mut().filter(|drawing| !drawing.knows(id)) {
+            let encoding = SCHEMA_ENCODING.into();
+            let schema = Arc::new(SchemaText { name: schema_name.clone(), encoding, data: data.clone() });
+            drawing
+                .add(id, Definition { topic: topic.clone(), message_encoding: MESSAGE_ENCODING.into(), texts, schema });
+        }
+        Ok(id)
+    }
+
+    /// Adds a message to the present chunk, and what is drawn of it.
+    fn put(&mut self, channel_id: u16, message: &Message<'_>) -> Result<(), DiskError> {
+        let Message { arrival_ns: log_time, stamp_ns: publish_time, sequence, data, .. } = *message;
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time };
+        self.add(&header, data)?;
+        let Some(drawing) = &mut self.drawing else { return Ok(()) };
+        for drawn in drawing.draw(channel_id, publish_time, data) {
+            let Definition { topic, message_encoding, texts, schema } = &*drawn.channel;
+            let schema = self.file.schema(&schema.name, &schema.encoding, &schema.data)?;
+            let channel_id = self.file.channel(schema, topic, message_encoding, texts)?;
+            self.add(&MessageHeader { channel_id, ..header }, &drawn.data)?;
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, header: &MessageHeader, data: &[u8]) -> Result<(), DiskError> {
+        let more = data.len() + MESSAGE_OVERHEAD_BYTES;
+        if self.chunk_bytes > 0 && self.chunk_bytes + more > CHUNK_BYTES_MAX {
+            self.file.split_chunk()?;
+            self.chunk_bytes = 0;
+        }
+        self.chunk_bytes += more;
+        self.file.message(header, data)
+    }
+
+    fn end_chunk(&mut self) -> Result<(), DiskError> {
+        self.chunk_bytes = 0;
+        self.file.end_chunk()
     }
 
     /// System time has stepped. Only a later epoch is news: streams learn of a step one after the other.
@@ -148,11 +228,4 @@ impl Current {
     pub(crate) fn lost_before(&self) -> &[u64] {
         &self.lost_before
     }
-}
-
-/// The same topic has a channel for each epoch.
-fn channel_of_epoch(file: &mut OpenFile, channel: &ChannelState, schema: u16, epoch: u64) -> Result<u16, DiskError> {
-    let mut texts = channel.texts.clone();
-    texts.insert(key::EPOCH.into(), epoch.to_string());
-    file.channel(schema, &channel.topic, MESSAGE_ENCODING, &texts)
 }

@@ -2,9 +2,11 @@
 
 use crate::error::ReadError;
 use crate::format::metadata;
+use crate::read::before::newest_before;
 use crate::read::selected::Selected;
 use crate::rewrite::{Progress, RewriteError, Rewriter};
 use crate::selection::{SelectError, Selection};
+use mcap::records::MessageHeader;
 use std::path::Path;
 use thiserror::Error;
 
@@ -22,8 +24,15 @@ pub enum CutError {
     Rewrite(#[from] RewriteError),
 }
 
+/// Numbers of sources in the new file: what is selected, and what it begins with.
+const SELECTED: usize = 0;
+const EARLIER: usize = 1;
+
 /// Writes what is selected to a new file; its messages and bytes. Reads only the chunks that have some of it. Counts of
 /// lost messages remain those of the whole file.
+///
+/// The new file begins with the newest message of each selected topic of which none came for a second before, as each
+/// file of a recording does. They do not count as its messages.
 ///
 /// # Errors
 /// When the file was not closed or is damaged, has no such name, or the new one cannot be written.
@@ -34,11 +43,19 @@ pub fn cut(path: &Path, to: &Path, selection: &Selection, progress: &mut Progres
         .each_metadata(|its| Ok::<_, CutError>(new.metadata(&its.name, its.metadata).map_err(RewriteError::from)?))?;
     new.metadata(metadata::CUT, selection.about(path)).map_err(RewriteError::from)?;
     for (id, channel) in selected.channels() {
-        new.channel(0, id, channel).map_err(RewriteError::from)?;
+        new.channel(SELECTED, id, channel).map_err(RewriteError::from)?;
     }
-    while let Some(found) = selected.next()? {
+    let mut next = selected.next()?;
+    let begins_ns = next.as_ref().map(|found| found.header.log_time).or(selection.from_ns);
+    for earlier in newest_before(path, selection)? {
+        let log_time = begins_ns.unwrap_or(earlier.header.log_time);
+        let header = MessageHeader { log_time, ..earlier.header };
+        new.message(EARLIER, &earlier.channel, &header, &earlier.data).map_err(RewriteError::from)?;
+    }
+    while let Some(found) = next {
         progress(selected.at(), selected.file_bytes());
-        new.message(0, &found.channel, &found.header, selected.data(&found)).map_err(RewriteError::from)?;
+        new.message(SELECTED, &found.channel, &found.header, selected.data(&found)).map_err(RewriteError::from)?;
+        next = selected.next()?;
     }
     let messages = new.messages();
     Ok((messages, new.finish()?))

@@ -90,10 +90,15 @@ impl OpenFile {
 
     /// Compresses the present chunk and writes it: a killed process loses nothing before here.
     pub(crate) fn end_chunk(&mut self) -> Result<(), DiskError> {
-        let told = self.mcap.flush();
-        self.explained(told)?;
+        self.split_chunk()?;
         self.whole_bytes = self.bytes();
         Ok(())
+    }
+
+    /// Begins another chunk in the middle of what belongs together: after an error none of it stays.
+    pub(crate) fn split_chunk(&mut self) -> Result<(), DiskError> {
+        let told = self.mcap.flush();
+        self.explained(told)
     }
 
     /// Has the disk keep what was written: a loss of power loses nothing before here.

@@ -50,6 +50,9 @@ pub mod key {
     pub const ITEM: &str = "item";
     /// Of system time. A step begins another channel of the same topic, so each message says its epoch.
     pub const EPOCH: &str = "epoch";
+    /// Of a channel with what came last before the file, from an earlier one, as a beginning: `true`. The log time of
+    /// its messages is that of the file's first message, the publish time is the stamp.
+    pub const REPEATED: &str = "repeated";
     /// Of a channel that was drawn of another one, for other programs: the topic of that.
     pub const DRAWN: &str = "drawn";
 }

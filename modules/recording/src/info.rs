@@ -30,8 +30,10 @@ pub struct Info {
     pub damages: Vec<(u64, Damage)>,
     /// Chunks.
     pub chunks: u64,
-    /// Messages in all channels.
+    /// Messages in all channels, without those that are repeated.
     pub messages: u64,
+    /// What it begins with, repeated from an earlier file.
+    pub repeated: u64,
     /// Messages that should be in it, and are not.
     pub lost: u64,
     /// When the first message came, in nanoseconds of system time.
@@ -69,8 +71,10 @@ pub struct ChannelInfo {
     pub message_encoding: String,
     /// The topic that it was drawn of for other programs, if it was.
     pub drawn_of: Option<String>,
-    /// Messages.
+    /// Messages, without those that are repeated.
     pub messages: u64,
+    /// Repeated from an earlier file, as the beginning of this one.
+    pub repeated: u64,
     /// Messages that should be here, and are not.
     pub lost: u64,
     /// When the first one came.
@@ -188,7 +192,8 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         profile: contents.header().map(|header| header.profile.clone()).unwrap_or_default(),
         damages: Vec::new(),
         chunks: 0,
-        messages: sum(tallies.values().map(|tally| tally.messages)),
+        messages: 0,
+        repeated: 0,
         lost: 0,
         first_ns: None,
         last_ns: None,
@@ -216,7 +221,14 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
     for (id, channel) in definitions.channels() {
         let tally = tallies.get(&id);
         let (messages, its_times) = tally.map_or((0, None), |tally| (tally.messages, tally.times));
-        add(channels.entry(&channel.topic).or_default(), channel, messages, its_times);
+        let told = channels.entry(&channel.topic).or_default();
+        describe(told, channel);
+        if channel.is_repeated() {
+            told.repeated = told.repeated.saturating_add(messages);
+            continue;
+        }
+        told.messages = told.messages.saturating_add(messages);
+        (told.first_ns, told.last_ns) = wider(told.first_ns.zip(told.last_ns), its_times).unzip();
         times = wider(times, its_times);
         if let Some(epoch) = channel.epoch().filter(|_| messages > 0) {
             let tally = epochs.entry(epoch).or_default();
@@ -231,6 +243,8 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
     }
     (info.first_ns, info.last_ns) = times.unzip();
     info.lost = sum(lost.values().copied());
+    info.messages = sum(channels.values().map(|channel| channel.messages));
+    info.repeated = sum(channels.values().map(|channel| channel.repeated));
     info.channels = channels.into_values().collect();
     let epoch_info = |(epoch, Tally { messages, times }): (u64, Tally)| {
         let (first_ns, last_ns) = times.unzip();
@@ -245,8 +259,8 @@ fn sum(counts: impl Iterator<Item = u64>) -> u64 {
     counts.fold(0, u64::saturating_add)
 }
 
-/// A topic has a channel for each epoch.
-fn add(info: &mut ChannelInfo, channel: &Definition, messages: u64, times: Option<(u64, u64)>) {
+/// A topic has a channel for each epoch, all with the same description.
+fn describe(info: &mut ChannelInfo, channel: &Definition) {
     let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
     info.topic.clone_from(&channel.topic);
     (info.name, info.item) = (text(key::NAME), text(key::ITEM));
@@ -255,6 +269,4 @@ fn add(info: &mut ChannelInfo, channel: &Definition, messages: u64, times: Optio
     info.schema_encoding.clone_from(&channel.schema.encoding);
     info.message_encoding.clone_from(&channel.message_encoding);
     info.drawn_of = channel.texts.get(key::DRAWN).cloned();
-    info.messages = info.messages.saturating_add(messages);
-    (info.first_ns, info.last_ns) = wider(info.first_ns.zip(info.last_ns), times).unzip();
 }

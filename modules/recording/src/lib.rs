@@ -44,11 +44,13 @@
 //! - **Channels are described in a chunk of their own,** and again in the index: one damaged chunk costs its messages
 //!   only.
 //! - **Each file stands alone:** session, configuration, types and channels are in each; counts of lost messages are
-//!   those since its beginning.
+//!   those since its beginning. It begins with the newest message of each channel of which nothing came for a second,
+//!   in channels that say so ([`format::key::REPEATED`]): nothing counts them a second time.
 //! - **A failed file is cut back** to its last whole chunk, so that no message is in two files.
 //! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut`, `merge` and `draw`.
-//! - **What other programs draw is made afterwards** ([`draw`]), in channels that say so: Rerun shows postcard as bytes
-//!   only. Replay leaves these channels out; `cut` and `merge` keep them.
+//! - **What other programs draw is made afterwards** ([`draw`]), or beside what is recorded ([`Options::drawn`]), in
+//!   channels that say so: Rerun shows postcard as bytes only. Replay leaves these channels out; `cut` and `merge` keep
+//!   them.
 //!
 //! Knows no mailbox, no module and no clock but that of its periods: times are arguments.
 
@@ -65,6 +67,7 @@ pub mod format;
 mod inbox;
 mod info;
 mod merge;
+mod newest;
 mod options;
 mod output;
 mod player;
@@ -84,7 +87,7 @@ mod writer;
 
 pub use batch::Message;
 pub use cut::{CutError, cut};
-pub use drawn::{DrawError, DrawOptions, Drawn, draw};
+pub use drawn::{DrawError, DrawOptions, Drawn, DrawnBeside, draw};
 pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
 pub use merge::{MergeError, merge};

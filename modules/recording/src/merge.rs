@@ -45,7 +45,8 @@ pub enum MergeError {
 }
 
 /// Writes messages of all files to a new one: always the one that arrived first of those that are next in their files.
-/// So each file's order stays, also where its time steps back. Its messages and bytes.
+/// So each file's order stays, also where its time steps back. What a file repeats at its beginning is left out if it
+/// is there already. Its messages and bytes.
 ///
 /// # Errors
 /// When one was not closed or is damaged, one name has two types, or the new file cannot be written.
@@ -59,9 +60,10 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
     new.metadata(metadata::MERGED, names.collect()).map_err(RewriteError::from)?;
     let sources = paths.iter().enumerate().map(|(number, path)| Source::open(number, path, &mut new));
     let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
+    let mut written = Written::default();
     let bytes: u64 = sources.iter().map(|source| source.contents.file_bytes()).sum();
     while let Some(source) = sources.iter_mut().filter(|its| its.next.is_some()).min_by_key(|its| its.arrival_ns()) {
-        source.write_next(&mut new, &types)?;
+        source.write_next(&mut new, &types, &mut written)?;
         source.advance(&mut new)?;
         progress(sources.iter().map(|source| source.contents.at()).sum(), bytes);
     }
@@ -81,6 +83,24 @@ pub fn merge(paths: &[PathBuf], to: &Path, progress: &mut Progress<'_>) -> Resul
     }
     let messages = new.messages();
     Ok((messages, new.finish()?))
+}
+
+/// The last message of each topic that was written: what a file repeats at its beginning may be that.
+#[derive(Default)]
+struct Written(BTreeMap<String, (Option<u64>, u32, u64)>);
+
+impl Written {
+    /// Whether it is to be written: not once more.
+    fn takes(&mut self, found: &Found) -> bool {
+        let Found { channel, header, .. } = found;
+        let its = (channel.epoch(), header.sequence, header.publish_time);
+        match self.0.get_mut(&channel.topic) {
+            Some(last) if channel.is_repeated() && *last == its => return false,
+            Some(last) => *last = its,
+            None => drop(self.0.insert(channel.topic.clone(), its)),
+        }
+        true
+    }
 }
 
 /// One of the files.
@@ -109,8 +129,9 @@ impl Source {
         &mut self,
         new: &mut Rewriter,
         types: &BTreeMap<String, Arc<SchemaText>>,
+        written: &mut Written,
     ) -> Result<(), RewriteError> {
-        let Some(found) = self.next.take() else { return Ok(()) };
+        let Some(found) = self.next.take().filter(|found| written.takes(found)) else { return Ok(()) };
         let Found { channel, header, .. } = &found;
         if !new.has_channel(self.number, header.channel_id) {
             new.channel(self.number, header.channel_id, &unified(channel, types))?;

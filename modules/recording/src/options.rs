@@ -1,5 +1,6 @@
 //! What a recording is told at its start.
 
+use crate::drawn::DrawnBeside;
 use crate::rotate::Rotation;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,6 +25,8 @@ pub struct Options {
     pub leave_bytes: u64,
     /// Chunks of up to a megabyte that wait in memory while the disk is slow; what comes then is lost, and counted.
     pub queue_chunks: usize,
+    /// What other programs draw is in the same files.
+    pub drawn: Option<DrawnBeside>,
 }
 
 impl Options {
@@ -38,6 +41,7 @@ impl Options {
             retry: Duration::from_secs(1),
             leave_bytes: 256 << 20,
             queue_chunks: 32,
+            drawn: None,
         }
     }
 }

@@ -64,6 +64,8 @@ pub struct Player {
     /// The file that is read, and how many were before it.
     reader: Option<Reader>,
     ended: usize,
+    /// The number of the file at which it began: only that one plays what it repeats of earlier ones.
+    began: usize,
     /// The reader's message is not played yet.
     is_ahead: bool,
     /// Of the time that passes now.
@@ -72,9 +74,10 @@ pub struct Player {
 
 impl Player {
     /// At the beginning of these files, which are played one after the other. They are those of one recording, in which
-    /// epochs go on from file to file. Channels that are not chosen are left out.
+    /// epochs go on from file to file. Channels that are not chosen are left out, and so is what a file repeats of
+    /// those before it.
     pub fn new(files: Vec<PathBuf>, plays: impl Fn(&RecordedChannel) -> bool + Send + 'static) -> Self {
-        Self { files, plays: Box::new(plays), reader: None, ended: 0, is_ahead: false, epoch: None }
+        Self { files, plays: Box::new(plays), reader: None, ended: 0, began: 1, is_ahead: false, epoch: None }
     }
 
     /// What comes next, `now_ns` in the time of the last [`Cue::Begin`].
@@ -108,7 +111,7 @@ impl Player {
     pub fn seek(&mut self, arrival_ns: u64) -> Result<bool, ReadError> {
         (self.reader, self.is_ahead, self.epoch) = (None, false, None);
         for (at, path) in self.files.iter().enumerate() {
-            self.ended = at + 1;
+            (self.ended, self.began) = (at + 1, at + 1);
             let mut reader = Reader::open(path)?;
             if reader.seek(arrival_ns)? {
                 self.reader = Some(reader);
@@ -128,8 +131,11 @@ impl Player {
                 continue;
             };
             reader.advance()?;
+            let is_first = self.ended == self.began;
             match reader.present() {
-                Some((channel, _)) if (self.plays)(&channel) => return Ok(true),
+                Some((channel, _)) if (is_first || !channel.is_repeated()) && (self.plays)(&channel) => {
+                    return Ok(true);
+                }
                 Some(_) => {}
                 None => self.reader = None,
             }

@@ -38,6 +38,12 @@ impl RecordedChannel {
     pub fn is_drawn(&self) -> bool {
         self.texts.contains_key(key::DRAWN)
     }
+
+    /// Whether its messages came before this file, which begins with them so that it stands alone. They are in an
+    /// earlier file, too.
+    pub fn is_repeated(&self) -> bool {
+        self.texts.contains_key(key::REPEATED)
+    }
 }
 
 /// Reads a file, or a part of it, with one chunk in memory.

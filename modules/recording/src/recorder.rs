@@ -18,6 +18,7 @@ use crate::error::{DiskError, Shown};
 use crate::file::OpenFile;
 use crate::format::metadata;
 use crate::inbox::Taken;
+use crate::newest::Newest;
 use crate::options::{Options, Session};
 use crate::rotate;
 use crate::shared::Shared;
@@ -38,6 +39,8 @@ pub(crate) struct Recorder {
     shared: Arc<Shared>,
     channels: Vec<Arc<ChannelState>>,
     current: Option<Current>,
+    /// What the next file begins with.
+    newest: Newest,
     /// Of the next file.
     number: u32,
     /// Taken, but not written, as the disk fails.
@@ -52,6 +55,7 @@ pub(crate) struct Recorder {
 
 impl Recorder {
     pub(crate) fn new(disk: Box<dyn Disk>, options: Options, session: Session, shared: Arc<Shared>) -> Self {
+        let newest = Newest::new(options.rotation.bytes_max);
         Self {
             disk,
             options,
@@ -59,6 +63,7 @@ impl Recorder {
             shared,
             channels: Vec::new(),
             current: None,
+            newest,
             number: 1,
             held: None,
             retry_at: None,
@@ -127,6 +132,7 @@ impl Recorder {
         }
         self.retry_at = None;
         batch.messages().for_each(|(at, _)| self.channels[at].count_written());
+        self.newest.note(&batch, &self.channels);
         let mut counts = self.shared.counts();
         counts.written += batch.len() as u64;
         counts.held = 0;
@@ -149,6 +155,7 @@ impl Recorder {
         self.learn_channels();
         if let Some(current) = &mut self.current {
             current.describe(&self.channels, self.epoch)?;
+            current.begin(&self.newest, batch, &self.channels)?;
             current.write(batch, &self.channels)?;
             self.shared.counts().bytes_now = current.file.bytes();
         }
@@ -196,7 +203,7 @@ impl Recorder {
         }
         let file = self.create()?;
         self.shared.counts().file = Some(file.path().to_owned());
-        let current = self.current.insert(Current::new(file, self.lost_told.clone(), now));
+        let current = self.current.insert(Current::new(file, &self.options, self.lost_told.clone(), now));
         let number = self.number;
         self.number += 1;
         current.introduce(&self.session, number)

@@ -52,7 +52,7 @@ impl Rewriter {
         Ok(Self { file: Some(file), part, to: to.to_owned(), channels: BTreeMap::new(), chunk_bytes: 0, messages: 0 })
     }
 
-    /// Messages so far.
+    /// Messages so far, without those that are repeated from an earlier file.
     pub(crate) fn messages(&self) -> u64 {
         self.messages
     }
@@ -100,7 +100,7 @@ impl Rewriter {
         }
         file.message(&MessageHeader { channel_id, ..*header }, data)?;
         self.chunk_bytes += more;
-        self.messages += 1;
+        self.messages += u64::from(!channel.is_repeated());
         Ok(())
     }
 

@@ -6,9 +6,12 @@
 mod sights;
 
 use rohrpost_modules::types::{Bytes, Image, ImageFormat};
-use rohrpost_recording::{DrawError, DrawOptions, Drawn, ReadError, Reader, RewriteError, SelectError, Selection};
-use rohrpost_recording::{cut, draw, info, merge};
-use sights::{Sight, line, pose, record, scan, sight, sights};
+use rohrpost_recording::{
+    DrawError, DrawOptions, Drawn, DrawnBeside, Options, ReadError, Reader, RewriteError, SelectError, Selection, cut,
+    draw, info, merge,
+};
+use sights::{Sight, line, pose, record, record_with, scan, sight, sights};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -176,4 +179,59 @@ fn what_cannot_be_drawn_is_explained_and_makes_no_file() {
     let error = draw(&scans, &to, &Selection::default(), &options(false), &mut |_, _| {}).unwrap_err();
     assert!(matches!(error, DrawError::Select(SelectError::Read(ReadError::NotClosed { .. }))), "{error}");
     assert!(!to.exists());
+}
+
+/// Drawn messages of a file: topic, stamp, number and bytes.
+fn drawn_of(path: &Path) -> Vec<(String, u64, u32, Vec<u8>)> {
+    let mut reader = Reader::open(path).unwrap();
+    let mut drawn = Vec::new();
+    while let Some((channel, message)) = reader.next().unwrap() {
+        if channel.is_drawn() {
+            drawn.push((channel.topic.clone(), message.stamp_ns, message.sequence, message.data.to_vec()));
+        }
+    }
+    drawn
+}
+
+/// A recording that draws what it records; its file.
+fn record_drawn(folder: &Path, period_ns: u64, sights: &[Sight]) -> PathBuf {
+    let drawn = Some(DrawnBeside { period_ns, classes: BTreeMap::from([(140, "pilot".to_owned())]) });
+    record_with(Options { drawn, ..Options::new(folder, "beside") }, sights);
+    folder.join("beside-0001.mcap")
+}
+
+#[test]
+fn what_is_drawn_while_it_is_recorded_is_what_is_drawn_afterwards() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = record_drawn(folder.path(), 1, &sights());
+    let to = folder.path().join("drawn.mcap");
+    let classes = BTreeMap::from([(140, "pilot".to_owned())]);
+    let options = DrawOptions { with_original: true, classes };
+    draw(&path, &to, &Selection::default(), &options, &mut |_, _| {}).unwrap();
+    let drawn = drawn_of(&path);
+    assert_eq!(drawn.len(), 12);
+    assert_eq!(drawn, drawn_of(&to));
+    assert_eq!(topics(&path), topics(&to));
+    assert_eq!(info(&path).unwrap().messages, 10 + 12, "and all that was recorded");
+}
+
+#[test]
+fn what_is_drawn_while_it_is_recorded_is_sampled_and_short() {
+    let folder = tempfile::tempdir().unwrap();
+    // A hundredth of a second apart: 1.25 s after a full one, so periods of 0.1 s end behind the fifth.
+    let mut all: Vec<Sight> = (0..12).map(|_| sight("mapper.0", "pose", &pose(1.0, 2.0, 0.5))).collect();
+    all.extend((0..3).map(|_| sight("output.0", "line", &line("battery low"))));
+    let long = Image { row_bytes: 300, pixels: Bytes(vec![7; 90_000]), ..Image::empty(100, 300, ImageFormat::Rgb8) };
+    all.push(sight("camera.0", "image", &long));
+    let path = record_drawn(folder.path(), 100_000_000, &all);
+    let drawn = drawn_of(&path);
+    let of = |topic: &str| -> Vec<u32> {
+        drawn.iter().filter(|(its, ..)| its == topic).map(|(_, _, number, _)| *number).collect()
+    };
+    assert_eq!(of("mapper.0/pose/pose"), [0, 5], "the first of each period");
+    assert_eq!(of("output.0/line/log"), [12, 13, 14], "each line");
+    assert_eq!(of("camera.0/image/image"), [0; 0], "it would be in the file twice");
+    let told = info(&path).unwrap();
+    let image = told.channels.iter().find(|channel| channel.topic == "camera.0/image").unwrap();
+    assert_eq!((image.messages, told.lost), (1, 0));
 }

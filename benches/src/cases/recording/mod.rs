@@ -1,6 +1,8 @@
-//! Recordings: how much a recorder writes in a second without a loss, and what of a processor each message takes.
+//! Recordings: how much a recorder writes in a second without a loss, what of a processor each message takes, and
+//! whether others notice it.
 
 mod bare;
+mod beside;
 mod recorder;
 mod workload;
 
@@ -8,6 +10,7 @@ use super::Case;
 use crate::harness::{Failure, Scratch, sample_in_child};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
+use beside::PairBeside;
 use nix::sys::resource::{UsageWho, getrusage};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -26,7 +29,8 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
     let cases = |figure| SIZES.map(|bytes| -> Box<dyn Case> { Box::new(Recorded { bytes, figure }) });
-    cases(TurnFigure::Rate).into_iter().chain(cases(TurnFigure::ProcessorTime)).collect()
+    let beside: [Box<dyn Case>; 1] = [Box::new(PairBeside)];
+    cases(TurnFigure::Rate).into_iter().chain(cases(TurnFigure::ProcessorTime)).chain(beside).collect()
 }
 
 /// What of a turn is told.

@@ -29,7 +29,7 @@ impl Workload {
     pub(super) fn all(&self) -> impl Iterator<Item = (u32, &'static [u8])> {
         let places = NOISE_BYTES - self.bytes + 1;
         (0..self.messages).map(move |number| {
-            let begin = (number * self.bytes) % places;
+            let begin = number.wrapping_mul(self.bytes) % places;
             (number as u32, &noise()[begin..begin + self.bytes])
         })
     }

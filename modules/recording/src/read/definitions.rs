@@ -45,6 +45,11 @@ impl SchemaText {
 }
 
 impl Definition {
+    /// Whether its messages are from an earlier file, as the beginning of this one.
+    pub(crate) fn is_repeated(&self) -> bool {
+        self.texts.contains_key(key::REPEATED)
+    }
+
     /// Of system time.
     pub(crate) fn epoch(&self) -> Option<u64> {
         self.texts.get(key::EPOCH)?.parse().ok()

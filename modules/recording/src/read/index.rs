@@ -126,6 +126,16 @@ impl Reading {
 
 /// When the first and the last of a channel's messages in a chunk came.
 pub(crate) fn times_at(frames: &mut Frames, at: u64) -> Result<Option<(u64, u64)>, ReadError> {
+    let times = log_times_at(frames, at)?;
+    Ok(times.iter().copied().min().zip(times.iter().copied().max()))
+}
+
+/// When the last of them came that arrived before a time.
+pub(crate) fn last_before(frames: &mut Frames, at: u64, before_ns: u64) -> Result<Option<u64>, ReadError> {
+    Ok(log_times_at(frames, at)?.into_iter().filter(|log_ns| *log_ns < before_ns).max())
+}
+
+fn log_times_at(frames: &mut Frames, at: u64) -> Result<Vec<u64>, ReadError> {
     frames.seek(at)?;
     let what = Damage::Record { op: op::MESSAGE_INDEX };
     let parsed = match frames.step()? {
@@ -133,8 +143,7 @@ pub(crate) fn times_at(frames: &mut Frames, at: u64) -> Result<Option<(u64, u64)
         _ => return Err(damaged(frames, what)),
     };
     let Ok(Record::MessageIndex(MessageIndex { records, .. })) = parsed else { return Err(damaged(frames, what)) };
-    let times = || records.iter().map(|entry| entry.log_time);
-    Ok(times().min().zip(times().max()))
+    Ok(records.iter().map(|entry| entry.log_time).collect())
 }
 
 fn damaged(frames: &Frames, what: Damage) -> ReadError {

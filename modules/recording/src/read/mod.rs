@@ -8,6 +8,7 @@
 //! `mcap` parses records. Framing and chunks are done here: its readers stop at the first damaged chunk, and trust a
 //! chunk's header, which no checksum protects. Lengths are bounded before anything is allocated for them.
 
+pub(crate) mod before;
 pub(crate) mod chunk;
 pub(crate) mod contents;
 pub(crate) mod definitions;

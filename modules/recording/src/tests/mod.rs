@@ -1,5 +1,6 @@
 //! What is written is read again; of what is cut or damaged, what is there; and a failing disk loses nothing uncounted.
 
+mod beginning;
 mod cutting;
 mod damaged;
 mod disks;

@@ -119,9 +119,15 @@ pub(crate) fn recover_all(folder: &Path) -> (u32, Vec<Recovered>) {
 /// Checks a whole file with a reader that is not ours: its messages are those from `first` on. The number behind them.
 pub(crate) fn check_messages(path: &Path, first: u32) -> u32 {
     let bytes = std::fs::read(path).unwrap();
-    let mut next = first;
+    let (mut next, mut repeated) = (first, 0);
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
+        // Behind a step of time: what a file begins with, from the one before it.
+        if message.channel.metadata.contains_key("repeated") {
+            assert!(message.sequence < next, "{}", path.display());
+            repeated += 1;
+            continue;
+        }
         with_message(next, |channel, expected| {
             assert_eq!(message.sequence, next, "{}", path.display());
             assert_eq!(message.channel.topic, ["laser.0/data", "motor.0/data"][channel]);
@@ -132,6 +138,6 @@ pub(crate) fn check_messages(path: &Path, first: u32) -> u32 {
         next += 1;
     }
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, u64::from(next - first));
+    assert_eq!(summary.stats.unwrap().message_count, u64::from(next - first) + repeated);
     next
 }

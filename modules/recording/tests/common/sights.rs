@@ -71,8 +71,14 @@ pub(crate) fn sights() -> Vec<Sight> {
 
 /// Records these in turn, a hundredth of a second apart.
 pub(crate) fn record(folder: &Path, stem: &str, sights: &[Sight]) -> PathBuf {
+    record_with(Options::new(folder, stem), sights);
+    folder.join(format!("{stem}-0001.mcap"))
+}
+
+/// The same with other options.
+pub(crate) fn record_with(options: Options, sights: &[Sight]) {
     let session = Session { node: "base".into(), ..Session::default() };
-    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(folder, stem) }, session).unwrap();
+    let mut writer = Writer::start(Options { leave_bytes: 0, ..options }, session).unwrap();
     for (number, (name, item, ty, data)) in (0_u32..).zip(sights) {
         let channel = writer.channel(&ChannelSpec { name, item, ty, texts: BTreeMap::new() }).unwrap();
         let stamp_ns = STAMP_NS + u64::from(number) * 10_000_000;
@@ -80,5 +86,4 @@ pub(crate) fn record(folder: &Path, stem: &str, sights: &[Sight]) -> PathBuf {
         writer.write(channel, &message).unwrap();
     }
     writer.finish().1.unwrap();
-    folder.join(format!("{stem}-0001.mcap"))
 }

@@ -1,0 +1,121 @@
+//! How long a package is on its way between two modules while a third process records, and while none does.
+
+use super::super::Case;
+use super::workload::{NAME, Workload};
+use crate::harness::{
+    Cell, Child, Failure, Placement, Scheduling, Scratch, Shared, Zeroable, interrupted, time_two_processes,
+};
+use crate::ours::{How, Mailboxes};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+use rohrpost_schema::Type;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// Of the packages: a speed.
+const BYTES: usize = 64;
+/// Round trips of a turn, and those before them that do not count.
+const MESSAGES: usize = 20_000;
+const WARM_UP: usize = 2_000;
+const CAP: Duration = Duration::from_secs(2);
+/// What is recorded meanwhile: 50 MB in a second, as scans of 62 kB.
+const RECORDED_BYTES: usize = 62_000;
+const RECORDED_PERIOD: Duration = Duration::from_micros(1240);
+/// So many before the packages, so that the first chunks are written.
+const RECORDED_FIRST: usize = 100;
+/// The longest turn, with all that may halt it.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// What the recording process and the others tell each other.
+#[repr(C)]
+struct RecordingTurn {
+    /// It records.
+    runs: AtomicU32,
+    /// It has recorded enough.
+    stops: AtomicU32,
+}
+
+// SAFETY: atomics only.
+unsafe impl Zeroable for RecordingTurn {}
+
+/// A pair of modules beside a recorder.
+pub(super) struct PairBeside;
+
+impl Case for PairBeside {
+    fn name(&self) -> String {
+        "pair beside 50 MB/s recorded".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let cell = Cell {
+            bytes: BYTES,
+            messages: settings.count(MESSAGES),
+            warm_up: settings.count(WARM_UP),
+            placement: Placement::TwoCores,
+            scheduling: Scheduling::Fifo,
+            pace: None,
+            cap: CAP,
+        };
+        let contenders = [
+            Contender::sampled("rohrpost", || while_recorded(|| pair(&cell))),
+            Contender::sampled("without recorder", || pair(&cell)),
+        ];
+        let versus = Versus { name: contenders[1].name, p50: None, p99: Some(Target::AtMost(1.1)) };
+        let subject = Subject { case: self.name(), bytes: Some(BYTES), unit: "us" };
+        Ok(compare(settings, &subject, &contenders, &[versus]))
+    }
+}
+
+/// One turn of the packages.
+fn pair(cell: &Cell) -> Result<Vec<f64>, Failure> {
+    let scratch = Scratch::new()?;
+    let node = scratch.directory().join("node");
+    time_two_processes(cell, |end, meetings| Mailboxes::open(&node, end, cell.bytes, How::Blocking, meetings))
+}
+
+/// Does it while a process of its own records.
+fn while_recorded(turn: impl FnOnce() -> Result<Vec<f64>, Failure>) -> Result<Vec<f64>, Failure> {
+    let folder = Scratch::new()?;
+    let shared = Shared::<RecordingTurn>::new()?;
+    let mut recorder = Child::start(|| record(&folder.directory(), &shared))?;
+    while shared.runs.load(Ordering::Relaxed) == 0 && !recorder.has_ended()? && !interrupted() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let samples = turn();
+    shared.stops.store(1, Ordering::Relaxed);
+    // That it could not record says more than figures without it.
+    recorder.finish(Instant::now() + PATIENCE)?;
+    samples
+}
+
+/// Records at its rate until it is told to stop.
+fn record(folder: &Path, shared: &RecordingTurn) -> Result<(), Failure> {
+    let workload = Workload { bytes: RECORDED_BYTES, messages: usize::MAX };
+    workload.prepare();
+    let options = Options { leave_bytes: 0, ..Options::new(folder, "bench") };
+    let start = |error| Failure::of("starting a recording", error);
+    let mut writer = Writer::start(options, Session::default()).map_err(start)?;
+    let ty = Type::List(Box::new(Type::U8));
+    let spec = ChannelSpec { name: NAME.0, item: NAME.1, ty: &ty, texts: BTreeMap::new() };
+    let channel = writer.channel(&spec).map_err(|error| Failure::of("a channel", error))?;
+    let mut due = Instant::now();
+    for (sequence, data) in workload.all() {
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        due += RECORDED_PERIOD;
+        let now_ns = u64::from(sequence) * RECORDED_PERIOD.as_nanos() as u64;
+        let message = Message { arrival_ns: now_ns, stamp_ns: now_ns, epoch: 1, sequence, data };
+        if let Err(error) = writer.write(channel, &message) {
+            return Err(Failure::Skipped(format!("this computer does not record 50 MB/s: {error}")));
+        }
+        if sequence as usize == RECORDED_FIRST {
+            shared.runs.store(1, Ordering::Relaxed);
+        }
+        if shared.stops.load(Ordering::Relaxed) != 0 {
+            break;
+        }
+    }
+    writer.finish().1.map_err(|error| Failure::of("closing the recording", error))
+}

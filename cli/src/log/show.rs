@@ -1,0 +1,29 @@
+//! How the selected lines are shown.
+
+use super::arguments::Arguments;
+use super::filter::Filter;
+use crate::terminal::{complain, say};
+use rohrpost::output::{Format, OutputLine};
+
+/// The selected lines and their format.
+pub(super) struct Show<'a> {
+    pub(super) filter: Filter,
+    pub(super) format: Format<'a>,
+    pub(super) arguments: &'a Arguments,
+}
+
+impl Show<'_> {
+    /// False when nobody reads any more.
+    pub(super) fn line(&self, line: &OutputLine) -> bool {
+        say(if self.arguments.json { self.format.json(line) } else { self.format.short(line) })
+    }
+
+    /// A notice of the tool between the lines; programs get only lines.
+    pub(super) fn note(&self, note: &str) -> bool {
+        if self.arguments.json {
+            complain(format_args!("… {note}"));
+            return true;
+        }
+        say(format_args!("… {note}"))
+    }
+}

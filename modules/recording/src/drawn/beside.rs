@@ -1,0 +1,64 @@
+//! What is drawn while it is recorded, into the same file.
+
+use super::TWICE_BYTES_MAX;
+use super::drawer::{Drawer, DrawnMessage};
+use crate::read::definitions::Definition;
+use crate::shape::Shape;
+use std::collections::BTreeMap;
+
+/// That a recording has drawn channels beside what it records.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DrawnBeside {
+    /// Of each channel the first message of every such time is drawn, by its stamp; of output lines each. One that is
+    /// longer than 64 KiB is not, so that nothing long is in a file twice.
+    pub period_ns: u64,
+    /// Names of classes by their numbers: output lines say which module they are of.
+    pub classes: BTreeMap<u8, String>,
+}
+
+/// Draws what is written to one file.
+pub(crate) struct DrawingBeside {
+    drawer: Drawer,
+    period_ns: u64,
+    channels: BTreeMap<u16, SampledChannel>,
+}
+
+/// A channel of which some messages are drawn.
+struct SampledChannel {
+    channel: Definition,
+    /// Its messages are words, of which none is left out.
+    is_each: bool,
+    /// The period, counted from 1970, of the last message that was drawn.
+    period: Option<u64>,
+}
+
+impl DrawingBeside {
+    pub(crate) fn new(options: &DrawnBeside) -> Self {
+        let DrawnBeside { period_ns, classes } = options;
+        Self { drawer: Drawer::new(classes.clone()), period_ns: (*period_ns).max(1), channels: BTreeMap::new() }
+    }
+
+    /// Whether a channel was added that is drawn.
+    pub(crate) fn knows(&self, id: u16) -> bool {
+        self.channels.contains_key(&id)
+    }
+
+    /// Adds a channel of the file.
+    pub(crate) fn add(&mut self, id: u16, channel: Definition) {
+        if let Some(shape) = self.drawer.add(id, &channel) {
+            self.channels.insert(id, SampledChannel { channel, is_each: shape == Shape::Line, period: None });
+        }
+    }
+
+    /// What is drawn of a message of the file.
+    pub(crate) fn draw(&mut self, id: u16, stamp_ns: u64, data: &[u8]) -> Vec<DrawnMessage> {
+        let Some(sampled) = self.channels.get_mut(&id).filter(|_| data.len() <= TWICE_BYTES_MAX) else {
+            return Vec::new();
+        };
+        let period = Some(stamp_ns / self.period_ns);
+        if !sampled.is_each && std::mem::replace(&mut sampled.period, period) == period {
+            return Vec::new();
+        }
+        self.drawer.draw(id, &sampled.channel, stamp_ns, data).unwrap_or_default()
+    }
+}

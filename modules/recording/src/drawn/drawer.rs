@@ -1,0 +1,137 @@
+//! Channels that can be drawn, and the messages that are drawn of theirs: those of a new file, or of the file that is
+//! recorded.
+
+use super::kind::Kind;
+use super::one::{Origin, WORLD, draw_one, draw_world};
+use super::schema;
+use crate::format::{MESSAGE_ENCODING, key};
+use crate::read::definitions::{Definition, SchemaText};
+use crate::shape::Shape;
+use rohrpost_schema::{Type, decode};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Draws messages of one file, one after the other.
+pub(crate) struct Drawer {
+    /// By the numbers of what they are drawn of.
+    sources: BTreeMap<u16, DrawnChannel>,
+    /// Of all kinds.
+    schema: Vec<u8>,
+    /// It is said where the world is.
+    has_world: bool,
+    /// The module that is taken to carry scanners.
+    carrier: Option<String>,
+    /// Names of classes by their numbers.
+    classes: BTreeMap<u8, String>,
+}
+
+/// A channel that is drawn.
+struct DrawnChannel {
+    module: String,
+    shape: Shape,
+    ty: Type,
+    /// As the file has them, once there is a message.
+    kinds: BTreeMap<Kind, Arc<Definition>>,
+}
+
+/// A message that was drawn.
+pub(crate) struct DrawnMessage {
+    /// Apart from those of other kinds: below [`DrawnMessage::NUMBERS`].
+    pub(crate) number: usize,
+    pub(crate) channel: Arc<Definition>,
+    pub(crate) data: Vec<u8>,
+}
+
+impl DrawnMessage {
+    /// Kinds, and where the world is.
+    const NUMBERS: usize = Kind::ALL.len() + 1;
+}
+
+impl Drawer {
+    pub(crate) fn new(classes: BTreeMap<u8, String>) -> Self {
+        Self { sources: BTreeMap::new(), schema: schema::descriptor_set(), has_world: false, carrier: None, classes }
+    }
+
+    /// Adds a channel of the file; what its values look like, if they are drawn. A drawn channel is not.
+    pub(crate) fn add(&mut self, id: u16, channel: &Definition) -> Option<Shape> {
+        let source = DrawnChannel::of(channel)?;
+        let shape = source.shape;
+        self.sources.insert(id, source);
+        let of = |shape| self.sources.values().filter(move |its| its.shape == shape).map(|its| &its.module).min();
+        self.carrier = of(Shape::Odometry).or_else(|| of(Shape::Pose)).cloned();
+        Some(shape)
+    }
+
+    /// Whether nothing is drawn.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.sources.is_empty()
+    }
+
+    /// Whether messages of a channel are drawn.
+    pub(crate) fn draws(&self, id: u16) -> bool {
+        self.sources.contains_key(&id)
+    }
+
+    /// The module that is taken to carry scanners: their points are in its frame. None: they are in that of the world.
+    pub(crate) fn carrier(&self) -> Option<&String> {
+        self.carrier.as_ref()
+    }
+
+    /// Draws a value of a channel; none if it contradicts itself, or is nowhere. With the first one in space comes where
+    /// the world is.
+    pub(crate) fn draw(
+        &mut self,
+        id: u16,
+        channel: &Definition,
+        stamp_ns: u64,
+        data: &[u8],
+    ) -> Option<Vec<DrawnMessage>> {
+        let source = self.sources.get_mut(&id)?;
+        let origin = Origin {
+            module: &source.module,
+            carrier: self.carrier.as_deref().unwrap_or(WORLD),
+            stamp_ns,
+            classes: &self.classes,
+        };
+        let messages = draw_one(source.shape, decode(&source.ty, data).ok()?, &origin)?;
+        let mut drawn = Vec::with_capacity(messages.len() + 1);
+        if !self.has_world && messages.iter().any(|(kind, _)| kind.is_in_space()) {
+            self.has_world = true;
+            let world = drawn_channel(WORLD, Kind::Transform, channel, &self.schema);
+            drawn.push(DrawnMessage { number: DrawnMessage::NUMBERS - 1, channel: world, data: draw_world(stamp_ns) });
+        }
+        for (kind, data) in messages {
+            let channel = source.channel(kind, channel, &self.schema).clone();
+            drawn.push(DrawnMessage { number: kind as usize, channel, data });
+        }
+        Some(drawn)
+    }
+}
+
+impl DrawnChannel {
+    fn of(channel: &Definition) -> Option<Self> {
+        let ty = channel.schema.ty().filter(|_| channel.message_encoding == MESSAGE_ENCODING)?;
+        let module = channel.texts.get(key::NAME).unwrap_or(&channel.topic).clone();
+        Some(Self { module, shape: Shape::of(&ty)?, ty, kinds: BTreeMap::new() })
+    }
+
+    fn channel(&mut self, kind: Kind, of: &Definition, schema: &[u8]) -> &Arc<Definition> {
+        self.kinds.entry(kind).or_insert_with(|| drawn_channel(&of.topic, kind, of, schema))
+    }
+}
+
+/// A channel below a topic, marked as drawn of another one.
+fn drawn_channel(topic: &str, kind: Kind, of: &Definition, schema: &[u8]) -> Arc<Definition> {
+    let mut texts = of.texts.clone();
+    texts.insert(key::DRAWN.into(), of.topic.clone());
+    Arc::new(Definition {
+        topic: format!("{topic}/{}", kind.suffix()),
+        message_encoding: schema::MESSAGE_ENCODING.into(),
+        texts,
+        schema: Arc::new(SchemaText {
+            name: format!("foxglove.{}", kind.message_name()),
+            encoding: schema::SCHEMA_ENCODING.into(),
+            data: schema.to_vec(),
+        }),
+    })
+}

@@ -1,0 +1,176 @@
+//! The newest message of each channel: the next file begins with those that would be missing there for long.
+
+use crate::batch::{Batch, Message};
+use crate::shape::Shape;
+use crate::status::ChannelState;
+use rohrpost_schema::Type;
+use std::sync::Arc;
+
+/// A channel of which nothing came for so long is slow: its next message may be far.
+pub(crate) const SLOW_NS: u64 = 1_000_000_000;
+/// Memory for all of them, and what a file begins with at most.
+pub(crate) const KEPT_BYTES_MAX: usize = 32 << 20;
+/// A longer message is copied only if its channel is slow.
+const LONG_BYTES: usize = 1 << 20;
+
+/// The newest message of each channel that is in a file.
+pub(crate) struct Newest {
+    channels: Vec<NewestOf>,
+    bytes: usize,
+    bytes_max: usize,
+}
+
+/// The newest message of a channel.
+struct NewestOf {
+    /// Its messages are words: the newest one says no more than others.
+    is_words: bool,
+    kept: Option<KeptMessage>,
+}
+
+struct KeptMessage {
+    arrival_ns: u64,
+    stamp_ns: u64,
+    epoch: u64,
+    sequence: u32,
+    /// None if it is too long.
+    data: Option<Vec<u8>>,
+}
+
+impl KeptMessage {
+    /// Whether so much time is between it and a later one, or a step of time.
+    fn is_old_at(&self, later: &Message<'_>) -> bool {
+        self.epoch != later.epoch || later.arrival_ns.saturating_sub(self.arrival_ns) >= SLOW_NS
+    }
+}
+
+impl Newest {
+    /// Of none; files have this length, and begin with no more than a quarter of it.
+    pub(crate) fn new(file_bytes: u64) -> Self {
+        let quarter = usize::try_from(file_bytes / 4).unwrap_or(usize::MAX);
+        Self { channels: Vec::new(), bytes: 0, bytes_max: quarter.min(KEPT_BYTES_MAX) }
+    }
+
+    /// Notes what is in a file now.
+    pub(crate) fn note(&mut self, batch: &Batch, channels: &[Arc<ChannelState>]) {
+        for channel in &channels[self.channels.len()..] {
+            let ty = Type::from_bytes(&channel.schema).ok();
+            let is_words = ty.as_ref().and_then(Shape::of) == Some(Shape::Line);
+            self.channels.push(NewestOf { is_words, kept: None });
+        }
+        let mut last = vec![None; channels.len()];
+        batch.messages().enumerate().for_each(|(place, (at, _))| last[at] = Some(place));
+        for (place, (at, message)) in batch.messages().enumerate() {
+            if last[at] == Some(place) && !self.channels[at].is_words {
+                self.keep(at, &message);
+            }
+        }
+    }
+
+    fn keep(&mut self, at: usize, message: &Message<'_>) {
+        let Message { arrival_ns, stamp_ns, epoch, sequence, data } = *message;
+        let before = self.channels[at].kept.take();
+        let is_slow = before.as_ref().is_none_or(|kept| kept.is_old_at(message));
+        let mut memory = before.and_then(|kept| kept.data).unwrap_or_default();
+        self.bytes -= memory.capacity();
+        if memory.capacity() < data.len() || memory.capacity() > LONG_BYTES {
+            memory = Vec::new();
+        }
+        memory.clear();
+        let fits = self.bytes + memory.capacity().max(data.len()) <= self.bytes_max;
+        let copied = ((data.len() <= LONG_BYTES || is_slow) && fits).then(|| {
+            memory.reserve_exact(data.len());
+            memory.extend_from_slice(data);
+            memory
+        });
+        self.bytes += copied.as_ref().map_or(0, Vec::capacity);
+        self.channels[at].kept = Some(KeptMessage { arrival_ns, stamp_ns, epoch, sequence, data: copied });
+    }
+
+    /// What a file begins with whose first message is this one, with the numbers of the channels, in the order of its
+    /// arrival.
+    pub(crate) fn before(&self, first: &Message<'_>) -> Vec<(usize, Message<'_>)> {
+        let kept = self.channels.iter().enumerate().filter_map(|(at, channel)| Some((at, channel.kept.as_ref()?)));
+        let old = kept.filter(|(_, kept)| kept.is_old_at(first)).filter_map(|(at, kept)| {
+            let KeptMessage { arrival_ns, stamp_ns, epoch, sequence, .. } = *kept;
+            let data = kept.data.as_deref()?;
+            Some((at, Message { arrival_ns, stamp_ns, epoch, sequence, data }))
+        });
+        let mut old: Vec<_> = old.collect();
+        old.sort_by_key(|(_, message)| (message.epoch, message.arrival_ns));
+        old
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn channels(count: usize) -> Vec<Arc<ChannelState>> {
+        let channel = |at: usize| {
+            let schema = ("bytes".to_owned(), Type::Bytes.to_bytes(), Type::Bytes.hash());
+            Arc::new(ChannelState::new(format!("a.{at}/b"), schema, BTreeMap::new()))
+        };
+        (0..count).map(channel).collect()
+    }
+
+    fn message(arrival_ns: u64, epoch: u64, data: &[u8]) -> Message<'_> {
+        Message { arrival_ns, stamp_ns: arrival_ns, epoch, sequence: 0, data }
+    }
+
+    /// Each as a batch of its own, as long ones are.
+    fn noted(bytes_max: u64, all: &[(usize, Message<'_>)]) -> Newest {
+        let mut newest = Newest::new(bytes_max);
+        for (at, message) in all {
+            let mut batch = Batch::default();
+            batch.push(*at, message);
+            newest.note(&batch, &channels(4));
+        }
+        newest
+    }
+
+    fn found(newest: &Newest, first: &Message<'_>) -> Vec<(usize, u64, usize)> {
+        newest.before(first).iter().map(|(at, its)| (*at, its.arrival_ns, its.data.len())).collect()
+    }
+
+    #[test]
+    fn a_file_begins_with_what_is_old() {
+        let newest =
+            noted(1 << 30, &[(2, message(5, 1, b"old")), (0, message(1, 1, b"x")), (1, message(SLOW_NS + 1, 1, b"y"))]);
+        assert_eq!(found(&newest, &message(SLOW_NS, 1, b"")), [], "not a second old");
+        assert_eq!(found(&newest, &message(SLOW_NS + 5, 1, b"")), [(0, 1, 1), (2, 5, 3)], "in the order of arrival");
+        assert_eq!(found(&newest, &message(9, 2, b"")).len(), 3, "times of two epochs say nothing of each other");
+    }
+
+    #[test]
+    fn long_messages_are_kept_of_slow_channels_only() {
+        let long = vec![0; LONG_BYTES + 1];
+        let far = message(u64::MAX, 1, b"");
+        let newest = noted(1 << 30, &[(0, message(0, 1, &long))]);
+        assert_eq!(found(&newest, &far), [(0, 0, long.len())]);
+        let newest = noted(1 << 30, &[(0, message(0, 1, &long)), (0, message(1, 1, &long))]);
+        assert_eq!((found(&newest, &far), newest.bytes), (vec![], 0), "two within a second");
+        let newest = noted(1 << 30, &[(0, message(0, 1, &long)), (0, message(SLOW_NS, 1, &long[1..]))]);
+        assert_eq!(found(&newest, &far), [(0, SLOW_NS, LONG_BYTES)]);
+    }
+
+    #[test]
+    fn memory_is_bounded_by_the_length_of_a_file() {
+        let some = vec![0; 300];
+        let all: Vec<_> = (0..4).map(|at| (at, message(at as u64, 1, &some[..]))).collect();
+        let newest = noted(4_000, &all);
+        assert_eq!((found(&newest, &message(u64::MAX, 1, b"")).len(), newest.bytes), (3, 900));
+    }
+
+    #[test]
+    fn of_a_batch_the_last_message_of_each_channel_is_kept() {
+        let mut batch = Batch::default();
+        for (at, arrival_ns) in [(0, 1), (1, 2), (0, 3), (1, 4), (0, 5)] {
+            batch.push(at, &message(arrival_ns, 1, b"abc"));
+        }
+        let mut newest = Newest::new(1 << 30);
+        newest.note(&batch, &channels(2));
+        assert_eq!(found(&newest, &message(u64::MAX, 1, b"")), [(1, 4, 3), (0, 5, 3)]);
+        assert!(newest.bytes <= 6);
+    }
+}

@@ -1,0 +1,124 @@
+//! A recorder hears modules of other nodes, over a network that loses packages: what is lost is counted.
+
+use crate::harness::{NETWORK, OUTPUT, Place, lacks_namespaces, wait};
+use crate::process::Running;
+use crate::recorded::{FRAME_BYTES, Frame, feed, feed_until_recorded, feeder_entry, lines};
+use rohrpost::wire::from_bytes;
+use rohrpost_recording::{Reader, info};
+use std::path::Path;
+
+const HEAD: &str = r#"
+installation = "test"
+[system]
+name = "robot"
+id = 1
+[classes]
+router = { id = 250 }
+feeder = { id = 96 }
+output = { id = 32 }
+logd = { id = 24 }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+[nodes.base]
+address = "10.77.0.1"
+tools = [0, 15]
+[nodes.arm]
+address = "10.77.0.2"
+tools = [16, 31]
+"#;
+
+const LOGD: &str = r#"
+[[module]]
+name = "logd.0"
+node = "base"
+builtin = "logd"
+stop-within = "60 s"
+[module.mailbox.data]
+slots = 512
+size = "12 KiB"
+[record]
+directory = "recordings"
+streams = ["*"]
+data = ["*", "feeder.0/frame"] # a stream on the other node; its records fit a package
+output = "info"
+leave-free = "0 B"
+flush = "20 ms"
+"#;
+
+/// Numbers of packages and of the values in them.
+fn values(file: &Path, topic: &str) -> Vec<(u32, u64)> {
+    let mut values = Vec::new();
+    let Ok(mut reader) = Reader::open(file) else { return values };
+    while let Ok(Some((channel, message))) = reader.next() {
+        if channel.topic != topic {
+            continue;
+        }
+        let number = if topic.ends_with("/count") {
+            from_bytes(message.data).unwrap()
+        } else {
+            let frame: Frame = from_bytes(message.data).unwrap();
+            assert_eq!(frame.bytes, [7; FRAME_BYTES]);
+            frame.number
+        };
+        values.push((message.sequence, number));
+    }
+    values
+}
+
+/// Feeds until one that was sent after `target` values is in the file: all before it are there, or known to be missing.
+fn feed_beyond(place: &Place, file: &Path, topic: &str, target: u64) {
+    wait(format!("{topic} is recorded up to {target}"), || {
+        feed(place, "feeder.0", 1);
+        values(file, topic).last().is_some_and(|(_, number)| *number >= target).then_some(())
+    });
+}
+
+#[test]
+fn data_and_output_of_another_node_are_recorded_or_counted() {
+    let place = Place::new();
+    let config = place.path("test.toml");
+    let at = |node: &str, entry: &str| entry.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1);
+    let modules = [at("base", OUTPUT), at("arm", &feeder_entry(0)), LOGD.to_owned()];
+    std::fs::write(&config, [HEAD, NETWORK, &modules.concat()].concat()).unwrap();
+    let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=11"];
+    let launch = [&["launch", config.to_str().unwrap(), "--all"][..], &bad].concat();
+    let mut launch = Running::start(place.command(&launch));
+    // It ends at once where there are none.
+    let begun = wait("both nodes run", || {
+        let runs = ["base", "arm"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
+        if runs { Some(true) } else { launch.err().contains("cannot be made here").then_some(false) }
+    });
+    if !begun {
+        assert!(lacks_namespaces(&launch.err()));
+        return;
+    }
+    let file = place.path("recordings/base-0001.mcap");
+    let topics = ["feeder.0/count", "feeder.0/frame"];
+    feed_until_recorded(&place, "feeder.0");
+    let target = feed(&place, "feeder.0", 300);
+    topics.iter().for_each(|topic| feed_beyond(&place, &file, topic, target));
+    // A line may be lost; the next one says so.
+    wait("a line of the other node", || {
+        ["off", "on"].iter().for_each(|word| drop(place.say(&["call", "feeder.0", word]).ok()));
+        lines(&file).iter().any(|line| line == "is off").then_some(())
+    });
+    launch.stop();
+
+    let told = info(&file).unwrap();
+    assert_eq!(told.closed_because.as_deref(), Some("ended"));
+    for topic in topics {
+        let values = values(&file, topic);
+        let ((first, first_number), (last, _)) = (values[0], values[values.len() - 1]);
+        assert!(values.is_sorted_by(|a, b| a.0 < b.0), "{topic}: {values:?}");
+        let is_numbered = |(package, number): &(u32, u64)| number - first_number == u64::from(package - first);
+        assert!(values.iter().all(is_numbered), "{topic}: each value has a package of its own: {values:?}");
+        let channel = told.channels.iter().find(|channel| channel.topic == topic).unwrap();
+        assert_eq!(values.len() as u64 + channel.lost, u64::from(last) + 1, "{topic}: each is there or counted");
+    }
+    let lost: u64 = told.channels.iter().map(|channel| channel.lost).sum();
+    assert!(lost > 0, "2 % of some thousand datagrams: {told:?}");
+    let said = place.say(&["log", "--file", file.to_str().unwrap(), "--module", "feeder.0"]).out;
+    assert!(said.contains(" info  arm/feeder.0: is off\n"), "{said}");
+    place.assert_empty();
+}
