@@ -48,8 +48,12 @@ mod process;
 mod readme;
 mod record;
 mod recorded;
+mod recorded_control;
+mod recorded_killed;
 mod restart;
 mod screen;
+#[path = "../../mailbox/tests/common/small_memory.rs"]
+mod small_memory;
 mod start;
 mod streams;
 mod streams_described;

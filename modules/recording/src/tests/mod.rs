@@ -3,9 +3,11 @@
 mod cutting;
 mod damaged;
 mod disks;
+mod dying;
 mod failing;
 mod foreign;
 mod merging;
+mod ordered;
 mod playing;
 mod support;
 mod telling;
