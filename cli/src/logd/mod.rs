@@ -110,7 +110,9 @@ impl Module for Logd {
     /// Ends the recording: its file is closed whole.
     fn off(&mut self, context: &mut Context) {
         self.control.close(context);
-        self.ending.take().into_iter().chain(self.writer.take()).for_each(|writer| drop(finish(writer)));
+        for writer in self.ending.take().into_iter().chain(self.writer.take()) {
+            self.ended = finish(writer);
+        }
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {

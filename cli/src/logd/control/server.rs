@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// Connections at a time.
 const CLIENTS_MAX: usize = 8;
 /// When all are taken, a new one replaces the one that was silent the longest, if that is so long.
-const SILENT: Duration = Duration::from_secs(10);
+const SILENT: Duration = Duration::from_secs(60);
 /// A socket that cannot be had is tried again after so long.
 const RETRY: Duration = Duration::from_secs(5);
 
@@ -72,7 +72,7 @@ impl ControlServer {
         if let Some(watch) = self.watch.take() {
             context.unwatch(watch);
         }
-        self.listener = None;
+        (self.listener, self.retry_at) = (None, None);
     }
 
     /// Takes in what a descriptor brings.

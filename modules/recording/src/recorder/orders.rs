@@ -45,13 +45,15 @@ impl Recorder {
         Ok(closed)
     }
 
-    /// The present file stays until the new folder has taken one: a mistaken folder ends nothing.
+    /// The present file stays until the new folder has taken one: a mistaken folder ends nothing. Each folder has its own
+    /// numbers.
     fn move_to(&mut self, folder: &Path, now: Instant) -> Result<Option<PathBuf>, DiskError> {
         let before = std::mem::replace(&mut self.options.folder, folder.to_owned());
+        let number = std::mem::replace(&mut self.number, 1);
         let file = match self.check_free(0).and_then(|()| self.create()) {
             Ok(file) => file,
             Err(error) => {
-                self.options.folder = before;
+                (self.options.folder, self.number) = (before, number);
                 return Err(error);
             }
         };
