@@ -130,8 +130,8 @@ impl Recording {
     pub fn control_note(&self) -> Option<String> {
         let control = self.control.filter(|control| !is_loopback(*control))?;
         Some(format!(
-            "control-security = \"none\": any computer that reaches {control} may switch the recording off; use a network \
-             that nobody else reaches"
+            "control-security = \"none\": any computer that reaches {control} may switch the recording off; use a \
+             network that nobody else reaches"
         ))
     }
 
@@ -186,7 +186,8 @@ fn control(section: &Section<'_>) -> Option<SocketAddr> {
     if !is_loopback(address) && !is_open {
         item.report(format!(
             "`control` {address} takes commands from other computers, and log control knows no password; write \
-             `control = \"127.0.0.1:{}\"`, or `control-security = \"none\"` beside it if nobody else reaches this address",
+             `control = \"127.0.0.1:{}\"`, or `control-security = \"none\"` beside it if nobody else reaches this \
+             address",
             address.port()
         ));
     }

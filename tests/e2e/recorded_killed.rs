@@ -244,7 +244,7 @@ impl Torture {
         all
     }
 
-    /// What one incarnation left: in order, nothing twice, nothing missing that is not counted, and all that it had told
+    /// What one incarnation left: in order, nothing twice, nothing missing uncounted, and all that it had told
     /// to be written.
     fn check(&mut self, round: u32, all: &[PathBuf], written: u64) {
         let told: Vec<_> = all.iter().map(|file| info(file).unwrap()).collect();

@@ -9,7 +9,9 @@ use thiserror::Error;
 pub(super) enum FolderError {
     #[error("{}: is no folder that files can be made in: {}", .0.display(), .1)]
     Io(PathBuf, io::Error),
-    #[error("{} is not below {}, where this recorder makes its files; name a folder below it", .0.display(), .1.display())]
+    #[error(
+        "{} is not below {}, where this recorder makes its files; name a folder below it", .0.display(), .1.display()
+    )]
     Outside(PathBuf, PathBuf),
     #[error("{}: is no folder", .0.display())]
     NoFolder(PathBuf),

@@ -104,7 +104,7 @@ mod tests {
         wanted.iter().for_each(|file| std::fs::write(file, "").unwrap());
         std::fs::write(below.join("arm-0001.mcap"), "").unwrap();
         assert_eq!(files(place.path(), "base"), wanted);
-        assert_eq!(files(&place.path().join("gone"), "base"), [PathBuf::new(); 0]);
+        assert!(files(&place.path().join("gone"), "base").is_empty());
     }
 
     #[test]

@@ -128,6 +128,7 @@ fn as_json(info: &Info) -> Value {
         "lost": info.lost,
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
-        "marks": marks.collect::<Vec<_>>(), "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
+        "marks": marks.collect::<Vec<_>>(), "others": others.collect::<Vec<_>>(),
+        "damages": damages.collect::<Vec<_>>(),
     })
 }

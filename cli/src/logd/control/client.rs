@@ -12,7 +12,7 @@ pub(super) struct ControlClient {
     lines: ControlLines,
     /// Of an answer that was not taken at once.
     rest: Vec<u8>,
-    /// The order whose answer it waits for.
+    /// It waits for the answer to this order.
     order: Option<u32>,
     watch: Option<(Watch, Interest)>,
     /// It says nothing more, but may wait for answers.

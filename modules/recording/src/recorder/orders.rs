@@ -45,8 +45,8 @@ impl Recorder {
         Ok(closed)
     }
 
-    /// The present file stays until the new folder has taken one: a mistaken folder ends nothing. Each folder has its own
-    /// numbers.
+    /// The present file stays until the new folder has taken one: a mistaken folder ends nothing. Numbers begin anew in
+    /// each folder.
     fn move_to(&mut self, folder: &Path, now: Instant) -> Result<Option<PathBuf>, DiskError> {
         let before = std::mem::replace(&mut self.options.folder, folder.to_owned());
         let number = std::mem::replace(&mut self.number, 1);

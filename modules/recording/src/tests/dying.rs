@@ -77,6 +77,11 @@ impl DiskFile for DyingFile {
     }
 }
 
+/// Such messages do not come to the recorder.
+fn is_lost(number: usize) -> bool {
+    number % 7 == 3
+}
+
 /// Records, rotates and sets marks; then how it went, and the marks that were told to be set.
 fn record_until_dead(disk: DyingDisk, folder: &Path) -> (Status, Vec<String>) {
     let rotation = Rotation { bytes_max: 40_000, ..Rotation::default() };
@@ -97,7 +102,11 @@ fn record_until_dead(disk: DyingDisk, folder: &Path) -> (Status, Vec<String>) {
         let spec = ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() };
         let channel = writer.channel(&spec).unwrap();
         let (arrival_ns, stamp_ns, epoch, sequence) = (one.arrival_ns, one.stamp_ns, one.epoch, one.sequence);
-        writer.write(channel, &Message { arrival_ns, stamp_ns, epoch, sequence, data: &one.data }).unwrap();
+        if is_lost(number) {
+            writer.count_lost(channel, 1);
+        } else {
+            writer.write(channel, &Message { arrival_ns, stamp_ns, epoch, sequence, data: &one.data }).unwrap();
+        }
         if number % 40 == 20 {
             let text = number.to_string();
             let mark = Mark { time_ns: 1, epoch: 1, text: text.clone() };
@@ -118,16 +127,24 @@ fn record_until_dead(disk: DyingDisk, folder: &Path) -> (Status, Vec<String>) {
     (status, told)
 }
 
+/// Of numbers from 0 on, how many are not there.
+fn missing(numbers: impl Iterator<Item = u32>) -> u64 {
+    let (count, last) = numbers.fold((0, 0), |(count, _), number| (count + 1, u64::from(number) + 1));
+    last - count
+}
+
 #[test]
 fn whatever_step_is_its_last_all_that_was_told_to_be_written_is_there() {
-    let all = said(240, 1_000);
+    let mut all = said(240, 1_000);
+    let mut number = 0..;
+    all.retain(|_| number.next().is_some_and(|number| !is_lost(number)));
     let mut steps = 0;
     loop {
         let folder = memory_folder();
         let disk = DyingDisk(Arc::new(AtomicI64::new(steps)));
         let (status, told) = record_until_dead(disk.clone(), folder.path());
         let has_died = disk.0.load(Relaxed) < 0;
-        let (mut kept, mut marks) = (Vec::new(), Vec::new());
+        let (mut kept, mut marks, mut lost) = (Vec::new(), Vec::new(), BTreeMap::new());
         let files = files(folder.path());
         for (at, path) in files.iter().enumerate() {
             let Ok(closed) = is_closed(path) else {
@@ -137,11 +154,19 @@ fn whatever_step_is_its_last_all_that_was_told_to_be_written_is_there() {
             assert!(closed || at + 1 == files.len(), "{steps}: only the last one is open");
             recover(path, &recovered_path(path), &mut |_, _| {}).unwrap();
             kept.extend(read(&recovered_path(path)).0);
-            marks.extend(info(&recovered_path(path)).unwrap().marks.into_iter().map(|mark| mark.text));
+            let told = info(&recovered_path(path)).unwrap();
+            marks.extend(told.marks.into_iter().map(|mark| mark.text));
+            for channel in told.channels {
+                *lost.entry(channel.topic).or_default() += channel.lost;
+            }
         }
         assert!(kept == all[..kept.len()], "{steps}: in order, nothing twice, nothing made up");
         assert!(kept.len() as u64 >= status.written, "{steps}: {} are there; {status:?}", kept.len());
         assert!(told.iter().all(|text| marks.contains(text)), "{steps}: {told:?} of {marks:?}");
+        for (topic, lost) in &lost {
+            let missing = missing(kept.iter().filter(|said| said.topic == *topic).map(|said| said.sequence));
+            assert!(missing <= *lost, "{steps}: {topic}: {missing} are missing, {lost} counted");
+        }
         if !has_died {
             assert_eq!((kept.len(), told.len()), (all.len(), 6), "{status:?}");
             break;

@@ -86,7 +86,7 @@ fn marks_stand_at_their_place_among_the_messages_and_survive_recover_cut_and_mer
     cut(&path, &part, &selection, &mut |_, _| {}).unwrap();
     assert_eq!(info(&part).unwrap().marks, marks[..1], "the other one is behind the part");
     let all = folder.path().join("all.mcap");
-    merge(&[path.clone(), part], &all, &mut |_, _| {}).unwrap();
+    merge(&[path, part], &all, &mut |_, _| {}).unwrap();
     assert_eq!(info(&all).unwrap().marks.len(), 3);
 }
 
@@ -134,7 +134,7 @@ fn it_goes_on_in_another_folder_and_stays_if_that_takes_no_file() {
     assert_eq!((back.closed, back.file.parent()), (None, Some(folder.path())));
     writer.finish().1.unwrap();
     assert_eq!(content(&first), ["0", "1", "2"]);
-    assert_eq!(files(&other), [moved.file.clone()]);
+    assert_eq!(files(&other), std::slice::from_ref(&moved.file));
     assert_eq!(content(&moved.file), ["3"]);
 }
 
