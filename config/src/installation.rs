@@ -71,6 +71,11 @@ impl Installation {
         self.modules.iter().find(|module| module.names().any(|own| own == name.module()))
     }
 
+    /// The module that records what `[record]` says.
+    pub fn recorder(&self) -> Option<&Module> {
+        self.modules.iter().find(|module| module.is_recorder())
+    }
+
     /// The modules of a node, in the order of their start.
     pub fn modules_on(&self, node: &str) -> impl Iterator<Item = &Module> {
         self.modules.iter().filter(move |module| module.node == node)

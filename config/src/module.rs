@@ -137,6 +137,10 @@ impl Module {
         self.index.is_some()
     }
 
+    pub(crate) fn is_recorder(&self) -> bool {
+        self.program == Program::Builtin(RECORDER.into())
+    }
+
     /// An implicit module, with the defaults of all of these.
     pub(crate) fn by_itself(name: Name, node: &Node, builtin: &str, restart: Restart) -> (Self, Lines) {
         let module = Self {

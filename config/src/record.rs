@@ -2,11 +2,12 @@
 
 use crate::classes::ClassTable;
 use crate::directory::Directory;
-use crate::module::{Lines, Module, Program, RECORDER};
+use crate::module::{Lines, Module, RECORDER};
 use crate::output::Level;
 use crate::reader::{Item, Section};
 use rohrpost_mailbox::Name;
 use std::fmt;
+use std::net::SocketAddr;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -45,6 +46,8 @@ pub struct Recording {
     pub flush: Duration,
     /// How often the disk is told to keep what it has: so much more is lost with the power.
     pub sync: Duration,
+    /// Where log control listens for connections; none: nowhere.
+    pub control: Option<SocketAddr>,
     /// Line of the section.
     pub line: usize,
 }
@@ -111,6 +114,7 @@ impl Recording {
         let leave_free = section.get("leave-free").and_then(|item| item.size(0..=1 << 50, "256 MiB"));
         let flush = section.get("flush").and_then(|item| item.duration_above_zero("500 ms"));
         let sync = section.get("sync").and_then(|item| item.duration_above_zero("2 s"));
+        let control = control(&section);
         let line = section.line;
         section.finish();
         Some(Self {
@@ -124,8 +128,18 @@ impl Recording {
             leave_free: leave_free.unwrap_or(256 << 20),
             flush: flush.unwrap_or(Duration::from_millis(500)),
             sync: sync.unwrap_or(Duration::from_secs(2)),
+            control,
             line,
         })
+    }
+
+    /// Note of `check`, and of each start of the recorder, if log control takes commands from other computers.
+    pub fn control_note(&self) -> Option<String> {
+        let control = self.control.filter(|control| !is_loopback(*control))?;
+        Some(format!(
+            "control-security = \"none\": any computer that reaches {control} may switch the recording off; use a \
+             network that nobody else reaches"
+        ))
     }
 
     /// The entry of `streams` that counts for a stream; none: it is not recorded.
@@ -164,6 +178,38 @@ fn drawn(item: &Item<'_>) -> Option<Option<f64>> {
         Some(is_drawn) => Some(is_drawn.then_some(DRAWN_HZ)),
         None => item.number(RATE_HZ, "10.0").map(Some),
     }
+}
+
+/// Where log control listens. Beyond this computer only if the file says that it is not protected.
+fn control(section: &Section<'_>) -> Option<SocketAddr> {
+    const EXAMPLE: &str = "127.0.0.1:21121";
+    let item = section.get("control");
+    let security = section.get("control-security");
+    let is_open = security.as_ref().and_then(|item| item.choice(&[("none", ())])).is_some();
+    let Some(item) = item else {
+        if let Some(security) = security {
+            security.report(format!("`control-security` is of no use without `control = \"{EXAMPLE}\"`; drop it"));
+        }
+        return None;
+    };
+    let text = item.text(EXAMPLE)?;
+    let address = text.parse::<SocketAddr>().ok().filter(|address| address.port() > 0 && !address.ip().is_multicast());
+    let Some(address) = address else {
+        return item.wrong(&format!("the address and port to listen at, such as `control = \"{EXAMPLE}\"`"));
+    };
+    if !is_loopback(address) && !is_open {
+        item.report(format!(
+            "`control` {address} takes commands from other computers, and log control knows no password; write \
+             `control = \"127.0.0.1:{}\"`, or `control-security = \"none\"` beside it if nobody else reaches this \
+             address",
+            address.port()
+        ));
+    }
+    Some(address)
+}
+
+fn is_loopback(address: SocketAddr) -> bool {
+    address.ip().to_canonical().is_loopback()
 }
 
 fn at_least_a_second(item: &Item<'_>, example: &str) -> Option<Duration> {
@@ -262,8 +308,7 @@ pub(crate) fn connect(
     modules: &mut [Module],
     lines: &mut [Lines],
 ) {
-    let is_it = |module: &Module| module.program == Program::Builtin(RECORDER.into());
-    let mut all = (0..modules.len()).filter(|at| is_it(&modules[*at]));
+    let mut all = (0..modules.len()).filter(|at| modules[*at].is_recorder());
     let (first, second) = (all.next(), all.next());
     if let (Some(first), Some(second)) = (first, second) {
         let (name, line) = (classes.format(modules[second].name), modules[first].line);

@@ -4,8 +4,8 @@
 
 mod common;
 
-use common::small_memory::{may_mount, unfinished, with_small_memory};
-use common::{Ground, LOW, MAILBOX, OTHER, label, shape, stay, tell};
+use common::small_memory::{may_mount, with_small_memory};
+use common::{Ground, LOW, MAILBOX, OTHER, label, shape, stay, tell, unfinished};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, Receiver, SendError, Shape, sys::room};
 use std::fs;

@@ -5,8 +5,8 @@
 
 mod common;
 
-use common::small_memory::{may_mount, unfinished, with_small_memory};
-use common::{Ground, MAILBOX, shape, tell};
+use common::small_memory::{may_mount, with_small_memory};
+use common::{Ground, MAILBOX, shape, tell, unfinished};
 use nix::fcntl::{FcntlArg, fcntl};
 use rohrpost_mailbox::{
     BadFile, LAYOUT_VERSION, Next, Participant, Stamp, StreamError, StreamId, StreamReader, StreamShape, StreamWriter,

@@ -50,9 +50,13 @@ mod process;
 mod readme;
 mod record;
 mod recorded;
+mod recorded_control;
+mod recorded_killed;
 mod recorded_nodes;
 mod restart;
 mod screen;
+#[path = "../../mailbox/tests/common/small_memory.rs"]
+mod small_memory;
 mod start;
 mod streams;
 mod streams_described;

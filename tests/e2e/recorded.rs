@@ -4,6 +4,8 @@
 use crate::harness::{OUTPUT, Place, Robot, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{RngCore, SeedableRng};
 use rohrpost::common::GET_DATA;
 use rohrpost::interfaces::{RecorderInterface, RecordingState};
 use rohrpost::serde::Deserialize;
@@ -35,6 +37,13 @@ pub(crate) struct Frame {
 pub(crate) const FRAME_BYTES: usize = 10_000;
 /// The recorder answers within this time.
 const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The bytes of a frame. As those of a camera, they do not get shorter by compression.
+fn noise(number: u64) -> Vec<u8> {
+    let mut bytes = vec![0; FRAME_BYTES];
+    ChaCha8Rng::seed_from_u64(number).fill_bytes(&mut bytes);
+    bytes
+}
 
 /// Publishes as much as it is told to: numbers from 1 on.
 #[rohrpost::interface(class = "feeder")]
@@ -78,7 +87,7 @@ impl Module for Feeder {
         if self.sent < self.wanted {
             let number = self.sent + 1;
             context.publish_now(FeedingInterface::COUNT, &number)?;
-            context.write_now(FeedingInterface::FRAME, &Frame { number, bytes: vec![7; FRAME_BYTES] })?;
+            context.write_now(FeedingInterface::FRAME, &Frame { number, bytes: noise(number) })?;
             self.sent = number;
         }
         Ok(())
@@ -119,7 +128,7 @@ stop-within = "60 s"
 slots = 1024
 "#;
 
-const RECORD: &str = r#"
+pub(crate) const RECORD: &str = r#"
 [record]
 directory = "recordings"
 streams = ["feeder.0/*", { name = "feeder.1/frame", every = 7 }]
@@ -139,9 +148,14 @@ pub(crate) fn feeder_entry(number: u8) -> String {
     )
 }
 
-fn launched(place: &Place, record: &str) -> (Running, Robot) {
+pub(crate) fn launched(place: &Place, record: &str) -> (Running, Robot) {
+    launched_with(place, LOGD, record)
+}
+
+/// The same, with another entry of the recorder.
+pub(crate) fn launched_with(place: &Place, logd: &str, record: &str) -> (Running, Robot) {
     let config = place.path("test.toml");
-    let text = [HEAD, OUTPUT, LOGD, &feeder_entry(0), &feeder_entry(1), record].concat();
+    let text = [HEAD, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record].concat();
     std::fs::write(&config, text).unwrap();
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
@@ -193,13 +207,13 @@ fn messages<T>(file: &Path, topic: &str, read: impl Fn(&[u8]) -> T) -> Vec<T> {
 }
 
 /// Numbers of all values of a topic.
-fn numbers(file: &Path, topic: &str) -> Vec<u64> {
+pub(crate) fn numbers(file: &Path, topic: &str) -> Vec<u64> {
     let numbers = messages(file, topic, |bytes| {
         if topic.ends_with("/count") {
             return from_bytes(bytes).unwrap();
         }
         let frame: Frame = from_bytes(bytes).unwrap();
-        assert_eq!(frame.bytes, [7; FRAME_BYTES]);
+        assert!(frame.bytes == noise(frame.number), "frame {} has other bytes than those that were sent", frame.number);
         frame.number
     });
     assert!(numbers.is_sorted_by(|a, b| a < b), "{topic}: {numbers:?}");
@@ -212,7 +226,7 @@ pub(crate) fn lines(file: &Path) -> Vec<String> {
 }
 
 /// Waits until all values of a topic, one in `every`, are in files or lost, from the first one in this file on.
-fn wait_for_all(place: &Place, file: &Path, topic: &str, last: u64, every: u64) {
+pub(crate) fn wait_for_all(place: &Place, file: &Path, topic: &str, last: u64, every: u64) {
     wait(format!("all of {topic} are recorded"), || {
         let first = *numbers(file, topic).first()?;
         let (written, lost) = *accounts(place).get(topic)?;
@@ -222,7 +236,7 @@ fn wait_for_all(place: &Place, file: &Path, topic: &str, last: u64, every: u64) 
 
 /// From the first one that is there to the last one that was sent, each is in the file or counted as lost.
 #[track_caller]
-fn assert_all_there(file: &Path, topic: &str, last: u64, every: u64) -> Vec<u64> {
+pub(crate) fn assert_all_there(file: &Path, topic: &str, last: u64, every: u64) -> Vec<u64> {
     let (info, numbers) = (info(file).unwrap(), numbers(file, topic));
     let channel = info.channels.iter().find(|channel| channel.topic == topic).unwrap();
     let first = numbers.first().copied().unwrap();

@@ -7,6 +7,9 @@ use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// Folders below folders that are looked through.
+const FOLDERS_DEEP: usize = 8;
+
 /// Begins. What is there now is looked at, and no file that comes later. Of the disk so much is left as recordings
 /// leave.
 ///
@@ -21,13 +24,27 @@ pub(super) fn recover(directory: &Path, stem: &str, leave_bytes: u64) -> io::Res
     std::thread::Builder::new().name("recovering".into()).spawn(work).map(drop)
 }
 
-/// Files of recordings of a stem, in order; none of a folder that cannot be read, which the writer will tell.
+/// Files of recordings of a stem, in order, also in folders that log control led to; none of a folder that cannot be
+/// read, which the writer will tell.
 fn files(directory: &Path, stem: &str) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
-    let is_one = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).is_some_and(|name| is_file(name, stem));
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_one).collect();
+    let mut files = Vec::new();
+    collect(directory, stem, FOLDERS_DEEP, &mut files);
     files.sort();
     files
+}
+
+/// Links are not followed: what they lead to is there by its own name, or outside.
+fn collect(directory: &Path, stem: &str, deep: usize, files: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            if deep > 0 {
+                collect(&path, stem, deep - 1, files);
+            }
+        } else if path.file_name().and_then(OsStr::to_str).is_some_and(|name| is_file(name, stem)) {
+            files.push(path);
+        }
+    }
 }
 
 /// `STEM-0001.mcap`, and not what was recovered of it.
@@ -75,6 +92,19 @@ mod tests {
         assert!(has_room_for(file.path(), 0));
         assert!(!has_room_for(file.path(), u64::MAX));
         assert!(has_room_for(Path::new("/nowhere"), u64::MAX), "what is wrong with it, is told when it is tried");
+    }
+
+    #[test]
+    fn files_in_folders_below_are_found_and_links_are_not_followed() {
+        let place = tempfile::tempdir().unwrap();
+        let below = place.path().join("run 1/deeper");
+        std::fs::create_dir_all(&below).unwrap();
+        std::os::unix::fs::symlink(&below, place.path().join("link")).unwrap();
+        let wanted = [place.path().join("base-0002.mcap"), below.join("base-0001.mcap")];
+        wanted.iter().for_each(|file| std::fs::write(file, "").unwrap());
+        std::fs::write(below.join("arm-0001.mcap"), "").unwrap();
+        assert_eq!(files(place.path(), "base"), wanted);
+        assert!(files(&place.path().join("gone"), "base").is_empty());
     }
 
     #[test]

@@ -5,25 +5,31 @@
 //! data, lines of output ─────────┴─▶ Taps: chosen, losses counted ─▶ Writer: memory ─▶ its thread ─▶ NODE-0001.mcap, …
 //!
 //! files that an earlier run left open ─▶ leftovers: a thread ─▶ NODE-0001.recovered.mcap
+//!
+//! log control: by the interface, by TCP ─▶ orders ─▶ Writer, at their place among the messages
 //! ```
 //!
 //! The module's thread copies each value once, from the ring or the mailbox into memory, and never waits for the disk.
 
+mod control;
+mod folder;
 mod health;
 mod leftovers;
+mod obey;
 mod sampler;
 mod taps;
 
 use crate::router::NoSettings;
 use crate::version;
+use control::{ControlServer, Orders};
 use health::Health;
 use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
-use rohrpost::{Context, Module, ModuleError, Received, Start, StartError};
+use rohrpost::{Context, Module, ModuleError, Ready, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
-use rohrpost_mailbox::TimeSource;
-use rohrpost_recording::{DrawnBeside, Options, Rotation, Session, Status, Writer};
+use rohrpost_mailbox::{SystemClock, TimeSource};
+use rohrpost_recording::{ControlAnswer, ControlCommand, DrawnBeside, Options, Rotation, Session, Status, Writer};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use taps::Taps;
 
@@ -42,9 +48,18 @@ struct Logd {
     options: Options,
     session: Session,
     taps: Taps,
-    /// None while it is switched off.
+    /// None while nothing is recorded.
     writer: Option<Writer>,
+    /// One that takes no more, and still writes.
+    ending: Option<Writer>,
+    /// How the one before ended.
+    ended: ControlAnswer,
     health: Health,
+    /// Log control leads to folders below it.
+    root: PathBuf,
+    clock: SystemClock,
+    orders: Orders,
+    control: ControlServer,
 }
 
 impl Module for Logd {
@@ -63,47 +78,100 @@ impl Module for Logd {
         let options = options(recording, installation, &node);
         let session = session(installation, &node);
         let taps = Taps::new(installation, recording.clone(), context.me(), &node);
+        if let Some(note) = recording.control_note() {
+            tracing::warn!("{note}");
+        }
+        let (root, control) = (recording.directory.clone(), ControlServer::new(recording.control));
         // It serves the computer's disk: also while the robot's time stands still.
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { options, session, taps, writer: None, health: Health::default() })
+        Ok(Self {
+            options,
+            session,
+            taps,
+            writer: None,
+            ending: None,
+            ended: ControlAnswer::ok(),
+            health: Health::default(),
+            root,
+            clock: context.clock().clone(),
+            orders: Orders::default(),
+            control,
+        })
     }
 
     fn on(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        let mut writer = Writer::start(self.options.clone(), self.session.clone())?;
-        self.health = Health::default();
-        self.taps.begin(&mut writer);
-        self.taps.find(context, &mut writer)?;
-        self.writer = Some(writer);
+        self.begin()?;
+        self.find(context)?;
+        self.control.open(context, Instant::now());
         Ok(())
     }
 
     /// Ends the recording: its file is closed whole.
-    fn off(&mut self, _: &mut Context) {
-        let Some(writer) = self.writer.take() else { return };
-        let (Status { written, lost, files_closed, files_torn, .. }, told) = writer.finish();
-        tracing::info!("recorded {written} messages, {lost} lost, in {} files", files_closed + files_torn);
-        if let Err(error) = told {
-            tracing::error!("the recording could not be ended: {error}");
+    fn off(&mut self, context: &mut Context) {
+        self.control.close(context);
+        for writer in self.ending.take().into_iter().chain(self.writer.take()) {
+            self.ended = finish(writer);
         }
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        let Some(writer) = &mut self.writer else { return Ok(()) };
-        self.taps.find(context, writer)?;
-        let status = writer.status();
-        // It cannot work without its thread; launch restarts it.
-        assert!(status.is_running, "the thread that writes has ended");
-        self.health.tell(&status, Instant::now());
-        context.publish_now(RecorderInterface::STATE, &state(&status))?;
+        self.find(context)?;
+        let status = self.writer.as_ref().map(Writer::status);
+        if let Some(status) = &status {
+            // It cannot work without its thread; launch restarts it.
+            assert!(status.is_running, "the thread that writes has ended");
+            self.health.tell(status, Instant::now());
+        }
+        context.publish_now(RecorderInterface::STATE, &status.as_ref().map(state).unwrap_or_default())?;
+        self.control.open(context, Instant::now());
+        self.look_at_orders();
+        self.serve(context);
         Ok(())
     }
 
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-        if let Some(writer) = self.writer.as_mut().filter(|_| has_begun(context)) {
-            self.taps.take(writer, &context.now(), data);
+        match self.writer.as_mut() {
+            Some(writer) if has_begun(context.clock()) => self.taps.take(writer, &context.now(), data),
+            _ => self.taps.pass_over(data),
         }
         Ok(())
+    }
+
+    fn ready(&mut self, context: &mut Context, ready: Ready) -> Result<(), ModuleError> {
+        self.control.ready(context, ready, Instant::now());
+        self.serve(context);
+        Ok(())
+    }
+}
+
+impl Logd {
+    /// A recording begins.
+    fn begin(&mut self) -> Result<(), rohrpost_recording::StartError> {
+        let mut writer = Writer::start(self.options.clone(), self.session.clone())?;
+        self.health = Health::default();
+        self.taps.begin(&mut writer);
+        self.writer = Some(writer);
+        Ok(())
+    }
+
+    fn find(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        self.taps.find(context, writer)
+    }
+
+    /// Obeys what connections say, as far as it goes without waiting.
+    fn serve(&mut self, context: &mut Context) {
+        self.control.tell(|order| self.orders.answer(order));
+        while let Some((client, command)) = self.control.next_command() {
+            let order = match command {
+                Ok(command) => self.obey(command),
+                Err(error) => self.orders.add_answered(ControlAnswer::err(&error)),
+            };
+            self.control.wait_for(client, order);
+            self.control.tell(|order| self.orders.answer(order));
+        }
+        self.control.watch(context);
     }
 }
 
@@ -124,11 +192,34 @@ impl Recorder for Logd {
         let rest = rest.map(|its| RecordedMessages { topic: its.topic, written: its.written, lost: its.lost });
         ChannelPage { total, channels: rest.take_while(fits).collect() }
     }
+
+    fn order(&mut self, line: String) -> u32 {
+        match line.parse::<ControlCommand>() {
+            Ok(command) => self.obey(command),
+            Err(error) => self.orders.add_answered(ControlAnswer::err(&error)),
+        }
+    }
+
+    fn answer(&mut self, order: u32) -> Option<String> {
+        self.orders.answer(order).map(|answer| answer.line().to_owned())
+    }
+}
+
+/// Waits until all is written; how it ended, for log control.
+fn finish(writer: Writer) -> ControlAnswer {
+    let (Status { written, lost, files_closed, files_torn, .. }, told) = writer.finish();
+    let files = files_closed + files_torn;
+    tracing::info!("recorded {written} messages, {lost} lost, in {files} files");
+    if let Err(error) = told {
+        tracing::error!("the recording could not be ended: {error}");
+        return ControlAnswer::err(&format!("the recording is off, but could not be ended: {error}"));
+    }
+    ControlAnswer::ok().with("written", written).with("lost", lost).with("files", files)
 }
 
 /// Whether there is a time at which something can arrive: that of a log begins with its player.
-fn has_begun(context: &Context) -> bool {
-    context.clock().record().is_none_or(|record| record.source != TimeSource::Log || record.is_known())
+fn has_begun(clock: &SystemClock) -> bool {
+    clock.record().is_none_or(|record| record.source != TimeSource::Log || record.is_known())
 }
 
 /// Makes the folder itself, and none above it: those may be where a disk is to be mounted.

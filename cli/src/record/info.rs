@@ -76,6 +76,7 @@ fn text(info: &Info) -> String {
     if !info.session.is_empty() {
         lines.push(session.collect::<Vec<_>>().join(", "));
     }
+    lines.extend(info.marks.iter().map(|mark| format!("mark at {}: {}", stamp_text(mark.time_ns), mark.text)));
     for (name, texts) in &info.others {
         let texts: Vec<String> = texts.iter().map(|(key, text)| format!("{key} {text}")).collect();
         lines.push(format!("{name}: {}", texts.join(", ")));
@@ -135,6 +136,7 @@ fn as_json(info: &Info) -> Value {
         |its| json!({"epoch": its.epoch, "messages": its.messages, "first_ns": its.first_ns, "last_ns": its.last_ns}),
     );
     let damages = info.damages.iter().map(|(at, what)| json!({"at": at, "what": what.to_string()}));
+    let marks = info.marks.iter().map(|its| json!({"time_ns": its.time_ns, "epoch": its.epoch, "text": its.text}));
     let others = info.others.iter().map(|(name, texts)| json!({"name": name, "texts": texts}));
     json!({
         "path": info.path, "bytes": info.bytes, "is_closed": info.is_closed, "closed_because": info.closed_because,
@@ -142,6 +144,7 @@ fn as_json(info: &Info) -> Value {
         "repeated": info.repeated, "lost": info.lost,
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
-        "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
+        "marks": marks.collect::<Vec<_>>(), "others": others.collect::<Vec<_>>(),
+        "damages": damages.collect::<Vec<_>>(),
     })
 }

@@ -1,6 +1,8 @@
-//! `rohrpost record`: files of recordings, described, made whole, cut, merged and exported. Looks at no running node.
+//! `rohrpost record`: files of recordings, described, made whole, cut, merged and exported, without a look at any
+//! running node; and orders to the recorder that runs.
 
 mod change;
+mod control;
 mod export;
 mod info;
 mod jsonl;
@@ -9,6 +11,7 @@ mod progress;
 mod time;
 
 use crate::terminal::Failure;
+use rohrpost_recording::ControlCommand;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -20,6 +23,8 @@ use std::process::ExitCode;
   rohrpost record merge all.mcap base-0001.mcap base-0002.mcap arm-0001.mcap
   rohrpost record export base-0001.mcap drawn.mcap --format drawn --rate 10; rerun drawn.mcap
   rohrpost record export base-0001.mcap - --format json --names pilot.0
+  rohrpost record mark door open                                  marks this moment in the recording that runs
+  rohrpost record rotate                                          closes its file, and begins the next
 No file is ever changed or overwritten. Other programs read the files, too (MCAP); Rerun and Foxglove draw what is
 exported.")]
 pub(super) struct Arguments {
@@ -39,6 +44,18 @@ enum RecordCommand {
     Merge(change::MergeArguments),
     /// Make a file for others: what Rerun and Foxglove draw, or JSON.
     Export(export::ExportArguments),
+    /// Have the recorder of the running node record.
+    On(control::RecorderTarget),
+    /// Have it end the recording: its file is closed, and no other begun.
+    Off(control::RecorderTarget),
+    /// Have it make its files in another folder below the configured one.
+    Directory(control::DirectoryArguments),
+    /// Say whether it records, where to, and what became of all messages.
+    Status(control::RecorderTarget),
+    /// Set a mark in its file: the time, and a text. `record info` lists marks.
+    Mark(control::MarkArguments),
+    /// Have it close its file, and begin the next.
+    Rotate(control::RecorderTarget),
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -48,5 +65,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         RecordCommand::Cut(arguments) => change::cut(arguments),
         RecordCommand::Merge(arguments) => change::merge(arguments),
         RecordCommand::Export(arguments) => export::run(arguments),
+        RecordCommand::On(recorder) => control::order(&ControlCommand::On, recorder),
+        RecordCommand::Off(recorder) => control::order(&ControlCommand::Off, recorder),
+        RecordCommand::Directory(arguments) => control::directory(arguments),
+        RecordCommand::Status(recorder) => control::order(&ControlCommand::Status, recorder),
+        RecordCommand::Mark(arguments) => control::mark(arguments),
+        RecordCommand::Rotate(recorder) => control::order(&ControlCommand::Rotate, recorder),
     }
 }

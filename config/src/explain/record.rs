@@ -1,7 +1,6 @@
 //! What is recorded, in words.
 
 use super::Page;
-use crate::module::{Program, RECORDER};
 use crate::output::Level;
 use crate::record::{RecordedItems, Sampling};
 use crate::units::{duration_text, size_text};
@@ -9,8 +8,7 @@ use crate::units::{duration_text, size_text};
 impl Page<'_> {
     pub(super) fn record(&mut self) {
         let Some(record) = &self.installation.record else { return };
-        let is_it = |program: &Program| *program == Program::Builtin(RECORDER.into());
-        let recorder = self.installation.modules.iter().find(|module| is_it(&module.program));
+        let recorder = self.installation.recorder();
         self.line("");
         self.line("Recording");
         self.line("");
@@ -38,6 +36,14 @@ impl Page<'_> {
         let (size, age) = (size_text(record.rotate_size), duration_text(record.rotate_after));
         let free = size_text(record.leave_free);
         self.entry("files", &format!("a new one after {size} or {age}; {free} of the disk stay free"));
+        let control = match record.control {
+            None => "`rohrpost record` alone".into(),
+            Some(control) => format!("`rohrpost record`, and TCP at {control}"),
+        };
+        self.entry("controlled by", &control);
+        if let Some(note) = record.control_note() {
+            self.entry("security", &note);
+        }
         let (flush, sync) = (duration_text(record.flush), duration_text(record.sync));
         self.entry("may lose", &format!("the last {flush} if it is killed, {sync} more if the power fails"));
     }

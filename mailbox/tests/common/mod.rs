@@ -212,3 +212,13 @@ pub(crate) fn accounted(info: &MailboxInfo) -> u64 {
     let accepted = Loss::ALL.into_iter().filter(|cause| cause.was_accepted());
     received(info) + accepted.map(|cause| lost(info, cause)).sum::<u64>() + u64::from(info.depth)
 }
+
+/// Files of a node that nobody finished.
+pub(crate) fn unfinished(node: &Path) -> Vec<PathBuf> {
+    let all = std::fs::read_dir(node).unwrap().map(|entry| entry.unwrap().path());
+    let is_unfinished = |path: &PathBuf| {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        name == "unfinished" || name.ends_with(".new")
+    };
+    all.filter(is_unfinished).collect()
+}

@@ -1,10 +1,10 @@
-//! A memory that is soon full: a file system of its own for one process.
+//! A memory that is soon full: a file system of its own for one process. Tests of other crates take this file, too.
 
 use std::ffi::CString;
 use std::io;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 /// Has a process mount a memory of `pages` here that it alone sees.
@@ -35,14 +35,4 @@ pub(crate) fn may_mount() -> bool {
     let mut command = Command::new("true");
     with_small_memory(&mut command, place.path(), 16);
     command.status().is_ok_and(|status| status.success())
-}
-
-/// Files of a node that nobody finished.
-pub(crate) fn unfinished(node: &Path) -> Vec<PathBuf> {
-    let all = std::fs::read_dir(node).unwrap().map(|entry| entry.unwrap().path());
-    let is_unfinished = |path: &PathBuf| {
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        name == "unfinished" || name.ends_with(".new")
-    };
-    all.filter(is_unfinished).collect()
 }

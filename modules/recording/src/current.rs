@@ -10,6 +10,7 @@ use crate::format::{
 };
 use crate::newest::Newest;
 use crate::options::{Options, Session};
+use crate::order::Mark;
 use crate::read::definitions::{Definition, SchemaText};
 use crate::status::ChannelState;
 use mcap::records::MessageHeader;
@@ -34,6 +35,7 @@ pub(crate) struct Current {
     pub(crate) messages: u64,
     /// Of those, how many came behind the last sync.
     pub(crate) unsynced: u64,
+    marks: u64,
     described: Vec<Described>,
     /// Of the present chunk, before compression.
     chunk_bytes: usize,
@@ -55,6 +57,7 @@ impl Current {
             synced: now,
             messages: 0,
             unsynced: 0,
+            marks: 0,
             described: Vec::new(),
             chunk_bytes: 0,
             drawing: options.drawn.as_ref().map(DrawingBeside::new),
@@ -181,6 +184,19 @@ impl Current {
         self.file.end_chunk()
     }
 
+    /// Sets a mark, behind what is written.
+    pub(crate) fn mark(&mut self, mark: &Mark) -> Result<(), DiskError> {
+        self.file.metadata(metadata::MARK, mark.texts())?;
+        self.end_chunk()?;
+        self.marks += 1;
+        Ok(())
+    }
+
+    /// Without, it is of no use to anybody.
+    pub(crate) fn has_content(&self) -> bool {
+        self.messages > 0 || self.marks > 0
+    }
+
     /// System time has stepped. Only a later epoch is news: streams learn of a step one after the other.
     fn tell_epoch(&mut self, epoch: u64, arrival_ns: u64) -> Result<(), DiskError> {
         if self.epoch.is_some_and(|newest| newest > epoch) {
@@ -195,7 +211,7 @@ impl Current {
     /// Tells losses that are not told yet.
     pub(crate) fn tell_lost(&mut self, channels: &[Arc<ChannelState>]) -> Result<(), DiskError> {
         let lost: Vec<u64> = channels.iter().map(|channel| channel.lost()).collect();
-        if lost.iter().sum::<u64>() == self.lost_told.iter().sum() {
+        if lost.iter().sum::<u64>() == self.lost_told.iter().sum::<u64>() {
             return Ok(());
         }
         let before = self.lost_before.iter().chain(std::iter::repeat(&0));

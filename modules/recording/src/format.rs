@@ -30,6 +30,8 @@ pub mod metadata {
     pub const EPOCH: &str = "rohrpost.epoch";
     /// Messages that are not in the file: a count for each topic, from the file's beginning. The last one counts.
     pub const LOST: &str = "rohrpost.lost";
+    /// A mark that was set while it was recorded: `text`, `time-ns`, `epoch`.
+    pub const MARK: &str = "rohrpost.mark";
     /// The file was closed: `reason`.
     pub const CLOSED: &str = "rohrpost.closed";
     /// The file was made by `recover`: from which, how much, why.

@@ -1,9 +1,14 @@
-//! Between what records and the thread that writes: a bounded queue of batches. Putting in never waits for the disk.
+//! Between what records and the thread that writes: a bounded queue of batches, with orders between them. Putting in
+//! never waits for the disk.
 
 use crate::batch::{Batch, Message};
+use crate::order::{Order, OrderError, OrderKind};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+
+/// Orders that wait.
+const ORDERS_MAX: usize = 16;
 
 /// The queue.
 pub(crate) struct Inbox {
@@ -17,16 +22,40 @@ struct Queue {
     /// Being filled.
     open: Batch,
     /// Waiting for the thread, oldest first.
-    full: VecDeque<Batch>,
+    full: VecDeque<Queued>,
     /// Written, to be filled again.
     free: Vec<Batch>,
     has_ended: bool,
+}
+
+/// One of the queue.
+enum Queued {
+    Batch(Batch),
+    Order(Order),
+}
+
+impl Queue {
+    fn batches(&self) -> impl Iterator<Item = &Batch> {
+        self.full.iter().filter_map(|queued| match queued {
+            Queued::Batch(batch) => Some(batch),
+            Queued::Order(_) => None,
+        })
+    }
+
+    /// What is being filled waits from now on.
+    fn end_open(&mut self) {
+        let next = self.free.pop().unwrap_or_default();
+        let full = std::mem::replace(&mut self.open, next);
+        self.full.push_back(Queued::Batch(full));
+    }
 }
 
 /// What the thread finds.
 pub(crate) enum Taken {
     /// The oldest messages.
     Batch(Batch),
+    /// What is asked for behind the messages before it.
+    Order(Order),
     /// None for so long.
     Nothing,
     /// None, and none will come.
@@ -46,16 +75,35 @@ impl Inbox {
             return false;
         }
         if !queue.open.has_room(message.data.len()) {
-            if queue.full.len() >= self.chunks_max {
+            if queue.batches().count() >= self.chunks_max {
                 return false;
             }
-            let next = queue.free.pop().unwrap_or_default();
-            let full = std::mem::replace(&mut queue.open, next);
-            queue.full.push_back(full);
+            queue.end_open();
             self.bell.notify_one();
         }
         queue.open.push(channel, message);
         true
+    }
+
+    /// Puts an order in, behind all messages so far.
+    pub(crate) fn put_order(&self, order: Order) -> Result<(), OrderError> {
+        let mut queue = self.lock();
+        if queue.has_ended {
+            return Err(OrderError::Ended);
+        }
+        let batches = queue.batches().count();
+        // One that leads to another disk needs no room: it is what helps.
+        let has_room = queue.full.len() - batches < ORDERS_MAX
+            && (batches < self.chunks_max || queue.open.is_empty() || matches!(order.kind, OrderKind::Move(_)));
+        if !has_room {
+            return Err(OrderError::Full);
+        }
+        if !queue.open.is_empty() {
+            queue.end_open();
+        }
+        queue.full.push_back(Queued::Order(order));
+        self.bell.notify_one();
+        Ok(())
     }
 
     /// Takes what is full; after a while also what is not.
@@ -63,8 +111,10 @@ impl Inbox {
         let waits = |queue: &mut Queue| queue.full.is_empty() && !queue.has_ended;
         let told = self.bell.wait_timeout_while(self.lock(), patience, waits);
         let (mut queue, _) = told.unwrap_or_else(PoisonError::into_inner);
-        if let Some(batch) = queue.full.pop_front() {
-            return Taken::Batch(batch);
+        match queue.full.pop_front() {
+            Some(Queued::Batch(batch)) => return Taken::Batch(batch),
+            Some(Queued::Order(order)) => return Taken::Order(order),
+            None => {}
         }
         if !queue.open.is_empty() {
             let next = queue.free.pop().unwrap_or_default();
@@ -73,10 +123,21 @@ impl Inbox {
         if queue.has_ended { Taken::End } else { Taken::Nothing }
     }
 
-    /// Waits without taking; whether the end has come.
-    pub(crate) fn wait_for_end(&self, patience: Duration) -> bool {
-        let told = self.bell.wait_timeout_while(self.lock(), patience, |queue| !queue.has_ended);
-        told.unwrap_or_else(PoisonError::into_inner).0.has_ended
+    /// Waits for the end, or for an order that leads to another disk, and takes nothing else.
+    pub(crate) fn wait_while_failing(&self, patience: Duration) -> Taken {
+        let leads_away =
+            |queued: &Queued| matches!(queued, Queued::Order(order) if matches!(order.kind, OrderKind::Move(_)));
+        let waits = |queue: &mut Queue| !queue.has_ended && !queue.full.iter().any(leads_away);
+        let told = self.bell.wait_timeout_while(self.lock(), patience, waits);
+        let (mut queue, _) = told.unwrap_or_else(PoisonError::into_inner);
+        if queue.has_ended {
+            return Taken::End;
+        }
+        let at = queue.full.iter().position(leads_away);
+        match at.and_then(|at| queue.full.remove(at)) {
+            Some(Queued::Order(order)) => Taken::Order(order),
+            _ => Taken::Nothing,
+        }
     }
 
     /// Takes back what was written.
@@ -94,7 +155,7 @@ impl Inbox {
     /// Messages that wait.
     pub(crate) fn waiting(&self) -> u64 {
         let queue = self.lock();
-        (queue.open.len() + queue.full.iter().map(Batch::len).sum::<usize>()) as u64
+        (queue.open.len() + queue.batches().map(Batch::len).sum::<usize>()) as u64
     }
 
     /// Nothing panics while it is locked; if something did, the queue is whole between any two lines.

@@ -2,6 +2,7 @@
 
 use crate::error::{Damage, ReadError};
 use crate::format::{self, key, metadata};
+use crate::order::Mark;
 use crate::read::contents::{Contents, Ending, Item};
 use crate::read::definitions::{Definition, Definitions};
 use crate::read::frames::Frames;
@@ -48,6 +49,8 @@ pub struct Info {
     pub session: BTreeMap<String, String>,
     /// Texts of the configuration, by file name.
     pub configuration: BTreeMap<String, String>,
+    /// Marks that were set, in the order of the file.
+    pub marks: Vec<Mark>,
     /// What else the file says of itself: `rohrpost.recovered`, `rohrpost.cut`, `rohrpost.merged`, and others'.
     pub others: Vec<(String, BTreeMap<String, String>)>,
 }
@@ -201,6 +204,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         epochs: Vec::new(),
         session: BTreeMap::new(),
         configuration: BTreeMap::new(),
+        marks: Vec::new(),
         others: Vec::new(),
     };
     let mut lost = BTreeMap::new();
@@ -212,6 +216,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
             metadata::CLOSED => info.closed_because = texts.remove("reason"),
             // Epochs are told by the channels.
             metadata::EPOCH => {}
+            metadata::MARK if let Some(mark) = Mark::of_texts(&texts) => info.marks.push(mark),
             _ => info.others.push((name, texts)),
         }
     }

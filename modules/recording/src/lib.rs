@@ -57,6 +57,7 @@
 #![forbid(unsafe_code)]
 
 mod batch;
+mod control;
 mod current;
 mod cut;
 mod disk;
@@ -69,6 +70,7 @@ mod info;
 mod merge;
 mod newest;
 mod options;
+mod order;
 mod output;
 mod player;
 mod read;
@@ -86,12 +88,14 @@ mod tests;
 mod writer;
 
 pub use batch::Message;
+pub use control::{CONTROL_LINE_BYTES_MAX, ControlAnswer, ControlCommand, ControlError, ControlLines};
 pub use cut::{CutError, cut};
 pub use drawn::{DrawError, DrawOptions, Drawn, DrawnBeside, draw};
 pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
 pub use merge::{MergeError, merge};
 pub use options::{Options, Session};
+pub use order::{FileChange, MARK_BYTES_MAX, Mark, OrderError, PendingOrder};
 pub use player::{Cue, Player};
 pub use reader::{Reader, RecordedChannel, is_closed};
 pub use recover::{RecoverError, Recovered, recover, recovered_path};

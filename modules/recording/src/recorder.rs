@@ -11,6 +11,8 @@
 //! After an error the file is cut back to its last whole chunk, so the batch is not in it and comes to the next one.
 //! Meanwhile messages wait in the inbox, and are counted as lost once it is full.
 
+mod orders;
+
 use crate::batch::Batch;
 use crate::current::Current;
 use crate::disk::Disk;
@@ -80,14 +82,17 @@ impl Recorder {
         }
         loop {
             if let Some(at) = self.retry_at.take() {
-                if self.shared.inbox.wait_for_end(at.saturating_duration_since(Instant::now())) {
-                    break;
+                match self.shared.inbox.wait_while_failing(at.saturating_duration_since(Instant::now())) {
+                    Taken::End => break,
+                    Taken::Order(order) => self.carry_out(order, Instant::now()),
+                    Taken::Batch(_) | Taken::Nothing => {}
                 }
                 self.resume(Instant::now());
                 continue;
             }
             match self.shared.inbox.take(self.options.flush) {
                 Taken::Batch(batch) => self.write(batch),
+                Taken::Order(order) => self.carry_out(order, Instant::now()),
                 Taken::Nothing => {}
                 Taken::End => break,
             }
@@ -146,7 +151,7 @@ impl Recorder {
         self.keep_free(more)?;
         let rotation = self.options.rotation;
         let is_full = |current: &Current| {
-            current.messages > 0 && rotation.is_due(current.file.bytes(), more, now.duration_since(current.opened))
+            current.has_content() && rotation.is_due(current.file.bytes(), more, now.duration_since(current.opened))
         };
         if self.current.as_ref().is_some_and(is_full) {
             self.close("rotated")?;
@@ -156,6 +161,8 @@ impl Recorder {
         if let Some(current) = &mut self.current {
             current.describe(&self.channels, self.epoch)?;
             current.begin(&self.newest, batch, &self.channels)?;
+            // Before the messages behind the gap: whatever is read of them, the file tells what is missing.
+            current.tell_lost(&self.channels)?;
             current.write(batch, &self.channels)?;
             self.shared.counts().bytes_now = current.file.bytes();
         }
@@ -177,7 +184,7 @@ impl Recorder {
             let mut counts = self.shared.counts();
             counts.synced = counts.written - counts.unsure;
         }
-        if current.messages > 0 && self.options.rotation.is_due(0, 0, now.duration_since(current.opened)) {
+        if current.has_content() && self.options.rotation.is_due(0, 0, now.duration_since(current.opened)) {
             self.close("rotated")?;
         }
         Ok(())
@@ -185,6 +192,14 @@ impl Recorder {
 
     /// Leaves to others what was promised. A file is closed in time, while there is room for its index.
     fn keep_free(&mut self, more: u64) -> Result<(), DiskError> {
+        let told = self.check_free(more);
+        if matches!(told, Err(DiskError::Low { .. })) {
+            self.close("low space")?;
+        }
+        told
+    }
+
+    fn check_free(&mut self, more: u64) -> Result<(), DiskError> {
         let folder = self.options.folder.clone();
         let free = self.disk.free_bytes(&folder);
         let free_bytes = free.map_err(|error| DiskError::new("look for free space", &folder, error))?;
@@ -192,7 +207,6 @@ impl Recorder {
         if leave_bytes == 0 || free_bytes >= leave_bytes.saturating_add(more) {
             return Ok(());
         }
-        self.close("low space")?;
         Err(DiskError::Low { folder: Shown(folder), free_bytes, leave_bytes })
     }
 
@@ -202,6 +216,11 @@ impl Recorder {
             return Ok(());
         }
         let file = self.create()?;
+        self.begin(file, now)
+    }
+
+    /// Says in a new file what each says first.
+    fn begin(&mut self, file: OpenFile, now: Instant) -> Result<(), DiskError> {
         self.shared.counts().file = Some(file.path().to_owned());
         let current = self.current.insert(Current::new(file, &self.options, self.lost_told.clone(), now));
         let number = self.number;
@@ -247,7 +266,7 @@ impl Recorder {
     fn fail(&mut self, error: DiskError, now: Instant) -> bool {
         self.retry_at = Some(now + self.options.retry);
         let had_messages = match self.current.take() {
-            Some(current) if current.messages > 0 => {
+            Some(current) if current.has_content() => {
                 self.lost_told = current.lost_told().to_vec();
                 self.give_up(current.file, current.messages, current.unsynced, &error);
                 true
@@ -305,6 +324,7 @@ impl Recorder {
         while !is_failing {
             match self.shared.inbox.take(Duration::ZERO) {
                 Taken::Batch(batch) => self.write(batch),
+                Taken::Order(order) => self.carry_out(order, Instant::now()),
                 Taken::Nothing | Taken::End => break,
             }
             is_failing = self.held.is_some();
@@ -312,8 +332,13 @@ impl Recorder {
         if let Some(batch) = self.held.take() {
             self.lose(&batch);
         }
-        while let Taken::Batch(batch) = self.shared.inbox.take(Duration::ZERO) {
-            self.lose(&batch);
+        loop {
+            match self.shared.inbox.take(Duration::ZERO) {
+                Taken::Batch(batch) => self.lose(&batch),
+                // Unanswered: the recording ends before it.
+                Taken::Order(_) => {}
+                Taken::Nothing | Taken::End => break,
+            }
         }
         self.shared.counts().held = 0;
         let told = self.opened_to_tell(is_failing).and_then(|()| self.close("ended"));
@@ -326,7 +351,7 @@ impl Recorder {
     fn opened_to_tell(&mut self, is_failing: bool) -> Result<(), DiskError> {
         self.learn_channels();
         let lost: u64 = self.channels.iter().map(|channel| channel.lost()).sum();
-        if is_failing || lost == self.lost_told.iter().sum() { Ok(()) } else { self.opened(Instant::now()) }
+        if is_failing || lost == self.lost_told.iter().sum::<u64>() { Ok(()) } else { self.opened(Instant::now()) }
     }
 
     fn lose(&mut self, batch: &Batch) {

@@ -6,12 +6,14 @@ use crate::error::DiskError;
 use crate::format::{MESSAGE_BYTES_MAX, key, topic};
 use crate::inbox::Inbox;
 use crate::options::{Options, Session};
+use crate::order::{Mark, Order, OrderError, OrderKind, PendingOrder};
 use crate::recorder::Recorder;
 use crate::shared::Shared;
 use crate::status::{ChannelState, Status};
 use rohrpost_schema::{Type, describe_type};
 use std::collections::BTreeMap;
 use std::io;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use thiserror::Error;
@@ -160,6 +162,44 @@ impl Writer {
         if let Some(channel) = self.channels.get(channel.0) {
             channel.count_lost(count);
         }
+    }
+
+    /// Sets a mark behind all messages so far.
+    ///
+    /// # Errors
+    /// When its text is none, or the queue is full.
+    pub fn mark(&mut self, mark: Mark) -> Result<PendingOrder, OrderError> {
+        mark.check()?;
+        self.order(OrderKind::Mark(mark))
+    }
+
+    /// Closes the file behind all messages so far, and begins the next. One that has nothing in it stays.
+    ///
+    /// # Errors
+    /// When the queue is full.
+    pub fn rotate(&mut self) -> Result<PendingOrder, OrderError> {
+        self.order(OrderKind::Rotate)
+    }
+
+    /// Goes on in another folder, which must exist. If no file can be made there, the present one goes on. Also while
+    /// the disk fails: what waits comes to the new folder.
+    ///
+    /// # Errors
+    /// When the queue is full.
+    pub fn move_to(&mut self, folder: PathBuf) -> Result<PendingOrder, OrderError> {
+        self.order(OrderKind::Move(folder))
+    }
+
+    fn order(&mut self, kind: OrderKind) -> Result<PendingOrder, OrderError> {
+        let (order, pending) = Order::new(kind);
+        self.shared.inbox.put_order(order)?;
+        Ok(pending)
+    }
+
+    /// Takes no more. What waits is written, and the file closed, without waiting for it: then
+    /// [`Status::is_running`] is false, and [`Writer::finish`] tells at once how it ended.
+    pub fn begin_end(&mut self) {
+        self.shared.inbox.end();
     }
 
     /// How it goes.

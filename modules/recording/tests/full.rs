@@ -3,41 +3,21 @@
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
 mod common;
+#[path = "../../../mailbox/tests/common/small_memory.rs"]
+mod small_memory;
 
 use common::{Running, busy_options, channels, in_role, recover_all, session, tell, with_message};
 use rohrpost_recording::{DiskError, Options, Status, Writer};
+use small_memory::{may_mount, with_small_memory};
 use std::ffi::CString;
 use std::io;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::Duration;
 
 /// A chunk of a megabyte must fit, and some files.
-const DISK_BYTES: u64 = 4 << 20;
-
-/// Has a process mount a small memory here that it alone sees.
-fn with_small_disk(command: &mut Command, place: &Path) {
-    let place = CString::new(place.as_os_str().as_bytes()).unwrap();
-    let options = CString::new(format!("size={DISK_BYTES}")).unwrap();
-    // As a user without rights: in a user namespace, where one has all of them.
-    // SAFETY: takes nothing.
-    let spaces = libc::CLONE_NEWNS | if unsafe { libc::geteuid() } == 0 { 0 } else { libc::CLONE_NEWUSER };
-    let mount = move || {
-        let check = |result: i32| if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) };
-        // SAFETY: strings that live as long as the calls, or null where that is allowed; nothing is allocated.
-        unsafe {
-            check(libc::unshare(spaces))?;
-            let all = libc::MS_REC | libc::MS_PRIVATE;
-            check(libc::mount(std::ptr::null(), c"/".as_ptr(), std::ptr::null(), all, std::ptr::null()))?;
-            let tmpfs = c"tmpfs".as_ptr();
-            check(libc::mount(tmpfs, place.as_ptr(), tmpfs, 0, options.as_ptr().cast()))
-        }
-    };
-    // SAFETY: system calls alone, which may be made between fork and exec.
-    unsafe { command.pre_exec(mount) };
-}
+const DISK_BYTES: u64 = DISK_PAGES as u64 * 4096;
+const DISK_PAGES: usize = 1024;
 
 /// Mounts that disk once more, with or without writing.
 fn remount(place: &Path, flags: libc::c_ulong) {
@@ -47,14 +27,6 @@ fn remount(place: &Path, flags: libc::c_ulong) {
         libc::mount(std::ptr::null(), place.as_ptr(), std::ptr::null(), libc::MS_REMOUNT | flags, std::ptr::null())
     };
     assert_eq!(told, 0, "{}", io::Error::last_os_error());
-}
-
-/// Whether a process may mount here at all: some containers forbid it.
-fn may_mount() -> bool {
-    let place = tempfile::tempdir().unwrap();
-    let mut command = Command::new("true");
-    with_small_disk(&mut command, place.path());
-    command.status().is_ok_and(|status| status.success())
 }
 
 #[test]
@@ -76,7 +48,7 @@ fn on_a_small_disk(role: &str) {
     }
     let folder = tempfile::tempdir().unwrap();
     let mut command = in_role(role, folder.path());
-    with_small_disk(&mut command, folder.path());
+    with_small_memory(&mut command, folder.path(), DISK_PAGES);
     let mut running = Running::start(command);
     assert_eq!(running.hear().as_deref(), Some("well"));
     assert!(running.child.wait().unwrap().success());

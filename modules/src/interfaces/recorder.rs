@@ -74,6 +74,15 @@ pub trait Recorder {
     #[command(17, idempotent)]
     fn channels(&mut self, from: u32) -> ChannelPage;
 
+    /// Obeys a line of log control: `on`, `off`, `directory PATH`, `status`, `mark TEXT` or `rotate`. The number of its
+    /// answer.
+    #[command(18)]
+    fn order(&mut self, line: String) -> u32;
+
+    /// The answer to an order: `OK`, with what is to be told, or `ERR` and why. None: not yet.
+    #[command(19, idempotent)]
+    fn answer(&mut self, order: u32) -> Option<String>;
+
     /// How the recording goes, several times a second.
     #[data(1)]
     fn state() -> RecordingState;

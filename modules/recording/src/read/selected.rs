@@ -2,6 +2,7 @@
 
 use crate::error::{ReadError, Shown};
 use crate::format::metadata;
+use crate::order::Mark;
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::{Definition, Definitions};
 use crate::read::frames::Frames;
@@ -79,7 +80,8 @@ impl Selected {
         self.channels.iter().map(|(id, wanted)| (*id, &wanted.channel))
     }
 
-    /// What the file says of itself, but for how it was closed: for a new file that is made of it.
+    /// What the file says of itself, but for how it was closed, and for marks out of the time range: for a new file
+    /// that is made of it.
     pub(crate) fn each_metadata<E: From<ReadError>>(
         &mut self,
         mut take: impl FnMut(Metadata) -> Result<(), E>,
@@ -87,7 +89,14 @@ impl Selected {
         let begin = self.contents.at();
         for at in std::mem::take(&mut self.metadata) {
             let its = self.contents.metadata_at(at)?;
-            if its.name != metadata::CLOSED {
+            let is_taken = match its.name.as_str() {
+                metadata::CLOSED => false,
+                metadata::MARK => {
+                    Mark::of_texts(&its.metadata).is_none_or(|mark| self.selection.has_time(mark.time_ns, mark.time_ns))
+                }
+                _ => true,
+            };
+            if is_taken {
                 take(its)?;
             }
         }

@@ -1,0 +1,100 @@
+//! Folders that log control may name: those below the configured one, wherever links lead.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why files are not made in a folder.
+#[derive(Debug, Error)]
+pub(super) enum FolderError {
+    #[error("{}: is no folder that files can be made in: {}", .0.display(), .1)]
+    Io(PathBuf, io::Error),
+    #[error(
+        "{} is not below {}, where this recorder makes its files; name a folder below it", .0.display(), .1.display()
+    )]
+    Outside(PathBuf, PathBuf),
+    #[error("{}: is no folder", .0.display())]
+    NoFolder(PathBuf),
+}
+
+/// The folder of this name below `root`, without links. It is made if the one above it exists.
+///
+/// That is checked when the folder is named: what others put in its place later, with the rights to do so, is theirs.
+pub(super) fn below(root: &Path, name: &str) -> Result<PathBuf, FolderError> {
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |error| FolderError::Io(path, error)
+    };
+    let root = root.canonicalize().map_err(failed(root))?;
+    let wanted = root.join(name);
+    let inside = |path: PathBuf| {
+        if path.starts_with(&root) { Ok(path) } else { Err(FolderError::Outside(wanted.clone(), root.clone())) }
+    };
+    let found = match wanted.canonicalize() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let (Some(above), Some(name)) = (wanted.parent(), wanted.file_name()) else {
+                return Err(FolderError::Io(wanted, error));
+            };
+            // The one above is inside, before anything is made; then a new folder is, too.
+            let made = inside(above.canonicalize().map_err(failed(above))?)?.join(name);
+            std::fs::create_dir(&made).map_err(failed(&made))?;
+            made
+        }
+        found => found.map_err(failed(&wanted))?,
+    };
+    let found = inside(found)?;
+    if found.is_dir() { Ok(found) } else { Err(FolderError::NoFolder(found)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::symlink;
+
+    #[test]
+    fn folders_below_the_root_are_taken_and_no_others() {
+        let place = tempfile::tempdir().unwrap();
+        let place = place.path().canonicalize().unwrap();
+        let (root, away) = (place.join("root"), place.join("away"));
+        for folder in [&root, &away, &root.join("there"), &root.join("a b"), &place.join("rootless")] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        std::fs::write(root.join("file"), "").unwrap();
+        symlink(&away, root.join("out")).unwrap();
+        symlink("../away", root.join("relative-out")).unwrap();
+        symlink("there", root.join("in")).unwrap();
+        symlink(away.join("missing"), root.join("dangling")).unwrap();
+        symlink(&root, place.join("link")).unwrap();
+        let absolute = root.join("there").display().to_string();
+        for (name, wanted) in [
+            ("there", Some("there")),
+            ("a b", Some("a b")),
+            (".", Some("")),
+            ("new", Some("new")),
+            ("new/newer/", Some("new/newer")),
+            ("in", Some("there")),
+            ("there/../new", Some("new")),
+            (&absolute, Some("there")),
+            ("..", None),
+            ("../away", None),
+            ("../fresh", None),
+            ("../rootless", None),
+            ("/tmp", None),
+            ("out", None),
+            ("out/fresh", None),
+            ("relative-out", None),
+            ("dangling", None),
+            ("file", None),
+            ("file/below", None),
+            ("one/two", None),
+            ("nul\0", None),
+        ] {
+            // Through a link to the root, as a configuration may name it.
+            let found = below(&place.join("link"), name);
+            assert_eq!(found.as_deref().ok(), wanted.map(|wanted| root.join(wanted)).as_deref(), "{name}: {found:?}");
+        }
+        assert_eq!(std::fs::read_dir(&away).unwrap().count(), 0, "nothing is made outside");
+        assert!(!place.join("fresh").exists());
+        assert!(below(&place.join("gone"), "there").is_err());
+    }
+}
