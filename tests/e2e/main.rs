@@ -48,6 +48,7 @@ mod process;
 mod readme;
 mod record;
 mod recorded;
+mod replayed;
 mod restart;
 mod screen;
 mod start;

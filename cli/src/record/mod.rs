@@ -9,6 +9,7 @@ mod progress;
 mod time;
 
 use crate::terminal::Failure;
+pub(crate) use part::PartArguments;
 use std::process::ExitCode;
 
 #[derive(clap::Args)]

@@ -1,10 +1,11 @@
 //! The file that is written now, with what the recorder knows of it.
 
 use crate::batch::Batch;
+use crate::described::DescribedModule;
 use crate::disk::Disk;
 use crate::error::DiskError;
 use crate::file::OpenFile;
-use crate::format::{MESSAGE_ENCODING, SCHEMA_ENCODING, VERSION, key, metadata};
+use crate::format::{MESSAGE_ENCODING, SCHEMA_ENCODING, VERSION, key, metadata, session_key};
 use crate::options::Session;
 use crate::status::ChannelState;
 use mcap::records::MessageHeader;
@@ -30,6 +31,8 @@ pub(crate) struct Current {
     /// Of those, how many came behind the last sync.
     pub(crate) unsynced: u64,
     described: Vec<Described>,
+    /// Modules that are described.
+    modules: usize,
     /// Losses of each channel that earlier files tell.
     lost_before: Vec<u64>,
     /// Losses that this one tells, too.
@@ -46,6 +49,7 @@ impl Current {
             messages: 0,
             unsynced: 0,
             described: Vec::new(),
+            modules: 0,
             lost_told: lost_before.clone(),
             lost_before,
             epoch: None,
@@ -53,8 +57,9 @@ impl Current {
     }
 
     /// Says what each file of a recording says of it, so that it stands alone.
-    pub(crate) fn introduce(&mut self, session: &Session, number: u32) -> Result<(), DiskError> {
+    pub(crate) fn introduce(&mut self, session: &Session, recording: &str, number: u32) -> Result<(), DiskError> {
         let mut about = session.versions.clone();
+        about.insert(session_key::RECORDING.into(), recording.into());
         about.insert("format".into(), VERSION.to_string());
         about.insert("node".into(), session.node.clone());
         about.insert("file".into(), number.to_string());
@@ -63,8 +68,15 @@ impl Current {
         self.file.end_chunk()
     }
 
-    /// Describes channels that are new here, in a chunk of their own: they are found though another chunk is damaged.
-    pub(crate) fn describe(&mut self, channels: &[Arc<ChannelState>], epoch: u64) -> Result<(), DiskError> {
+    /// Describes modules and channels that are new here; channels in a chunk of their own: they are found though another
+    /// chunk is damaged.
+    pub(crate) fn describe(
+        &mut self,
+        modules: &[Arc<DescribedModule>],
+        channels: &[Arc<ChannelState>],
+        epoch: u64,
+    ) -> Result<(), DiskError> {
+        self.describe_modules(modules)?;
         if self.described.len() == channels.len() {
             return Ok(());
         }
@@ -73,6 +85,18 @@ impl Current {
             let id = channel_of_epoch(&mut self.file, channel, schema, epoch)?;
             self.described.push(Described { epoch, schema, id });
         }
+        self.file.end_chunk()
+    }
+
+    /// Describes modules that are new here.
+    pub(crate) fn describe_modules(&mut self, modules: &[Arc<DescribedModule>]) -> Result<(), DiskError> {
+        if self.modules == modules.len() {
+            return Ok(());
+        }
+        for module in &modules[self.modules..] {
+            self.file.metadata(metadata::DESCRIPTION, module.texts())?;
+        }
+        self.modules = modules.len();
         self.file.end_chunk()
     }
 

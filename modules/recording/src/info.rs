@@ -1,5 +1,6 @@
 //! What is in a file.
 
+use crate::described::DescribedModule;
 use crate::error::{Damage, ReadError};
 use crate::format::{self, key, metadata};
 use crate::read::contents::{Contents, Ending, Item};
@@ -46,6 +47,8 @@ pub struct Info {
     pub session: BTreeMap<String, String>,
     /// Texts of the configuration, by file name.
     pub configuration: BTreeMap<String, String>,
+    /// Modules of which something is recorded, each interface of them once.
+    pub described: Vec<DescribedModule>,
     /// What else the file says of itself: `rohrpost.recovered`, `rohrpost.cut`, `rohrpost.merged`, and others'.
     pub others: Vec<(String, BTreeMap<String, String>)>,
 }
@@ -196,6 +199,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         epochs: Vec::new(),
         session: BTreeMap::new(),
         configuration: BTreeMap::new(),
+        described: Vec::new(),
         others: Vec::new(),
     };
     let mut lost = BTreeMap::new();
@@ -207,6 +211,11 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
             metadata::CLOSED => info.closed_because = texts.remove("reason"),
             // Epochs are told by the channels.
             metadata::EPOCH => {}
+            metadata::DESCRIPTION => match DescribedModule::read(&texts) {
+                Some(module) if info.described.contains(&module) => {}
+                Some(module) => info.described.push(module),
+                None => info.others.push((name, texts)),
+            },
             _ => info.others.push((name, texts)),
         }
     }

@@ -43,7 +43,7 @@
 //!   chunk has no length, and readers stop before it if the writer was killed.
 //! - **Channels are described in a chunk of their own,** and again in the index: one damaged chunk costs its messages
 //!   only.
-//! - **Each file stands alone:** session, configuration, types and channels are in each; counts of lost messages are
+//! - **Each file stands alone:** session, configuration, descriptions of modules, types and channels are in each; counts of lost messages are
 //!   those since its beginning.
 //! - **A failed file is cut back** to its last whole chunk, so that no message is in two files.
 //! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut`, `merge` and `draw`.
@@ -57,6 +57,7 @@
 mod batch;
 mod current;
 mod cut;
+mod described;
 mod disk;
 mod drawn;
 mod error;
@@ -84,6 +85,7 @@ mod writer;
 
 pub use batch::Message;
 pub use cut::{CutError, cut};
+pub use described::DescribedModule;
 pub use drawn::{DrawError, DrawOptions, Drawn, draw};
 pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
@@ -96,4 +98,4 @@ pub use rewrite::{Progress, RewriteError};
 pub use rotate::Rotation;
 pub use selection::{SelectError, Selection};
 pub use status::{ChannelStatus, Failures, Problem, Status};
-pub use writer::{ChannelError, ChannelId, ChannelSpec, StartError, WriteError, Writer};
+pub use writer::{ChannelError, ChannelId, ChannelSpec, OtherInterface, StartError, WriteError, Writer};
