@@ -243,11 +243,16 @@ fn what_is_replayed_and_recorded_again_is_the_same_and_a_fresh_mapper_draws_the_
 fn a_replay_is_paused_stepped_and_sought_by_calls() {
     let place = Place::new();
     let first = record(&place);
+    let file = first.to_str().unwrap();
+    let told = place.say(&["replay", file, "--from", "+2s", "--until", "+1s"]).fails();
+    assert!(told.contains("the time range is empty"), "{told}");
+    let told = place.say(&["replay", file, "--run", "mapper.7"]).fails();
+    assert!(told.contains("--run mapper.7: the configuration has no such module; it has output.0"), "{told}");
     let mut replay = replay(&place, &first, &["--paused"]);
     let robot = replaying(&place, &mut replay);
     let clock = SystemClock::open(&robot.node);
     let began = wait("time begins", || Some(position(&place)).filter(|position| position["time_ns"] != 0));
-    assert_eq!((&began["paused"], &began["played"], &began["at_s"]), (&true.into(), &0.into(), &0.0.into()));
+    assert_eq!((&began["paused"], &began["played"], began["at_s"].as_f64()), (&true.into(), &0.into(), Some(0.0)));
     place.say(&["call", "replay.0", "step"]).ok();
     let played = |count: u64| move |position: &Value| position["played"].as_u64() >= Some(count);
     let stepped = wait("a value is played", || Some(position(&place)).filter(played(1)));

@@ -81,8 +81,8 @@ impl PlayedChannels {
         self.by_topic.values().filter(|channel| channel.has_played).count() as u32
     }
 
-    /// The node's epoch in the place of a recorded one. Streams learn of a step of time one after the other: a value may
-    /// be of the epoch before.
+    /// The node's epoch in the place of a recorded one. Streams learn of a step of time one after the other: a value
+    /// may be of the epoch before.
     fn epoch_of(&self, recorded: u64) -> u64 {
         let known = self.epochs.iter().find(|(earlier, _)| *earlier == recorded);
         known.or(self.epochs.last()).map_or(0, |(_, epoch)| *epoch)

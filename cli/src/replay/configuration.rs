@@ -26,7 +26,7 @@ const COMMANDS_MIN: (u16, u32) = (32, 1024);
 
 /// What the GUI is to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Drawing {
+pub(super) enum ReplayDrawing {
     Nothing,
     /// Write this file.
     File(PathBuf),
@@ -45,7 +45,7 @@ pub(super) struct ReplayWish<'a> {
     pub(super) runs: &'a [String],
     /// Names and topics that are played; none: all.
     pub(super) names: &'a [String],
-    pub(super) drawing: Drawing,
+    pub(super) drawing: ReplayDrawing,
     /// The file with saved parameters.
     pub(super) saved: Option<&'a Path>,
 }
@@ -76,7 +76,7 @@ impl ReplayWish<'_> {
             }
             running.push(module);
         }
-        let gui = installation.classes.id(GUI).filter(|_| self.drawing != Drawing::Nothing);
+        let gui = installation.classes.id(GUI).filter(|_| self.drawing != ReplayDrawing::Nothing);
         running.extend(installation.modules.iter().filter(|module| Some(module.name.class()) == gui));
         // In the order of their start.
         let is_running = |module: &&Module| running.iter().any(|running| running.name == module.name);
@@ -246,9 +246,9 @@ impl ReplayWish<'_> {
             self.find_paths(settings);
             if let (true, Some(settings)) = (is_gui, settings.as_table_mut()) {
                 match &self.drawing {
-                    Drawing::File(file) => drop(settings.insert("file".into(), text_of(file))),
-                    Drawing::Window => drop(settings.insert("viewer".into(), "window".into())),
-                    Drawing::Nothing => {}
+                    ReplayDrawing::File(file) => drop(settings.insert("file".into(), text_of(file))),
+                    ReplayDrawing::Window => drop(settings.insert("viewer".into(), "window".into())),
+                    ReplayDrawing::Nothing => {}
                 }
             }
         }

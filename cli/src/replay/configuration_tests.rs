@@ -59,7 +59,7 @@ fn made(text: &str, modules: &[(&str, Description)], runs: &[&str], names: &[&st
         recorded: &recorded,
         runs: &runs,
         names: &names,
-        drawing: Drawing::Nothing,
+        drawing: ReplayDrawing::Nothing,
         saved: None,
     };
     let played = wish.played().unwrap();
@@ -148,7 +148,7 @@ fn what_cannot_be_played_is_refused_in_words() {
             recorded: &recorded,
             runs: &runs,
             names: &names,
-            drawing: Drawing::Nothing,
+            drawing: ReplayDrawing::Nothing,
             saved: None,
         };
         let told = wish.played().map(|_| ()).unwrap_err().to_string();
@@ -174,7 +174,7 @@ fn paths_in_settings_begin_where_they_did() {
         recorded: &recorded,
         runs: &runs,
         names: &[],
-        drawing: Drawing::Nothing,
+        drawing: ReplayDrawing::Nothing,
         saved: None,
     };
     let (text, _) = wish.text(&wish.played().unwrap(), Table::new()).unwrap();

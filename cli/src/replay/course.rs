@@ -1,5 +1,5 @@
-//! The course of a replay that can be paused, stepped, sought and repeated: what is to be done next, by the node's time.
-//! It has no clock.
+//! The course of a replay that can be paused, stepped, sought and repeated: what is to be done next, by the node's
+//! time. It has no clock.
 
 use rohrpost_recording::{Cue, Message, Player, ReadError, RecordedChannel};
 use std::sync::Arc;
@@ -35,7 +35,7 @@ pub(super) enum Move<'a> {
 
 /// A step while it is paused.
 #[derive(Clone, Copy, Debug)]
-enum Step {
+enum CourseStep {
     /// To the next value.
     Next,
     /// To this time.
@@ -58,7 +58,7 @@ pub(super) struct Course {
     player: Player,
     part: Part,
     is_paused: bool,
-    step: Option<Step>,
+    step: Option<CourseStep>,
     /// Time has begun since the last seek.
     has_begun: bool,
     /// There is no further value in this round.
@@ -111,12 +111,12 @@ impl Course {
 
     /// Pauses, and plays the next value.
     pub(super) fn step(&mut self) {
-        (self.is_paused, self.step) = (true, Some(Step::Next));
+        (self.is_paused, self.step) = (true, Some(CourseStep::Next));
     }
 
     /// Pauses, and plays what is due until this time.
     pub(super) fn step_until(&mut self, until_ns: u64) {
-        (self.is_paused, self.step) = (true, Some(Step::Until(until_ns)));
+        (self.is_paused, self.step) = (true, Some(CourseStep::Until(until_ns)));
     }
 
     /// Goes to the first value that arrived then or later; to the end if there is none.
@@ -144,8 +144,8 @@ impl Course {
         }
         let due_ns = match self.step {
             None => now_ns,
-            Some(Step::Next) => u64::MAX,
-            Some(Step::Until(until_ns)) => until_ns,
+            Some(CourseStep::Next) => u64::MAX,
+            Some(CourseStep::Until(until_ns)) => until_ns,
         };
         let end_ns = self.part.until_ns.unwrap_or(u64::MAX);
         Ok(match self.player.poll(due_ns)? {
@@ -155,7 +155,7 @@ impl Course {
             }
             Cue::Begin { system_ns, epoch } => {
                 self.has_begun = true;
-                if let Some(Step::Until(until_ns)) = &mut self.step {
+                if let Some(CourseStep::Until(until_ns)) = &mut self.step {
                     // What is left of the step is left after the step of time.
                     *until_ns = system_ns.saturating_add(until_ns.saturating_sub(now_ns));
                 }
@@ -168,7 +168,7 @@ impl Course {
             Cue::Message(channel, message) => {
                 self.has_played = true;
                 let time_ns = self.step.map(|_| message.arrival_ns);
-                self.step = self.step.filter(|step| matches!(step, Step::Until(_)));
+                self.step = self.step.filter(|step| matches!(step, CourseStep::Until(_)));
                 Move::Play { time_ns, channel, message }
             }
             Cue::Wait { .. } if self.step.is_some() => {

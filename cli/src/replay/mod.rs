@@ -20,7 +20,7 @@ use crate::launch::end;
 use crate::record::PartArguments;
 use crate::speech::Speech;
 use crate::terminal::{Failure, say};
-use configuration::{Drawing, NODE, PlayedModules, ReplayWish, saved_of};
+use configuration::{NODE, PlayedModules, ReplayDrawing, ReplayWish, saved_of};
 pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::launch::{Launch, events};
@@ -102,12 +102,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let speech = Speech::begin()?;
     let resolved = crate::resolved::of_node(&installation, NODE);
     let mut launch = Launch::begin(installation, NODE, std::env::current_exe()?, events()?, &resolved)?;
-    let mut session = ReplaySession::new(&launch, &made.player, &made.played)?;
-    let outcome = session.watch(&mut launch, &speech, arguments.quiet, arguments.paused);
-    let summary = session.summary(&mut launch);
+    let summary = ReplaySession::new(&launch, &made.player, &made.played).and_then(|mut session| {
+        session.watch(&mut launch, &speech, arguments.quiet, arguments.paused)?;
+        session.summary(&mut launch)
+    });
     let code = end(launch, &speech);
     speech.settle();
-    outcome?;
     say(summary?.trim_end());
     drawn(drawing, begun);
     Ok(code)
@@ -135,9 +135,9 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         }
     };
     let drawing = match (arguments.no_gui, arguments.viewer) {
-        (true, _) => Drawing::Nothing,
-        (false, true) => Drawing::Window,
-        (false, false) => Drawing::File(here.join(DRAWING)),
+        (true, _) => ReplayDrawing::Nothing,
+        (false, true) => ReplayDrawing::Window,
+        (false, false) => ReplayDrawing::File(here.join(DRAWING)),
     };
     let wish = ReplayWish {
         installation: &source,
@@ -200,6 +200,11 @@ fn settings(
     let mut whole = recorded.infos[0].clone();
     (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
     let part = arguments.part.of(&whole, &[]);
+    if let (Some(from_ns), Some(until_ns)) = (part.from_ns, part.until_ns)
+        && from_ns >= until_ns
+    {
+        return Err("the time range is empty: --until is not behind --from".into());
+    }
     let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));
     let mut settings = Table::new();
     for (key, value) in [

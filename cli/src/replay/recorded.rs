@@ -63,8 +63,8 @@ impl RecordedFiles {
                 if known.hash() != description.hash() {
                     let (first, second) = (first.path.display(), info.path.display());
                     return Err(format!(
-                        "{name} has one interface ({:08x}) in {first} and another ({:08x}) in {second}; replay the files \
-                         one by one, or `--names` without it",
+                        "{name} has one interface ({:08x}) in {first} and another ({:08x}) in {second}; replay the \
+                         files one by one, or `--names` without it",
                         known.hash(),
                         description.hash()
                     )

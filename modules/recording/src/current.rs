@@ -68,8 +68,8 @@ impl Current {
         self.file.end_chunk()
     }
 
-    /// Describes modules and channels that are new here; channels in a chunk of their own: they are found though another
-    /// chunk is damaged.
+    /// Describes modules and channels that are new here; channels in a chunk of their own: they are found though
+    /// another chunk is damaged.
     pub(crate) fn describe(
         &mut self,
         modules: &[Arc<DescribedModule>],

@@ -184,8 +184,8 @@ impl Context {
         &self.clock
     }
 
-    /// Becomes the writer of the node's time, which is a log's (`source = "log"`): for a module that plays one. There is
-    /// to be one writer on a node. Until it begins, the node has no time.
+    /// Becomes the writer of the node's time, which is a log's (`source = "log"`): for a module that plays one. There
+    /// is to be one writer on a node. Until it begins, the node has no time.
     ///
     /// ```
     /// # use rohrpost_modules::{ModuleError, runtime::{Context, TimeTeller}};
@@ -197,7 +197,8 @@ impl Context {
     /// ```
     ///
     /// # Errors
-    /// [`ContextError::OtherTime`] where the time is another one, [`ContextError::Node`] when its page cannot be opened.
+    /// [`ContextError::OtherTime`] where the time is another one, [`ContextError::Node`] when its page cannot be
+    /// opened.
     pub fn tell_time(&self) -> Result<TimeTeller, ContextError> {
         if self.installation.time != TimeSource::Log {
             return Err(ContextError::OtherTime);

@@ -18,12 +18,13 @@ pub struct TimeTeller {
 }
 
 impl TimeTeller {
-    /// Of a node whose time is to come from a log.
+    /// Of a node that takes its time from a log.
     pub(super) fn of(node: &Arc<Node>) -> Result<Self, NodeError> {
         Ok(Self { keeper: TimeKeeper::resume(node)?, has_begun: false })
     }
 
-    /// Begins an epoch, at this time (ns since 1970), which passes `pace` times as fast as the world's; 0 lets it stand.
+    /// Begins an epoch, at this time (ns since 1970), which passes `pace` times as fast as the world's; 0 lets it
+    /// stand.
     /// Returns its number: `least_epoch`, or the next one if the node has had that.
     ///
     /// ```

@@ -9,8 +9,8 @@ use rohrpost_mailbox::{Name, Stamp};
 impl Context {
     /// Publishes a value as the module that this one stands in for under the name `from`
     /// ([`crate::Module::stand_ins`]). Its item `number` is data, or a stream, of which this is the next record. The
-    /// value is postcard of the type that the description says; nobody looks whether it is. Its time is in ns since 1970,
-    /// of the present epoch; a record of a stream may be of an earlier one, with a stamp that says so.
+    /// value is postcard of the type that the description says; nobody looks whether it is. Its time is in ns since
+    /// 1970, of the present epoch; a record of a stream may be of an earlier one, with a stamp that says so.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::{Context, ContextError};
