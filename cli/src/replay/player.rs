@@ -30,6 +30,8 @@ use std::time::{Duration, Instant};
 /// Values played at once at most, and the time after which no further one is begun: commands are heard in between.
 const AT_ONCE_MAX: usize = 64;
 const AT_ONCE_TIME: Duration = Duration::from_millis(2);
+/// Within this time a chunk of a recording is read and unpacked.
+const LEISURE: Duration = Duration::from_millis(5);
 /// Where it is, is published so often.
 const TOLD: Duration = Duration::from_millis(200);
 /// The timer's shortest time; none would switch it off.
@@ -174,9 +176,7 @@ impl RecordingPlayer {
                     self.channels.play(context, &channel, &message)?;
                 }
                 Move::Advance { time_ns } => drop(self.time.advance_to(time_ns)),
-                Move::Wait { until_ns } => {
-                    return Ok(Some(Duration::from_nanos(((until_ns - now_ns) as f64 / self.rate) as u64)));
-                }
+                Move::Wait { until_ns } => return Ok(Some(self.read_while_waiting(until_ns))),
                 // Time goes on behind the end: modules that run have work left.
                 Move::Again | Move::End => {}
                 Move::Rest => return Ok(None),
@@ -186,6 +186,16 @@ impl RecordingPlayer {
             }
         }
         Ok(Some(Duration::ZERO))
+    }
+
+    /// How long until then. If there is time, it reads what comes next.
+    fn read_while_waiting(&mut self, until_ns: u64) -> Duration {
+        let left = || Duration::from_nanos((until_ns.saturating_sub(self.clock.now().ns) as f64 / self.rate) as u64);
+        if left() >= LEISURE {
+            // What is wrong here is told when it is to be played.
+            let _ = self.course.read_ahead();
+        }
+        left()
     }
 
     /// Time passes at the rate, or stands still; there is something to look after.

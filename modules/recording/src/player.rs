@@ -130,6 +130,15 @@ impl Player {
         Ok(Cue::Message(channel, message))
     }
 
+    /// Reads and unpacks the chunk behind the one that is played, if that is not done yet. To be called while there is
+    /// time: it takes milliseconds, which else a message is late.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn read_ahead(&mut self) -> Result<(), ReadError> {
+        self.reader.as_mut().map_or(Ok(()), Reader::read_ahead)
+    }
+
     /// Goes to the first message that arrived at this time or later, in the order of the files; with 0 to the
     /// beginning. Time begins anew there. False if there is none: then it is at the end.
     ///

@@ -72,3 +72,28 @@ impl TimeTeller {
         is_later && self.keeper.write(&TimeRecord { monotonic_ns, system_ns, ..last })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rohrpost_mailbox::SystemClock;
+
+    #[test]
+    fn time_begins_in_an_epoch_of_its_own_and_goes_on_to_later_times_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+        TimeKeeper::await_source(&node, TimeSource::Log).unwrap();
+        let mut time = TimeTeller::of(&node).unwrap();
+        assert!(!time.has_begun() && !time.set_pace(1.0) && !time.advance_to(5), "there is no time yet");
+        let clock = SystemClock::open(&node);
+        let now = || (clock.now().epoch, clock.now().ns);
+        assert!(!clock.record().unwrap().is_known());
+        assert_eq!((time.begin(1_000, 0.0, 9), now()), (9, (9, 1_000)));
+        assert!(clock.record().unwrap().is_known());
+        assert!(time.advance_to(1_500) && !time.advance_to(1_400));
+        assert_eq!(now(), (9, 1_500));
+        assert_eq!((time.begin(10, 0.0, 3), now()), (10, (10, 10)), "the node has had epoch 3, or may have");
+        assert!(time.set_pace(2.0));
+        assert_eq!(clock.record().unwrap().pace_ppb, 2_000_000_000);
+    }
+}
