@@ -61,7 +61,7 @@ pub use rohrpost_modules::call::{CallError, Fault, Pending};
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::runtime::{
     BadRate, ClientError, Context, ContextError, Moment, OpenValue, Rate, Received, Record, RecordError, Start,
-    StartError, Stream, StreamReadError, StreamSubscription, Subscription, ToolLink, Unreadable, describe,
+    StartError, Stream, StreamReadError, StreamSubscription, Subscription, TimeTeller, ToolLink, Unreadable, describe,
     find_other_versions, find_running,
 };
 pub use rohrpost_modules::serde;

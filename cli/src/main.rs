@@ -41,6 +41,7 @@ mod ping;
 mod published;
 mod quantities;
 mod record;
+mod replay;
 mod resolved;
 mod round;
 mod router;
@@ -123,6 +124,8 @@ enum Command {
     Param(param::Arguments),
     /// Describe, recover, cut and merge files of recordings.
     Record(record::Arguments),
+    /// Play recordings in the place of the modules that were recorded.
+    Replay(replay::Arguments),
     /// Show how well each node knows the common time.
     Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
@@ -177,6 +180,7 @@ fn main() -> ExitCode {
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
         Command::Record(arguments) => record::run(&arguments),
+        Command::Replay(arguments) => replay::run(&arguments),
         Command::Time(arguments) => time::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

@@ -1,9 +1,9 @@
 //! `rohrpost run`: runs a built-in module, started by launch or by hand.
 
-use crate::logd;
 use crate::terminal::Failure;
+use crate::{logd, replay};
 use rohrpost::Start;
-use rohrpost_config::{BUILTINS, RECORDER};
+use rohrpost_config::{BUILTINS, RECORDER, REPLAY};
 use rohrpost_modules::runtime::exit;
 use std::process::ExitCode;
 
@@ -26,6 +26,9 @@ pub(super) fn run(arguments: Arguments) -> Result<ExitCode, Failure> {
     if arguments.builtin == RECORDER {
         // Not with the others: the author of a module does not compile what it needs.
         return Ok(exit(logd::run(start)));
+    }
+    if arguments.builtin == REPLAY {
+        return Ok(exit(replay::play(start)));
     }
     match rohrpost_modules::builtin::run(&arguments.builtin, start) {
         Some(result) => Ok(exit(result)),

@@ -82,7 +82,7 @@ pub use installation::Installation;
 pub use keys::{KEY_BYTES, Key, Keys, KeysError, check_secret};
 pub use mailbox::{CLAIMS_MAX, MailboxSpec, Mailboxes, SLOTS_MAX, TRANSIT};
 pub use module::{
-    BUILTINS, Module, Program, RECORDER, Restart, RestartPolicy, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER,
+    BUILTINS, Module, Program, RECORDER, REPLAY, Restart, RestartPolicy, SPIN_MAX, Start, TCP_CLIENT, TCP_ROUTER,
 };
 pub use node::{Node, Reach, System};
 pub use output::{Level, LineFormat, Output};

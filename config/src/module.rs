@@ -18,8 +18,10 @@ pub const TCP_CLIENT: &str = "tcp-client";
 pub const TCP_ROUTER: &str = "tcp-router";
 /// The built-in module that records.
 pub const RECORDER: &str = "logd";
+/// The built-in module that plays recordings.
+pub const REPLAY: &str = "replay";
 /// The modules that the `rohrpost` program itself contains.
-pub const BUILTINS: [&str; 6] = ["sim", "carmen", "mapper", "pilot", "output", RECORDER];
+pub const BUILTINS: [&str; 7] = ["sim", "carmen", "mapper", "pilot", "output", RECORDER, REPLAY];
 
 /// What runs as a module.
 #[derive(Clone, Debug, PartialEq, Eq)]

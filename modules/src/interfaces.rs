@@ -2,11 +2,13 @@
 //! modules.
 
 mod recorder;
+mod replay;
 mod router;
 mod slots;
 mod tcp;
 
 pub use recorder::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecorderProxy, RecordingState};
+pub use replay::{Replay, ReplayInterface, ReplayPosition, ReplayProxy, ReplayRefusal};
 pub use router::{
     Age, Carried, CarriedLoss, ClassCarried, ClockRole, ClockState, FlowState, FlowStates, LevelWaiting, LinkCounters,
     LinkState, Links, PeerLink, Rejected, Router, RouterInterface, RouterProxy, SocketFailure,

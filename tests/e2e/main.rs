@@ -53,6 +53,7 @@ mod recorded;
 mod recorded_control;
 mod recorded_killed;
 mod recorded_nodes;
+mod replayed;
 mod restart;
 mod screen;
 #[path = "../../mailbox/tests/common/small_memory.rs"]

@@ -1,7 +1,7 @@
 //! `rohrpost record`: files of a recording at the command line.
 
 use crate::harness::Place;
-use rohrpost::schema::{Field, Members, Named, Schema, Type};
+use rohrpost::schema::{DataItem, DataKind, Description, Field, Members, Named, Schema, Type};
 use rohrpost::types::Pose;
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use std::collections::BTreeMap;
@@ -32,6 +32,11 @@ pub(crate) fn recording_that_says(place: &Place, text: &str, ty: &Type) -> PathB
     let texts = BTreeMap::from([(text.to_owned(), text.to_owned())]);
     let session = Session { node: text.into(), versions: texts.clone(), configuration: texts.clone() };
     let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), "odd") }, session).unwrap();
+    let field = Field::new(text, ty.clone());
+    let data = vec![DataItem { number: 1, kind: DataKind::Data, field }];
+    let description =
+        Description { name: text.into(), class: text.into(), text: text.into(), functions: Vec::new(), data };
+    writer.describe(text, &description).unwrap();
     let channel = writer.channel(&ChannelSpec { name: text, item: text, ty, texts }).unwrap();
     let message = Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: 0, data: text.as_bytes() };
     writer.write(channel, &message).unwrap();

@@ -9,7 +9,7 @@ use std::time::SystemTime;
 pub(super) const GUI: &str = "gui";
 
 /// The file that the GUI will write, if it writes one.
-pub(super) fn drawing(installation: &Installation) -> Option<PathBuf> {
+pub(crate) fn drawing(installation: &Installation) -> Option<PathBuf> {
     let class = installation.classes.id(GUI)?;
     let gui = installation.modules.iter().find(|module| module.name.class() == class)?;
     let file = gui.settings.get("file").filter(|_| !gui.settings.contains_key("viewer"))?;
@@ -17,7 +17,7 @@ pub(super) fn drawing(installation: &Installation) -> Option<PathBuf> {
 }
 
 /// Prints where the drawing is, if it was written since.
-pub(super) fn drawn(drawing: Option<PathBuf>, begun: SystemTime) {
+pub(crate) fn drawn(drawing: Option<PathBuf>, begun: SystemTime) {
     let is_new = |path: &PathBuf| path.metadata().and_then(|file| file.modified()).is_ok_and(|at| at >= begun);
     if let Some(path) = drawing.filter(is_new) {
         let path = path.canonicalize().unwrap_or(path);

@@ -14,14 +14,14 @@ const IN_USE: &str = "in-use";
 const NOT_LOCKED: &str = "not-locked-yet";
 
 /// A demo's folder; removed on drop.
-pub(super) struct Folder {
+pub(crate) struct Folder {
     folder: TempDir,
     _in_use: File,
 }
 
 impl Folder {
     /// Creates a folder among temporary files. Removes the folders of killed demos.
-    pub(super) fn new() -> io::Result<Self> {
+    pub(crate) fn new() -> io::Result<Self> {
         let temp = std::env::temp_dir();
         remove_abandoned(&temp);
         Self::new_in(&temp)
@@ -37,7 +37,7 @@ impl Folder {
         Ok(Self { folder, _in_use: in_use })
     }
 
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.folder.path()
     }
 }

@@ -35,8 +35,8 @@ struct SourceModule {
     name: String,
     /// The module of its process, if that is on this node.
     own: Option<Name>,
-    /// It has described itself.
-    has_answered: bool,
+    /// As it has described itself.
+    description: Option<Description>,
     asking: DescriptionRequest,
 }
 
@@ -76,7 +76,7 @@ impl Taps {
                 from,
                 name: installation.classes.format(from),
                 own: host.map(|host| host.name),
-                has_answered: false,
+                description: None,
                 asking: DescriptionRequest::default(),
             }
         };
@@ -95,6 +95,7 @@ impl Taps {
 
     /// A recording begins: what is known already has its channels from the first file on.
     pub(super) fn begin(&mut self, writer: &mut Writer) {
+        self.sources.iter().for_each(|source| source.describe(writer));
         for tap in &mut self.taps {
             tap.sampler.begin();
             tap.open_channel(writer);
@@ -104,15 +105,16 @@ impl Taps {
     /// Subscribes to what modules offer that run by now. Nobody is waited for.
     pub(super) fn find(&mut self, context: &mut Context, writer: &mut Writer) -> Result<(), ModuleError> {
         let node = context.link().borrow().participant().node().clone();
-        for source in self.sources.iter_mut().filter(|source| !source.has_answered) {
+        for source in self.sources.iter_mut().filter(|source| source.description.is_none()) {
             let description = match source.own {
                 Some(host) if runs(&node, host) => noted(&node, source.from),
                 Some(_) => None,
                 None => source.asking.poll(context, source.from),
             };
             let Some(description) = description else { continue };
-            source.has_answered = true;
             let mut taps = source.taps(&self.recording, &description);
+            source.description = Some(description);
+            source.describe(writer);
             taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
@@ -156,6 +158,14 @@ impl Taps {
 }
 
 impl SourceModule {
+    /// What it offers is said in each file, so that replay can stand in for it.
+    fn describe(&self, writer: &mut Writer) {
+        let Some(description) = &self.description else { return };
+        if let Err(error) = writer.describe(&self.name, description) {
+            tracing::error!("{error}");
+        }
+    }
+
     /// What is to be recorded of what the module offers.
     fn taps(&self, recording: &Recording, description: &Description) -> Vec<Tap> {
         let has = |items: &&RecordedItems, is_stream: bool| {

@@ -9,6 +9,7 @@ use rohrpost::schema::describe_type;
 use rohrpost_recording::format::PROFILE;
 use rohrpost_recording::{ChannelInfo, Info};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -77,6 +78,10 @@ fn text(info: &Info) -> String {
         lines.push(session.collect::<Vec<_>>().join(", "));
     }
     lines.extend(info.marks.iter().map(|mark| format!("mark at {}: {}", stamp_text(mark.time_ns), mark.text)));
+    if !info.described.is_empty() {
+        let names: BTreeSet<&str> = info.described.iter().map(|module| module.name.as_str()).collect();
+        lines.push(format!("described for replay: {}", names.into_iter().collect::<Vec<_>>().join(", ")));
+    }
     for (name, texts) in &info.others {
         let texts: Vec<String> = texts.iter().map(|(key, text)| format!("{key} {text}")).collect();
         lines.push(format!("{name}: {}", texts.join(", ")));
@@ -137,6 +142,10 @@ fn as_json(info: &Info) -> Value {
     );
     let damages = info.damages.iter().map(|(at, what)| json!({"at": at, "what": what.to_string()}));
     let marks = info.marks.iter().map(|its| json!({"time_ns": its.time_ns, "epoch": its.epoch, "text": its.text}));
+    let described = info.described.iter().map(|module| {
+        let description = &module.description;
+        json!({"name": module.name, "class": description.class, "interface": format!("{:08x}", description.hash())})
+    });
     let others = info.others.iter().map(|(name, texts)| json!({"name": name, "texts": texts}));
     json!({
         "path": info.path, "bytes": info.bytes, "is_closed": info.is_closed, "closed_because": info.closed_because,
@@ -144,7 +153,7 @@ fn as_json(info: &Info) -> Value {
         "repeated": info.repeated, "lost": info.lost,
         "first_ns": info.first_ns, "last_ns": info.last_ns, "channels": channels.collect::<Vec<_>>(),
         "epochs": epochs.collect::<Vec<_>>(), "session": info.session, "configuration": info.configuration,
-        "marks": marks.collect::<Vec<_>>(), "others": others.collect::<Vec<_>>(),
-        "damages": damages.collect::<Vec<_>>(),
+        "marks": marks.collect::<Vec<_>>(), "described": described.collect::<Vec<_>>(),
+        "others": others.collect::<Vec<_>>(), "damages": damages.collect::<Vec<_>>(),
     })
 }

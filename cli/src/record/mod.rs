@@ -11,6 +11,7 @@ mod progress;
 mod time;
 
 use crate::terminal::Failure;
+pub(crate) use part::PartArguments;
 use rohrpost_recording::ControlCommand;
 use std::process::ExitCode;
 

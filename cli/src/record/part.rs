@@ -5,18 +5,18 @@ use rohrpost_recording::{Info, Selection};
 
 /// A time range.
 #[derive(clap::Args)]
-pub(super) struct PartArguments {
+pub(crate) struct PartArguments {
     /// What arrived from then on: seconds since 1970, from the begin (+10s), or before the end (-10s).
     #[arg(long, value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
     from: Option<RecordTime>,
     /// What arrived before then.
-    #[arg(long, value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
+    #[arg(long, alias = "to", value_name = "TIME", value_parser = parse_time, allow_hyphen_values = true)]
     until: Option<RecordTime>,
 }
 
 impl PartArguments {
     /// Of these names in a file.
-    pub(super) fn of(&self, info: &Info, names: &[String]) -> Selection {
+    pub(crate) fn of(&self, info: &Info, names: &[String]) -> Selection {
         Selection {
             from_ns: self.from.map(|time| time.in_file(info)),
             until_ns: self.until.map(|time| time.in_file(info)),

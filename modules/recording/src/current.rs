@@ -1,12 +1,13 @@
 //! The file that is written now, with what the recorder knows of it.
 
 use crate::batch::{Batch, Message};
+use crate::described::DescribedModule;
 use crate::disk::Disk;
 use crate::drawn::DrawingBeside;
 use crate::error::DiskError;
 use crate::file::OpenFile;
 use crate::format::{
-    CHUNK_BYTES_MAX, MESSAGE_ENCODING, MESSAGE_OVERHEAD_BYTES, SCHEMA_ENCODING, VERSION, key, metadata,
+    CHUNK_BYTES_MAX, MESSAGE_ENCODING, MESSAGE_OVERHEAD_BYTES, SCHEMA_ENCODING, VERSION, key, metadata, session_key,
 };
 use crate::newest::Newest;
 use crate::options::{Options, Session};
@@ -42,6 +43,8 @@ pub(crate) struct Current {
     drawing: Option<DrawingBeside>,
     /// It has what came before it.
     has_begun: bool,
+    /// Modules that are described.
+    modules: usize,
     /// Losses of each channel that earlier files tell.
     lost_before: Vec<u64>,
     /// Losses that this one tells, too.
@@ -62,6 +65,7 @@ impl Current {
             chunk_bytes: 0,
             drawing: options.drawn.as_ref().map(DrawingBeside::new),
             has_begun: false,
+            modules: 0,
             lost_told: lost_before.clone(),
             lost_before,
             epoch: None,
@@ -69,8 +73,9 @@ impl Current {
     }
 
     /// Says what each file of a recording says of it, so that it stands alone.
-    pub(crate) fn introduce(&mut self, session: &Session, number: u32) -> Result<(), DiskError> {
+    pub(crate) fn introduce(&mut self, session: &Session, recording: &str, number: u32) -> Result<(), DiskError> {
         let mut about = session.versions.clone();
+        about.insert(session_key::RECORDING.into(), recording.into());
         about.insert("format".into(), VERSION.to_string());
         about.insert("node".into(), session.node.clone());
         about.insert("file".into(), number.to_string());
@@ -79,8 +84,15 @@ impl Current {
         self.file.end_chunk()
     }
 
-    /// Describes channels that are new here, in a chunk of their own: they are found though another chunk is damaged.
-    pub(crate) fn describe(&mut self, channels: &[Arc<ChannelState>], epoch: u64) -> Result<(), DiskError> {
+    /// Describes modules and channels that are new here; channels in a chunk of their own: they are found though
+    /// another chunk is damaged.
+    pub(crate) fn describe(
+        &mut self,
+        modules: &[Arc<DescribedModule>],
+        channels: &[Arc<ChannelState>],
+        epoch: u64,
+    ) -> Result<(), DiskError> {
+        self.describe_modules(modules)?;
         if self.described.len() == channels.len() {
             return Ok(());
         }
@@ -111,6 +123,18 @@ impl Current {
             // So that the file's time begins with what is new in it.
             self.put(id, &Message { arrival_ns: first.arrival_ns, ..message })?;
         }
+        self.end_chunk()
+    }
+
+    /// Describes modules that are new here.
+    pub(crate) fn describe_modules(&mut self, modules: &[Arc<DescribedModule>]) -> Result<(), DiskError> {
+        if self.modules == modules.len() {
+            return Ok(());
+        }
+        for module in &modules[self.modules..] {
+            self.file.metadata(metadata::DESCRIPTION, module.texts())?;
+        }
+        self.modules = modules.len();
         self.end_chunk()
     }
 

@@ -26,6 +26,8 @@ pub mod metadata {
     pub const SESSION: &str = "rohrpost.session";
     /// The texts of the configuration: file name and content; in each file.
     pub const CONFIGURATION: &str = "rohrpost.configuration";
+    /// A module of which something is recorded, and what it offers: `name`, `class`, `interface`, `description`.
+    pub const DESCRIPTION: &str = "rohrpost.description";
     /// System time has stepped: `epoch`, and `arrival-ns` of the first message of it.
     pub const EPOCH: &str = "rohrpost.epoch";
     /// Messages that are not in the file: a count for each topic, from the file's beginning. The last one counts.
@@ -42,6 +44,12 @@ pub mod metadata {
     pub const DRAWN: &str = "rohrpost.drawn";
     /// The file was made by `merge`: a number and a name for each.
     pub const MERGED: &str = "rohrpost.merged";
+}
+
+/// Keys of a session's metadata.
+pub mod session_key {
+    /// Tells recordings apart: the same in all files of one, another in each other.
+    pub const RECORDING: &str = "recording";
 }
 
 /// Keys of a channel's metadata.

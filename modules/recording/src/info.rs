@@ -1,5 +1,6 @@
 //! What is in a file.
 
+use crate::described::DescribedModule;
 use crate::error::{Damage, ReadError};
 use crate::format::{self, key, metadata};
 use crate::order::Mark;
@@ -51,6 +52,8 @@ pub struct Info {
     pub configuration: BTreeMap<String, String>,
     /// Marks that were set, in the order of the file.
     pub marks: Vec<Mark>,
+    /// Modules of which something is recorded, each interface of them once.
+    pub described: Vec<DescribedModule>,
     /// What else the file says of itself: `rohrpost.recovered`, `rohrpost.cut`, `rohrpost.merged`, and others'.
     pub others: Vec<(String, BTreeMap<String, String>)>,
 }
@@ -205,6 +208,7 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         session: BTreeMap::new(),
         configuration: BTreeMap::new(),
         marks: Vec::new(),
+        described: Vec::new(),
         others: Vec::new(),
     };
     let mut lost = BTreeMap::new();
@@ -217,6 +221,11 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
             // Epochs are told by the channels.
             metadata::EPOCH => {}
             metadata::MARK if let Some(mark) = Mark::of_texts(&texts) => info.marks.push(mark),
+            metadata::DESCRIPTION => match DescribedModule::read(&texts) {
+                Some(module) if info.described.contains(&module) => {}
+                Some(module) => info.described.push(module),
+                None => info.others.push((name, texts)),
+            },
             _ => info.others.push((name, texts)),
         }
     }

@@ -43,9 +43,9 @@
 //!   chunk has no length, and readers stop before it if the writer was killed.
 //! - **Channels are described in a chunk of their own,** and again in the index: one damaged chunk costs its messages
 //!   only.
-//! - **Each file stands alone:** session, configuration, types and channels are in each; counts of lost messages are
-//!   those since its beginning. It begins with the newest message of each channel of which nothing came for a second,
-//!   in channels that say so ([`format::key::REPEATED`]): nothing counts them a second time.
+//! - **Each file stands alone:** session, configuration, descriptions of modules, types and channels are in each; counts
+//!   of lost messages are those since its beginning. It begins with the newest message of each channel of which nothing
+//!   came for a second, in channels that say so ([`format::key::REPEATED`]): nothing counts them a second time.
 //! - **A failed file is cut back** to its last whole chunk, so that no message is in two files.
 //! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut`, `merge` and `draw`.
 //! - **What other programs draw is made afterwards** ([`draw`]), or beside what is recorded ([`Options::drawn`]), in
@@ -60,6 +60,7 @@ mod batch;
 mod control;
 mod current;
 mod cut;
+mod described;
 mod disk;
 mod drawn;
 mod error;
@@ -90,6 +91,7 @@ mod writer;
 pub use batch::Message;
 pub use control::{CONTROL_LINE_BYTES_MAX, ControlAnswer, ControlCommand, ControlError, ControlLines};
 pub use cut::{CutError, cut};
+pub use described::DescribedModule;
 pub use drawn::{DrawError, DrawOptions, Drawn, DrawnBeside, draw};
 pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
@@ -103,4 +105,4 @@ pub use rewrite::{Progress, RewriteError};
 pub use rotate::Rotation;
 pub use selection::{SelectError, Selection};
 pub use status::{ChannelStatus, Failures, Problem, Status};
-pub use writer::{ChannelError, ChannelId, ChannelSpec, StartError, WriteError, Writer};
+pub use writer::{ChannelError, ChannelId, ChannelSpec, OtherInterface, StartError, WriteError, Writer};

@@ -134,6 +134,14 @@ impl Reader {
         }
     }
 
+    /// Reads and unpacks what comes behind the messages that are in memory.
+    pub(crate) fn read_ahead(&mut self) -> Result<(), ReadError> {
+        match &mut self.source {
+            ReaderSource::Whole(contents) => contents.read_ahead(),
+            ReaderSource::Part(_) => Ok(()),
+        }
+    }
+
     /// Goes to the next message, unless a search has gone there already.
     pub(crate) fn advance(&mut self) -> Result<(), ReadError> {
         if !std::mem::take(&mut self.is_ahead) {

@@ -15,6 +15,7 @@ mod orders;
 
 use crate::batch::Batch;
 use crate::current::Current;
+use crate::described::DescribedModule;
 use crate::disk::Disk;
 use crate::error::{DiskError, Shown};
 use crate::file::OpenFile;
@@ -26,6 +27,7 @@ use crate::rotate;
 use crate::shared::Shared;
 use crate::status::ChannelState;
 use std::collections::BTreeMap;
+use std::hash::{BuildHasher, RandomState};
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -38,8 +40,11 @@ pub(crate) struct Recorder {
     disk: Box<dyn Disk>,
     options: Options,
     session: Session,
+    /// Tells this recording from all others.
+    identity: String,
     shared: Arc<Shared>,
     channels: Vec<Arc<ChannelState>>,
+    described: Vec<Arc<DescribedModule>>,
     current: Option<Current>,
     /// What the next file begins with.
     newest: Newest,
@@ -62,8 +67,10 @@ impl Recorder {
             disk,
             options,
             session,
+            identity: format!("{:016x}", RandomState::new().hash_one(std::process::id())),
             shared,
             channels: Vec::new(),
+            described: Vec::new(),
             current: None,
             newest,
             number: 1,
@@ -159,7 +166,7 @@ impl Recorder {
         self.opened(now)?;
         self.learn_channels();
         if let Some(current) = &mut self.current {
-            current.describe(&self.channels, self.epoch)?;
+            current.describe(&self.described, &self.channels, self.epoch)?;
             current.begin(&self.newest, batch, &self.channels)?;
             // Before the messages behind the gap: whatever is read of them, the file tells what is missing.
             current.tell_lost(&self.channels)?;
@@ -172,12 +179,15 @@ impl Recorder {
     fn learn_channels(&mut self) {
         let known = self.channels.len();
         self.channels.extend(self.shared.channels_from(known));
+        let known = self.described.len();
+        self.described.extend(self.shared.described_from(known));
     }
 
     /// What is due by time.
     fn tick(&mut self, now: Instant) -> Result<(), DiskError> {
         self.learn_channels();
         let Some(current) = &mut self.current else { return Ok(()) };
+        current.describe_modules(&self.described)?;
         if now.duration_since(current.synced) >= self.options.sync {
             current.tell_lost(&self.channels)?;
             current.sync(&mut *self.disk, now)?;
@@ -225,7 +235,7 @@ impl Recorder {
         let current = self.current.insert(Current::new(file, &self.options, self.lost_told.clone(), now));
         let number = self.number;
         self.number += 1;
-        current.introduce(&self.session, number)
+        current.introduce(&self.session, &self.identity, number)
     }
 
     /// A file of the next name that is not taken.
@@ -246,6 +256,7 @@ impl Recorder {
     /// Closes the file, if there is one.
     fn close(&mut self, reason: &str) -> Result<(), DiskError> {
         let Some(current) = &mut self.current else { return Ok(()) };
+        current.describe_modules(&self.described)?;
         let texts = BTreeMap::from([("reason".to_owned(), reason.to_owned())]);
         current.tell_lost(&self.channels)?;
         current.file.metadata(metadata::CLOSED, texts)?;

@@ -1,19 +1,21 @@
 //! What the writer and its thread have in common.
 
+use crate::described::DescribedModule;
 use crate::inbox::Inbox;
 use crate::status::{ChannelState, Counts, Status};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The queue, the channels and the counts.
+/// The queue, the channels, the modules and the counts.
 pub(crate) struct Shared {
     pub(crate) inbox: Inbox,
     channels: Mutex<Vec<Arc<ChannelState>>>,
+    described: Mutex<Vec<Arc<DescribedModule>>>,
     counts: Mutex<Counts>,
 }
 
 impl Shared {
     pub(crate) fn new(inbox: Inbox) -> Self {
-        Self { inbox, channels: Mutex::default(), counts: Mutex::default() }
+        Self { inbox, channels: Mutex::default(), described: Mutex::default(), counts: Mutex::default() }
     }
 
     pub(crate) fn add(&self, channel: Arc<ChannelState>) {
@@ -23,6 +25,15 @@ impl Shared {
     /// Those behind the first `known`.
     pub(crate) fn channels_from(&self, known: usize) -> Vec<Arc<ChannelState>> {
         self.channels.lock().unwrap_or_else(PoisonError::into_inner)[known..].to_vec()
+    }
+
+    pub(crate) fn describe(&self, module: Arc<DescribedModule>) {
+        self.described.lock().unwrap_or_else(PoisonError::into_inner).push(module);
+    }
+
+    /// Those behind the first `known`.
+    pub(crate) fn described_from(&self, known: usize) -> Vec<Arc<DescribedModule>> {
+        self.described.lock().unwrap_or_else(PoisonError::into_inner)[known..].to_vec()
     }
 
     pub(crate) fn counts(&self) -> MutexGuard<'_, Counts> {

@@ -1,6 +1,7 @@
 //! The end of a recording that programs hold: channels, messages, counts. It never waits for the disk.
 
 use crate::batch::Message;
+use crate::described::DescribedModule;
 use crate::disk::{Disk, RealDisk};
 use crate::error::DiskError;
 use crate::format::{MESSAGE_BYTES_MAX, key, topic};
@@ -10,7 +11,7 @@ use crate::order::{Mark, Order, OrderError, OrderKind, PendingOrder};
 use crate::recorder::Recorder;
 use crate::shared::Shared;
 use crate::status::{ChannelState, Status};
-use rohrpost_schema::{Type, describe_type};
+use rohrpost_schema::{Description, Type, describe_type};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::PathBuf;
@@ -67,6 +68,20 @@ pub enum ChannelError {
     TooMany,
 }
 
+/// A module's description is not recorded, since one name has one interface.
+#[derive(Debug, PartialEq, Eq, Error)]
+#[error(
+    "{name} is recorded with interface {recorded:08x} already, not {offered:08x}; end the recording and begin another"
+)]
+pub struct OtherInterface {
+    /// The module.
+    pub name: String,
+    /// Hash of the interface so far.
+    pub recorded: u32,
+    /// Of the other one.
+    pub offered: u32,
+}
+
 /// Why a message is not recorded. It is counted as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum WriteError {
@@ -85,6 +100,8 @@ pub enum WriteError {
 pub struct Writer {
     shared: Arc<Shared>,
     channels: Vec<Arc<ChannelState>>,
+    /// Names of described modules, and hashes of their interfaces.
+    described: BTreeMap<String, u32>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -106,7 +123,8 @@ impl Writer {
         let shared = Arc::new(Shared::new(Inbox::new(options.queue_chunks)));
         let recorder = Recorder::new(disk, options, session, shared.clone());
         let thread = std::thread::Builder::new().name("recording".into()).spawn(|| recorder.run());
-        Ok(Self { shared, channels: Vec::new(), thread: Some(thread.map_err(StartError::Thread)?) })
+        let thread = Some(thread.map_err(StartError::Thread)?);
+        Ok(Self { shared, channels: Vec::new(), described: BTreeMap::new(), thread })
     }
 
     /// Adds a channel. The same one again is the same.
@@ -135,6 +153,21 @@ impl Writer {
         self.shared.add(channel.clone());
         self.channels.push(channel);
         Ok(ChannelId(self.channels.len() - 1))
+    }
+
+    /// Describes a module in each file, so that replay can stand in for it. The same again is no news.
+    ///
+    /// # Errors
+    /// When it is described with another interface already.
+    pub fn describe(&mut self, name: &str, description: &Description) -> Result<(), OtherInterface> {
+        let offered = description.hash();
+        if let Some(recorded) = self.described.get(name).copied() {
+            let is_same = recorded == offered;
+            return if is_same { Ok(()) } else { Err(OtherInterface { name: name.into(), recorded, offered }) };
+        }
+        self.described.insert(name.into(), offered);
+        self.shared.describe(Arc::new(DescribedModule { name: name.into(), description: description.clone() }));
+        Ok(())
     }
 
     /// Records a message. Takes as long as copying it.

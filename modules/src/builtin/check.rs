@@ -2,7 +2,7 @@
 //! modules, so it is here that both meet.
 
 use super::{Builtin, description};
-use rohrpost_config::{Installation, Module, Problem, Program, RECORDER, RecordedItems, Show, nearest};
+use rohrpost_config::{Installation, Module, Problem, Program, RECORDER, REPLAY, RecordedItems, Show, nearest};
 use rohrpost_mailbox::Name;
 use rohrpost_schema::{DataKind, Description};
 use std::collections::BTreeSet;
@@ -14,7 +14,10 @@ pub fn check(installation: &Installation) -> Vec<Problem> {
     for module in &installation.modules {
         let Program::Builtin(name) = &module.program else { continue };
         problems.extend(Builtin::find(name).map(|builtin| (builtin.check)(installation, module)).unwrap_or_default());
-        problems.extend(unknown_streams(installation, module, name));
+        // The streams of a player are those of its recording.
+        if name != REPLAY {
+            problems.extend(unknown_streams(installation, module, name));
+        }
     }
     problems.extend(installation.gui.show.iter().filter_map(|show| data_of(installation, show)));
     if let Some(record) = &installation.record {

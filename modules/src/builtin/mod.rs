@@ -11,11 +11,11 @@ mod sim;
 pub use check::{check, check_saved};
 
 use crate::interface::{Interface, Interfaces};
-use crate::interfaces::{RecorderInterface, RouterInterface, TcpInterface};
+use crate::interfaces::{RecorderInterface, ReplayInterface, RouterInterface, TcpInterface};
 use crate::module::Module;
 use crate::runtime::{Start, StartError, run_started};
 use rohrpost_config::{
-    Installation, Module as Configured, Problem, RECORDER, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER,
+    Installation, Module as Configured, Problem, RECORDER, REPLAY, ROUTER, SettingsError, TCP_CLIENT, TCP_ROUTER,
 };
 use rohrpost_schema::Description;
 
@@ -56,7 +56,7 @@ pub fn run(name: &str, start: Start) -> Option<Result<(), StartError>> {
 
 /// The built-in module that is called so or offers the interface of a class; none if nothing is built in for it.
 pub fn of_class(class: &str) -> Option<&'static str> {
-    let all = ["sim", "carmen", "mapper", "pilot", "output", RECORDER, ROUTER, TCP_CLIENT, TCP_ROUTER];
+    let all = ["sim", "carmen", "mapper", "pilot", "output", RECORDER, REPLAY, ROUTER, TCP_CLIENT, TCP_ROUTER];
     all.into_iter().find(|builtin| *builtin == class || description(builtin, class).is_some())
 }
 
@@ -67,6 +67,7 @@ pub fn description(builtin: &str, class: &str) -> Option<Description> {
         ROUTER => Some(RouterInterface::description()),
         TCP_CLIENT | TCP_ROUTER => Some(TcpInterface::description()),
         RECORDER => Some(RecorderInterface::description()),
+        REPLAY => Some(ReplayInterface::description()),
         _ => None,
     };
     if beyond_here.is_some() {

@@ -14,10 +14,11 @@ use super::newest::Newest;
 use super::refusals::Refusals;
 use super::schedule::Schedule;
 use super::stream::{FollowedStreams, OwnStreams};
+use super::time_teller::TimeTeller;
 use crate::call::{Caller, Link};
 use crate::interface::Proxy;
 use crate::publish::Subscriptions;
-use rohrpost_config::{Installation, Principal};
+use rohrpost_config::{Installation, Principal, TimeSource};
 use rohrpost_mailbox::{
     Interest, Name, OverflowPolicy, Publications, Receiver, Shape, SystemClock, SystemTime, Watch, Watches, local,
 };
@@ -181,6 +182,28 @@ impl Context {
     /// ```
     pub fn clock(&self) -> &SystemClock {
         &self.clock
+    }
+
+    /// Becomes the writer of the node's time, which is a log's (`source = "log"`): for a module that plays one. There
+    /// is to be one writer on a node. Until it begins, the node has no time.
+    ///
+    /// ```
+    /// # use rohrpost_modules::{ModuleError, runtime::{Context, TimeTeller}};
+    /// fn begin(context: &Context, first_stamp_ns: u64) -> Result<TimeTeller, ModuleError> {
+    ///     let mut time = context.tell_time()?;
+    ///     time.begin(first_stamp_ns, 1.0, 0);
+    ///     Ok(time)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// [`ContextError::OtherTime`] where the time is another one, [`ContextError::Node`] when its page cannot be
+    /// opened.
+    pub fn tell_time(&self) -> Result<TimeTeller, ContextError> {
+        if self.installation.time != TimeSource::Log {
+            return Err(ContextError::OtherTime);
+        }
+        Ok(TimeTeller::of(self.link.borrow().participant().node())?)
     }
 
     /// Asks for [`crate::Module::tick`] once in this time, from now on; at least 10 µs, at most a day. Ticks that come

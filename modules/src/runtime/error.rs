@@ -171,6 +171,12 @@ pub enum ContextError {
     /// The value cannot be written as postcard.
     #[error("data `{0}` cannot be written: {1}")]
     Encode(&'static str, postcard::Error),
+    /// The node's time is not to be told by a module.
+    #[error("the time of this node is not a log's; write `source = \"log\"` into [time], or do not tell the time")]
+    OtherTime,
+    /// Something of the node cannot be opened.
+    #[error(transparent)]
+    Node(#[from] NodeError),
     /// It is not data but a stream, which is written as such.
     #[error("`{0}` is a stream: write it with `write` or `begin`, which publish it, too")]
     IsStream(&'static str),

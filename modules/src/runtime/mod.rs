@@ -27,6 +27,7 @@ pub(crate) mod server;
 mod start;
 mod stream;
 mod subscribed;
+mod time_teller;
 mod unreadable;
 
 pub use context::Context;
@@ -40,4 +41,5 @@ pub(crate) use start::environment;
 pub use start::{Start, find_other_versions, find_running, kept};
 pub use stream::{Moment, OpenValue, Record, RecordError, Stream, StreamReadError, StreamSubscription};
 pub use subscribed::Subscribed;
+pub use time_teller::TimeTeller;
 pub use unreadable::Unreadable;

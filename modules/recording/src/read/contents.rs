@@ -11,6 +11,8 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+/// So many records between two chunks are passed over while reading ahead.
+const AHEAD_MAX: usize = 1_000;
 /// What a message takes before its data.
 const MESSAGE_HEAD_BYTES: usize = 22;
 
@@ -29,6 +31,17 @@ pub(crate) struct Contents {
     /// Where the present record of the file begins.
     begins: u64,
     ending: Option<Ending>,
+    ahead: Option<Ahead>,
+    /// Records of a chunk that was read ahead.
+    spare: Vec<u8>,
+}
+
+/// What was read behind the present chunk, while there was time.
+enum Ahead {
+    /// The next chunk, unpacked; or it is damaged.
+    Chunk(u64, Result<(), Damage>),
+    /// Another record, which is in the frames.
+    Other(u64, Step),
 }
 
 /// How a file ends.
@@ -82,6 +95,8 @@ impl Contents {
             chunks: 0,
             begins: 0,
             ending: None,
+            ahead: None,
+            spare: Vec::new(),
         }
     }
 
@@ -159,8 +174,33 @@ impl Contents {
         Ok(None)
     }
 
+    /// Reads and unpacks the next chunk, if there is none yet: later it takes no time.
+    pub(crate) fn read_ahead(&mut self) -> Result<(), ReadError> {
+        // Outside of chunks the present message may be in the frames.
+        if self.in_chunk.is_none() || self.is_cut || self.ahead.is_some() {
+            return Ok(());
+        }
+        for _ in 0..AHEAD_MAX {
+            let begins = self.frames.at();
+            match self.frames.step()? {
+                Step::Record(op::MESSAGE_INDEX) => {}
+                Step::Record(op::CHUNK) => {
+                    let unpacked = chunk::unpack(self.frames.body(), &mut self.spare);
+                    self.ahead = Some(Ahead::Chunk(begins, unpacked));
+                    break;
+                }
+                step => {
+                    self.ahead = Some(Ahead::Other(begins, step));
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Goes to the chunk there; then [`Contents::next_in_chunk`] has its messages.
     pub(crate) fn open_chunk(&mut self, at: u64) -> Result<(), ReadError> {
+        self.ahead = None;
         self.frames.seek(at)?;
         self.begins = at;
         match self.frames.step()? {
@@ -176,7 +216,7 @@ impl Contents {
 
     /// Reads on from there, where a record of the file begins.
     pub(crate) fn go_to(&mut self, at: u64) -> Result<(), ReadError> {
-        self.in_chunk = None;
+        (self.in_chunk, self.ahead) = (None, None);
         self.frames.seek(at)
     }
 
@@ -225,9 +265,18 @@ impl Contents {
 
     /// The next record of the file; none if it is nothing of its own.
     fn next_outside(&mut self) -> Result<Option<Item>, ReadError> {
-        self.begins = self.frames.at();
-        let damaged = |damage| Some(Item::Damaged(self.begins, damage));
-        Ok(match self.frames.step()? {
+        let (begins, step) = match self.ahead.take() {
+            Some(Ahead::Chunk(begins, unpacked)) => {
+                self.begins = begins;
+                std::mem::swap(&mut self.records, &mut self.spare);
+                return Ok(self.enter_chunk(unpacked).err().map(|damage| Item::Damaged(begins, damage)));
+            }
+            Some(Ahead::Other(begins, step)) => (begins, step),
+            None => (self.frames.at(), self.frames.step()?),
+        };
+        self.begins = begins;
+        let damaged = |damage| Some(Item::Damaged(begins, damage));
+        Ok(match step {
             Step::Record(op) => self.record(op)?,
             Step::Cut(Some(op::CHUNK)) => {
                 chunk::unpack_cut(self.frames.body(), &mut self.records);
@@ -252,11 +301,10 @@ impl Contents {
 
     fn record(&mut self, op: u8) -> Result<Option<Item>, ReadError> {
         let told = match op {
-            op::CHUNK => chunk::unpack(self.frames.body(), &mut self.records).map(|()| {
-                self.in_chunk = Some(0);
-                self.chunks += 1;
-                None
-            }),
+            op::CHUNK => {
+                let unpacked = chunk::unpack(self.frames.body(), &mut self.records);
+                self.enter_chunk(unpacked).map(|()| None)
+            }
             op::MESSAGE => self.found(0..self.frames.body().len(), false).map(|found| Some(Item::Message(found))),
             op::SCHEMA | op::CHANNEL => self.definitions.add(op, self.frames.body()).map(|()| None),
             op::HEADER | op::METADATA => match mcap::parse_record(op, self.frames.body()) {
@@ -275,6 +323,13 @@ impl Contents {
             _ => Ok(None),
         };
         Ok(told.unwrap_or_else(|damage| Some(Item::Damaged(self.begins, damage))))
+    }
+
+    fn enter_chunk(&mut self, unpacked: Result<(), Damage>) -> Result<(), Damage> {
+        unpacked?;
+        self.in_chunk = Some(0);
+        self.chunks += 1;
+        Ok(())
     }
 
     fn found(&self, body: Range<usize>, is_in_chunk: bool) -> Result<Found, Damage> {

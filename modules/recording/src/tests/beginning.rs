@@ -126,7 +126,7 @@ fn played(files: &[PathBuf], from_ns: u64) -> Vec<u32> {
         match player.poll(u64::MAX).unwrap() {
             Cue::Message(_, message) => sequences.push(message.sequence),
             Cue::End => return sequences,
-            Cue::Begin { .. } | Cue::Wait { .. } => {}
+            Cue::Begin { .. } | Cue::Wait { .. } | Cue::Busy => {}
         }
     }
 }

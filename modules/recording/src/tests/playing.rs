@@ -1,7 +1,8 @@
 //! A replay has the recording's order and spacing, whatever the time does.
 
-use super::support::{Said, file_of, memory_folder, said};
-use crate::{Cue, Player, Reader};
+use super::support::{Said, file_of, files, memory_folder, options, record, said};
+use crate::disk::RealDisk;
+use crate::{Cue, Options, Player, Reader, Rotation};
 use std::path::{Path, PathBuf};
 
 /// What a replay did.
@@ -26,8 +27,10 @@ fn play(player: &mut Player, step_ns: u64) -> Vec<Did> {
             }
             Cue::Wait { until_ns } => {
                 assert!(until_ns > now_ns, "a wait of nothing");
+                player.read_ahead().unwrap();
                 now_ns += step_ns;
             }
+            Cue::Busy => {}
             Cue::End => return did,
         }
     }
@@ -50,9 +53,12 @@ fn course(all: &[Said], step_ns: u64) -> Vec<Did> {
     did
 }
 
+/// Of one recording.
 fn two_files(folder: &Path, all: &[Said]) -> Vec<PathBuf> {
-    let (one, other) = all.split_at(all.len() / 2);
-    vec![file_of(folder, "a", one), file_of(folder, "b", other)]
+    let rotation = Rotation { bytes_max: 3 << 20, ..Rotation::default() };
+    let (status, refused) = record(Box::new(RealDisk), Options { rotation, ..options(folder) }, all);
+    assert!(refused.is_empty() && status.files_closed == 2, "{status:?}");
+    files(folder)
 }
 
 /// Messages of 700 B, several chunks of them, with a step of time back, which one channel learns of later.
@@ -126,9 +132,12 @@ fn behind_damage_a_replay_goes_on() {
     let (mut played, mut errors) = (0, 0);
     loop {
         match player.poll(u64::MAX) {
-            Ok(Cue::Message(..)) => played += 1,
+            Ok(Cue::Message(..)) => {
+                played += 1;
+                player.read_ahead().unwrap();
+            }
             Ok(Cue::End) => break,
-            Ok(_) => {}
+            Ok(_) => player.read_ahead().unwrap(),
             Err(error) => {
                 assert!(error.to_string().contains("damaged at byte"), "{error}");
                 errors += 1;
@@ -136,4 +145,35 @@ fn behind_damage_a_replay_goes_on() {
         }
     }
     assert!(errors == 1 && (3_000..6_000).contains(&played), "{played} of 6000, {errors} errors");
+}
+
+/// As after a reboot: epochs begin anew, at a later time.
+#[test]
+fn where_another_recording_begins_time_begins_anew() {
+    let (folder, all) = (memory_folder(), said(60, 10));
+    for (epoch, later_ns) in [(1, 1_000_000), (1, 0), (0, 1_000_000)] {
+        let mut second = all.clone();
+        for said in &mut second {
+            (said.arrival_ns, said.epoch) = (said.arrival_ns + later_ns, epoch);
+        }
+        let stem = |which| format!("{which}-{epoch}-{later_ns}");
+        let files = vec![file_of(folder.path(), &stem("a"), &all), file_of(folder.path(), &stem("b"), &second)];
+        let both = course(&all, 10).into_iter().chain(course(&second, 10));
+        let did = play(&mut Player::new(files, |_| true), 10);
+        assert!(did == both.collect::<Vec<_>>(), "epoch {epoch}, {later_ns} ns later: {did:?}");
+    }
+}
+
+#[test]
+fn a_poll_passes_over_no_more_than_it_may() {
+    let (folder, all) = (memory_folder(), said(6_000, 700));
+    let files = two_files(folder.path(), &all);
+    let mut player = Player::new(files, |_| false);
+    let mut polls = 1;
+    while let Cue::Busy = player.poll(0).unwrap() {
+        polls += 1;
+    }
+    // 4.4 MB, a quarter of a MiB at a time.
+    assert!((16..=18).contains(&polls), "{polls}");
+    assert!(matches!(player.poll(0).unwrap(), Cue::End));
 }

@@ -2,9 +2,12 @@
 
 use super::support::{Said, file_of, files, memory_folder, noise, options, read, record, said};
 use crate::disk::RealDisk;
-use crate::{ChannelError, ChannelSpec, Message, Options, Rotation, Session, StartError, WriteError, Writer, info};
+use crate::{
+    ChannelError, ChannelSpec, DescribedModule, Message, Options, Rotation, Selection, Session, StartError, WriteError,
+    Writer, cut, info, merge, recover,
+};
 use proptest::prelude::*;
-use rohrpost_schema::Type;
+use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -169,4 +172,54 @@ fn losses_are_told_also_of_a_channel_without_messages() {
     writer.finish().1.unwrap();
     let told = info(&files(folder.path())[0]).unwrap();
     assert_eq!((told.messages, told.lost, told.channels[0].topic.as_str()), (0, 7, "camera.0/image"));
+}
+
+fn described(class: &str) -> Description {
+    let field = Field::new("speed", Type::U8).said("", "m/s");
+    let data = vec![DataItem { number: 1, kind: DataKind::Data, field }];
+    Description { name: "Speed".into(), class: class.into(), text: String::new(), functions: Vec::new(), data }
+}
+
+#[test]
+fn modules_are_described_in_each_file_and_in_what_is_made_of_it() {
+    let folder = memory_folder();
+    let rotation = Rotation { bytes_max: 1 << 20, ..Rotation::default() };
+    let mut writer = Writer::start(Options { rotation, ..options(folder.path()) }, Session::default()).unwrap();
+    let spec = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
+    let channel = writer.channel(&spec).unwrap();
+    let modules = ["motor.0", "pump.3"].map(|name| {
+        let description = described(&name[..name.len() - 2]);
+        writer.describe(name, &description).unwrap();
+        DescribedModule { name: name.into(), description }
+    });
+    assert_eq!(writer.describe("motor.0", &modules[0].description), Ok(()));
+    let other = writer.describe("motor.0", &described("wheel")).unwrap_err();
+    assert!(other.to_string().contains("is recorded with interface"), "{other}");
+    for sequence in 0..400 {
+        writer.write(channel, &message(sequence, &noise(sequence, 10_000))).unwrap();
+    }
+    while writer.status().waiting > 0 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let late = DescribedModule { name: "late.0".into(), description: described("late") };
+    writer.describe("late.0", &late.description).unwrap();
+    writer.finish().1.unwrap();
+    let paths = files(folder.path());
+    assert!(paths.len() >= 3, "{paths:?}");
+    for path in &paths[..paths.len() - 1] {
+        assert_eq!(info(path).unwrap().described, modules, "{path:?}");
+    }
+    let last = paths.last().unwrap();
+    let [motor, pump] = modules;
+    let all = [motor, pump, late];
+    assert_eq!(info(last).unwrap().described, all, "also what came last");
+    let made = ["cut", "merged", "recovered"].map(|name| folder.path().join(format!("{name}.mcap")));
+    cut(last, &made[0], &Selection::default(), &mut |_, _| {}).unwrap();
+    merge(&paths, &made[1], &mut |_, _| {}).unwrap();
+    recover(last, &made[2], &mut |_, _| {}).unwrap();
+    for path in made {
+        assert_eq!(info(&path).unwrap().described, all, "{path:?}: once, from whichever file");
+    }
+    let identities: Vec<String> = paths.iter().map(|path| info(path).unwrap().session["recording"].clone()).collect();
+    assert!(identities.iter().all(|identity| *identity == identities[0]), "{identities:?}");
 }

@@ -1,9 +1,9 @@
 //! A player tells its node the time: that of the log.
 
 use crate::module::ModuleError;
-use crate::runtime::Context;
+use crate::runtime::{Context, TimeTeller};
 use rohrpost_config::{Installation, Program, TimeSource};
-use rohrpost_mailbox::{Name, TimeKeeper, TimeSource as Source};
+use rohrpost_mailbox::Name;
 
 /// Times of a log are after 1970 and before the year 2255, seconds: the rest is a mistake of its writer.
 const STAMP_S_MIN: f64 = 1.0;
@@ -14,38 +14,37 @@ pub(super) struct Telling {
     /// Seconds of the log in a second.
     pace: f64,
     /// None before the log has begun.
-    keeper: Option<TimeKeeper>,
+    teller: Option<TimeTeller>,
 }
 
 impl Telling {
     /// Of the player that tells its node the time.
     pub(super) fn of(context: &Context, pace: f64) -> Option<Self> {
-        tells_time(context.installation(), context.me()).then_some(Self { pace, keeper: None })
+        tells_time(context.installation(), context.me()).then_some(Self { pace, teller: None })
     }
 
     /// Begins an epoch at the log's first stamp, ns since 1970; returns it.
     pub(super) fn begin(&mut self, context: &Context, stamp_s: f64) -> Result<u64, ModuleError> {
         let begin_ns = (stamp_s.clamp(STAMP_S_MIN, STAMP_S_MAX) * 1e9) as u64;
-        let link = context.link().borrow();
-        self.keeper = Some(TimeKeeper::begin(link.participant().node(), Source::Log, begin_ns, self.pace)?);
+        self.teller.insert(context.tell_time()?).begin(begin_ns, self.pace, 0);
         Ok(begin_ns)
     }
 
     /// Lets time pass again, if it has begun.
     pub(super) fn goes_on(&mut self) -> bool {
-        set_pace(&mut self.keeper, self.pace)
+        set_pace(&mut self.teller, self.pace)
     }
 
     /// Time stands still.
     pub(super) fn pause(&mut self) {
-        set_pace(&mut self.keeper, 0.0);
+        set_pace(&mut self.teller, 0.0);
     }
 }
 
 /// False before time has begun.
-fn set_pace(keeper: &mut Option<TimeKeeper>, pace: f64) -> bool {
-    let Some(keeper) = keeper else { return false };
-    if !keeper.set_pace(pace) {
+fn set_pace(teller: &mut Option<TimeTeller>, pace: f64) -> bool {
+    let Some(teller) = teller else { return false };
+    if !teller.set_pace(pace) {
         tracing::error!(
             "time goes on at its old pace: this computer was too busy to change it; switch off and on again"
         );

@@ -3,13 +3,14 @@
 use super::Context;
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::Newest;
-use crate::runtime::stream::{OpenValue, OwnStream};
+use crate::runtime::stream::{Moment, OpenValue, OwnStream};
 use rohrpost_mailbox::{Name, Stamp};
 
 impl Context {
     /// Publishes a value as the module that this one stands in for under the name `from`
     /// ([`crate::Module::stand_ins`]). Its item `number` is data, or a stream, of which this is the next record. The
-    /// value is postcard of the type that the description says; nobody looks whether it is.
+    /// value is postcard of the type that the description says; nobody looks whether it is. Its time is in ns since
+    /// 1970, of the present epoch; a record of a stream may be of an earlier one, with a stamp that says so.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::{Context, ContextError};
@@ -29,12 +30,22 @@ impl Context {
     ///
     /// # Errors
     /// [`ContextError::NotStoodIn`], or [`ContextError::Record`]: too large for the stream, or too late.
-    pub fn publish_as(&mut self, from: Name, number: u16, stamp_ns: u64, value: &[u8]) -> Result<(), ContextError> {
+    pub fn publish_as(
+        &mut self,
+        from: Name,
+        number: u16,
+        at: impl Into<Moment>,
+        value: &[u8],
+    ) -> Result<(), ContextError> {
+        let stamp = match at.into() {
+            Moment::Stamp(stamp) => Stamp { epoch: stamp.epoch, ns: stamp.ns },
+            Moment::Ns(ns) => Stamp { epoch: self.clock.now().epoch, ns },
+        };
         let endpoint = self.endpoints.iter().position(|name| *name == from.module());
         let stood_in = endpoint.and_then(|endpoint| Some((endpoint, self.stood_in.get(endpoint)?.as_ref()?)));
         let Some((endpoint, data)) = stood_in else { return Err(self.not_stood_in(from, number)) };
         if let Some(at) = self.streams.iter().position(|stream| stream.is(endpoint, number)) {
-            return self.write_as(at, stamp_ns, value);
+            return self.write_as(at, stamp, value);
         }
         let known = self.newest.iter().position(|newest| (newest.endpoint, newest.number) == (endpoint, number));
         let at = match (known, data.iter().find(|(item, _)| *item == number)) {
@@ -46,7 +57,7 @@ impl Context {
             }
         };
         let newest = &mut self.newest[at];
-        newest.stamp_ns = stamp_ns;
+        newest.stamp_ns = stamp.ns;
         newest.value.clear();
         newest.value.extend_from_slice(value);
         let (all, _, mut outlet) = self.split();
@@ -55,12 +66,11 @@ impl Context {
     }
 
     /// The next record of a stream.
-    fn write_as(&mut self, at: usize, stamp_ns: u64, value: &[u8]) -> Result<(), ContextError> {
-        let stamp = Stamp { epoch: self.clock.now().epoch, ns: stamp_ns };
+    fn write_as(&mut self, at: usize, stamp: Stamp, value: &[u8]) -> Result<(), ContextError> {
         let (_, streams, outlet) = self.split();
         let OwnStream { about, writer } = &mut streams[at];
         let record = writer.begin(stamp).map_err(|error| about.explain(error))?;
-        let mut open = OpenValue::<()>::new(record, stamp_ns, about, outlet);
+        let mut open = OpenValue::<()>::new(record, stamp.ns, about, outlet);
         open.put_bytes(value)?;
         open.finish().map(drop)
     }

@@ -1,0 +1,105 @@
+//! What is played: values as their modules published them, and what became of them.
+
+use rohrpost::interface::StandIn;
+use rohrpost::{Context, ContextError, Installation, Name};
+use rohrpost_mailbox::Stamp;
+use rohrpost_recording::{Message, RecordedChannel};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A channel that is played.
+struct PlayedChannel {
+    from: Name,
+    number: u16,
+    has_played: bool,
+    has_refused: bool,
+}
+
+/// All of them.
+#[derive(Default)]
+pub(super) struct PlayedChannels {
+    by_topic: BTreeMap<String, PlayedChannel>,
+    /// Recorded epochs, and those of the node in their place.
+    epochs: Vec<(u64, u64)>,
+    /// Values that were published.
+    pub(super) played: u64,
+    /// Values that their streams did not take.
+    pub(super) refused: u64,
+}
+
+impl PlayedChannels {
+    /// Items of these modules that are among the topics.
+    pub(super) fn new(stand_ins: &[StandIn], topics: &BTreeSet<String>, installation: &Installation) -> Self {
+        let mut channels = Self::default();
+        for StandIn { name, description } in stand_ins {
+            let module = installation.classes.format(*name);
+            for item in &description.data {
+                let topic = format!("{module}/{}", item.field.name);
+                if topics.contains(&topic) {
+                    let (from, number) = (*name, item.number);
+                    let channel = PlayedChannel { from, number, has_played: false, has_refused: false };
+                    channels.by_topic.insert(topic, channel);
+                }
+            }
+        }
+        channels
+    }
+
+    /// A recorded epoch begins, which is this one of the node.
+    pub(super) fn begin(&mut self, recorded: u64, epoch: u64) {
+        // Behind a seek, or in another recording, they begin anew.
+        self.epochs.retain(|(earlier, _)| *earlier < recorded);
+        self.epochs.push((recorded, epoch));
+    }
+
+    /// Publishes a value as its module did, and counts it.
+    pub(super) fn play(
+        &mut self,
+        context: &mut Context,
+        recorded: &RecordedChannel,
+        message: &Message<'_>,
+    ) -> Result<(), ContextError> {
+        let stamp = Stamp { epoch: self.epoch_of(message.epoch), ns: message.stamp_ns };
+        let Some(channel) = self.by_topic.get_mut(&recorded.topic) else { return Ok(()) };
+        match context.publish_as(channel.from, channel.number, stamp, message.data) {
+            Ok(()) => {
+                channel.has_played = true;
+                self.played += 1;
+            }
+            Err(ContextError::Record(error)) => {
+                self.refused += 1;
+                if !std::mem::replace(&mut channel.has_refused, true) {
+                    tracing::warn!("{}: {error}; values like this one are counted as `refused`", recorded.topic);
+                }
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// How many of them had a value.
+    pub(super) fn count(&self) -> u32 {
+        self.by_topic.values().filter(|channel| channel.has_played).count() as u32
+    }
+
+    /// The node's epoch in the place of a recorded one. Streams learn of a step of time one after the other: a value
+    /// may be of the epoch before.
+    fn epoch_of(&self, recorded: u64) -> u64 {
+        let known = self.epochs.iter().find(|(earlier, _)| *earlier == recorded);
+        known.or(self.epochs.last()).map_or(0, |(_, epoch)| *epoch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_of_the_epoch_before_a_step_stays_of_that() {
+        let mut channels = PlayedChannels::default();
+        channels.begin(3, 3);
+        channels.begin(4, 7);
+        assert_eq!([3, 4, 9].map(|recorded| channels.epoch_of(recorded)), [3, 7, 7]);
+        channels.begin(3, 8);
+        assert_eq!([3, 4].map(|recorded| channels.epoch_of(recorded)), [8, 8], "behind a seek");
+    }
+}

@@ -1,0 +1,193 @@
+//! The configuration of a replay is right for one node, whatever was recorded.
+
+use super::*;
+use rohrpost::interface::Interface;
+use rohrpost::interfaces::{
+    CartographerInterface, LaserInterface, MotorInterface, RecorderInterface, ReplayInterface, WheelsInterface,
+};
+use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+
+const DEMO: &str = include_str!("../../../config/demo.toml");
+const NODES: &str = include_str!("../../../config/demo-nodes.toml");
+const LOGD: &str = r#"
+[[module]]
+name = "logd.0"
+builtin = "logd"
+[record]
+directory = "recordings"
+streams = ["*", { name = "camera.0/image", rate = 2.0 }]
+data = ["*", "pilot.0/*"]
+output = true
+"#;
+
+/// A recording of these modules; of each item a message.
+fn recorded(folder: &Path, modules: &[(&str, Description)]) -> RecordedFiles {
+    let options = Options { leave_bytes: 0, ..Options::new(folder, "base") };
+    let mut writer = Writer::start(options, Session::default()).unwrap();
+    for (name, description) in modules {
+        writer.describe(name, description).unwrap();
+        for item in &description.data {
+            let spec = ChannelSpec { name, item: &item.field.name, ty: &item.field.ty, texts: BTreeMap::new() };
+            let channel = writer.channel(&spec).unwrap();
+            let message = Message { arrival_ns: 5, stamp_ns: 5, epoch: 1, sequence: 0, data: &[] };
+            writer.write(channel, &message).unwrap();
+        }
+    }
+    writer.finish().1.unwrap();
+    RecordedFiles::read(&[folder.join("base-0001.mcap")]).unwrap()
+}
+
+fn demo_modules() -> Vec<(&'static str, Description)> {
+    vec![
+        ("motor.0", MotorInterface::description()),
+        ("laser.0", LaserInterface::description()),
+        ("odometry.0", WheelsInterface::description()),
+        ("mapper.0", CartographerInterface::description()),
+    ]
+}
+
+/// The configuration, and what is played.
+fn made(text: &str, modules: &[(&str, Description)], runs: &[&str], names: &[&str]) -> (Installation, PlayedModules) {
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = recorded(folder.path(), modules);
+    let source = Installation::parse(text, Path::new("robot.toml")).unwrap();
+    let texts = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    let (runs, names) = (texts(runs), texts(names));
+    let wish = ReplayWish {
+        installation: &source,
+        folder: folder.path(),
+        recorded: &recorded,
+        runs: &runs,
+        names: &names,
+        drawing: ReplayDrawing::Nothing,
+        saved: None,
+    };
+    let played = wish.played().unwrap();
+    let (text, player) = wish.text(&played, Table::new()).unwrap();
+    let installation = Installation::parse(&text, Path::new("replay.toml"));
+    let installation = installation.unwrap_or_else(|errors| panic!("{errors}\n{text}"));
+    let player = installation.classes.parse_module(&player).unwrap();
+    assert_eq!(installation.module(player).unwrap().program, Program::Builtin(REPLAY.into()));
+    (crate::check::validate(installation).unwrap(), played)
+}
+
+fn names(installation: &Installation) -> Vec<String> {
+    let modules = installation.modules.iter().flat_map(Module::names);
+    modules.map(|name| installation.classes.format(name)).collect()
+}
+
+#[test]
+fn one_player_has_the_names_of_all_that_was_recorded() {
+    for text in [DEMO, NODES] {
+        let (installation, played) = made(text, &demo_modules(), &[], &[]);
+        assert_eq!(names(&installation), ["replay.0", "laser.0", "mapper.0", "motor.0", "odometry.0"]);
+        assert_eq!(installation.time, rohrpost_config::TimeSource::Log);
+        assert_eq!((installation.nodes.len(), installation.nodes[0].name.as_str()), (1, NODE));
+        let topics: Vec<&str> = played.topics.iter().map(String::as_str).collect();
+        let all = ["laser.0/scan", "mapper.0/map", "mapper.0/pose", "motor.0/motion", "odometry.0/odometry"];
+        assert_eq!((topics, played.left_out.len()), (all.to_vec(), 0));
+        let player = &installation.modules[0];
+        assert_eq!(player.streams["odometry"].keep, 1024, "as the recorded module had it");
+        assert!(u16::from(player.name.class().0) < installation.real_time_from(), "it is not real time by itself");
+    }
+}
+
+#[test]
+fn modules_that_run_keep_their_configuration_but_for_what_is_not_here() {
+    let (installation, played) = made(DEMO, &demo_modules(), &["mapper.0"], &["laser.0", "odometry.0/odometry"]);
+    assert_eq!(names(&installation), ["mapper.0", "replay.0", "laser.0", "odometry.0"]);
+    let [mapper, player] = [&installation.modules[0], &installation.modules[1]];
+    assert_eq!(mapper.calls.len(), 2);
+    assert!(player.name.class() > mapper.name.class(), "it does not wait for something less important");
+    assert_eq!(played.topics.len(), 2);
+    // The pilot is more important than the number of any ordinary class; and its motor is not there.
+    let (installation, _) = made(DEMO, &demo_modules()[1..], &["pilot.0"], &[]);
+    assert_eq!(names(&installation)[0], "pilot.0");
+    let laser = installation.classes.parse_module("laser.0").unwrap();
+    assert_eq!(installation.modules[0].calls, [laser]);
+    assert!(installation.modules[1].name.class() > installation.modules[0].name.class());
+}
+
+#[test]
+fn a_recorder_that_runs_records_what_is_here() {
+    let text = DEMO.replace("[nodes.main]", "logd = { id = 24 }\n[nodes.main]").replace("[classes]", "[classes]\n");
+    let (installation, _) = made(&format!("{text}{LOGD}"), &demo_modules(), &["logd.0"], &[]);
+    let record = installation.record.as_ref().unwrap();
+    assert_eq!((record.streams.len(), record.data.len(), record.output), (1, 1, None));
+    assert!(record.directory.is_absolute(), "{:?}", record.directory);
+}
+
+#[test]
+fn a_replay_that_was_recorded_is_not_a_part_of_the_robot() {
+    let mut modules = demo_modules();
+    modules.push(("replay.0", ReplayInterface::description()));
+    let replayed = "replay = { id = 127 }\n[nodes.main]";
+    let (installation, _) = made(&DEMO.replace("[nodes.main]", replayed), &modules, &[], &[]);
+    assert_eq!(names(&installation)[0], "replay.0");
+    assert_eq!(installation.modules[0].name.class().0, 127);
+}
+
+#[test]
+fn what_cannot_be_played_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut modules = demo_modules();
+    modules.push(("logd.0", RecorderInterface::description()));
+    let recorded = recorded(folder.path(), &modules);
+    let source = Installation::parse(DEMO, Path::new("robot.toml")).unwrap();
+    for (runs, names, words) in [
+        (vec!["mapper.1"], vec![], "--run mapper.1: the configuration has no such module; it has output.0, motor.0"),
+        (vec![], vec!["laser.0/scna"], "--names laser.0/scna: nothing of it is recorded; did you mean laser.0/scan?"),
+        (vec![], vec![], "logd.0 was recorded as a module of class `logd`, which the configuration does not have"),
+        (vec!["mapper.0"], vec!["mapper.0"], "nothing is left to be played"),
+    ] {
+        let texts = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect::<Vec<_>>();
+        let (runs, names) = (texts(runs), texts(names));
+        let wish = ReplayWish {
+            installation: &source,
+            folder: folder.path(),
+            recorded: &recorded,
+            runs: &runs,
+            names: &names,
+            drawing: ReplayDrawing::Nothing,
+            saved: None,
+        };
+        let told = wish.played().map(|_| ()).unwrap_err().to_string();
+        assert!(told.contains(words), "{told}");
+    }
+}
+
+#[test]
+fn paths_in_settings_begin_where_they_did() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("office.map"), "").unwrap();
+    let recorded = recorded(folder.path(), &demo_modules());
+    let text = DEMO.replace(
+        "settings = { laser = \"laser.0\", odometry",
+        "settings = { map = \"office.map\", laser = \"laser.0\", odometry",
+    );
+    let text = text.replace("builtin = \"mapper\"", "program = [\"./bin/mapper\", \"./x\"]");
+    let source = Installation::parse(&text, Path::new("robot.toml")).unwrap();
+    let runs = ["mapper.0".to_owned()];
+    let wish = ReplayWish {
+        installation: &source,
+        folder: folder.path(),
+        recorded: &recorded,
+        runs: &runs,
+        names: &[],
+        drawing: ReplayDrawing::Nothing,
+        saved: None,
+    };
+    let (text, _) = wish.text(&wish.played().unwrap(), Table::new()).unwrap();
+    let installation = Installation::parse(&text, Path::new("replay.toml")).unwrap();
+    let mapper = &installation.modules[0];
+    assert_eq!(mapper.settings["map"], text_of(&folder.path().join("office.map")));
+    assert_eq!(mapper.settings["laser"], "laser.0".into());
+    let program = folder.path().join("./bin/mapper").display().to_string();
+    assert_eq!(mapper.program, Program::Command(vec![program, "./x".into()]));
+}
+
+#[test]
+fn saved_parameters_are_those_of_modules_that_run() {
+    let saved = "[\"pilot.0\"]\ncruise-m-s = 0.5\n\n[\"motor.0\"]\nlaser-rate-hz = 5.0\n";
+    assert_eq!(saved_of(saved, |name| name == "pilot.0").unwrap().trim(), "[\"pilot.0\"]\ncruise-m-s = 0.5");
+}

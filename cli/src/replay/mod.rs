@@ -1,0 +1,227 @@
+//! `rohrpost replay`: a node of its own in which a recording is played in the place of the modules that were recorded.
+//!
+//! ```text
+//! files ─▶ recorded: modules, configuration ─▶ configuration: of one node ─▶ launch
+//!                                                                              ├─ replay.0 (player), stands in for all
+//!                                                                              └─ modules that run: --run
+//! ```
+
+mod channels;
+mod configuration;
+mod course;
+mod player;
+mod recorded;
+mod session;
+mod spacing;
+
+use crate::check;
+use crate::demo::{Folder, drawing, drawn};
+use crate::launch::end;
+use crate::record::PartArguments;
+use crate::speech::Speech;
+use crate::terminal::{Failure, say};
+use configuration::{NODE, PlayedModules, ReplayDrawing, ReplayWish, saved_of};
+pub(crate) use player::run as play;
+use recorded::RecordedFiles;
+use rohrpost::launch::{Launch, events};
+use rohrpost_config::Installation;
+use session::ReplaySession;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::SystemTime;
+use toml::{Table, Value};
+
+/// The name of the configuration that is made.
+const CONFIG: &str = "replay.toml";
+/// The file that the GUI writes.
+const DRAWING: &str = "rohrpost-replay.rrd";
+/// The largest rate: that of a node's time.
+const RATES: std::ops::RangeInclusive<f64> = 0.001..=player::RATE_MAX;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  rohrpost replay recordings/main-*.mcap                  all that was recorded, at its speed
+  rohrpost replay main-0001.mcap --run mapper.0 --rate 5  a fresh mapper draws the map anew
+  rohrpost replay main-0001.mcap --from +10s --until +20s --loop
+  rohrpost replay main-0001.mcap --names laser.0 odometry.0/odometry --paused
+In another terminal, as with any node:
+  rohrpost call replay.0 pause                            also resume, step, step_by 0.5, seek 12.5, rate 2
+  rohrpost echo replay.0 state
+  rohrpost stream read laser.0 scan --next 10
+It is a node of its own, called `replay`; no command reaches a module that is played.")]
+pub(crate) struct Arguments {
+    /// Recordings, played one after the other. Those of several recorders are to be merged first.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Another configuration than the recorded one.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// A module that runs as it was configured, and is not played; can be given several times.
+    #[arg(long, value_name = "NAME")]
+    run: Vec<String>,
+    /// Names (laser.0) or topics (laser.0/scan) to play; all, if none is named.
+    #[arg(long, num_args = 1.., value_name = "NAME")]
+    names: Vec<String>,
+    #[command(flatten)]
+    part: PartArguments,
+    /// Times the speed at which it was recorded.
+    #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = parse_rate)]
+    rate: f64,
+    /// Begin anew at the end.
+    #[arg(long = "loop")]
+    repeats: bool,
+    /// Begin paused.
+    #[arg(long)]
+    paused: bool,
+    /// Show it live in the Rerun viewer, if one is installed, instead of writing a file.
+    #[arg(long)]
+    viewer: bool,
+    /// Leave the GUI out.
+    #[arg(long, conflicts_with = "viewer")]
+    no_gui: bool,
+    /// No live table, only events.
+    #[arg(long)]
+    quiet: bool,
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| RATES.contains(rate));
+    rate.ok_or_else(|| format!("write {} to {}", RATES.start(), RATES.end()))
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let recorded = RecordedFiles::read(&arguments.files)?;
+    let folder = Folder::new()?;
+    let made = installation(arguments, &recorded, folder.path())?;
+    for topic in &made.played.left_out {
+        say(format_args!("{topic} is not played: its module is not described, or with another type"));
+    }
+    let installation = Arc::new(made.installation);
+    let (drawing, begun) = (drawing(&installation), SystemTime::now());
+    let speech = Speech::begin()?;
+    let resolved = crate::resolved::of_node(&installation, NODE);
+    let mut launch = Launch::begin(installation, NODE, std::env::current_exe()?, events()?, &resolved)?;
+    let summary = ReplaySession::new(&launch, &made.player, &made.played).and_then(|mut session| {
+        session.watch(&mut launch, &speech, arguments.quiet, arguments.paused)?;
+        session.summary(&mut launch)
+    });
+    let code = end(launch, &speech);
+    speech.settle();
+    say(summary?.trim_end());
+    drawn(drawing, begun);
+    Ok(code)
+}
+
+/// What is launched.
+struct MadeReplay {
+    installation: Installation,
+    /// The player's name.
+    player: String,
+    played: PlayedModules,
+}
+
+/// Writes the configuration and what belongs to it into a folder.
+fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) -> Result<MadeReplay, Failure> {
+    let here = std::env::current_dir()?;
+    let (source, base) = source(arguments, recorded, &here)?;
+    let saved = folder.join("parameters.toml");
+    let saved_text = match (&source.parameters, &arguments.config) {
+        (None, _) => None,
+        (Some(path), Some(_)) => std::fs::read_to_string(path).ok(),
+        (Some(path), None) => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            recorded.text(&name).map(str::to_owned)
+        }
+    };
+    let drawing = match (arguments.no_gui, arguments.viewer) {
+        (true, _) => ReplayDrawing::Nothing,
+        (false, true) => ReplayDrawing::Window,
+        (false, false) => ReplayDrawing::File(here.join(DRAWING)),
+    };
+    let wish = ReplayWish {
+        installation: &source,
+        folder: &base,
+        recorded,
+        runs: &arguments.run,
+        names: &arguments.names,
+        drawing,
+        saved: saved_text.is_some().then_some(&*saved),
+    };
+    let played = wish.played()?;
+    if let Some(text) = saved_text {
+        let runs = |name: &str| arguments.run.iter().any(|run| run == name);
+        std::fs::write(&saved, saved_of(&text, runs)?)?;
+    }
+    let settings = settings(arguments, recorded, &played, folder)?;
+    let (text, player) = wish.text(&played, settings)?;
+    let path = folder.join(CONFIG);
+    std::fs::write(&path, text)?;
+    let named = |errors: rohrpost_config::Errors| {
+        format!(
+            "the recorded configuration does not fit a replay with these modules:\n{}",
+            errors.to_string().replace(&path.display().to_string(), CONFIG)
+        )
+    };
+    let mut installation = check::load(&path).map_err(named)?;
+    installation.shown = CONFIG.into();
+    Ok(MadeReplay { installation, player, played })
+}
+
+/// The configuration that was recorded, or the one that is named; and where its paths begin.
+fn source(arguments: &Arguments, recorded: &RecordedFiles, here: &Path) -> Result<(Installation, PathBuf), Failure> {
+    if let Some(path) = &arguments.config {
+        let base = path.canonicalize().map_err(|error| format!("{}: {error}", path.display()))?;
+        let text = std::fs::read_to_string(path)?;
+        return Ok((Installation::parse(&text, path)?, base.parent().unwrap_or(here).to_owned()));
+    }
+    let recorded = recorded.configuration()?;
+    let named = |errors| format!("{errors}\nthis is the configuration in the recording; name another: --config FILE");
+    let installation = Installation::parse(&recorded.text, Path::new(&recorded.name)).map_err(named)?;
+    Ok((installation, here.to_owned()))
+}
+
+/// The player's settings, and files with the descriptions.
+fn settings(
+    arguments: &Arguments,
+    recorded: &RecordedFiles,
+    played: &PlayedModules,
+    folder: &Path,
+) -> Result<Table, Failure> {
+    let mut described = Vec::new();
+    for (name, description) in &played.described {
+        let file = format!("{name}.description");
+        std::fs::write(folder.join(&file), description.to_bytes())?;
+        described.push(Value::Array(vec![name.as_str().into(), file.into()]));
+    }
+    let files = recorded.infos.iter().map(|info| Ok(info.path.canonicalize()?.display().to_string().into()));
+    let files = files.collect::<std::io::Result<Vec<Value>>>()?;
+    let topics = played.topics.iter().map(|topic| topic.as_str().into()).collect();
+    let mut whole = recorded.infos[0].clone();
+    (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
+    let part = arguments.part.of(&whole, &[]);
+    if let (Some(from_ns), Some(until_ns)) = (part.from_ns, part.until_ns)
+        && from_ns >= until_ns
+    {
+        return Err("the time range is empty: --until is not behind --from".into());
+    }
+    let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));
+    let mut settings = Table::new();
+    for (key, value) in [
+        ("files", Value::Array(files)),
+        ("begin-ns", ns(recorded.begin_ns)?),
+        ("end-ns", ns(recorded.end_ns)?),
+        ("described", Value::Array(described)),
+        ("topics", Value::Array(topics)),
+        ("rate", arguments.rate.into()),
+        ("repeats", arguments.repeats.into()),
+    ] {
+        settings.insert(key.into(), value);
+    }
+    for (key, time) in [("from-ns", part.from_ns), ("until-ns", part.until_ns)] {
+        if let Some(time) = time {
+            settings.insert(key.into(), ns(time)?);
+        }
+    }
+    Ok(settings)
+}
