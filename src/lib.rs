@@ -60,8 +60,8 @@ pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::runtime::{
-    BadRate, ClientError, Context, ContextError, Moment, OpenValue, Rate, Received, Record, RecordError, Start,
-    StartError, Stream, StreamReadError, StreamSubscription, Subscription, ToolLink, Unreadable, describe,
+    BadRate, ClientError, Context, ContextError, ModuleClock, Moment, OpenValue, Rate, Received, Record, RecordError,
+    Start, StartError, Stream, StreamReadError, StreamSubscription, Subscription, ToolLink, Unreadable, describe,
     find_other_versions, find_running,
 };
 pub use rohrpost_modules::serde;

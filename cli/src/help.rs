@@ -7,7 +7,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("To begin", &["demo", "new", "check", "launch"]),
     ("A robot that runs", &["list", "top", "log", "echo", "call", "param", "status"]),
     ("One of its modules", &["restart", "stop", "start"]),
-    ("To measure", &["hz", "bw", "delay", "mailbox", "stream", "graph", "ping", "send", "record"]),
+    ("To measure", &["hz", "bw", "delay", "mailbox", "stream", "graph", "ping", "send", "record", "replay"]),
     ("Several nodes", &["net", "time", "keys"]),
     ("This computer", &["doctor", "bench", "clean", "completions", "version"]),
     ("Else", &["run", "router", "tcp-router", "tcp-client", "help"]),

@@ -21,6 +21,7 @@ mod delay;
 mod demo;
 mod doctor;
 mod echo;
+mod exact;
 mod flows;
 mod graph;
 mod help;
@@ -41,6 +42,7 @@ mod ping;
 mod published;
 mod quantities;
 mod record;
+mod replay;
 mod resolved;
 mod round;
 mod router;
@@ -123,6 +125,8 @@ enum Command {
     Param(param::Arguments),
     /// Describe, recover, cut and merge files of recordings.
     Record(record::Arguments),
+    /// Run modules again as they were recorded, and compare what they do.
+    Replay(replay::Arguments),
     /// Show how well each node knows the common time.
     Time(time::Arguments),
     /// Remove what a crash left in shared memory, and nothing that lives.
@@ -177,6 +181,7 @@ fn main() -> ExitCode {
         Command::Send(arguments) => send::run(&arguments),
         Command::Param(arguments) => param::run(&arguments),
         Command::Record(arguments) => record::run(&arguments),
+        Command::Replay(arguments) => replay::run(arguments),
         Command::Time(arguments) => time::run(&arguments),
         Command::Clean(arguments) => clean::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

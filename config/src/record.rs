@@ -2,6 +2,7 @@
 
 use crate::classes::ClassTable;
 use crate::directory::Directory;
+use crate::exact::{self, ExactModule};
 use crate::module::{Lines, Module, Program, RECORDER};
 use crate::output::Level;
 use crate::reader::{Item, Section};
@@ -30,6 +31,8 @@ pub struct Recording {
     pub data: Vec<RecordedItems>,
     /// Lines of output from this level on; none: no line.
     pub output: Option<Level>,
+    /// Modules whose journals are recorded, so that they can be replayed exactly.
+    pub exact: Vec<ExactModule>,
     /// A file gets no longer.
     pub rotate_size: u64,
     /// Nor older.
@@ -100,6 +103,7 @@ impl Recording {
             }
         }
         let output = section.get("output").and_then(|item| output(&item)).flatten();
+        let exact = exact::read(&section, directory);
         let rotate_size = section.get("rotate-size").and_then(|item| item.size(ROTATE_SIZE, "1 GiB"));
         let rotate_after = section.get("rotate-after").and_then(|item| at_least_a_second(&item, "1 h"));
         let leave_free = section.get("leave-free").and_then(|item| item.size(0..=1 << 50, "256 MiB"));
@@ -112,6 +116,7 @@ impl Recording {
             streams,
             data,
             output,
+            exact,
             rotate_size: rotate_size.unwrap_or(1 << 30),
             rotate_after: rotate_after.unwrap_or(Duration::from_secs(3600)),
             leave_free: leave_free.unwrap_or(256 << 20),
@@ -119,6 +124,11 @@ impl Recording {
             sync: sync.unwrap_or(Duration::from_secs(2)),
             line,
         })
+    }
+
+    /// Whether this module has a journal, which is recorded.
+    pub fn is_exact(&self, module: Name) -> bool {
+        self.exact.iter().any(|exact| exact.name == module)
     }
 
     /// The entry of `streams` that counts for a stream; none: it is not recorded.
@@ -260,7 +270,8 @@ pub(crate) fn connect(
     }
     match (first, recording) {
         (Some(at), Some(recording)) => {
-            let (calls, wrong) = connections(recording, classes, modules, &modules[at]);
+            let (calls, mut wrong) = connections(recording, classes, modules, &modules[at]);
+            wrong.extend(exact::mistakes(&recording.exact, classes, modules, &modules[at]));
             wrong.into_iter().for_each(|(line, message)| file.reader.report(line, format!("[record]: {message}")));
             for (name, line) in calls {
                 if !modules[at].calls.contains(&name) {

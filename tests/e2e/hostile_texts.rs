@@ -200,6 +200,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["record", "cut", recording, &place.path("cut.mcap").display().to_string(), HOSTILE],
         &["record", "export", recording, &place.path("drawn.mcap").display().to_string(), "--format", "drawn"],
         &["record", "export", recording, "-", "--format", "json"],
+        &["replay", "--exact", recording, HOSTILE],
         &["call", "probe.0"],
         &["call", "probe.0", "tells"],
         &["call", "probe.0", "fails"],

@@ -31,6 +31,10 @@ impl Page<'_> {
             Some(level) => format!("lines of level {} and above", level.as_str()),
         };
         self.entry("output", &output);
+        if !record.exact.is_empty() {
+            let names: Vec<String> = record.exact.iter().map(|module| self.name(module.name)).collect();
+            self.entry("exact", &format!("{}; each writes a journal, by which it can be replayed", names.join(", ")));
+        }
         let (size, age) = (size_text(record.rotate_size), duration_text(record.rotate_after));
         let free = size_text(record.leave_free);
         self.entry("files", &format!("a new one after {size} or {age}; {free} of the disk stay free"));

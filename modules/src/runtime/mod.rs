@@ -9,9 +9,11 @@
 //!             └────────────────────────────────────────────┘
 //! ```
 
+mod clock;
 mod context;
 mod endpoint;
 mod error;
+mod exact;
 mod exchange;
 mod follow;
 mod host;
@@ -29,6 +31,7 @@ mod stream;
 mod subscribed;
 mod unreadable;
 
+pub use clock::ModuleClock;
 pub use context::Context;
 pub use error::{ContextError, StartError};
 pub use follow::{BadRate, Rate, Subscription};

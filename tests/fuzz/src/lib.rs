@@ -16,6 +16,7 @@ mod descriptions;
 mod frames;
 mod head;
 mod impairments;
+mod journals;
 mod lines;
 mod logs;
 mod maps;
@@ -41,7 +42,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 17] = [
+pub const TARGETS: [Target; 18] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -52,6 +53,7 @@ pub const TARGETS: [Target; 17] = [
     Target { name: "logs", run: logs::run },
     Target { name: "maps", run: maps::run },
     Target { name: "recordings", run: recordings::run },
+    Target { name: "journals", run: journals::run },
     Target { name: "segments", run: segments::run },
     Target { name: "frames", run: frames::run },
     Target { name: "routers", run: routers::run },

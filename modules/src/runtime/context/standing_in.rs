@@ -1,10 +1,10 @@
 //! Publishing as another module, by its description.
 
 use super::Context;
+use crate::journal::{NotedItem, NotedValue, Tag};
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::Newest;
-use crate::runtime::stream::{OpenValue, OwnStream};
-use rohrpost_mailbox::{Name, Stamp};
+use rohrpost_mailbox::Name;
 
 impl Context {
     /// Publishes a value as the module that this one stands in for under the name `from`
@@ -45,6 +45,8 @@ impl Context {
                 self.newest.len() - 1
             }
         };
+        let noted = NotedItem { endpoint: endpoint as u16, number, stamp_ns, value: NotedValue::of(value) };
+        self.journal.output(Tag::Published, &noted);
         let newest = &mut self.newest[at];
         newest.stamp_ns = stamp_ns;
         newest.value.clear();
@@ -56,11 +58,7 @@ impl Context {
 
     /// The next record of a stream.
     fn write_as(&mut self, at: usize, stamp_ns: u64, value: &[u8]) -> Result<(), ContextError> {
-        let stamp = Stamp { epoch: self.clock.now().epoch, ns: stamp_ns };
-        let (_, streams, outlet) = self.split();
-        let OwnStream { about, writer } = &mut streams[at];
-        let record = writer.begin(stamp).map_err(|error| about.explain(error))?;
-        let mut open = OpenValue::<()>::new(record, stamp_ns, about, outlet);
+        let mut open = self.begin_at::<()>(at, stamp_ns)?;
         open.put_bytes(value)?;
         open.finish().map(drop)
     }
