@@ -212,7 +212,7 @@ fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
         let text = why[side].as_str().unwrap();
         assert!(text.starts_with("it publishes data: vision of "), "{text}");
     }
-    for (number, events, words) in [(4, 1, "Context::watch"), (5, 1, "for_threads"), (6, 3, "Context::link")] {
+    for (number, events, words) in [(4, 1, "Context::watch"), (5, 1, "in another thread"), (6, 3, "Context::link")] {
         let run = of(number);
         assert_eq!((&run["result"], &run["events"]), (&"refused".into(), &events.into()), "{run:#}");
         assert!(run["why"].as_str().unwrap().contains(words), "{run:#}");

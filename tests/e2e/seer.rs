@@ -92,10 +92,10 @@ impl Module for Seer {
         let map = (source == Sight::Map).then(|| std::fs::read(context.path("vision.map"))).transpose()?;
         match source {
             Sight::Descriptor => drop(context.watch(&std::io::stdin(), Interest::Read)?),
-            Sight::Thread => drop(std::thread::spawn({
-                let clock = context.clock().for_threads();
-                move || clock.now()
-            })),
+            Sight::Thread => {
+                let clock = context.clock().clone();
+                drop(std::thread::spawn(move || clock.now()).join());
+            }
             _ => {}
         }
         let bias = std::env::var(OTHER_BUILD).ok().and_then(|bias| bias.parse().ok()).unwrap_or(0);

@@ -56,7 +56,9 @@ fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {
 fn take(runs: &mut Vec<RecordedRun>, module: &str, value: &[u8]) {
     let Some(Piece { incarnation, offset, bytes }) = Piece::read(value) else { return };
     let is_it = |run: &RecordedRun| (run.module.as_str(), run.incarnation) == (module, incarnation);
-    let at = runs.iter().position(is_it).unwrap_or_else(|| {
+    // After the node's memory was made anew, incarnations are counted from the beginning.
+    let known = runs.iter().rposition(is_it).filter(|at| offset > 0 || runs[*at].bytes.is_empty());
+    let at = known.unwrap_or_else(|| {
         let begins_late = (offset > 0).then(|| {
             format!(
                 "its journal began {offset} bytes before the recording did; record from the module's start on, or \
@@ -112,6 +114,8 @@ mod tests {
             ("pilot.0", 5, 7, b"h"),
             ("pilot.0", 5, 4, b"efg"),
             ("mapper.0", 6, 10, b"y"),
+            ("pilot.0", 7, 0, b"new"),
+            ("pilot.0", 7, 3, b"er"),
         ] {
             take(&mut runs, module, &record(incarnation, offset, bytes));
         }
@@ -120,8 +124,12 @@ mod tests {
             .iter()
             .map(|run| (run.module.as_str(), &run.bytes[..], run.ends.is_some(), run.begins_late.is_some()))
             .collect();
-        let expected =
-            [("pilot.0", &b"abcd"[..], true, false), ("mapper.0", b"", false, true), ("pilot.0", b"z", false, false)];
+        let expected = [
+            ("pilot.0", &b"abcd"[..], true, false),
+            ("mapper.0", b"", false, true),
+            ("pilot.0", b"z", false, false),
+            ("pilot.0", b"newer", false, false),
+        ];
         assert_eq!(told, expected);
         assert!(runs[0].ends.as_ref().is_some_and(|why| why.starts_with("3 bytes ")), "{:?}", runs[0].ends);
     }

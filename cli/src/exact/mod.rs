@@ -36,12 +36,11 @@ pub(super) struct ExactArguments {
 
 pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
     let runs = journals::read(&arguments.file, &arguments.modules)?;
-    let texts = rohrpost_recording::info(&arguments.file)?.configuration;
-    let programs = ExactPrograms::new(texts, arguments.program.clone(), arguments.folder.clone());
     if arguments.list {
-        runs.iter().for_each(|run| list(run, &programs));
+        runs.iter().for_each(list);
         return Ok(ExitCode::SUCCESS);
     }
+    let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone());
     let mut code = ExitCode::SUCCESS;
     for run in &runs {
         let began = Instant::now();
@@ -58,9 +57,9 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
-fn list(run: &RecordedRun, programs: &ExactPrograms) {
+fn list(run: &RecordedRun) {
     say(format_args!("{}:", plain::line(&run.module)));
-    let entries = programs.exact(run, String::new(), None).entries();
+    let entries = ExactPrograms::exact(run, String::new(), None).entries();
     // The reader may have seen enough.
     let _ = entries.iter().all(|entry| say(plain::line(entry)));
 }

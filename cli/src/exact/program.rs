@@ -4,7 +4,6 @@ use super::journals::RecordedRun;
 use crate::terminal::Failure;
 use rohrpost_config::{Program, find_program};
 use rohrpost_modules::journal::{ExactRun, ReplayReport, VARIABLE};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -13,15 +12,13 @@ const SHARED_MEMORY: &str = "/dev/shm";
 
 /// Runs programs of recorded modules.
 pub(super) struct ExactPrograms {
-    /// Texts of the configuration, by the names of their files.
-    texts: BTreeMap<String, String>,
     program: Option<PathBuf>,
     folder: Option<PathBuf>,
 }
 
 impl ExactPrograms {
-    pub(super) fn new(texts: BTreeMap<String, String>, program: Option<PathBuf>, folder: Option<PathBuf>) -> Self {
-        Self { texts, program, folder }
+    pub(super) fn new(program: Option<PathBuf>, folder: Option<PathBuf>) -> Self {
+        Self { program, folder }
     }
 
     /// Repeats a run, and reads what the program found.
@@ -29,7 +26,7 @@ impl ExactPrograms {
         let directory = tempfile::Builder::new().prefix("rohrpost-exact-").tempdir_in(SHARED_MEMORY)?;
         let (file, report) = (directory.path().join("run"), directory.path().join("report"));
         let folder = self.folder.as_ref().map(|folder| folder.canonicalize()).transpose()?;
-        let exact = self.exact(run, report.display().to_string(), folder.map(|folder| folder.display().to_string()));
+        let exact = Self::exact(run, report.display().to_string(), folder.map(|folder| folder.display().to_string()));
         let mut command = match self.command(&exact) {
             Ok(command) => command,
             Err(why) => return Ok(ReplayReport::refused(why)),
@@ -47,9 +44,8 @@ impl ExactPrograms {
     }
 
     /// The run as its program reads it.
-    pub(super) fn exact(&self, run: &RecordedRun, report: String, folder: Option<String>) -> ExactRun {
-        let (texts, ends, journal) = (self.texts.clone(), run.ends.clone(), run.bytes.clone().into());
-        ExactRun { texts, folder, report, ends, journal }
+    pub(super) fn exact(run: &RecordedRun, report: String, folder: Option<String>) -> ExactRun {
+        ExactRun { folder, report, ends: run.ends.clone(), journal: run.bytes.clone().into() }
     }
 
     fn command(&self, exact: &ExactRun) -> Result<Command, String> {

@@ -75,9 +75,7 @@ impl Caller {
         let mut bytes = bytes.borrow_mut();
         bytes.clear();
         append(&mut bytes, arguments).map_err(|error| CallError::BadArguments(error.to_string()))?;
-        if let Some(mut replay) = journal.replay() {
-            replay.know_called(interface, description);
-        }
+        journal.replay(|replay| replay.know_called(interface, description));
         let timeout_ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
         let arguments = NotedValue::of(&bytes);
         journal.output(Tag::Called, &NotedCommand { to: to.raw(), function, interface, timeout_ns, arguments });

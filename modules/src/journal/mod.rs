@@ -39,31 +39,53 @@ pub(crate) use write::{JournalWriter, SHAPE};
 use rohrpost_mailbox::monotonic_ns;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::cell::{RefCell, RefMut};
+use std::cell::RefCell;
 use std::path::Path;
-use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Number of the stream, under the module's own name. Interfaces have numbers from 1 to 16384.
 pub const JOURNAL_NUMBER: u16 = u16::MAX;
 /// Its name.
 pub const JOURNAL_NAME: &str = "journal";
 
-/// A module's journal, or none; all that share it have a copy of this.
+/// A module's journal, or none; all that share it have a copy of this. The journal itself is its thread's. What another
+/// thread does with a copy is seen by no journal: that is marked here, and noted by the module's thread.
 #[derive(Clone, Default)]
-pub(crate) struct ModuleJournal(Option<Rc<RefCell<JournalMode>>>);
+pub(crate) struct ModuleJournal(Option<Arc<AtomicBool>>);
 
 enum JournalMode {
     Write(Box<JournalWriter>),
     Replay(Box<Replay>),
 }
 
+thread_local! {
+    static PRESENT: RefCell<Option<JournalMode>> = const { RefCell::new(None) };
+}
+
+const STRAYED: &str = "the module reads the clock, or a stream, in another thread";
+
+/// Hands on what a module that has no journal any more, since it panicked in its making, has noted.
+pub(crate) fn flush_present() {
+    PRESENT.with_borrow_mut(|present| match present {
+        Some(JournalMode::Write(writer)) => writer.flush(),
+        Some(JournalMode::Replay(_)) | None => {}
+    });
+}
+
 impl ModuleJournal {
     pub(crate) fn written(writer: JournalWriter) -> Self {
-        Self(Some(Rc::new(RefCell::new(JournalMode::Write(Box::new(writer))))))
+        Self::of(JournalMode::Write(Box::new(writer)))
     }
 
     pub(crate) fn replayed(replay: Replay) -> Self {
-        Self(Some(Rc::new(RefCell::new(JournalMode::Replay(Box::new(replay))))))
+        Self::of(JournalMode::Replay(Box::new(replay)))
+    }
+
+    /// The one of this thread.
+    fn of(mode: JournalMode) -> Self {
+        PRESENT.set(Some(mode));
+        Self(Some(Arc::default()))
     }
 
     /// Whether nothing is noted.
@@ -73,25 +95,38 @@ impl ModuleJournal {
 
     /// Whether events and answers are taken from it.
     pub(crate) fn is_replayed(&self) -> bool {
-        self.0.as_ref().is_some_and(|mode| matches!(*mode.borrow(), JournalMode::Replay(_)))
+        self.replay(|_| ()).is_some()
     }
 
-    fn writer(&self) -> Option<RefMut<'_, JournalWriter>> {
-        let mode = self.0.as_ref()?.borrow_mut();
-        RefMut::filter_map(mode, |mode| match mode {
-            JournalMode::Write(writer) => Some(&mut **writer),
+    fn mode<T>(&self, part: impl FnOnce(&mut JournalMode, bool) -> Option<T>) -> Option<T> {
+        let has_strayed = self.0.as_ref()?;
+        PRESENT.with_borrow_mut(|present| match present {
+            Some(mode) => part(mode, has_strayed.load(Ordering::Acquire)),
+            None => {
+                has_strayed.store(true, Ordering::Release);
+                None
+            }
+        })
+    }
+
+    fn write<T>(&self, part: impl FnOnce(&mut JournalWriter) -> T) -> Option<T> {
+        self.mode(|mode, has_strayed| match mode {
+            JournalMode::Write(writer) => {
+                if has_strayed {
+                    writer.put(Tag::Hole, STRAYED);
+                }
+                Some(part(writer))
+            }
             JournalMode::Replay(_) => None,
         })
-        .ok()
     }
 
-    pub(crate) fn replay(&self) -> Option<RefMut<'_, Replay>> {
-        let mode = self.0.as_ref()?.borrow_mut();
-        RefMut::filter_map(mode, |mode| match mode {
+    /// Does this if it is replayed.
+    pub(crate) fn replay<T>(&self, part: impl FnOnce(&mut Replay) -> T) -> Option<T> {
+        self.mode(|mode, _| match mode {
             JournalMode::Write(_) => None,
-            JournalMode::Replay(replay) => Some(&mut **replay),
+            JournalMode::Replay(replay) => Some(part(replay)),
         })
-        .ok()
     }
 
     /// Something that the module is told: asked now, and noted; or, replayed, what was noted then.
@@ -109,95 +144,68 @@ impl ModuleJournal {
 
     /// Notes an answer that was given already; nothing, unless it is written.
     pub(crate) fn note<T: Serialize + ?Sized>(&self, tag: Tag, answer: &T) {
-        if let Some(mut writer) = self.writer() {
-            writer.put(tag, answer);
-        }
+        self.write(|writer| writer.put(tag, answer));
     }
 
     /// The answer that was noted then; none unless it is replayed.
     pub(crate) fn given(&self, tag: Tag) -> Option<Given> {
-        self.replay().map(|mut replay| replay.answer(tag))
+        self.replay(|replay| replay.answer(tag))
+    }
+
+    /// How it begins.
+    pub(crate) fn begin(&self, begin: &Begin<'_>) {
+        if self.replay(|replay| replay.begin(begin)).is_none() {
+            self.note(Tag::Begin, begin);
+        }
     }
 
     /// The module is called; `now_ns` is asked for if that is noted.
     pub(crate) fn event(&self, event: &JournalEvent<'_>, now_ns: impl FnOnce() -> u64) {
-        if self.0.is_none() {
-            return;
-        }
-        if let Some(mut replay) = self.replay() {
-            replay.event(event);
-        } else {
+        if !self.is_none() && self.replay(|replay| replay.event(event)).is_none() {
             self.note(Tag::Event, &EventAt { at_ns: now_ns(), event: *event });
         }
     }
 
     /// The module sends something, or says something of itself.
     pub(crate) fn output<T: Serialize + ?Sized>(&self, tag: Tag, output: &T) {
-        if self.0.is_none() {
-            return;
-        }
-        if let Some(mut replay) = self.replay() {
-            replay.output(tag, output);
-        } else {
+        if !self.is_none() && self.replay(|replay| replay.output(tag, output)).is_none() {
             self.note(tag, output);
         }
     }
 
     /// What comes now is seen by no journal.
     pub(crate) fn hole(&self, why: &str) {
-        if self.0.is_some() {
-            self.output(Tag::Hole, why);
-        }
+        self.output(Tag::Hole, why);
     }
 
     /// A file that the module's settings name: a replay wants one with the same content.
     pub(crate) fn file(&self, path: &Path) {
-        if self.0.is_none() {
+        if self.is_none() {
             return;
         }
         let found = files::digest_of(path);
-        if let Some(mut replay) = self.replay() {
-            replay.file(path, found);
-        } else {
+        if self.replay(|replay| replay.file(path, found)).is_none() {
             self.note(Tag::File, &found);
         }
     }
 
     /// Hands entries on to readers that have waited long enough for them.
     pub(crate) fn pass_on(&self) {
-        if let Some(mut writer) = self.writer() {
-            writer.pass_on(monotonic_ns());
-        }
+        self.write(|writer| writer.pass_on(monotonic_ns()));
     }
 
     /// When [`ModuleJournal::pass_on`] has something to do, by the monotonic clock.
     pub(crate) fn due_ns(&self) -> Option<u64> {
-        self.writer().and_then(|writer| writer.due_ns())
-    }
-
-    /// Hands all entries on.
-    pub(crate) fn flush(&self) {
-        if let Some(mut writer) = self.writer() {
-            writer.flush();
-        }
+        self.write(|writer| writer.due_ns()).flatten()
     }
 
     /// The module has ended as it should, and its journal with it.
     pub(crate) fn end(&self) {
-        if let Some(replay) = self.replay() {
-            replay.end();
-        }
-        self.note(Tag::End, &());
-        self.flush();
-    }
-
-    /// What begins with this.
-    pub(crate) fn begin(&self, begin: &Begin<'_>) {
-        if let Some(mut replay) = self.replay() {
-            replay.begin(begin);
-        } else {
-            self.note(Tag::Begin, begin);
-        }
+        self.replay(|replay| replay.end());
+        self.write(|writer| {
+            writer.put(Tag::End, &());
+            writer.flush();
+        });
     }
 }
 

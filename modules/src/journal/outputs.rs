@@ -1,7 +1,7 @@
 //! What a module sends and says, as its journal has it.
 
 use super::bytes::{Blob, digest};
-use super::entry::Tag;
+use super::entry::{Tag, VERSION};
 use super::event::JournalEvent;
 use rohrpost_mailbox::Name;
 use rohrpost_schema::{Description, Type, decode};
@@ -22,26 +22,26 @@ pub(super) struct KnownTypes {
     pub(super) called: Vec<(u32, fn() -> Description)>,
 }
 
-/// How a journal begins.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+/// How a journal begins: with all that the module was given at its start.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub(crate) struct Begin<'a> {
-    pub(crate) version: u32,
+    pub(super) version: u32,
     /// The module's name, as the configuration has it.
-    pub(crate) module: &'a str,
-    /// The configuration's file.
-    pub(crate) config: &'a str,
-    /// The file of saved parameters, if it names one.
-    pub(crate) saved: Option<&'a str>,
-    /// Sum of both.
-    pub(crate) settings: u64,
+    pub(super) module: &'a str,
+    /// The configuration's file, and its text.
+    pub(super) config: (&'a str, &'a str),
+    /// The same of saved parameters, if the configuration has a place for them.
+    pub(super) saved: Option<(&'a str, &'a str)>,
 }
 
 impl<'a> Begin<'a> {
-    /// Of these two texts.
-    pub(crate) fn new(module: &'a str, config: (&'a str, &str), saved: Option<(&'a str, &str)>) -> Self {
-        let sum = digest(0, config.1.as_bytes());
-        let settings = saved.map_or(sum, |(_, text)| digest(sum, text.as_bytes()));
-        Self { version: super::entry::VERSION, module, config: config.0, saved: saved.map(|(path, _)| path), settings }
+    pub(crate) fn new(module: &'a str, config: (&'a str, &'a str), saved: Option<(&'a str, &'a str)>) -> Self {
+        Self { version: VERSION, module, config, saved }
+    }
+
+    /// All but where files are.
+    pub(super) fn texts(&self) -> (u32, &'a str, &'a str, Option<&'a str>) {
+        (self.version, self.module, self.config.1, self.saved.map(|(_, text)| text))
     }
 }
 

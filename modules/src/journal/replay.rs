@@ -87,12 +87,12 @@ impl Replay {
         }
     }
 
-    /// It is of the same module and settings.
-    pub(crate) fn begin(&mut self, begin: &Begin<'_>) {
+    /// It is of this module and these settings, wherever their files are now.
+    pub(super) fn begin(&mut self, begin: &Begin<'_>) {
         let given = self.answer(Tag::Begin);
         let noted: Begin<'_> = given.read();
-        if (noted.version, noted.module, noted.settings) != (begin.version, begin.module, begin.settings) {
-            self.progress.stop(ReplayVerdict::Refused("it is of another module, or of other settings".into()));
+        if noted.texts() != begin.texts() {
+            self.refuse("it is of another module, or of other settings");
         }
     }
 

@@ -1,6 +1,6 @@
 //! A module's run, as a file for the program that is to repeat it.
 
-use super::bytes::{Blob, digest};
+use super::bytes::Blob;
 use super::entry::{self, NoEntry, Tag};
 use super::list;
 use super::outputs::Begin;
@@ -9,7 +9,6 @@ use rohrpost_config::{Installation, Saved};
 use rohrpost_mailbox::Name;
 use rohrpost_schema::Bytes;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Variable of the environment with the path of an [`ExactRun`]: the module's program repeats it, and does nothing
@@ -66,8 +65,6 @@ impl<'a> Piece<'a> {
 /// A run that is to be repeated.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ExactRun {
-    /// Texts of the configuration and of saved parameters, by the names of their files.
-    pub texts: BTreeMap<String, String>,
     /// Where relative paths of the configuration start; none: where they did.
     pub folder: Option<String>,
     /// Where to write the `ReplayReport`.
@@ -127,27 +124,16 @@ impl ExactRun {
     /// The configuration as it was then, and the module.
     ///
     /// # Errors
-    /// The journal does not begin as one of this version does, or its text is not the one that the module had.
+    /// The journal does not begin as one of this version does.
     pub fn installation(&self) -> Result<(Installation, Name), RunError> {
-        let begin = self.begin()?;
-        let (config, text) = self.text(begin.config)?;
-        let mut installation = Installation::parse(text, &config).map_err(|error| RunError(error.to_string()))?;
-        let mut sum = digest(0, text.as_bytes());
-        if let Some(saved) = begin.saved {
-            // Without such a file nothing was saved.
-            let (path, text) = self.text(saved).unwrap_or_else(|_| (saved.into(), ""));
-            sum = digest(sum, text.as_bytes());
-            let saved = Saved::parse(text, &path, &installation).map_err(|error| RunError(error.to_string()))?;
+        let Begin { module, config: (config, text), saved, .. } = self.begin()?;
+        let failed = |error: &dyn std::fmt::Display| RunError(error.to_string());
+        let mut installation = Installation::parse(text, &self.here(config)).map_err(|error| failed(&error))?;
+        if let Some((path, text)) = saved {
+            let saved = Saved::parse(text, &self.here(path), &installation).map_err(|error| failed(&error))?;
             installation.saved = Some(saved);
         }
-        if sum != begin.settings {
-            return Err(RunError(
-                "the settings of the recording are not those that the module began with: the file of saved parameters, \
-                 or the configuration, was changed after the recording began"
-                    .into(),
-            ));
-        }
-        let name = installation.classes.parse_module(begin.module).map_err(|error| RunError(error.to_string()))?;
+        let name = installation.classes.parse_module(module).map_err(|error| failed(&error))?;
         Ok((installation, name))
     }
 
@@ -156,15 +142,11 @@ impl ExactRun {
         list::entries(&self.journal)
     }
 
-    /// A file's path here, and its text.
-    fn text(&self, path: &str) -> Result<(PathBuf, &str), RunError> {
+    /// A file's path here.
+    fn here(&self, path: &str) -> PathBuf {
         let path = Path::new(path);
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let Some(text) = self.texts.get(&*name) else {
-            return Err(RunError(format!("the recording does not have the text of {}", path.display())));
-        };
-        let here = self.folder.as_ref().map_or_else(|| path.to_owned(), |folder| Path::new(folder).join(&*name));
-        Ok((here, text))
+        let name = path.file_name().unwrap_or_default();
+        self.folder.as_ref().map_or_else(|| path.to_owned(), |folder| Path::new(folder).join(name))
     }
 
     pub(crate) fn replay(self) -> Replay {

@@ -40,7 +40,7 @@ fn written(run: impl FnOnce(&ModuleJournal)) -> Vec<u8> {
     let journal = ModuleJournal::written(JournalWriter::new(stream, SystemClock::open(&node), 7));
     journal.begin(&Begin::new("pilot.0", ("robot.toml", "text"), None));
     run(&journal);
-    drop(journal);
+    flush_present();
     let mut bytes = Vec::new();
     while let Next::Record(record) = reader.try_next().unwrap() {
         let piece = Piece::read(record.body()).unwrap();

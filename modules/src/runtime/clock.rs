@@ -5,7 +5,7 @@ use rohrpost_mailbox::{SystemClock, SystemTime, TimeRecord, TimeSource};
 use std::time::Duration;
 
 /// A module's view of system time: each reading is noted in its journal, if it has one, and given back in an exact
-/// replay. It stays in the module's thread.
+/// replay. What another thread reads cannot be given back: an exact replay ends there.
 ///
 /// ```
 /// use rohrpost_modules::runtime::{Context, ModuleClock};
@@ -71,20 +71,6 @@ impl ModuleClock {
     pub fn record(&self) -> Option<TimeRecord> {
         let noted: Option<NotedTimeRecord> = self.journal.answer(Tag::TimeRecord, || self.clock.record().map(noted));
         noted.and_then(recorded)
-    }
-
-    /// The same clock for another thread. An exact replay cannot give back what that reads: the journal ends here.
-    ///
-    /// ```
-    /// # use rohrpost_modules::runtime::Context;
-    /// fn stamp_in_a_thread(context: &Context) -> std::thread::JoinHandle<u64> {
-    ///     let clock = context.clock().for_threads();
-    ///     std::thread::spawn(move || clock.now().ns)
-    /// }
-    /// ```
-    pub fn for_threads(&self) -> SystemClock {
-        self.journal.hole("the module reads the clock in another thread (`ModuleClock::for_threads`)");
-        self.clock.clone()
     }
 }
 

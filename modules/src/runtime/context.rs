@@ -181,9 +181,10 @@ impl Context {
     /// The clock that system time is read from, to keep.
     ///
     /// ```
-    /// # use rohrpost_modules::runtime::{Context, ModuleClock};
-    /// fn keep(context: &Context) -> ModuleClock {
-    ///     context.clock().clone()
+    /// # use rohrpost_modules::runtime::Context;
+    /// fn stamp_in_a_thread(context: &Context) -> std::thread::JoinHandle<u64> {
+    ///     let clock = context.clock().clone();
+    ///     std::thread::spawn(move || clock.now().ns)
     /// }
     /// ```
     pub fn clock(&self) -> &ModuleClock {

@@ -7,7 +7,6 @@ use super::received::Received;
 use super::runner::Running;
 use crate::journal::{JournalEvent, Replay};
 use crate::module::Module;
-use std::cell::RefMut;
 
 impl<M: Module> Running<M> {
     /// Whether it repeats a journal.
@@ -18,22 +17,25 @@ impl<M: Module> Running<M> {
     /// Does all that is in the journal, and ends the process with the result.
     pub(super) fn repeat(&mut self) -> ! {
         loop {
-            let next = self.replay().next_event();
-            let before = self.replay().events();
+            let (next, before) = self.replay(|replay| (replay.next_event(), replay.events()));
             self.repeat_event(&next.event());
-            if self.replay().events() == before {
-                self.replay().give_up("the module is called in a state in which this program does not call it");
+            if self.replay(|replay| replay.events()) == before {
+                self.give_up("the module is called in a state in which this program does not call it");
             }
         }
     }
 
-    fn replay(&self) -> RefMut<'_, Replay> {
-        self.context.journal.replay().expect("only a module with a journal repeats it")
+    fn replay<T>(&self, part: impl FnOnce(&mut Replay) -> T) -> T {
+        self.context.journal.replay(part).expect("only a module with a journal repeats it")
+    }
+
+    fn give_up(&self, why: &str) -> ! {
+        self.replay(|replay| replay.give_up(why))
     }
 
     fn repeat_event(&mut self, event: &JournalEvent<'_>) {
         match *event {
-            JournalEvent::New => self.replay().give_up("the module is made twice in its journal"),
+            JournalEvent::New => self.give_up("the module is made twice in its journal"),
             JournalEvent::On => drop(self.life.turn_on(&mut self.context)),
             JournalEvent::Off => self.life.turn_off(&mut self.context),
             JournalEvent::Tick => {
@@ -55,14 +57,14 @@ impl<M: Module> Running<M> {
                 let mut reply = Vec::new();
                 let _ = self.hosted(0).set_parameters(wish.0, by, &mut reply);
             }
-            JournalEvent::Ready => self.replay().give_up("it waits for a descriptor"),
+            JournalEvent::Ready => self.give_up("it waits for a descriptor"),
         }
     }
 
     fn hosted(&mut self, endpoint: u16) -> Hosted<'_, M> {
         let index = usize::from(endpoint);
         let Some(endpoint) = self.endpoints.get(index) else {
-            self.replay().give_up("it runs a function under a name that the module does not have here")
+            self.give_up("it runs a function under a name that the module does not have here")
         };
         Hosted { index, offer: &endpoint.offer, life: &mut self.life, context: &mut self.context }
     }

@@ -12,7 +12,7 @@ use super::stream::{self, Step};
 use super::subscribed::Origin;
 use crate::common::DataHead;
 use crate::interface::Interfaces;
-use crate::journal::JournalEvent;
+use crate::journal::{JournalEvent, flush_present};
 use crate::module::Module;
 use crate::output;
 use rohrpost_mailbox::{Kind, ModuleState, OverflowPolicy, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any};
@@ -89,6 +89,7 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
     let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
     let mut running = joined.unwrap_or_else(|panic| {
+        flush_present();
         output::flush();
         std::panic::resume_unwind(panic)
     })?;

@@ -175,10 +175,10 @@ impl Start {
         };
         let served: Vec<_> = endpoints.iter().map(streams_of).collect();
         context.streams = stream::make(&participant, &installation, module, &served)?;
-        if let Some(mut replay) = journal.replay() {
+        journal.replay(|replay| {
             let own = endpoints.iter().map(|endpoint| Description::from_bytes(&endpoint.offer.description).ok());
             replay.know_own(own.collect());
-        }
+        });
         journal.event(&JournalEvent::New, || context.clock.unseen().now().ns);
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);

@@ -2,15 +2,6 @@
 //! the same as what was written, or an error in words.
 
 use rohrpost_modules::journal::{ExactRun, Piece};
-use std::collections::BTreeMap;
-
-const CONFIG: &str = r#"
-installation = "fuzz"
-system = { name = "robot", id = 1 }
-classes = { pilot = { id = 100 }, tool = { id = 16 } }
-nodes = { main = {} }
-module = [{ name = "pilot.0", program = "pilot" }]
-"#;
 
 pub(crate) fn run(data: &[u8]) {
     let Some((which, body)) = data.split_first() else { return };
@@ -29,8 +20,7 @@ fn piece(body: &[u8]) {
 }
 
 fn exact(journal: &[u8]) -> ExactRun {
-    let texts = BTreeMap::from([("robot.toml".to_owned(), CONFIG.to_owned())]);
-    ExactRun { texts, folder: None, report: String::new(), ends: None, journal: journal.to_vec().into() }
+    ExactRun { folder: None, report: String::new(), ends: None, journal: journal.to_vec().into() }
 }
 
 fn begin(run: &ExactRun) {

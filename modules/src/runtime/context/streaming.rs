@@ -97,9 +97,7 @@ impl Context {
             }
             Err(error) => {
                 let error = about.explain(error);
-                if let Some(replay) = journal.replay() {
-                    replay.give_up(&format!("a record that was written then is refused now: {error}"));
-                }
+                journal.replay(|replay| replay.give_up(&format!("a record that was written is refused now: {error}")));
                 journal.note(Tag::Wrote, &Err::<(u64, u64), _>(&error));
                 Err(error.into())
             }
