@@ -8,7 +8,7 @@ use super::incarnation::Incarnation;
 use super::received::Received;
 use super::refusals::Cause;
 use super::start::Start;
-use super::stream::{self, Step};
+use super::stream::{self, FollowedStream, Step};
 use super::subscribed::Origin;
 use crate::common::DataHead;
 use crate::interface::Interfaces;
@@ -138,7 +138,7 @@ impl<M: Module> Running<M> {
         while !self.stop.load(Ordering::Acquire) {
             let mut busy = self.commands();
             busy |= self.take_data();
-            busy |= self.take_records();
+            busy |= self.take_records(|_| true);
             self.periodic();
             self.context.journal.pass_on();
             output::drain();
@@ -185,12 +185,12 @@ impl<M: Module> Running<M> {
         any
     }
 
-    /// Hands out records of the streams that the module follows, while it is on.
-    fn take_records(&mut self) -> bool {
+    /// Hands out records of those streams that the module follows, while it is on.
+    fn take_records(&mut self, of: impl Fn(&FollowedStream) -> bool) -> bool {
         let mut any = false;
         // Taken out meanwhile, as own mailboxes are.
         let mut followed = std::mem::take(&mut self.context.followed_streams.list);
-        for stream in &mut followed {
+        for stream in followed.iter_mut().filter(|stream| of(stream)) {
             any |= burst(|| {
                 if self.life.state != ModuleState::On {
                     return false;
@@ -287,6 +287,8 @@ impl<M: Module> Running<M> {
     }
 
     fn end(mut self) {
+        // What modules did that have ended by now waits for nobody else.
+        while self.take_records(FollowedStream::is_journal) {}
         if self.life.state == ModuleState::On {
             self.life.work(JournalEvent::Off, &mut self.context, M::off);
         }

@@ -130,7 +130,7 @@ impl FollowedStreams {
 
     /// Passes over what was written until now; of a journal nothing is to be missing.
     pub(in crate::runtime) fn pass_over(&mut self) {
-        for stream in self.list.iter_mut().filter(|stream| !stream.reader.is_journal()) {
+        for stream in self.list.iter_mut().filter(|stream| !stream.is_journal()) {
             if let Err(error) = stream.reader.reader.pass_over() {
                 stream.notices.refused(&stream.reader.source.explain(&error));
             }
@@ -157,13 +157,18 @@ impl FollowedStreams {
 
     /// What wakes the module. Journals wait for its next turn: those that write them must not pay for waking it.
     pub(in crate::runtime) fn sources(&mut self) -> impl Iterator<Item = &mut (dyn Source + 'static)> {
-        let is_awaited = |stream: &&mut FollowedStream| stream.notices.retry.is_none() && !stream.reader.is_journal();
+        let is_awaited = |stream: &&mut FollowedStream| stream.notices.retry.is_none() && !stream.is_journal();
         let awaited = self.list.iter_mut().filter(is_awaited);
         awaited.map(|stream| -> &mut (dyn Source + 'static) { &mut stream.reader.reader })
     }
 }
 
 impl FollowedStream {
+    /// Whether it is the journal of a module.
+    pub(in crate::runtime) fn is_journal(&self) -> bool {
+        self.reader.is_journal()
+    }
+
     /// The next record, or what there is instead.
     pub(in crate::runtime) fn step(&mut self) -> Step<'_> {
         let Self { reader, id, notices } = self;

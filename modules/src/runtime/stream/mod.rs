@@ -20,9 +20,9 @@ mod read;
 
 pub(super) use check::{CheckedReader, KnownStream};
 pub use error::{RecordError, StreamReadError};
-pub(crate) use follow::FollowedStreams;
 pub(super) use follow::Step;
 pub use follow::StreamSubscription;
+pub(crate) use follow::{FollowedStream, FollowedStreams};
 pub use moment::Moment;
 pub(super) use noted::{note, opened};
 pub use open::OpenValue;
