@@ -60,9 +60,9 @@ pub use rohrpost_modules::call::{CallError, Fault, Pending};
 #[doc(hidden)]
 pub use rohrpost_modules::macro_support;
 pub use rohrpost_modules::runtime::{
-    BadRate, ClientError, Context, ContextError, Moment, OpenValue, Rate, Received, Record, RecordError, Start,
-    StartError, Stream, StreamReadError, StreamSubscription, Subscription, TimeTeller, ToolLink, Unreadable, describe,
-    find_other_versions, find_running,
+    BadRate, ClientError, Context, ContextError, ModuleClock, Moment, OpenValue, Rate, Received, Record, RecordError,
+    Start, StartError, Stream, StreamReadError, StreamSubscription, Subscription, TimeTeller, ToolLink, Unreadable,
+    describe, find_other_versions, find_running,
 };
 pub use rohrpost_modules::serde;
 pub use rohrpost_modules::{

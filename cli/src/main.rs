@@ -21,6 +21,7 @@ mod delay;
 mod demo;
 mod doctor;
 mod echo;
+mod exact;
 mod flows;
 mod graph;
 mod help;
@@ -124,7 +125,7 @@ enum Command {
     Param(param::Arguments),
     /// Describe, recover, cut and merge files of recordings.
     Record(record::Arguments),
-    /// Play recordings in the place of the modules that were recorded.
+    /// Play recordings in the place of the modules that were recorded, or repeat modules exactly as they were recorded.
     Replay(replay::Arguments),
     /// Show how well each node knows the common time.
     Time(time::Arguments),

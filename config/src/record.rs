@@ -2,6 +2,7 @@
 
 use crate::classes::ClassTable;
 use crate::directory::Directory;
+use crate::exact::{self, ExactModule};
 use crate::module::{Lines, Module, RECORDER};
 use crate::output::Level;
 use crate::reader::{Item, Section};
@@ -36,6 +37,8 @@ pub struct Recording {
     /// At most so many values a second of each item are in the files once more, as other programs draw them; none: not
     /// one.
     pub drawn: Option<f64>,
+    /// Modules whose journals are recorded, so that they can be replayed exactly.
+    pub exact: Vec<ExactModule>,
     /// A file gets no longer.
     pub rotate_size: u64,
     /// Nor older.
@@ -109,6 +112,7 @@ impl Recording {
         }
         let output = section.get("output").and_then(|item| output(&item)).flatten();
         let drawn = section.get("drawn").and_then(|item| drawn(&item)).flatten();
+        let exact = exact::read(&section, directory);
         let rotate_size = section.get("rotate-size").and_then(|item| item.size(ROTATE_SIZE, "1 GiB"));
         let rotate_after = section.get("rotate-after").and_then(|item| at_least_a_second(&item, "1 h"));
         let leave_free = section.get("leave-free").and_then(|item| item.size(0..=1 << 50, "256 MiB"));
@@ -123,6 +127,7 @@ impl Recording {
             data,
             output,
             drawn,
+            exact,
             rotate_size: rotate_size.unwrap_or(1 << 30),
             rotate_after: rotate_after.unwrap_or(Duration::from_secs(3600)),
             leave_free: leave_free.unwrap_or(256 << 20),
@@ -140,6 +145,11 @@ impl Recording {
             "control-security = \"none\": any computer that reaches {control} may switch the recording off; use a \
              network that nobody else reaches"
         ))
+    }
+
+    /// Whether this module has a journal, which is recorded.
+    pub fn is_exact(&self, module: Name) -> bool {
+        self.exact.iter().any(|exact| exact.name == module)
     }
 
     /// The entry of `streams` that counts for a stream; none: it is not recorded.
@@ -319,7 +329,8 @@ pub(crate) fn connect(
     }
     match (first, recording) {
         (Some(at), Some(recording)) => {
-            let (calls, wrong) = connections(recording, classes, modules, &modules[at]);
+            let (calls, mut wrong) = connections(recording, classes, modules, &modules[at]);
+            wrong.extend(exact::mistakes(&recording.exact, classes, modules, &modules[at]));
             wrong.into_iter().for_each(|(line, message)| file.reader.report(line, format!("[record]: {message}")));
             for (name, line) in calls {
                 if !modules[at].calls.contains(&name) {

@@ -73,6 +73,11 @@ impl Saved {
         }
     }
 
+    /// Its text; empty, if there is no such file yet.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Modules with values in it, in the order of their names.
     pub fn modules(&self) -> impl Iterator<Item = Name> {
         self.modules.iter().map(|(name, _)| *name)

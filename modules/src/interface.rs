@@ -1,6 +1,6 @@
 //! What the `interface` attribute makes of a trait: an interface that a module serves and proxies call.
 
-use crate::call::{CallError, Caller, Fault, Pending, append};
+use crate::call::{CallError, Caller, Fault, Pending};
 use rohrpost_mailbox::Name;
 use rohrpost_schema::{Data, Description};
 use std::marker::PhantomData;
@@ -144,14 +144,15 @@ pub struct ProxyCore {
     pub link: Caller,
     pub module: Name,
     pub timeout: Duration,
+    description: fn() -> Description,
 }
 
 impl ProxyCore {
     /// A call is given up after a second unless the proxy says otherwise.
     const TIMEOUT: Duration = Duration::from_secs(1);
 
-    pub fn new(link: &Caller, module: Name) -> Self {
-        Self { link: link.clone(), module: module.module(), timeout: Self::TIMEOUT }
+    pub fn new(link: &Caller, module: Name, description: fn() -> Description) -> Self {
+        Self { link: link.clone(), module: module.module(), timeout: Self::TIMEOUT, description }
     }
 
     /// Begins a call; the arguments are a tuple.
@@ -161,8 +162,8 @@ impl ProxyCore {
         hash: u32,
         arguments: &A,
     ) -> Result<Pending<T>, CallError> {
-        let write = |body: &mut Vec<u8>| append(body, arguments);
-        let sequence = self.link.borrow_mut().begin(self.module, function, hash, self.timeout, write)?;
+        let interface = (hash, self.description);
+        let sequence = self.link.begin(self.module, function, interface, self.timeout, arguments)?;
         Ok(Pending::new(self.link.clone(), sequence, self.module))
     }
 

@@ -5,6 +5,7 @@
 //! call                commands, at most once           runtime          the loop of a module's thread
 //! publish             subscribers of data              launch           starts, watches and stops a node's modules
 //! parameter           settings that may change         output           lines of output
+//! journal             a module's run, to be repeated
 //! ```
 //!
 //! Module authors use it through the crate `rohrpost`.
@@ -18,6 +19,7 @@ pub mod common;
 pub mod description;
 pub mod interface;
 pub mod interfaces;
+pub mod journal;
 pub mod launch;
 pub mod launcher;
 #[doc(hidden)]

@@ -6,10 +6,8 @@
 use rohrpost_config::Principal;
 use rohrpost_mailbox::{Head, Label, Name, Node, Options, Participant, Receiver, SendError, Sender, Shape, Type};
 use rohrpost_modules::call::{
-    CallEnvelope, CallError, Deduplicator, Fault, Link, Pending, REPLIES_KEPT, ReplyEnvelope, Request, Verdict,
+    CallEnvelope, CallError, Caller, Deduplicator, Fault, Link, Pending, REPLIES_KEPT, ReplyEnvelope, Request, Verdict,
 };
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -220,7 +218,7 @@ fn pendings_are_waited_for_in_any_order_and_dropped_ones_are_given_up() {
         let command = take(&mut ground.server);
         ground.answer(&command, &postcard::to_stdvec(&Ok::<u32, u8>(command.argument)).unwrap());
     }
-    let link = Rc::new(RefCell::new(ground.link));
+    let link = Caller::from(ground.link);
     let pending = |call| Pending::<Result<u32, u8>>::new(link.clone(), call, SERVER);
     let [first, second, third] = [pending(calls[0]), pending(calls[1]), pending(calls[2])];
     assert_eq!(third.wait_result().unwrap(), 2);

@@ -179,7 +179,7 @@ fn a_modules_thread_does_not_touch_the_heap() {
         assert!(began.elapsed() < Duration::from_secs(60) && !module.is_finished(), "it does not start");
         std::thread::yield_now();
     }
-    let link = std::rc::Rc::new(std::cell::RefCell::new(tool.link));
+    let link = rohrpost_modules::call::Caller::from(tool.link);
     let motor =
         <MotorProxy as rohrpost_modules::interface::Proxy>::new(&link, MOTOR).with_timeout(Duration::from_secs(5));
     // Longer than a renewal of the subscriptions takes to come.

@@ -6,6 +6,7 @@
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Next, Node, Participant, StreamId, StreamReader, node_directory};
 use rohrpost_modules::builtin;
+use rohrpost_modules::call::Caller;
 use rohrpost_modules::interface::Proxy;
 use rohrpost_modules::interfaces::{CartographerProxy, MapCounts, PlayerProxy, Progress};
 use rohrpost_modules::robot::camera::{CAMERA, SimulatedCamera};
@@ -13,9 +14,7 @@ use rohrpost_modules::robot::depth::{DEPTH_SENSOR, SimulatedDepth};
 use rohrpost_modules::robot::world::World;
 use rohrpost_modules::runtime::{Start, ToolLink};
 use rohrpost_modules::types::{ImageView, PointCloudView, Pose};
-use std::cell::RefCell;
 use std::path::PathBuf;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -84,7 +83,7 @@ impl Place {
     }
 
     fn proxy<P: Proxy>(&self, module: &str) -> P {
-        P::new(&Rc::new(RefCell::new(self.tool().link)), self.name(module))
+        P::new(&Caller::from(self.tool().link), self.name(module))
     }
 
     /// The stream of number 1, from its first record on.

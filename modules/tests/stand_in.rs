@@ -5,7 +5,7 @@
 
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{Name, Node, node_directory};
-use rohrpost_modules::call::{CallError, Fault};
+use rohrpost_modules::call::{CallError, Caller, Fault};
 use rohrpost_modules::common::State;
 use rohrpost_modules::interface::{Interface, Proxy, StandIn, StandInCommand};
 use rohrpost_modules::interfaces::{LaserInterface, LaserProxy, MotorInterface, MotorProxy};
@@ -13,9 +13,7 @@ use rohrpost_modules::runtime::{Context, ContextError, Start, StartError, ToolLi
 use rohrpost_modules::schema::Description;
 use rohrpost_modules::types::{LaserScan, Twist};
 use rohrpost_modules::{Module, ModuleError, description, wire};
-use std::cell::RefCell;
 use std::path::PathBuf;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -148,7 +146,7 @@ impl Place {
     }
 
     fn proxy<P: Proxy>(&self, module: &str) -> P {
-        P::new(&Rc::new(RefCell::new(self.tool().link)), self.name(module))
+        P::new(&Caller::from(self.tool().link), self.name(module))
     }
 }
 

@@ -1,5 +1,5 @@
 //! Writing to a stream and reading one ask the kernel for nothing: the thread of a module is followed from one system
-//! call to the next, and marks what it does.
+//! call to the next, and marks what it does. So it is with a journal, in which each of these is noted.
 //!
 //! Without a test harness: the module runs on the main thread of a process, which its parent traces.
 
@@ -90,12 +90,24 @@ name = "robot"
 id = 1
 [classes]
 crane = { id = 100, text = "Lifts" }
+logd = { id = 24, text = "Records" }
 tool = { id = 16, text = "By hand" }
 [nodes.main]
 [[module]]
 name = "crane.0"
 program = "crane"
 optional = true
+"#;
+
+    /// With a journal.
+    const EXACT: &str = r#"
+[[module]]
+name = "logd.0"
+builtin = "logd"
+optional = true
+[record]
+directory = "."
+exact = ["crane.0"]
 "#;
 
     /// The system calls within each step, of each time that it was done.
@@ -139,9 +151,15 @@ optional = true
             let words = ["--config", &file, "--name", "crane.0"].map(String::from);
             return run_started::<Hook>(Start::from_arguments(words.into_iter()).unwrap()).unwrap();
         }
+        for more in ["", EXACT] {
+            traced(&format!("{CONFIG}{more}"));
+        }
+    }
+
+    fn traced(config: &str) {
         let directory = tempfile::tempdir().unwrap();
         let file = directory.path().join("calls.toml");
-        std::fs::write(&file, CONFIG.replace("PID", &std::process::id().to_string())).unwrap();
+        std::fs::write(&file, config.replace("PID", &std::process::id().to_string())).unwrap();
         let node = node_directory(&Installation::load(&file).unwrap().name, "main");
         #[expect(clippy::zombie_processes, reason = "`follow` waits until it has ended")]
         let child = Command::new(std::env::current_exe().unwrap())

@@ -167,7 +167,7 @@ fn a_driver_waits_for_its_port_and_its_mailboxes_with_one_thread() {
     assert_eq!(threads.len(), 3, "{threads:?}");
 
     let mut far = OpenOptions::new().write(true).open(&port).unwrap();
-    let link = std::rc::Rc::new(std::cell::RefCell::new(tool.link));
+    let link = rohrpost_modules::call::Caller::from(tool.link);
     let motor = MotorProxy::new(&link, MOTOR).with_timeout(Duration::from_secs(5));
     let mut written = 0.0;
     let mut write = |bytes: &[u8]| {

@@ -204,6 +204,7 @@ fn no_tool_lets_a_module_drive_the_terminal() {
         &["replay", recording],
         &["replay", recording, "--config", config.to_str().unwrap()],
         &["replay", recording, "--config", config.to_str().unwrap(), "--names", "x"],
+        &["replay", "--exact", recording, HOSTILE],
         &["call", "probe.0"],
         &["call", "probe.0", "tells"],
         &["call", "probe.0", "fails"],

@@ -19,6 +19,7 @@ mod crash;
 mod demo;
 mod demo_recorded;
 mod doctor;
+mod exact;
 mod far;
 mod faults;
 mod graph;
@@ -56,6 +57,7 @@ mod recorded_nodes;
 mod replayed;
 mod restart;
 mod screen;
+mod seer;
 #[path = "../../mailbox/tests/common/small_memory.rs"]
 mod small_memory;
 mod start;

@@ -24,9 +24,9 @@ use crate::version;
 use control::{ControlServer, Orders};
 use health::Health;
 use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
-use rohrpost::{Context, Module, ModuleError, Ready, Received, Start, StartError};
+use rohrpost::{Context, Module, ModuleClock, ModuleError, Ready, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
-use rohrpost_mailbox::{SystemClock, TimeSource};
+use rohrpost_mailbox::TimeSource;
 use rohrpost_recording::{ControlAnswer, ControlCommand, DrawnBeside, Options, Rotation, Session, Status, Writer};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -57,7 +57,7 @@ struct Logd {
     health: Health,
     /// Log control leads to folders below it.
     root: PathBuf,
-    clock: SystemClock,
+    clock: ModuleClock,
     orders: Orders,
     control: ControlServer,
 }
@@ -218,7 +218,7 @@ fn finish(writer: Writer) -> ControlAnswer {
 }
 
 /// Whether there is a time at which something can arrive: that of a log begins with its player.
-fn has_begun(clock: &SystemClock) -> bool {
+fn has_begun(clock: &ModuleClock) -> bool {
     clock.record().is_none_or(|record| record.source != TimeSource::Log || record.is_known())
 }
 

@@ -6,7 +6,7 @@ use rohrpost::description::{DescriptionRequest, noted};
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
 use rohrpost::output::OutputLine;
-use rohrpost::schema::{DataItem, DataKind, Description};
+use rohrpost::schema::{DataItem, DataKind, Description, Field, Type};
 use rohrpost::wire::from_bytes;
 use rohrpost::{
     Context, ContextError, ModuleError, ModuleState, Moment, Name, Node, Rate, Received, StreamSubscription,
@@ -14,6 +14,7 @@ use rohrpost::{
 };
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
 use rohrpost_mailbox::local;
+use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER};
 use rohrpost_recording::{ChannelId, ChannelSpec, Message, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -87,6 +88,7 @@ impl Taps {
         // `*` are those of the file; routers have to be named.
         let is_wanted = |(name, is_in_file): &(Name, bool)| {
             Some(name.class()) == collector
+                || recording.is_exact(*name)
                 || entries().any(|entry| entry.from.map_or(*is_in_file, |from| from == *name))
         };
         let sources = names.filter(is_wanted).map(|(name, _)| source(name)).collect();
@@ -183,7 +185,16 @@ impl SourceModule {
                 known.join(", ")
             );
         }
-        description.data.iter().filter_map(|item| self.tap(recording, description, item)).collect()
+        let taps = description.data.iter().filter_map(|item| self.tap(recording, description, item));
+        taps.chain(recording.is_exact(self.from).then(|| self.journal(description))).collect()
+    }
+
+    /// The module's journal. It is none of its interfaces: those do not know it.
+    fn journal(&self, description: &Description) -> Tap {
+        let text = "What the module is called with and told, and what it sends: for `rohrpost replay --exact`.";
+        let field = Field::new(JOURNAL_NAME, Type::Bytes).said(text, "");
+        let item = DataItem { number: JOURNAL_NUMBER, kind: DataKind::Stream, field };
+        self.tap_of(&item, description, (Sampling::Each, Numbering::Records), None)
     }
 
     fn tap(&self, recording: &Recording, description: &Description, item: &DataItem) -> Option<Tap> {
@@ -200,6 +211,17 @@ impl SourceModule {
             (None, Some(items)) => (items.sampling, Numbering::Packages),
             (None, None) => return None,
         };
+        let least = recording.output.filter(|_| is_line).map(|level| OutputLevel::ALL[level as usize]);
+        Some(self.tap_of(item, description, (sampling, numbering), least))
+    }
+
+    fn tap_of(
+        &self,
+        item: &DataItem,
+        description: &Description,
+        (sampling, numbering): (Sampling, Numbering),
+        least: Option<OutputLevel>,
+    ) -> Tap {
         let interface = description.hash();
         let texts = [
             ("class", description.class.clone()),
@@ -207,7 +229,7 @@ impl SourceModule {
             ("number", item.number.to_string()),
             ("sampling", sampling.to_string()),
         ];
-        Some(Tap {
+        Tap {
             from: self.from,
             module: self.name.clone(),
             item: item.clone(),
@@ -215,11 +237,11 @@ impl SourceModule {
             texts: texts.into_iter().map(|(key, text)| (key.to_owned(), text)).collect(),
             sampling,
             sampler: Sampler::new(sampling, numbering),
-            least: recording.output.filter(|_| is_line).map(|level| OutputLevel::ALL[level as usize]),
+            least,
             source: None,
             refusal: String::new(),
             channel: None,
-        })
+        }
     }
 }
 

@@ -16,6 +16,7 @@ mod spacing;
 
 use crate::check;
 use crate::demo::{Folder, drawing, drawn};
+use crate::exact::{self, ExactArguments};
 use crate::launch::end;
 use crate::record::PartArguments;
 use crate::speech::Speech;
@@ -45,13 +46,16 @@ const RATES: std::ops::RangeInclusive<f64> = 0.001..=player::RATE_MAX;
   rohrpost replay main-0001.mcap --run mapper.0 --rate 5  a fresh mapper draws the map anew
   rohrpost replay main-0001.mcap --from +10s --until +20s --loop
   rohrpost replay main-0001.mcap --names laser.0 odometry.0/odometry --paused
+  rohrpost replay --exact main-0001.mcap                  all modules that have a journal there
+  rohrpost replay --exact main-0001.mcap pilot.0 --program target/debug/pilot
 In another terminal, as with any node:
   rohrpost call replay.0 pause                            also resume, step, step_by 0.5, seek 12.5, rate 2
   rohrpost echo replay.0 state
   rohrpost stream read laser.0 scan --next 10
-It is a node of its own, called `replay`; no command reaches a module that is played.")]
+It is a node of its own, called `replay`; no command reaches a module that is played. With --exact no node runs.")]
 pub(crate) struct Arguments {
-    /// Recordings, played one after the other. Those of several recorders are to be merged first.
+    /// Recordings, played one after the other. Those of several recorders are to be merged first. With --exact one
+    /// recording, and modules; all that have a journal, if none is named.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Another configuration than the recorded one.
@@ -83,6 +87,30 @@ pub(crate) struct Arguments {
     /// No live table, only events.
     #[arg(long)]
     quiet: bool,
+    #[command(flatten)]
+    repeated: RepeatArguments,
+}
+
+/// What belongs to exact replay alone.
+#[derive(clap::Args)]
+struct RepeatArguments {
+    /// Run the programs of modules again with what they were called with and told, and compare all that they do.
+    #[arg(long, conflicts_with_all = [
+        "config", "run", "names", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
+    ])]
+    exact: bool,
+    /// With --exact: another build of the module's program.
+    #[arg(long, value_name = "PATH", requires = "exact")]
+    program: Option<PathBuf>,
+    /// With --exact: folder that stands for that of the configuration; files that its settings name are there.
+    #[arg(long, value_name = "FOLDER", requires = "exact")]
+    folder: Option<PathBuf>,
+    /// With --exact: print what is in the journals instead, entry by entry.
+    #[arg(long, requires = "exact", conflicts_with = "json")]
+    list: bool,
+    /// With --exact: one JSON object a run of a module.
+    #[arg(long, requires = "exact")]
+    json: bool,
 }
 
 fn parse_rate(text: &str) -> Result<f64, String> {
@@ -91,6 +119,9 @@ fn parse_rate(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    if arguments.repeated.exact {
+        return repeat(arguments);
+    }
     let recorded = RecordedFiles::read(&arguments.files)?;
     let folder = Folder::new()?;
     let made = installation(arguments, &recorded, folder.path())?;
@@ -111,6 +142,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     say(summary?.trim_end());
     drawn(drawing, begun);
     Ok(code)
+}
+
+/// Exact replay.
+fn repeat(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let RepeatArguments { program, folder, list, json, .. } = &arguments.repeated;
+    let (file, modules) = arguments.files.split_first().ok_or("name a recording")?;
+    exact::run(&ExactArguments {
+        file: file.clone(),
+        modules: modules.iter().map(|module| module.display().to_string()).collect(),
+        program: program.clone(),
+        folder: folder.clone(),
+        list: *list,
+        json: *json,
+    })
 }
 
 /// What is launched.

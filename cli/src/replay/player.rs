@@ -19,8 +19,10 @@ use nix::sys::timerfd::{ClockId, TimerFd, TimerFlags};
 use rohrpost::interface::{StandIn, StandInCommand};
 use rohrpost::interfaces::{Replay, ReplayInterface, ReplayPosition, ReplayRefusal};
 use rohrpost::schema::Description;
-use rohrpost::{Context, Fault, Installation, Interest, Module, ModuleError, Ready, Start, StartError, TimeTeller};
-use rohrpost_mailbox::{SystemClock, monotonic_ns};
+use rohrpost::{
+    Context, Fault, Installation, Interest, Module, ModuleClock, ModuleError, Ready, Start, StartError, TimeTeller,
+};
+use rohrpost_mailbox::monotonic_ns;
 use rohrpost_recording::{Player, RecordedChannel};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -67,7 +69,7 @@ pub(crate) fn run(start: Start) -> Result<(), StartError> {
 struct RecordingPlayer {
     course: Course,
     time: TimeTeller,
-    clock: SystemClock,
+    clock: ModuleClock,
     timer: TimerFd,
     channels: PlayedChannels,
     begin_ns: u64,

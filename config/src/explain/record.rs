@@ -33,6 +33,10 @@ impl Page<'_> {
             let drawn = format!("for other programs, at most {rate_hz} a second of each, beside what is recorded");
             self.entry("drawn", &drawn);
         }
+        if !record.exact.is_empty() {
+            let names: Vec<String> = record.exact.iter().map(|module| self.name(module.name)).collect();
+            self.entry("exact", &format!("{}; each writes a journal, by which it can be replayed", names.join(", ")));
+        }
         let (size, age) = (size_text(record.rotate_size), duration_text(record.rotate_after));
         let free = size_text(record.leave_free);
         self.entry("files", &format!("a new one after {size} or {age}; {free} of the disk stay free"));

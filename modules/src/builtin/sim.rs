@@ -12,10 +12,9 @@ use crate::module::{Module, ModuleError};
 use crate::parameter::ParameterSet;
 use crate::robot::simulator::{STEP_NS, Scanner, Settings as RobotSettings, Simulator};
 use crate::robot::world::World;
-use crate::runtime::Context;
+use crate::runtime::{Context, ModuleClock};
 use crate::types::Twist;
 use every::Every;
-use rohrpost_mailbox::SystemClock;
 use sensors::Sensors;
 use std::time::Duration;
 
@@ -94,7 +93,7 @@ impl settings::Settings for Settings {
 pub(super) struct Sim {
     settings: Settings,
     simulator: Simulator,
-    clock: SystemClock,
+    clock: ModuleClock,
     /// Epoch of system time; another epoch may have any time.
     epoch: u64,
     odometry: Every,

@@ -7,8 +7,6 @@ use super::{CallEnvelope, CallError, Fault, REPLIES_KEPT, ReplyEnvelope, VALIDIT
 use rohrpost_mailbox::{
     ALL_SYSTEMS, Head, Label, Name, Options, Participant, Receiver, SendError, Sender, Type, monotonic_ns,
 };
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -40,9 +38,6 @@ pub struct Link {
     spare: Vec<Vec<u8>>,
     next_sequence: u32,
 }
-
-/// Proxies of one thread share its link.
-pub type Caller = Rc<RefCell<Link>>;
 
 /// A call under way.
 struct PendingCall {

@@ -1,21 +1,24 @@
 //! Calls: a command with an envelope, its reply, and what may go wrong between.
 //!
 //! `envelope` is the bytes, `deduplicator` decides on the server's side whether a command runs, `link` is the caller's
-//! side, `tally` counts what came of its calls.
+//! side, `caller` is what its proxies share of it, `tally` counts what came of its calls.
 
 mod absent;
+mod caller;
 mod deduplicator;
 mod envelope;
 mod error;
 mod link;
+mod noted;
 mod pending;
 mod tally;
 
+pub use caller::Caller;
 pub use deduplicator::{CALLERS_MAX, Deduplicator, REPLIES_KEPT, Request, TRANSIT_MAX, VALIDITY_MAX, Verdict, WINDOW};
 pub(crate) use envelope::micros;
 pub use envelope::{CallEnvelope, ReplyEnvelope, append};
 pub use error::{CallError, Fault};
 pub(crate) use link::is_to;
-pub use link::{CALLS_MAX, Caller, Link};
+pub use link::{CALLS_MAX, Link};
 pub use pending::Pending;
 pub use tally::Tally;

@@ -22,7 +22,7 @@ pub struct Pending<T> {
 }
 
 impl<T: serde::de::DeserializeOwned> Pending<T> {
-    /// Handle of a call that [`super::Link::begin`] began.
+    /// Handle of a call that the link's [`super::Link::begin`] began.
     pub fn new(link: Caller, sequence: u32, to: Name) -> Self {
         Self { link, sequence, to, result: std::marker::PhantomData }
     }
@@ -32,7 +32,7 @@ impl<T: serde::de::DeserializeOwned> Pending<T> {
     /// # Errors
     /// See [`CallError`].
     pub fn wait(self) -> Result<T, CallError> {
-        self.link.borrow_mut().wait(self.sequence, |bytes| postcard::from_bytes(bytes))
+        self.link.wait(self.sequence, self.to)
     }
 }
 
@@ -62,9 +62,6 @@ impl<T: serde::de::DeserializeOwned, E: serde::de::DeserializeOwned> Pending<Res
 
 impl<T> Drop for Pending<T> {
     fn drop(&mut self) {
-        // Not while the link waits: then this call is the one it waits for, and it forgets by itself.
-        if let Ok(mut link) = self.link.try_borrow_mut() {
-            link.forget(self.sequence);
-        }
+        self.link.forget(self.sequence);
     }
 }

@@ -4,9 +4,11 @@ mod publishing;
 mod standing_in;
 mod streaming;
 mod subscribing;
+mod taking_in;
 
 pub(super) use publishing::Distribution;
 
+use super::clock::ModuleClock;
 use super::endpoint::Endpoint;
 use super::error::ContextError;
 use super::follow::Followings;
@@ -17,16 +19,15 @@ use super::stream::{FollowedStreams, OwnStreams};
 use super::time_teller::TimeTeller;
 use crate::call::{Caller, Link};
 use crate::interface::Proxy;
+use crate::journal::ModuleJournal;
 use crate::publish::Subscriptions;
 use rohrpost_config::{Installation, Principal, TimeSource};
 use rohrpost_mailbox::{
-    Interest, Name, OverflowPolicy, Publications, Receiver, Shape, SystemClock, SystemTime, Watch, Watches, local,
+    Interest, Name, OverflowPolicy, Publications, Receiver, Shape, SystemTime, Watch, Watches, local,
 };
-use std::cell::RefCell;
 use std::io;
 use std::os::fd::AsFd;
 use std::path::PathBuf;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -63,7 +64,9 @@ pub struct Context {
     pub(crate) subscriptions: Subscriptions,
     pub(crate) followings: Followings,
     pub(crate) refusals: Refusals,
-    pub(crate) clock: SystemClock,
+    pub(crate) clock: ModuleClock,
+    /// What the module is told, and what it says.
+    pub(crate) journal: ModuleJournal,
     /// Mailboxes of the module's own, besides commands, replies and data.
     pub(crate) own: Vec<Receiver>,
     /// Mailboxes that take subscribed data, by local id, and whether only the newest counts there.
@@ -83,18 +86,19 @@ impl Context {
         installation: Arc<Installation>,
         link: Link,
         endpoints: Vec<Name>,
-        clock: SystemClock,
+        clock: ModuleClock,
         data: &Shape,
     ) -> Self {
+        let journal = clock.journal().clone();
         let publications = Publications::new(link.participant());
         let followings = Followings::of(link.incarnation());
         let named: Vec<Principal> = endpoints.iter().flat_map(|endpoint| installation.callers(*endpoint)).collect();
         let subscriptions = Subscriptions::new(&named);
-        let schedule = Schedule::new(&installation, &clock);
+        let schedule = Schedule::new(&installation, clock.unseen());
         Self {
             me,
             installation,
-            link: Rc::new(RefCell::new(link)),
+            link: Caller::new(link, journal.clone()),
             endpoints,
             served: Vec::new(),
             stood_in: Vec::new(),
@@ -107,6 +111,7 @@ impl Context {
             followings,
             refusals: Refusals::default(),
             clock,
+            journal,
             own: Vec::new(),
             taking: vec![(local::DATA, data.full == OverflowPolicy::Latest)],
             open: Vec::new(),
@@ -147,7 +152,8 @@ impl Context {
         &self.installation
     }
 
-    /// Resolves a path of the settings, relative to the configuration file's folder.
+    /// Resolves a path of the settings, relative to the configuration file's folder. What is in a file there belongs to
+    /// the settings: an exact replay wants the same.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::Context;
@@ -156,7 +162,9 @@ impl Context {
     /// }
     /// ```
     pub fn path(&self, path: &str) -> PathBuf {
-        self.installation.resolve(path)
+        let path = self.installation.resolve(path);
+        self.journal.file(&path);
+        path
     }
 
     /// System time now, with its error bound and age; its field `ns` is ns since 1970.
@@ -180,7 +188,7 @@ impl Context {
     ///     std::thread::spawn(move || clock.now().ns)
     /// }
     /// ```
-    pub fn clock(&self) -> &SystemClock {
+    pub fn clock(&self) -> &ModuleClock {
         &self.clock
     }
 
@@ -267,7 +275,8 @@ impl Context {
     /// Waits for a file descriptor too: a serial port, a socket, a pipe, anything that `poll` knows. When there is
     /// something to do [`crate::Module::ready`] is called, while the module is on; until then it waits in the kernel.
     ///
-    /// A duplicate is kept until [`Context::unwatch`]: closing one's own descriptor does not end it.
+    /// A duplicate is kept until [`Context::unwatch`]: closing one's own descriptor does not end it. A module that
+    /// watches one cannot be replayed exactly: its journal ends here.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::Context;
@@ -285,9 +294,10 @@ impl Context {
     /// When [`rohrpost_mailbox::WATCHES_MAX`] are watched, the process has no descriptor left, or the pipe by which
     /// senders wake such a receiver cannot be made in the node's directory.
     pub fn watch(&mut self, descriptor: &impl AsFd, interest: Interest) -> io::Result<Watch> {
+        self.journal.hole("the module waits for a descriptor (`Context::watch`)");
         let watches = match &mut self.watches {
             Some(watches) => watches,
-            none => none.insert(Watches::new(self.link.borrow().participant())?),
+            none => none.insert(Watches::new(self.link.unseen().borrow().participant())?),
         };
         watches.add(descriptor, interest)
     }

@@ -1,6 +1,7 @@
 //! Why a module did not start.
 
 use super::stream::{RecordError, StreamReadError};
+use crate::journal::RunError;
 use rohrpost_config::{Errors, NameTextError, SettingsError};
 use rohrpost_mailbox::NodeError;
 use std::path::PathBuf;
@@ -80,6 +81,9 @@ pub enum StartError {
         /// What is wrong.
         why: &'static str,
     },
+    /// A run that cannot be repeated.
+    #[error(transparent)]
+    Exact(#[from] RunError),
     /// Launch is gone.
     #[error("launch, process {0}, ended before this module began")]
     Orphan(u32),
@@ -112,6 +116,7 @@ impl StartError {
             Self::Node(_)
             | Self::Mailbox(_)
             | Self::Stream(_)
+            | Self::Exact(_)
             | Self::Orphan(_)
             | Self::Module(..)
             | Self::System(..) => 1,

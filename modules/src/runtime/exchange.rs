@@ -7,7 +7,7 @@ use rohrpost_mailbox::Name;
 /// From this one on: first the data that it follows, then those that it calls.
 pub(super) fn page(context: &Context, from: u16) -> ExchangePage {
     let named = |module: Name| context.installation.classes.format(module);
-    let mut link = context.link.borrow_mut();
+    let mut link = context.link.unseen().borrow_mut();
     // Answers that nobody waits for any more.
     link.collect();
     let followed = context.followings.tallies().chain(context.followed_streams.tallies()).map(

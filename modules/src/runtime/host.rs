@@ -2,11 +2,13 @@
 
 mod functions;
 
+use super::clock::ModuleClock;
 use super::stream::{CheckedReader, Stream, StreamReadError};
 use crate::call::append;
 use crate::call::{CallError, Link, REPLIES_KEPT};
 use crate::common::{self, DescriptionPart};
 use crate::interface::StreamPort;
+use crate::journal::ModuleJournal;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     BODY_BYTES_MAX, CreateError, Name, Node, NodeError, Participant, Receiver, Shape, SystemClock, local,
@@ -177,7 +179,7 @@ impl ToolLink {
     ) -> Result<Stream<T>, StreamReadError> {
         let installation = Arc::new(installation.clone());
         let reader = CheckedReader::open(self.link.participant(), &installation, port.into(), module)?;
-        Ok(Stream::new(reader, self.clock.clone()))
+        Ok(Stream::new(reader, ModuleClock::new(self.clock.clone(), ModuleJournal::default())))
     }
 
     /// Calls a common function with a tuple of arguments.

@@ -10,11 +10,12 @@ use super::server::{Command, CommandHandler, admit, read_arguments, write_result
 use crate::call::Fault;
 use crate::common::{self, OutputLevel, SetParameters, Subscribe, TimeReport, Unsubscribe};
 use crate::interface::StandInCommand;
+use crate::journal::{Blob, JournalEvent, NotedReply, NotedValue, Tag};
 use crate::module::Module;
 use crate::output;
 use crate::publish::RequestOrigin;
 use rohrpost_config::Principal;
-use rohrpost_mailbox::{BODY_BYTES_MAX, Head, Label, Name, Options, SendError, Work, local};
+use rohrpost_mailbox::{BODY_BYTES_MAX, Head, Label, Name, Options, SendError, local};
 
 /// What is needed to run one command.
 pub(super) struct Hosted<'a, M> {
@@ -36,12 +37,7 @@ impl<M: Module> CommandHandler for Hosted<'_, M> {
             return self.common(call, reply);
         }
         self.life.require_on()?;
-        if self.offer.stands_in.is_some() {
-            return self.stand_in(call, reply);
-        }
-        let serve = self.offer.serve.ok_or(Fault::Unknown(call.number))?;
-        let part = |module: &mut M, _: &mut Context| serve(module, call.number, call.arguments, reply);
-        self.life.work(Work::Function(call.number), self.context, part)
+        self.function(call.number, call.arguments, reply)
     }
 
     fn admit(&self, head: &Head) -> Result<Principal, Fault> {
@@ -53,19 +49,49 @@ impl<M: Module> CommandHandler for Hosted<'_, M> {
     }
 
     fn send(&mut self, to: Name, label: &Label, parts: &[&[u8]]) -> Result<(), SendError> {
-        self.context.link.borrow_mut().send(to, label, parts)
+        self.context.link.unseen().borrow_mut().send(to, label, parts)
     }
 }
 
 impl<M: Module> Hosted<'_, M> {
-    fn stand_in(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
-        if !self.offer.functions.iter().any(|(number, _)| *number == call.number) {
-            return Err(Fault::Unknown(call.number));
+    /// Runs a function of the module's own.
+    pub(super) fn function(&mut self, number: u16, arguments: &[u8], reply: &mut Vec<u8>) -> Result<(), Fault> {
+        let event = JournalEvent::Function { endpoint: self.index as u16, number, arguments: Blob(arguments) };
+        let result = if self.offer.stands_in.is_some() {
+            if !self.offer.functions.iter().any(|(known, _)| *known == number) {
+                return Err(Fault::Unknown(number));
+            }
+            let command = StandInCommand { to: self.context.endpoints[self.index], number, arguments };
+            let part = |module: &mut M, context: &mut Context| module.stand_in_command(context, &command, reply);
+            self.life.work(event, self.context, part)
+        } else {
+            let serve = self.offer.serve.ok_or(Fault::Unknown(number))?;
+            let part = |module: &mut M, _: &mut Context| serve(module, number, arguments, reply);
+            self.life.work(event, self.context, part)
+        };
+        self.note_reply(&result, reply);
+        result
+    }
+
+    /// Sets parameters, all or none.
+    pub(super) fn set_parameters(&mut self, arguments: &[u8], by: &str, reply: &mut Vec<u8>) -> Result<(), Fault> {
+        let wish: SetParameters = read_arguments(arguments)?;
+        let part = |module: &mut M, context: &mut Context| parameters::set(module, context, &wish, by);
+        let set = self.life.work(JournalEvent::Parameters { wish: Blob(arguments), by }, self.context, part);
+        self.life.changes = self.life.changes.wrapping_add(u32::from(set.is_ok() && !wish.only_check));
+        let result = write_result(reply, &set);
+        self.note_reply(&result, reply);
+        result
+    }
+
+    fn note_reply(&self, result: &Result<(), Fault>, reply: &[u8]) {
+        let journal = &self.context.journal;
+        if journal.is_none() {
+            return;
         }
-        let (to, number) = (self.context.endpoints[self.index], call.number);
-        let command = StandInCommand { to, number, arguments: call.arguments };
-        let part = |module: &mut M, context: &mut Context| module.stand_in_command(context, &command, reply);
-        self.life.work(Work::Function(number), self.context, part)
+        let fault = result.as_ref().err().map(|fault| fault.to_string());
+        let value = fault.as_ref().map_or(reply, |text| text.as_bytes());
+        journal.output(Tag::Replied, &NotedReply { is_fault: fault.is_some(), result: NotedValue::of(value) });
     }
 
     fn common(&mut self, call: &Command<'_>, reply: &mut Vec<u8>) -> Result<(), Fault> {
@@ -120,16 +146,12 @@ impl<M: Module> Hosted<'_, M> {
                 write_result(reply, &parameters::page(&mut self.life.module, self.life.changes, from))
             }
             common::SET_PARAMETERS => {
-                let wish: SetParameters = read_arguments(call.arguments)?;
                 let by = self.context.installation.classes.format(call.head.from.module());
-                let part = |module: &mut M, context: &mut Context| parameters::set(module, context, &wish, &by);
-                let set = self.life.work(Work::Parameters, self.context, part);
-                self.life.changes = self.life.changes.wrapping_add(u32::from(set.is_ok() && !wish.only_check));
-                write_result(reply, &set)
+                self.set_parameters(call.arguments, &by, reply)
             }
             common::TIME => {
                 let () = read_arguments(call.arguments)?;
-                write_result(reply, &TimeReport::of(&self.context.clock))
+                write_result(reply, &TimeReport::of(self.context.clock.unseen()))
             }
             common::EXCHANGE => {
                 let (from,): (u16,) = read_arguments(call.arguments)?;

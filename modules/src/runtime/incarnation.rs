@@ -3,6 +3,7 @@
 use super::context::Context;
 use crate::call::Fault;
 use crate::common::Status;
+use crate::journal::{JournalEvent, Tag};
 use crate::module::{Module, ModuleError};
 use crate::output;
 use crate::survey::in_words;
@@ -35,10 +36,12 @@ impl<M: Module> Incarnation<M> {
     /// Runs a part of the module's own code. Tools see which, and since when; what took long is told.
     pub(crate) fn work<T>(
         &mut self,
-        work: Work,
+        event: JournalEvent<'_>,
         context: &mut Context,
         part: impl FnOnce(&mut M, &mut Context) -> T,
     ) -> T {
+        let work = work_of(&event);
+        context.journal.event(&event, || context.clock.unseen().now().ns);
         self.participant.begin_work(work);
         let result = part(&mut self.module, context);
         let lasted = self.participant.end_work();
@@ -51,9 +54,10 @@ impl<M: Module> Incarnation<M> {
     /// What a handler left half done is not to be trusted; but what it drives must be made safe.
     pub(super) fn panicked(&mut self, text: &str, context: &mut Context) {
         self.error = format!("panicked: {text}");
+        context.journal.output(Tag::Panicked, text);
         self.enter(ModuleState::Error);
         // Whatever its state: it may have panicked half way on.
-        if catch_unwind(AssertUnwindSafe(|| self.work(Work::Off, context, M::off))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| self.work(JournalEvent::Off, context, M::off))).is_err() {
             tracing::error!("panicked again on the way to its safe state");
         }
     }
@@ -77,7 +81,7 @@ impl<M: Module> Incarnation<M> {
         }
         self.error.clear();
         context.followed_streams.pass_over();
-        if let Err(error) = self.work(Work::On, context, M::on) {
+        if let Err(error) = self.work(JournalEvent::On, context, M::on) {
             self.fail(&error, context);
             return Err(Fault::ModuleError(self.error.clone()));
         }
@@ -86,13 +90,13 @@ impl<M: Module> Incarnation<M> {
         context.schedule.restart();
         // Asked for before the answer goes out: a tool that switches modules on one after the other knows which one
         // subscribes to which.
-        context.followings.renew(&mut context.link.borrow_mut(), Instant::now());
+        context.followings.renew(&mut context.link.unseen().borrow_mut(), Instant::now());
         Ok(())
     }
 
     pub(crate) fn turn_off(&mut self, context: &mut Context) {
         if self.state == ModuleState::On {
-            self.work(Work::Off, context, M::off);
+            self.work(JournalEvent::Off, context, M::off);
             tracing::info!("is off");
         }
         self.error.clear();
@@ -100,7 +104,8 @@ impl<M: Module> Incarnation<M> {
     }
 
     pub(super) fn fail(&mut self, error: &ModuleError, context: &mut Context) {
-        self.work(Work::Off, context, M::off);
+        context.journal.output(Tag::Failed, &error.to_string());
+        self.work(JournalEvent::Off, context, M::off);
         self.error = error.to_string();
         tracing::error!("{error}");
         self.enter(ModuleState::Error);
@@ -126,5 +131,19 @@ impl<M: Module> Incarnation<M> {
             output_level: output::level(),
             refused: context.refusals.counts,
         }
+    }
+}
+
+/// What tools see of it.
+fn work_of(event: &JournalEvent<'_>) -> Work {
+    match *event {
+        JournalEvent::New => Work::New,
+        JournalEvent::On => Work::On,
+        JournalEvent::Off => Work::Off,
+        JournalEvent::Tick => Work::Tick,
+        JournalEvent::Received { number, .. } => Work::Received(number),
+        JournalEvent::Function { number, .. } => Work::Function(number),
+        JournalEvent::Parameters { .. } => Work::Parameters,
+        JournalEvent::Ready => Work::Ready,
     }
 }

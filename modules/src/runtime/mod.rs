@@ -9,9 +9,11 @@
 //!             └────────────────────────────────────────────┘
 //! ```
 
+mod clock;
 mod context;
 mod endpoint;
 mod error;
+mod exact;
 mod exchange;
 mod follow;
 mod host;
@@ -30,6 +32,7 @@ mod subscribed;
 mod time_teller;
 mod unreadable;
 
+pub use clock::ModuleClock;
 pub use context::Context;
 pub use error::{ContextError, StartError};
 pub use follow::{BadRate, Rate, Subscription};

@@ -4,7 +4,8 @@ use super::stream::Moment;
 use super::subscribed::{Origin, Subscribed};
 use super::unreadable::Unreadable;
 use crate::common::DataHead;
-use rohrpost_mailbox::{Name, local};
+use crate::journal::{Blob, JournalEvent, NotedOrigin};
+use rohrpost_mailbox::{Name, Stamp, local};
 use rohrpost_schema::{Data, View};
 
 /// Data that a subscription brought.
@@ -38,6 +39,31 @@ impl<'a> Received<'a> {
             Origin::Stream { .. } => local::COMMANDS,
         };
         Self { from, number, mailbox, head, value, origin }
+    }
+
+    /// As a journal has it.
+    pub(super) fn event(&self) -> JournalEvent<'a> {
+        let DataHead { stamp_ns, sequence, missed, incarnation } = self.head;
+        let origin = match self.origin {
+            Origin::Package { mailbox, id } => NotedOrigin::Package { mailbox, id },
+            Origin::Stream { id, stamp: Stamp { epoch, ns } } => NotedOrigin::Stream { id, epoch, ns },
+        };
+        let (from, number, value) = (self.from.raw(), self.number, Blob(self.value));
+        JournalEvent::Received { from, number, origin, stamp_ns, sequence, missed, incarnation, value }
+    }
+
+    /// Of a journal; none of another event.
+    pub(super) fn of(event: &JournalEvent<'a>) -> Option<Self> {
+        let JournalEvent::Received { from, number, origin, stamp_ns, sequence, missed, incarnation, value } = *event
+        else {
+            return None;
+        };
+        let origin = match origin {
+            NotedOrigin::Package { mailbox, id } => Origin::Package { mailbox, id },
+            NotedOrigin::Stream { id, epoch, ns } => Origin::Stream { id, stamp: Stamp { epoch, ns } },
+        };
+        let head = DataHead { stamp_ns, sequence, missed, incarnation };
+        Some(Self::new(Name::from_raw(from), number, origin, head, value.0))
     }
 
     /// When it was true, to look for in a stream ([`super::Stream::at`]); that of a record with its epoch.

@@ -8,15 +8,14 @@ use super::incarnation::Incarnation;
 use super::received::Received;
 use super::refusals::Cause;
 use super::start::Start;
-use super::stream::{self, Step};
+use super::stream::{self, FollowedStream, Step};
 use super::subscribed::Origin;
 use crate::common::DataHead;
 use crate::interface::Interfaces;
+use crate::journal::{JournalEvent, flush_present};
 use crate::module::Module;
 use crate::output;
-use rohrpost_mailbox::{
-    Kind, ModuleState, OverflowPolicy, Receiver, Source, Waiting, Watches, Work, monotonic_ns, wait_any,
-};
+use rohrpost_mailbox::{Kind, ModuleState, OverflowPolicy, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -90,10 +89,14 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
     let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
     let mut running = joined.unwrap_or_else(|panic| {
+        flush_present();
         output::flush();
         std::panic::resume_unwind(panic)
     })?;
     let worked = catch_unwind(AssertUnwindSafe(|| {
+        if running.is_replayed() {
+            running.repeat();
+        }
         running.turn_on_if_wanted();
         running.go();
     }));
@@ -135,8 +138,9 @@ impl<M: Module> Running<M> {
         while !self.stop.load(Ordering::Acquire) {
             let mut busy = self.commands();
             busy |= self.take_data();
-            busy |= self.take_records();
+            busy |= self.take_records(|_| true);
             self.periodic();
+            self.context.journal.pass_on();
             output::drain();
             let slept = if busy { self.look() } else { self.sleep() };
             self.ready();
@@ -154,6 +158,7 @@ impl<M: Module> Running<M> {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told");
         self.life.panicked(text, &mut self.context);
+        self.context.journal.end();
         output::flush();
     }
 
@@ -180,12 +185,12 @@ impl<M: Module> Running<M> {
         any
     }
 
-    /// Hands out records of the streams that the module follows, while it is on.
-    fn take_records(&mut self) -> bool {
+    /// Hands out records of those streams that the module follows, while it is on.
+    fn take_records(&mut self, of: impl Fn(&FollowedStream) -> bool) -> bool {
         let mut any = false;
         // Taken out meanwhile, as own mailboxes are.
         let mut followed = std::mem::take(&mut self.context.followed_streams.list);
-        for stream in &mut followed {
+        for stream in followed.iter_mut().filter(|stream| of(stream)) {
             any |= burst(|| {
                 if self.life.state != ModuleState::On {
                     return false;
@@ -194,7 +199,7 @@ impl<M: Module> Running<M> {
                     Step::Record(record) => {
                         let received = record.received();
                         let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-                        let result = self.life.work(Work::Received(received.number), &mut self.context, part);
+                        let result = self.life.work(received.event(), &mut self.context, part);
                         self.life.check(result, &mut self.context);
                         true
                     }
@@ -210,13 +215,13 @@ impl<M: Module> Running<M> {
 
     fn periodic(&mut self) {
         // Also while it is off: late answers must not wait for ever in front of its sleep.
-        self.context.link.borrow_mut().collect();
+        self.context.link.unseen().borrow_mut().collect();
         if self.life.state == ModuleState::On {
-            self.context.followings.renew(&mut self.context.link.borrow_mut(), Instant::now());
+            self.context.followings.renew(&mut self.context.link.unseen().borrow_mut(), Instant::now());
         }
         let moment = self.context.deliver_due();
         if self.life.state == ModuleState::On && self.context.schedule.take_tick(moment) {
-            let result = self.life.work(Work::Tick, &mut self.context, M::tick);
+            let result = self.life.work(JournalEvent::Tick, &mut self.context, M::tick);
             self.life.check(result, &mut self.context);
         }
     }
@@ -238,18 +243,19 @@ impl<M: Module> Running<M> {
             && let Some(ready) = self.context.watches.as_mut().and_then(Watches::next_ready)
         {
             let part = |module: &mut M, context: &mut Context| module.ready(context, ready);
-            let result = self.life.work(Work::Ready, &mut self.context, part);
+            let result = self.life.work(JournalEvent::Ready, &mut self.context, part);
             self.life.check(result, &mut self.context);
         }
     }
 
-    /// When there is a tick, a delivery or the end of a lease next.
+    /// When there is a tick, a delivery or the end of a lease next, or entries of a journal have waited.
     fn next_periodic(&self) -> Option<Instant> {
         let (now_ns, context) = (monotonic_ns(), &self.context);
         let (lease, delivery) = (context.subscriptions.lease_ns(), context.subscriptions.due_ns());
         let tick = context.schedule.tick_ns().filter(|_| self.is_on());
         let due = tick.into_iter().chain(delivery).min();
-        let waits = [due.map(|ns| context.schedule.wait_ns(now_ns, ns)), lease.map(|ns| ns.saturating_sub(now_ns))];
+        let other = [lease, context.journal.due_ns()].into_iter().flatten().min();
+        let waits = [due.map(|ns| context.schedule.wait_ns(now_ns, ns)), other.map(|ns| ns.saturating_sub(now_ns))];
         waits.into_iter().flatten().min().map(|ns| Instant::now() + Duration::from_nanos(ns))
     }
 
@@ -261,7 +267,7 @@ impl<M: Module> Running<M> {
         let output = output::retry_at();
         let stream = self.context.followed_streams.retry().filter(|_| on);
         let deadline = [renewal, periodic, output, stream].into_iter().flatten().min();
-        let mut link = self.context.link.borrow_mut();
+        let mut link = self.context.link.unseen().borrow_mut();
         let mut sources = empty(std::mem::take(&mut self.sources));
         sources.extend(self.endpoints.iter_mut().map(|endpoint| source(&mut endpoint.command_server.commands)));
         sources.push(&mut self.data);
@@ -281,10 +287,13 @@ impl<M: Module> Running<M> {
     }
 
     fn end(mut self) {
+        // What modules did that have ended by now waits for nobody else.
+        while self.take_records(FollowedStream::is_journal) {}
         if self.life.state == ModuleState::On {
-            self.life.work(Work::Off, &mut self.context, M::off);
+            self.life.work(JournalEvent::Off, &mut self.context, M::off);
         }
-        self.context.followings.end(&mut self.context.link.borrow_mut());
+        self.context.followings.end(&mut self.context.link.unseen().borrow_mut());
+        self.context.journal.end();
         self.life.enter(ModuleState::Stopping);
         tracing::debug!("ends");
         output::flush();
@@ -299,8 +308,8 @@ impl<M: Module> Running<M> {
         for mailbox in commands.chain([self.data]).chain(self.context.own) {
             mailbox.close();
         }
-        if let Ok(link) = std::rc::Rc::try_unwrap(self.context.link) {
-            link.into_inner().close();
+        if let Some(link) = self.context.link.into_link() {
+            link.close();
         }
     }
 }
@@ -319,7 +328,7 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &
             let origin = Origin::Package { mailbox: local, id: head.id };
             let received = Received::new(head.from, number, origin, data, value);
             let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-            let result = life.work(Work::Received(number), context, part);
+            let result = life.work(received.event(), context, part);
             life.check(result, context);
         }
         true

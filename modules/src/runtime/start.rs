@@ -1,5 +1,6 @@
 //! From a command line or launch's environment to a running module.
 
+use super::clock::ModuleClock;
 use super::context::Context;
 use super::endpoint::{Endpoint, Offered};
 use super::error::StartError;
@@ -9,14 +10,16 @@ use super::runner::{Running, served};
 use super::stream::{self, ServedStreams};
 use crate::call::Link;
 use crate::interface::StandIn;
+use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal, SHAPE, Tag};
 use crate::module::{Module, ModuleError};
 use crate::output;
 use nix::sys::signal::Signal;
 use rohrpost_config::{Installation, MailboxSpec, Scheduling, Start as StartState};
 use rohrpost_mailbox::{
-    CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, SystemClock, Work, base_directory, local,
-    node_directory, sys,
+    CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, StreamError, StreamId, SystemClock, Work,
+    base_directory, local, node_directory, sys,
 };
+use rohrpost_schema::Description;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -85,6 +88,10 @@ impl Start {
         let launcher = variable(environment::LAUNCHER).and_then(|pid| pid.parse().ok());
         let restarts = variable(environment::RESTARTS).and_then(|count| count.parse().ok()).unwrap_or(0);
         let mut off = std::env::var_os(environment::OFF).is_some();
+        if let Some(run) = ExactRun::from_environment()? {
+            let (installation, name) = run.installation()?;
+            return Ok(Self { installation: Arc::new(installation), name, launcher: None, restarts: 0, off: true });
+        }
         let mut arguments = arguments;
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or_else(|| StartError::Usage(format!("`{argument}` needs a value")));
@@ -117,10 +124,14 @@ impl Start {
         participant.set_state(ModuleState::Starting);
         participant.set_restarts(self.restarts);
         let stop = stop_on_signals(&participant, module.stop_within)?;
-        let quiet = std::env::var(environment::QUIET_MS).ok().filter(|_| self.launcher.is_some());
-        let quiet = quiet.and_then(|ms| ms.parse().ok()).map_or(Duration::ZERO, Duration::from_millis);
-        output::install_quiet(&participant, &installation, self.name, self.launcher.is_some(), quiet);
-        schedule(installation.scheduling(self.name.class()));
+        let clock = SystemClock::open(&node);
+        let journal = self.journal(&participant, &clock)?;
+        if !journal.is_replayed() {
+            let quiet = std::env::var(environment::QUIET_MS).ok().filter(|_| self.launcher.is_some());
+            let quiet = quiet.and_then(|ms| ms.parse().ok()).map_or(Duration::ZERO, Duration::from_millis);
+            output::install_quiet(&participant, &installation, self.name, self.launcher.is_some(), quiet);
+            schedule(installation.scheduling(self.name.class()));
+        }
         // The mailboxes themselves know numbers only.
         let receiver = |name: Name, spec: &MailboxSpec| {
             participant.clone().receiver(name, shape(spec)).map_err(|error: CreateError| {
@@ -154,7 +165,7 @@ impl Start {
         let data = receiver(self.name.with_local(local::DATA), &module.mailboxes.data)?;
         let replies = receiver(self.name.with_local(local::REPLIES), &module.mailboxes.replies)?;
         let link = Link::new(&participant, self.name, replies);
-        let clock = SystemClock::open(&node);
+        let clock = ModuleClock::new(clock, journal.clone());
         let names = endpoints.iter().map(|endpoint: &Endpoint<M>| endpoint.name).collect();
         let mut context = Context::new(self.name, installation.clone(), link, names, clock, data.shape());
         context.serves(&endpoints);
@@ -164,16 +175,51 @@ impl Start {
         };
         let served: Vec<_> = endpoints.iter().map(streams_of).collect();
         context.streams = stream::make(&participant, &installation, module, &served)?;
+        journal.replay(|replay| {
+            let own = endpoints.iter().map(|endpoint| Description::from_bytes(&endpoint.offer.description).ok());
+            replay.know_own(own.collect());
+        });
+        journal.event(&JournalEvent::New, || context.clock.unseen().now().ns);
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);
         participant.end_work();
-        let mut made = made.map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
+        let mut made = made.map_err(|error| {
+            journal.output(Tag::Failed, &error.to_string());
+            journal.end();
+            StartError::Module(text.clone(), error.to_string())
+        })?;
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
         let spin = module.spin;
         let life = Incarnation::new(made, participant, module.busy_after);
         Ok(Running { life, endpoints, data, context, stop, turn_on, by_hand, spin, sources: Vec::new() })
+    }
+}
+
+impl Start {
+    /// The journal that it repeats or writes, if either.
+    fn journal(&self, participant: &Arc<Participant>, clock: &SystemClock) -> Result<ModuleJournal, StartError> {
+        let installation = &*self.installation;
+        let wanted = installation.record.as_ref().is_some_and(|record| record.is_exact(self.name));
+        let journal = match ExactRun::from_environment()? {
+            Some(run) => ModuleJournal::replayed(run.replay()),
+            None if wanted => {
+                let id = StreamId { name: self.name, number: JOURNAL_NUMBER };
+                let text = installation.classes.format(self.name);
+                let failed = |error: StreamError| StartError::Stream(format!("the journal of `{text}`: {error}"));
+                let stream = participant.stream_writer(id, SHAPE).map_err(failed)?;
+                ModuleJournal::written(JournalWriter::new(stream, clock.clone(), participant.node().next_incarnation()))
+            }
+            None => return Ok(ModuleJournal::default()),
+        };
+        let absolute = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string();
+        let module = installation.classes.format(self.name);
+        let config = absolute(&installation.path);
+        let saved = installation.saved.as_ref().map(|saved| (absolute(&saved.path), saved.text()));
+        let saved = saved.as_ref().map(|(path, text)| (path.as_str(), *text));
+        journal.begin(&Begin::new(&module, (&config, &installation.text), saved));
+        Ok(journal)
     }
 }
 

@@ -11,10 +11,8 @@ use rohrpost_modules::types::Pose;
 use rohrpost_modules::{Module, ModuleError};
 use serde::{Deserialize, Serialize};
 use std::any::Any;
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::rc::Rc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -257,7 +255,7 @@ impl Place {
 
     /// A link that proxies are made of.
     pub(crate) fn caller(&self) -> Caller {
-        Rc::new(RefCell::new(self.tool().link))
+        self.tool().link.into()
     }
 
     /// Values that the camera has published under this number, as tools count them.

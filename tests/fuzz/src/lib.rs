@@ -16,6 +16,7 @@ mod descriptions;
 mod frames;
 mod head;
 mod impairments;
+mod journals;
 mod lines;
 mod log_control;
 mod logs;
@@ -42,7 +43,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 18] = [
+pub const TARGETS: [Target; 19] = [
     Target { name: "head", run: head::run },
     Target { name: "names", run: names::run },
     Target { name: "config", run: config::run },
@@ -53,6 +54,7 @@ pub const TARGETS: [Target; 18] = [
     Target { name: "logs", run: logs::run },
     Target { name: "maps", run: maps::run },
     Target { name: "recordings", run: recordings::run },
+    Target { name: "journals", run: journals::run },
     Target { name: "log-control", run: log_control::run },
     Target { name: "segments", run: segments::run },
     Target { name: "frames", run: frames::run },

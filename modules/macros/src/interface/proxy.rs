@@ -67,7 +67,7 @@ pub(super) fn proxy(item: &ItemTrait, krate: &TokenStream, commands: &[Command],
             const CLASS: &'static str = <#interface as #krate::Interface>::CLASS;
 
             fn new(link: &#krate::Caller, module: #krate::Name) -> Self {
-                Self { core: #krate::ProxyCore::new(link, module) }
+                Self { core: #krate::ProxyCore::new(link, module, <#interface as #krate::Interface>::description) }
             }
         }
 

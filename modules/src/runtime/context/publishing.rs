@@ -4,6 +4,7 @@ use super::Context;
 use crate::call::{Caller, append};
 use crate::common::DataHead;
 use crate::interface::DataPort;
+use crate::journal::{ModuleJournal, NotedItem, NotedValue, Tag};
 use crate::publish::{Delivery, SubscriptionEntry, Subscriptions};
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::{Newest, Published};
@@ -33,6 +34,13 @@ impl Context {
         self.scratch.clear();
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
         let at = self.newest_at(endpoint, &port)?;
+        let noted = NotedItem {
+            endpoint: endpoint as u16,
+            number: port.number,
+            stamp_ns,
+            value: NotedValue::of(&self.scratch),
+        };
+        self.journal.output(Tag::Published, &noted);
         let newest = &mut self.newest[at];
         (newest.name, newest.stamp_ns) = (port.name.into(), stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);
@@ -97,7 +105,8 @@ impl Context {
             link: &self.link,
             classes: &self.installation.classes,
             endpoints: &self.endpoints,
-            clock: &self.clock,
+            clock: self.clock.unseen(),
+            journal: &self.journal,
             publications: &mut self.publications,
             subscriptions: &mut self.subscriptions,
         };
@@ -141,6 +150,7 @@ pub(in crate::runtime) struct Distribution<'a> {
     classes: &'a ClassTable,
     endpoints: &'a [Name],
     clock: &'a SystemClock,
+    pub(in crate::runtime) journal: &'a ModuleJournal,
     publications: &'a mut Publications,
     subscriptions: &'a mut Subscriptions,
 }
@@ -174,7 +184,7 @@ fn deliver(
         priority: asked.priority,
         options: if asked.newest { Options::STAMPED.with(Options::NEWEST) } else { Options::STAMPED },
     };
-    match link.borrow_mut().send(asked.to, &label, &[&head.to_bytes(), newest.value]) {
+    match link.unseen().borrow_mut().send(asked.to, &label, &[&head.to_bytes(), newest.value]) {
         Ok(()) => Delivery::Sent,
         Err(SendError::NoMailbox(_)) => Delivery::Gone,
         Err(SendError::TooLarge { len, max, .. }) => {

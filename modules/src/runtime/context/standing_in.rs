@@ -1,10 +1,11 @@
 //! Publishing as another module, by its description.
 
 use super::Context;
+use crate::journal::{NotedItem, NotedValue, Tag};
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::Newest;
-use crate::runtime::stream::{Moment, OpenValue, OwnStream};
-use rohrpost_mailbox::{Name, Stamp};
+use crate::runtime::stream::Moment;
+use rohrpost_mailbox::Name;
 
 impl Context {
     /// Publishes a value as the module that this one stands in for under the name `from`
@@ -37,15 +38,15 @@ impl Context {
         at: impl Into<Moment>,
         value: &[u8],
     ) -> Result<(), ContextError> {
-        let stamp = match at.into() {
-            Moment::Stamp(stamp) => Stamp { epoch: stamp.epoch, ns: stamp.ns },
-            Moment::Ns(ns) => Stamp { epoch: self.clock.now().epoch, ns },
+        let (epoch, stamp_ns) = match at.into() {
+            Moment::Stamp(stamp) => (Some(stamp.epoch), stamp.ns),
+            Moment::Ns(ns) => (None, ns),
         };
         let endpoint = self.endpoints.iter().position(|name| *name == from.module());
         let stood_in = endpoint.and_then(|endpoint| Some((endpoint, self.stood_in.get(endpoint)?.as_ref()?)));
         let Some((endpoint, data)) = stood_in else { return Err(self.not_stood_in(from, number)) };
         if let Some(at) = self.streams.iter().position(|stream| stream.is(endpoint, number)) {
-            return self.write_as(at, stamp, value);
+            return self.write_as(at, epoch, stamp_ns, value);
         }
         let known = self.newest.iter().position(|newest| (newest.endpoint, newest.number) == (endpoint, number));
         let at = match (known, data.iter().find(|(item, _)| *item == number)) {
@@ -56,8 +57,10 @@ impl Context {
                 self.newest.len() - 1
             }
         };
+        let noted = NotedItem { endpoint: endpoint as u16, number, stamp_ns, value: NotedValue::of(value) };
+        self.journal.output(Tag::Published, &noted);
         let newest = &mut self.newest[at];
-        newest.stamp_ns = stamp.ns;
+        newest.stamp_ns = stamp_ns;
         newest.value.clear();
         newest.value.extend_from_slice(value);
         let (all, _, mut outlet) = self.split();
@@ -66,11 +69,8 @@ impl Context {
     }
 
     /// The next record of a stream.
-    fn write_as(&mut self, at: usize, stamp: Stamp, value: &[u8]) -> Result<(), ContextError> {
-        let (_, streams, outlet) = self.split();
-        let OwnStream { about, writer } = &mut streams[at];
-        let record = writer.begin(stamp).map_err(|error| about.explain(error))?;
-        let mut open = OpenValue::<()>::new(record, stamp.ns, about, outlet);
+    fn write_as(&mut self, at: usize, epoch: Option<u64>, stamp_ns: u64, value: &[u8]) -> Result<(), ContextError> {
+        let mut open = self.begin_at::<()>(at, epoch, stamp_ns)?;
         open.put_bytes(value)?;
         open.finish().map(drop)
     }

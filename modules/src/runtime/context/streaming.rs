@@ -2,8 +2,11 @@
 
 use super::Context;
 use crate::interface::StreamPort;
+use crate::journal::Tag;
 use crate::runtime::error::ContextError;
-use crate::runtime::stream::{CheckedReader, KnownStream, OpenValue, OwnStream, Stream, StreamSubscription};
+use crate::runtime::stream::{
+    CheckedReader, KnownStream, OpenValue, OwnStream, RecordError, Stream, StreamSubscription, note, opened,
+};
 use rohrpost_mailbox::{Name, Stamp};
 use rohrpost_schema::{Data, DataItem};
 
@@ -75,11 +78,35 @@ impl Context {
         let at = self.streams.iter().position(|stream| stream.is(endpoint, port.number));
         let is_declared = self.is_declared(endpoint, port.hash);
         let Some(at) = at.filter(|_| is_declared) else { return Err(self.undeclared(endpoint, &port.data())) };
-        let stamp = Stamp { epoch: self.clock.now().epoch, ns: stamp_ns };
+        self.begin_at(at, None, stamp_ns)
+    }
+
+    /// The next record of a stream, of the present epoch if no other is named. A journal has what its time's epoch is,
+    /// which number it will have, or why it cannot be written.
+    pub(super) fn begin_at<T: Data>(
+        &mut self,
+        at: usize,
+        epoch: Option<u64>,
+        stamp_ns: u64,
+    ) -> Result<OpenValue<'_, T>, ContextError> {
+        let epoch = epoch.unwrap_or_else(|| self.clock.unseen().now().epoch);
         let (_, streams, outlet) = self.split();
         let OwnStream { about, writer } = &mut streams[at];
-        let record = writer.begin(stamp).map_err(|error| about.explain(error))?;
-        Ok(OpenValue::new(record, stamp_ns, about, outlet))
+        let journal = outlet.journal;
+        let noted = journal.given(Tag::Wrote).map(|given| given.read::<Result<(u64, u64), RecordError>>());
+        let (epoch, sequence) = noted.unwrap_or_else(|| Ok((epoch, writer.written())))?;
+        match writer.begin(Stamp { epoch, ns: stamp_ns }) {
+            Ok(record) => {
+                journal.note(Tag::Wrote, &Ok::<_, RecordError>((epoch, sequence)));
+                Ok(OpenValue::new(record, (sequence, stamp_ns), about, outlet))
+            }
+            Err(error) => {
+                let error = about.explain(error);
+                journal.replay(|replay| replay.give_up(&format!("a record that was written is refused now: {error}")));
+                journal.note(Tag::Wrote, &Err::<(u64, u64), _>(&error));
+                Err(error.into())
+            }
+        }
     }
 
     /// Opens a stream of another module of this node, to look at when the module likes: its newest record, the next
@@ -219,7 +246,12 @@ impl Context {
             let (stream, module) = (known.name.into_owned(), module());
             return Err(ContextError::FarStream { stream, module, node: node.into() });
         }
-        let participant = self.link.borrow().participant().clone();
-        Ok(CheckedReader::open(&participant, &self.installation, known, from)?)
+        let participant = self.link.unseen().borrow().participant().clone();
+        let then = opened(&self.journal).transpose()?;
+        let reader = CheckedReader::open(&participant, &self.installation, known, from);
+        if then.is_none() {
+            note(&self.journal, Tag::Opened, &reader, |_| ());
+        }
+        Ok(reader?)
     }
 }

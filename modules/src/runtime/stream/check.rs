@@ -2,6 +2,7 @@
 
 use super::error::{StreamReadError, in_words};
 use crate::interface::StreamPort;
+use crate::journal::JOURNAL_NUMBER;
 use rohrpost_config::Installation;
 use rohrpost_mailbox::{HeldRecord, Name, Next, Participant, RecordInfo, StreamError, StreamId, StreamReader};
 use rohrpost_schema::Description;
@@ -64,6 +65,11 @@ impl CheckedReader {
         };
         let reader = participant.stream_reader(source.id).map_err(|error| source.explain(&error))?;
         Ok(Self { reader, source })
+    }
+
+    /// Whether it reads a module's journal.
+    pub(super) fn is_journal(&self) -> bool {
+        self.source.id.number == JOURNAL_NUMBER
     }
 
     pub(super) fn next(&mut self) -> Result<Next<(HeldRecord<'_>, &Source)>, StreamReadError> {

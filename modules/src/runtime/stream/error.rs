@@ -20,7 +20,7 @@ use std::time::Duration;
 ///     Ok(())
 /// }
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, thiserror::Error)]
 pub enum RecordError {
     /// Larger than the stream's records.
     #[error(

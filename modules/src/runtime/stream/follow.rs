@@ -115,18 +115,22 @@ impl FollowedRecord<'_> {
 
 impl FollowedStreams {
     /// None when all ids are used up.
-    pub(in crate::runtime) fn follow<T>(&mut self, reader: CheckedReader) -> Option<StreamSubscription<T>> {
+    pub(in crate::runtime) fn follow<T>(&mut self, mut reader: CheckedReader) -> Option<StreamSubscription<T>> {
         let id = self.made;
         self.made = id.checked_add(1)?;
         let (stream, module) = (reader.source.name.clone().into_owned(), reader.source.module());
+        if reader.is_journal() {
+            // From its beginning on, as far as it is there.
+            reader.reader.seek(0);
+        }
         let notices = Notices { stream, module, throttle: Throttle::default(), refusal: None, retry: None };
         self.list.push(FollowedStream { reader, id, notices });
         Some(StreamSubscription { id, data: PhantomData })
     }
 
-    /// Passes over what was written until now.
+    /// Passes over what was written until now; of a journal nothing is to be missing.
     pub(in crate::runtime) fn pass_over(&mut self) {
-        for stream in &mut self.list {
+        for stream in self.list.iter_mut().filter(|stream| !stream.is_journal()) {
             if let Err(error) = stream.reader.reader.pass_over() {
                 stream.notices.refused(&stream.reader.source.explain(&error));
             }
@@ -151,14 +155,20 @@ impl FollowedStreams {
         self.list.iter().filter_map(|stream| stream.notices.retry).min()
     }
 
-    /// What wakes the module.
+    /// What wakes the module. Journals wait for its next turn: those that write them must not pay for waking it.
     pub(in crate::runtime) fn sources(&mut self) -> impl Iterator<Item = &mut (dyn Source + 'static)> {
-        let awaited = self.list.iter_mut().filter(|stream| stream.notices.retry.is_none());
+        let is_awaited = |stream: &&mut FollowedStream| stream.notices.retry.is_none() && !stream.is_journal();
+        let awaited = self.list.iter_mut().filter(is_awaited);
         awaited.map(|stream| -> &mut (dyn Source + 'static) { &mut stream.reader.reader })
     }
 }
 
 impl FollowedStream {
+    /// Whether it is the journal of a module.
+    pub(in crate::runtime) fn is_journal(&self) -> bool {
+        self.reader.is_journal()
+    }
+
     /// The next record, or what there is instead.
     pub(in crate::runtime) fn step(&mut self) -> Step<'_> {
         let Self { reader, id, notices } = self;

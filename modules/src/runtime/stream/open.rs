@@ -3,6 +3,7 @@
 use super::encode::{self, EncodeError};
 use super::error::RecordError;
 use super::own::OwnAbout;
+use crate::journal::{NotedItem, NotedValue, Tag};
 use crate::runtime::context::Distribution;
 use crate::runtime::error::ContextError;
 use crate::runtime::newest::Published;
@@ -44,6 +45,8 @@ pub struct OpenValue<'a, T> {
     /// Bytes of the value, once it is there.
     len: Option<usize>,
     stamp_ns: u64,
+    /// The record's.
+    sequence: u64,
     about: &'a OwnAbout,
     outlet: Distribution<'a>,
     data: PhantomData<fn(T)>,
@@ -52,11 +55,11 @@ pub struct OpenValue<'a, T> {
 impl<'a, T: Data> OpenValue<'a, T> {
     pub(in crate::runtime) fn new(
         record: OpenRecord<'a>,
-        stamp_ns: u64,
+        (sequence, stamp_ns): (u64, u64),
         about: &'a OwnAbout,
         outlet: Distribution<'a>,
     ) -> Self {
-        Self { record, len: None, stamp_ns, about, outlet, data: PhantomData }
+        Self { record, len: None, stamp_ns, sequence, about, outlet, data: PhantomData }
     }
 
     /// Puts a value in, in place of what was put in before.
@@ -105,7 +108,10 @@ impl<'a, T: Data> OpenValue<'a, T> {
         let Some(len) = self.len else {
             return Err(RecordError::NothingPut { stream: self.about.item.name.clone() }.into());
         };
-        let (sequence, bytes) = self.record.finish_seen(len).map_err(|error| self.about.explain(error))?;
+        let (_, bytes) = self.record.finish_seen(len).map_err(|error| self.about.explain(error))?;
+        let (endpoint, number) = (self.about.endpoint as u16, self.about.item.number);
+        let noted = NotedItem { endpoint, number, stamp_ns: self.stamp_ns, value: NotedValue::of(bytes) };
+        self.outlet.journal.output(Tag::Written, &noted);
         self.outlet.published(&Published {
             endpoint: self.about.endpoint,
             number: self.about.item.number,
@@ -113,7 +119,7 @@ impl<'a, T: Data> OpenValue<'a, T> {
             stamp_ns: self.stamp_ns,
             value: bytes,
         });
-        Ok(sequence)
+        Ok(self.sequence)
     }
 
     #[cold]

@@ -3,9 +3,12 @@
 use super::check::{CheckedReader, Source};
 use super::error::StreamReadError;
 use super::moment::Moment;
+use super::noted::{self, GivenRecord, NotedAround, NotedNext, NotedRecord, note};
 use crate::fusion::{Interpolate, NoValue, Share, Stamp};
+use crate::journal::Tag;
+use crate::runtime::clock::ModuleClock;
 use crate::runtime::unreadable::Unreadable;
-use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo, SystemClock};
+use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo};
 use rohrpost_schema::{Data, View};
 use std::marker::PhantomData;
 use std::time::Duration;
@@ -43,13 +46,13 @@ const TRIES: usize = 3;
 /// ```
 pub struct Stream<T> {
     reader: CheckedReader,
-    clock: SystemClock,
+    clock: ModuleClock,
     gap_max_ns: u64,
     data: PhantomData<fn() -> T>,
 }
 
 impl<T: Data> Stream<T> {
-    pub(in crate::runtime) fn new(reader: CheckedReader, clock: SystemClock) -> Self {
+    pub(in crate::runtime) fn new(reader: CheckedReader, clock: ModuleClock) -> Self {
         Self { reader, clock, gap_max_ns: u64::MAX, data: PhantomData }
     }
 
@@ -73,7 +76,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// The stream cannot be read, or is of another interface.
     pub fn newest(&mut self) -> Result<Option<Record<'_, T>>, StreamReadError> {
-        Ok(self.reader.newest()?.map(Record::new))
+        let Self { reader, clock, .. } = self;
+        if let Some(given) = noted::record(clock.journal(), Tag::Newest) {
+            return Ok(given?.map(|record| Record::given(record, &reader.source)));
+        }
+        let newest = reader.newest();
+        note(clock.journal(), Tag::Newest, &newest, |newest| newest.as_ref().map(|(held, _)| NotedRecord::from(held)));
+        Ok(newest?.map(Record::new))
     }
 
     /// The next record; the first time the first one written after the stream was opened.
@@ -96,7 +105,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn try_next(&mut self) -> Result<Next<Record<'_, T>>, StreamReadError> {
-        Ok(self.reader.next()?.map(Record::new))
+        let Self { reader, clock, .. } = self;
+        if let Some(given) = noted::next(clock.journal()) {
+            return Ok(given?.map(|record| Record::given(record, &reader.source)));
+        }
+        let next = reader.next();
+        note(clock.journal(), Tag::Next, &next, NotedNext::of);
+        Ok(next?.map(Record::new))
     }
 
     /// As [`Stream::try_next`]; waits for a record, at most so long. All else of the module waits as well.
@@ -112,14 +127,21 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn next_within(&mut self, timeout: Duration) -> Result<Next<Record<'_, T>>, StreamReadError> {
-        let CheckedReader { reader, source } = &mut self.reader;
-        let next = reader.next_timeout(timeout).map_err(|error| source.explain(&error))?;
-        Ok(source.check_next(next)?.map(Record::new))
+        let Self { reader: CheckedReader { reader, source }, clock, .. } = self;
+        if let Some(given) = noted::next(clock.journal()) {
+            return Ok(given?.map(|record| Record::given(record, source)));
+        }
+        let next = match reader.next_timeout(timeout) {
+            Ok(next) => source.check_next(next),
+            Err(error) => Err(source.explain(&error)),
+        };
+        note(clock.journal(), Tag::Next, &next, NotedNext::of);
+        Ok(next?.map(Record::new))
     }
 
     /// Whether [`Stream::try_next`] has something to tell.
     pub fn has_next(&self) -> bool {
-        self.reader.reader.has_next()
+        self.clock.journal().answer(Tag::HasNext, || self.reader.reader.has_next())
     }
 
     /// The record of this sequence; none when it is there no more, or not yet. The position stays.
@@ -134,7 +156,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn record(&mut self, sequence: u64) -> Result<Option<Record<'_, T>>, StreamReadError> {
-        Ok(self.reader.record(sequence)?.map(Record::new))
+        let Self { reader, clock, .. } = self;
+        if let Some(given) = noted::record(clock.journal(), Tag::Record) {
+            return Ok(given?.map(|record| Record::given(record, &reader.source)));
+        }
+        let record = reader.record(sequence);
+        note(clock.journal(), Tag::Record, &record, |record| record.as_ref().map(|(held, _)| NotedRecord::from(held)));
+        Ok(record?.map(Record::new))
     }
 
     /// [`Stream::try_next`] goes on from this sequence. What is there no more counts as lost.
@@ -151,12 +179,12 @@ impl<T: Data> Stream<T> {
 
     /// Sequence of the next record to read.
     pub fn position(&self) -> u64 {
-        self.reader.reader.position()
+        self.clock.journal().answer(Tag::Position, || self.reader.reader.position())
     }
 
     /// Records read by [`Stream::try_next`], and records lost on the way.
     pub fn accounts(&self) -> (u64, u64) {
-        self.reader.reader.accounts()
+        self.clock.journal().answer(Tag::Accounts, || self.reader.reader.accounts())
     }
 
     /// The two records around a time, or exactly why not. [`Stream::record`] reads each.
@@ -175,8 +203,13 @@ impl<T: Data> Stream<T> {
     /// As for [`Stream::newest`].
     pub fn around(&mut self, at: impl Into<Moment>) -> Result<Around, StreamReadError> {
         let Stamp { epoch, ns } = self.stamp(at.into());
-        let CheckedReader { reader, source } = &mut self.reader;
-        reader.around(rohrpost_mailbox::Stamp { epoch, ns }).map_err(|error| source.explain(&error))
+        let Self { reader: CheckedReader { reader, source }, clock, .. } = self;
+        if let Some(given) = noted::around(clock.journal()) {
+            return given;
+        }
+        let around = reader.around(rohrpost_mailbox::Stamp { epoch, ns }).map_err(|error| source.explain(&error));
+        note(clock.journal(), Tag::Around, &around, |around| NotedAround::from(*around));
+        around
     }
 
     /// The value at a time: that of the record with this stamp, or interpolated between the two around it; or exactly
@@ -255,19 +288,34 @@ impl<T: Data> Stream<T> {
 /// }
 /// ```
 pub struct Record<'a, T> {
-    held: HeldRecord<'a>,
+    body: RecordBody<'a>,
     source: &'a Source,
     data: PhantomData<fn() -> T>,
 }
 
+/// Where a record is.
+enum RecordBody<'a> {
+    /// In its ring.
+    Held(HeldRecord<'a>),
+    /// In a journal that is replayed.
+    Given(GivenRecord),
+}
+
 impl<'a, T: Data> Record<'a, T> {
     fn new((held, source): (HeldRecord<'a>, &'a Source)) -> Self {
-        Self { held, source, data: PhantomData }
+        Self { body: RecordBody::Held(held), source, data: PhantomData }
+    }
+
+    fn given(given: GivenRecord, source: &'a Source) -> Self {
+        Self { body: RecordBody::Given(given), source, data: PhantomData }
     }
 
     /// What is said of it: sequence, stamp, when it was written.
     pub fn info(&self) -> RecordInfo {
-        self.held.info()
+        match &self.body {
+            RecordBody::Held(held) => held.info(),
+            RecordBody::Given((info, _)) => *info,
+        }
     }
 
     /// When it was true, with the epoch of system time.
@@ -302,7 +350,10 @@ impl<'a, T: Data> Record<'a, T> {
 
     /// The value, in postcard.
     pub fn bytes(&self) -> &[u8] {
-        self.held.body()
+        match &self.body {
+            RecordBody::Held(held) => held.body(),
+            RecordBody::Given((_, bytes)) => bytes,
+        }
     }
 
     fn decode<'r, V: serde::Deserialize<'r>>(&'r self) -> Result<V, Unreadable> {

@@ -1,0 +1,79 @@
+//! The program of a module, run with a journal and nothing else.
+
+use super::journals::RecordedRun;
+use crate::terminal::Failure;
+use rohrpost_config::{Program, find_program};
+use rohrpost_modules::journal::{ExactRun, ReplayReport, VARIABLE};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Where shared memory is; a program that runs alone has its mailboxes and streams there, too.
+const SHARED_MEMORY: &str = "/dev/shm";
+
+/// Runs programs of recorded modules.
+pub(super) struct ExactPrograms {
+    program: Option<PathBuf>,
+    folder: Option<PathBuf>,
+}
+
+impl ExactPrograms {
+    pub(super) fn new(program: Option<PathBuf>, folder: Option<PathBuf>) -> Self {
+        Self { program, folder }
+    }
+
+    /// Repeats a run, and reads what the program found.
+    pub(super) fn repeat(&self, run: &RecordedRun) -> Result<ReplayReport, Failure> {
+        let directory = tempfile::Builder::new().prefix("rohrpost-exact-").tempdir_in(SHARED_MEMORY)?;
+        let (file, report) = (directory.path().join("run"), directory.path().join("report"));
+        let folder = self.folder.as_ref().map(|folder| folder.canonicalize()).transpose()?;
+        let exact = Self::exact(run, report.display().to_string(), folder.map(|folder| folder.display().to_string()));
+        let mut command = match self.command(&exact) {
+            Ok(command) => command,
+            Err(why) => return Ok(ReplayReport::refused(why)),
+        };
+        exact.save(&file)?;
+        let status = command
+            .env(VARIABLE, &file)
+            .env("ROHRPOST_DIR", directory.path().join("nodes"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .status()
+            .map_err(|error| format!("{}: {error}", command.get_program().display()))?;
+        let report = std::fs::read(&report).ok().and_then(|bytes| ReplayReport::from_bytes(&bytes));
+        Ok(report.unwrap_or_else(|| ReplayReport::refused(format!("its program ended ({status}) and told no result"))))
+    }
+
+    /// The run as its program reads it.
+    pub(super) fn exact(run: &RecordedRun, report: String, folder: Option<String>) -> ExactRun {
+        ExactRun { folder, report, ends: run.ends.clone(), journal: run.bytes.clone().into() }
+    }
+
+    fn command(&self, exact: &ExactRun) -> Result<Command, String> {
+        let (installation, name) = exact.installation().map_err(|error| error.to_string())?;
+        let own = std::env::current_exe().map_err(|error| error.to_string())?;
+        let module = installation.module(name).ok_or("the configuration does not have the module")?;
+        let command = match (&self.program, &module.program) {
+            (Some(program), Program::Command(words)) => {
+                let mut command = Command::new(program);
+                command.args(words.get(1..).unwrap_or_default());
+                command
+            }
+            (program, Program::Builtin(builtin)) => {
+                let mut command = Command::new(program.as_ref().unwrap_or(&own));
+                command.args(["run", builtin]);
+                command
+            }
+            (None, Program::Command(words)) => {
+                let wanted = words.first().map_or("", String::as_str);
+                let beside = own.parent().unwrap_or(Path::new("."));
+                let found = find_program(wanted, &installation.folder, beside);
+                let found =
+                    found.ok_or_else(|| format!("its program `{wanted}` is not here; name one: --program PATH"))?;
+                let mut command = Command::new(found);
+                command.args(words.get(1..).unwrap_or_default());
+                command
+            }
+        };
+        Ok(command)
+    }
+}

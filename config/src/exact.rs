@@ -1,0 +1,72 @@
+//! Modules with a journal, so that they can be replayed exactly: `exact` of `[record]`.
+
+use crate::classes::{ClassTable, ROUTER};
+use crate::directory::Directory;
+use crate::module::{Module, Program, RECORDER, TCP_CLIENT, TCP_ROUTER};
+use crate::reader::Section;
+use rohrpost_mailbox::Name;
+
+/// Built-in modules that take in what no journal sees: descriptors, files, threads, packages past their proxies.
+const WITHOUT: [&str; 6] = [RECORDER, ROUTER, TCP_CLIENT, TCP_ROUTER, "output", "carmen"];
+
+/// A module of `exact`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExactModule {
+    /// Its name.
+    pub name: Name,
+    /// Line in the file.
+    pub line: usize,
+}
+
+pub(crate) fn read(section: &Section<'_>, directory: &Directory<'_>) -> Vec<ExactModule> {
+    let items = section.get("exact").and_then(|item| item.list("[\"pilot.0\"]")).unwrap_or_default();
+    let mut all: Vec<ExactModule> = Vec::new();
+    for item in &items {
+        let Some(text) = item.text_of_list("pilot.0") else { continue };
+        match directory.find(text) {
+            Err(unknown) => item.report(format!("`{text}` is no [[module]]; {}", unknown.or("drop the entry"))),
+            Ok(name) => match all.iter().find(|first| first.name == name) {
+                Some(first) => {
+                    item.report(format!("`{text}` is in line {} of `exact` already; drop one", first.line));
+                }
+                None => all.push(ExactModule { name, line: item.line }),
+            },
+        }
+    }
+    all
+}
+
+/// What is wrong with them, each with its line. `own` records.
+pub(crate) fn mistakes(
+    exact: &[ExactModule],
+    classes: &ClassTable,
+    modules: &[Module],
+    own: &Module,
+) -> Vec<(usize, String)> {
+    let mistake = |ExactModule { name, line }: &ExactModule| {
+        let module = modules.iter().find(|module| module.names().any(|known| known == *name))?;
+        let text = classes.format(*name);
+        let why = match &module.program {
+            _ if module.name != *name => {
+                format!(
+                    "is an alias of `{0}`, and a journal is of a whole module; write `{0}`",
+                    classes.format(module.name)
+                )
+            }
+            Program::Builtin(builtin) if WITHOUT.contains(&builtin.as_str()) => {
+                format!("runs the built-in `{builtin}`, which takes in what no journal sees; drop the entry")
+            }
+            _ if module.node != own.node => format!(
+                "is on node {}, and `{}` records on node {}: journals are read on their own node; drop the entry, or \
+                 record on node {}",
+                module.node,
+                classes.format(own.name),
+                own.node,
+                module.node
+            ),
+            _ => return None,
+        };
+        Some((*line, format!("`exact`: `{text}` {why}")))
+    };
+    exact.iter().filter_map(mistake).collect()
+}

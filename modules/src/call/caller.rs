@@ -1,0 +1,135 @@
+//! The link of a module as its proxies share it; what they do is noted in the module's journal, if it has one.
+
+use super::noted::NotedCallError;
+use super::{CallError, Link, append};
+use crate::journal::{Blob, ModuleJournal, NotedCommand, NotedValue, Tag};
+use rohrpost_mailbox::Name;
+use rohrpost_schema::Description;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::cell::RefCell;
+use std::ops::Deref;
+use std::rc::Rc;
+use std::time::Duration;
+
+/// What the proxies of one thread share: its link.
+///
+/// Proxies are made of it. A module that speaks to the link itself does what an exact replay cannot repeat: the journal
+/// ends there.
+///
+/// ```
+/// use rohrpost_modules::call::Caller;
+///
+/// fn calls(link: &Caller) -> u64 {
+///     link.borrow().tallies().iter().map(|tally| tally.calls).sum()
+/// }
+/// ```
+#[derive(Clone)]
+pub struct Caller(Rc<SharedLink>);
+
+struct SharedLink {
+    link: RefCell<Link>,
+    journal: ModuleJournal,
+    /// Arguments, on their way into a journal and a command.
+    arguments: RefCell<Vec<u8>>,
+}
+
+/// For those that are no proxy.
+impl Deref for Caller {
+    type Target = RefCell<Link>;
+
+    fn deref(&self) -> &RefCell<Link> {
+        self.0.journal.hole("the module speaks to its link itself (`Context::link`), and not by a proxy");
+        &self.0.link
+    }
+}
+
+impl Caller {
+    pub(crate) fn new(link: Link, journal: ModuleJournal) -> Self {
+        Self(Rc::new(SharedLink { link: RefCell::new(link), journal, arguments: RefCell::default() }))
+    }
+
+    /// For the runtime's own work, which no module sees.
+    pub(crate) fn unseen(&self) -> &RefCell<Link> {
+        &self.0.link
+    }
+
+    /// The link, if nothing else has it any more.
+    pub(crate) fn into_link(self) -> Option<Link> {
+        Rc::try_unwrap(self.0).ok().map(|shared| shared.link.into_inner())
+    }
+
+    /// Sends a command with a tuple of arguments, of the interface with this hash and description.
+    pub(crate) fn begin<A: Serialize>(
+        &self,
+        to: Name,
+        function: u16,
+        (interface, description): (u32, fn() -> Description),
+        timeout: Duration,
+        arguments: &A,
+    ) -> Result<u32, CallError> {
+        let SharedLink { link, journal, arguments: bytes } = &*self.0;
+        if journal.is_none() {
+            return link.borrow_mut().begin(to, function, interface, timeout, |body| append(body, arguments));
+        }
+        let mut bytes = bytes.borrow_mut();
+        bytes.clear();
+        append(&mut bytes, arguments).map_err(|error| CallError::BadArguments(error.to_string()))?;
+        journal.replay(|replay| replay.know_called(interface, description));
+        let timeout_ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
+        let arguments = NotedValue::of(&bytes);
+        journal.output(Tag::Called, &NotedCommand { to: to.raw(), function, interface, timeout_ns, arguments });
+        let write = |body: &mut Vec<u8>| {
+            body.extend_from_slice(&bytes);
+            Ok(())
+        };
+        let begin = || link.borrow_mut().begin(to, function, interface, timeout, write);
+        let begun: Result<u32, NotedCallError> = journal.answer(Tag::Begun, || begin().map_err(NotedCallError::from));
+        begun.map_err(CallError::from)
+    }
+
+    /// Waits for the result of a call to this module.
+    pub(crate) fn wait<T: DeserializeOwned>(&self, sequence: u32, to: Name) -> Result<T, CallError> {
+        let SharedLink { link, journal, .. } = &*self.0;
+        if let Some(given) = journal.given(Tag::Answered) {
+            let answer: Result<Blob<'_>, NotedCallError> = given.read();
+            let read = |bytes: Blob<'_>| {
+                postcard::from_bytes(bytes.0).map_err(|error| CallError::BadReply(to, error.to_string()))
+            };
+            return answer.map_err(CallError::from).and_then(read);
+        }
+        let mut is_noted = journal.is_none();
+        let read = |bytes: &[u8]| {
+            journal.note(Tag::Answered, &Ok::<_, NotedCallError>(Blob(bytes)));
+            is_noted = true;
+            postcard::from_bytes(bytes)
+        };
+        let result = link.borrow_mut().wait(sequence, read);
+        match result {
+            Err(error) if !is_noted => {
+                let error = NotedCallError::from(error);
+                journal.note(Tag::Answered, &Err::<Blob<'_>, _>(&error));
+                Err(error.into())
+            }
+            result => result,
+        }
+    }
+
+    /// Gives a call up.
+    pub(crate) fn forget(&self, sequence: u32) {
+        if self.0.journal.is_replayed() {
+            return;
+        }
+        // Not while the link waits: then this call is the one it waits for, and it forgets by itself.
+        if let Ok(mut link) = self.0.link.try_borrow_mut() {
+            link.forget(sequence);
+        }
+    }
+}
+
+/// Without a journal.
+impl From<Link> for Caller {
+    fn from(link: Link) -> Self {
+        Self::new(link, ModuleJournal::default())
+    }
+}

@@ -1,0 +1,289 @@
+//! Entries as bytes, one behind the other:
+//!
+//! ```text
+//! len u32   bytes of tag and content, little endian
+//! sum u32   of the sum before, tag and content: no entry is missing, and none is changed
+//! tag u8    which kind
+//! content   postcard
+//! ```
+
+use super::bytes::digest;
+use serde::Serialize;
+use std::ops::Range;
+
+/// Version of all that is in a journal. Others are not read.
+pub(super) const VERSION: u32 = 1;
+/// Bytes before the tag.
+const HEAD_BYTES: usize = 8;
+
+/// The kind of an entry.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(crate) enum Tag {
+    /// The first one.
+    Begin = 1,
+    /// The module is called.
+    Event,
+    /// Answers: a reading of the clock,
+    Time,
+    /// what the clock goes by,
+    TimeRecord,
+    /// whether a stream could be opened,
+    Opened,
+    /// where its reader stands,
+    Position,
+    /// whether there is a next record,
+    HasNext,
+    /// how many it has read and lost,
+    Accounts,
+    /// its newest record,
+    Newest,
+    /// its next one,
+    Next,
+    /// one by its sequence,
+    Record,
+    /// those around a time,
+    Around,
+    /// whether a command went out,
+    Begun,
+    /// what came of it,
+    Answered,
+    /// whether a record was written,
+    Wrote,
+    /// what the module took in by itself.
+    TakenIn,
+    /// A file that it was given.
+    File,
+    /// Outputs: data,
+    Published,
+    /// a record of its own stream,
+    Written,
+    /// a command,
+    Called,
+    /// a reply,
+    Replied,
+    /// why it is in error,
+    Failed,
+    /// why it panicked.
+    Panicked,
+    /// Something that a journal does not see.
+    Hole,
+    /// The module ended as it should.
+    End,
+}
+
+const ALL: [Tag; 25] = [
+    Tag::Begin,
+    Tag::Event,
+    Tag::Time,
+    Tag::TimeRecord,
+    Tag::Opened,
+    Tag::Position,
+    Tag::HasNext,
+    Tag::Accounts,
+    Tag::Newest,
+    Tag::Next,
+    Tag::Record,
+    Tag::Around,
+    Tag::Begun,
+    Tag::Answered,
+    Tag::Wrote,
+    Tag::TakenIn,
+    Tag::File,
+    Tag::Published,
+    Tag::Written,
+    Tag::Called,
+    Tag::Replied,
+    Tag::Failed,
+    Tag::Panicked,
+    Tag::Hole,
+    Tag::End,
+];
+
+impl Tag {
+    fn from_code(code: u8) -> Option<Self> {
+        ALL.get(usize::from(code).checked_sub(1)?).copied()
+    }
+
+    /// What a module does there.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Begin => "begins",
+            Self::Event => "is called",
+            Self::Time => "reads the clock",
+            Self::TimeRecord => "asks what the clock goes by",
+            Self::Opened => "opens a stream",
+            Self::Position => "asks where it stands in a stream",
+            Self::HasNext => "asks whether a stream has a next record",
+            Self::Accounts => "asks how many records it has read",
+            Self::Newest => "reads the newest record of a stream",
+            Self::Next => "reads the next record of a stream",
+            Self::Record => "reads a record of a stream",
+            Self::Around => "looks for a time in a stream",
+            Self::Begun => "sends a command",
+            Self::Answered => "waits for an answer",
+            Self::Wrote => "ends a record of its stream",
+            Self::TakenIn => "takes something in (`take_in`)",
+            Self::File => "asks for a file",
+            Self::Published => "publishes data",
+            Self::Written => "writes a record",
+            Self::Called => "sends a command",
+            Self::Replied => "replies to a command",
+            Self::Failed => "fails",
+            Self::Panicked => "panics",
+            Self::Hole => "does what no journal sees",
+            Self::End => "ends",
+        }
+    }
+}
+
+/// Appends an entry, of which the one before had the sum `before`; its own sum.
+pub(super) fn append<T: Serialize + ?Sized>(
+    to: &mut Vec<u8>,
+    before: u32,
+    tag: Tag,
+    content: &T,
+) -> Result<u32, postcard::Error> {
+    let begin = head(to, tag);
+    let mut counted = Counted { bytes: std::mem::take(to) };
+    let written = postcard::serialize_with_flavor::<T, &mut Counted, ()>(content, &mut counted);
+    *to = counted.bytes;
+    if let Err(error) = written {
+        // What fails leaves no half an entry behind.
+        to.truncate(begin);
+        return Err(error);
+    }
+    seal(to, begin, before)
+}
+
+/// Room for the head of an entry, and its tag; where it begins.
+fn head(to: &mut Vec<u8>, tag: Tag) -> usize {
+    let begin = to.len();
+    to.extend_from_slice(&[0; HEAD_BYTES]);
+    to.push(tag as u8);
+    begin
+}
+
+/// Fills in the head of the entry that begins there.
+fn seal(to: &mut [u8], begin: usize, before: u32) -> Result<u32, postcard::Error> {
+    let body = begin + HEAD_BYTES;
+    let len = u32::try_from(to.len() - body).map_err(|_| postcard::Error::SerializeBufferFull)?;
+    let sum = digest(before.into(), &to[body..]) as u32;
+    to[begin..begin + 4].copy_from_slice(&len.to_le_bytes());
+    to[begin + 4..body].copy_from_slice(&sum.to_le_bytes());
+    Ok(sum)
+}
+
+/// The same with content that is postcard already.
+#[cfg(test)]
+pub(super) fn append_raw(to: &mut Vec<u8>, before: u32, tag: Tag, content: &[u8]) -> Result<u32, postcard::Error> {
+    let begin = head(to, tag);
+    to.extend_from_slice(content);
+    seal(to, begin, before)
+}
+
+/// A vector that postcard writes to; it stays where it is if that fails.
+struct Counted {
+    bytes: Vec<u8>,
+}
+
+impl postcard::ser_flavors::Flavor for &mut Counted {
+    type Output = ();
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.bytes.push(byte);
+        Ok(())
+    }
+
+    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
+        self.bytes.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    fn finalize(self) -> postcard::Result<()> {
+        Ok(())
+    }
+}
+
+/// An entry that was read.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) struct ReadEntry {
+    pub(super) tag: Tag,
+    /// Where its content lies.
+    pub(super) content: Range<usize>,
+    pub(super) sum: u32,
+}
+
+/// What is there instead of an entry.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum NoEntry {
+    /// The journal ends here.
+    End,
+    /// It ends within an entry.
+    Cut,
+    /// An entry is changed, or one before it is missing.
+    Sum,
+    /// It is of a kind that this version does not know.
+    Tag(u8),
+}
+
+/// The entry that begins at `at`; the one before it had the sum `before`.
+pub(super) fn read(bytes: &[u8], at: usize, before: u32) -> Result<ReadEntry, NoEntry> {
+    let rest = bytes.get(at..).unwrap_or_default();
+    if rest.is_empty() {
+        return Err(NoEntry::End);
+    }
+    let word = |from: usize| rest.get(from..from + 4)?.try_into().ok().map(u32::from_le_bytes);
+    let (Some(len), Some(sum)) = (word(0), word(4)) else { return Err(NoEntry::Cut) };
+    let Some(body) = rest[HEAD_BYTES..].get(..len as usize) else { return Err(NoEntry::Cut) };
+    if digest(before.into(), body) as u32 != sum {
+        return Err(NoEntry::Sum);
+    }
+    let code = body.first().copied().ok_or(NoEntry::Sum)?;
+    let tag = Tag::from_code(code).ok_or(NoEntry::Tag(code))?;
+    let begin = at + HEAD_BYTES;
+    Ok(ReadEntry { tag, content: begin + 1..begin + len as usize, sum })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two() -> (Vec<u8>, u32, usize) {
+        let mut bytes = Vec::new();
+        let sum = append(&mut bytes, 0, Tag::Time, &(1u64, "one")).unwrap();
+        let second = bytes.len();
+        append(&mut bytes, sum, Tag::Published, &2u8).unwrap();
+        (bytes, sum, second)
+    }
+
+    #[test]
+    fn tags_are_their_places() {
+        for (code, tag) in (1..).zip(ALL) {
+            assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
+        }
+        assert_eq!((Tag::from_code(0), Tag::from_code(26)), (None, None));
+    }
+
+    #[test]
+    fn entries_come_back_and_what_is_changed_or_missing_is_found() {
+        let (bytes, sum, second) = two();
+        let first = read(&bytes, 0, 0).unwrap();
+        assert_eq!(
+            (first.tag, &bytes[first.content.clone()], first.sum),
+            (Tag::Time, &[1, 3, b'o', b'n', b'e'][..], sum)
+        );
+        let frame = read(&bytes, second, sum).unwrap();
+        assert_eq!((frame.tag, &bytes[frame.content.clone()]), (Tag::Published, &[2][..]));
+        assert_eq!(read(&bytes, bytes.len(), frame.sum), Err(NoEntry::End));
+        assert_eq!(read(&bytes, second, 0), Err(NoEntry::Sum), "the one before is missing");
+        for len in 1..second {
+            assert_eq!(read(&bytes[..len], 0, 0), Err(NoEntry::Cut), "{len} bytes");
+        }
+        for bit in 0..second * 8 {
+            let mut flipped = bytes.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            assert!(matches!(read(&flipped, 0, 0), Err(NoEntry::Sum | NoEntry::Cut)), "bit {bit}");
+        }
+    }
+}

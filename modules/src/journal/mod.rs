@@ -1,0 +1,213 @@
+//! The journal of a module: all that its thread is called with and told, and all that it sends, in the order in which
+//! it happens. With it the same program runs again, alone, and does the same.
+//!
+//! ```text
+//!             ┌───────────────── the module's own code ─────────────────┐
+//!  event ────▶│ on, off, tick, received, a command, parameters          │────▶ output: published, written, called,
+//!             │        asks: what time is it? which record? ▲           │      replied, failed
+//!             └─────────────────────────────────────────────┼───────────┘
+//!                                                         answer
+//!
+//!  written:   each is an entry ──▶ a stream of the module, 4 KiB records ──▶ `logd` ──▶ a recording
+//!  replayed:  events and answers are taken from there, outputs are compared with it, bit by bit
+//! ```
+//!
+//! The runtime, proxies, readers of streams and clocks of a module share one [`ModuleJournal`]. Without one each of them
+//! pays for a branch. Whatever no journal sees is noted as a hole, and a replay ends there, with the reason.
+
+mod bytes;
+mod entry;
+mod event;
+mod files;
+mod list;
+mod outputs;
+mod replay;
+mod run;
+mod verdict;
+mod write;
+
+pub(crate) use bytes::Blob;
+pub(crate) use entry::Tag;
+use event::EventAt;
+pub(crate) use event::{JournalEvent, NotedOrigin};
+pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply, NotedValue};
+pub(crate) use replay::{Given, Replay};
+pub use run::{ExactRun, Piece, RunError, VARIABLE};
+pub use verdict::{Difference, ReplayReport, ReplayVerdict};
+pub(crate) use write::{JournalWriter, SHAPE};
+
+use rohrpost_mailbox::monotonic_ns;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::cell::RefCell;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Number of the stream, under the module's own name. Interfaces have numbers from 1 to 16384.
+pub const JOURNAL_NUMBER: u16 = u16::MAX;
+/// Its name.
+pub const JOURNAL_NAME: &str = "journal";
+
+/// A module's journal, or none; all that share it have a copy of this. The journal itself is its thread's. What another
+/// thread does with a copy is seen by no journal: that is marked here, and noted by the module's thread.
+#[derive(Clone, Default)]
+pub(crate) struct ModuleJournal(Option<Arc<AtomicBool>>);
+
+enum JournalMode {
+    Write(Box<JournalWriter>),
+    Replay(Box<Replay>),
+}
+
+thread_local! {
+    static PRESENT: RefCell<Option<JournalMode>> = const { RefCell::new(None) };
+}
+
+const STRAYED: &str = "the module reads the clock, or a stream, in another thread";
+
+/// Hands on what a module that has no journal any more, since it panicked in its making, has noted.
+pub(crate) fn flush_present() {
+    PRESENT.with_borrow_mut(|present| match present {
+        Some(JournalMode::Write(writer)) => writer.flush(),
+        Some(JournalMode::Replay(_)) | None => {}
+    });
+}
+
+impl ModuleJournal {
+    pub(crate) fn written(writer: JournalWriter) -> Self {
+        Self::of(JournalMode::Write(Box::new(writer)))
+    }
+
+    pub(crate) fn replayed(replay: Replay) -> Self {
+        Self::of(JournalMode::Replay(Box::new(replay)))
+    }
+
+    /// The one of this thread.
+    fn of(mode: JournalMode) -> Self {
+        PRESENT.set(Some(mode));
+        Self(Some(Arc::default()))
+    }
+
+    /// Whether nothing is noted.
+    pub(crate) fn is_none(&self) -> bool {
+        self.0.is_none()
+    }
+
+    /// Whether events and answers are taken from it.
+    pub(crate) fn is_replayed(&self) -> bool {
+        self.replay(|_| ()).is_some()
+    }
+
+    fn mode<T>(&self, part: impl FnOnce(&mut JournalMode, bool) -> Option<T>) -> Option<T> {
+        let has_strayed = self.0.as_ref()?;
+        PRESENT.with_borrow_mut(|present| match present {
+            Some(mode) => part(mode, has_strayed.load(Ordering::Acquire)),
+            None => {
+                has_strayed.store(true, Ordering::Release);
+                None
+            }
+        })
+    }
+
+    fn write<T>(&self, part: impl FnOnce(&mut JournalWriter) -> T) -> Option<T> {
+        self.mode(|mode, has_strayed| match mode {
+            JournalMode::Write(writer) => {
+                if has_strayed {
+                    writer.put(Tag::Hole, STRAYED);
+                }
+                Some(part(writer))
+            }
+            JournalMode::Replay(_) => None,
+        })
+    }
+
+    /// Does this if it is replayed.
+    pub(crate) fn replay<T>(&self, part: impl FnOnce(&mut Replay) -> T) -> Option<T> {
+        self.mode(|mode, _| match mode {
+            JournalMode::Write(_) => None,
+            JournalMode::Replay(replay) => Some(part(replay)),
+        })
+    }
+
+    /// Something that the module is told: asked now, and noted; or, replayed, what was noted then.
+    pub(crate) fn answer<T: Serialize + DeserializeOwned>(&self, tag: Tag, ask: impl FnOnce() -> T) -> T {
+        if self.0.is_none() {
+            return ask();
+        }
+        if let Some(given) = self.given(tag) {
+            return given.read();
+        }
+        let answer = ask();
+        self.note(tag, &answer);
+        answer
+    }
+
+    /// Notes an answer that was given already; nothing, unless it is written.
+    pub(crate) fn note<T: Serialize + ?Sized>(&self, tag: Tag, answer: &T) {
+        self.write(|writer| writer.put(tag, answer));
+    }
+
+    /// The answer that was noted then; none unless it is replayed.
+    pub(crate) fn given(&self, tag: Tag) -> Option<Given> {
+        self.replay(|replay| replay.answer(tag))
+    }
+
+    /// How it begins.
+    pub(crate) fn begin(&self, begin: &Begin<'_>) {
+        if self.replay(|replay| replay.begin(begin)).is_none() {
+            self.note(Tag::Begin, begin);
+        }
+    }
+
+    /// The module is called; `now_ns` is asked for if that is noted.
+    pub(crate) fn event(&self, event: &JournalEvent<'_>, now_ns: impl FnOnce() -> u64) {
+        if !self.is_none() && self.replay(|replay| replay.event(event)).is_none() {
+            self.note(Tag::Event, &EventAt { at_ns: now_ns(), event: *event });
+        }
+    }
+
+    /// The module sends something, or says something of itself.
+    pub(crate) fn output<T: Serialize + ?Sized>(&self, tag: Tag, output: &T) {
+        if !self.is_none() && self.replay(|replay| replay.output(tag, output)).is_none() {
+            self.note(tag, output);
+        }
+    }
+
+    /// What comes now is seen by no journal.
+    pub(crate) fn hole(&self, why: &str) {
+        self.output(Tag::Hole, why);
+    }
+
+    /// A file that the module's settings name: a replay wants one with the same content.
+    pub(crate) fn file(&self, path: &Path) {
+        if self.is_none() {
+            return;
+        }
+        let found = files::digest_of(path);
+        if self.replay(|replay| replay.file(path, found)).is_none() {
+            self.note(Tag::File, &found);
+        }
+    }
+
+    /// Hands entries on to readers that have waited long enough for them.
+    pub(crate) fn pass_on(&self) {
+        self.write(|writer| writer.pass_on(monotonic_ns()));
+    }
+
+    /// When [`ModuleJournal::pass_on`] has something to do, by the monotonic clock.
+    pub(crate) fn due_ns(&self) -> Option<u64> {
+        self.write(|writer| writer.due_ns()).flatten()
+    }
+
+    /// The module has ended as it should, and its journal with it.
+    pub(crate) fn end(&self) {
+        self.replay(|replay| replay.end());
+        self.write(|writer| {
+            writer.put(Tag::End, &());
+            writer.flush();
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,250 @@
+//! A journal that is replayed: hands out events and answers, compares outputs.
+//!
+//! The first thing that differs ends the process: nothing behind it would mean anything, and no code of the module is
+//! to run on a made-up answer. What was found is in a file by then.
+
+use super::entry::{self, NoEntry, ReadEntry, Tag};
+use super::event::{EventAt, JournalEvent};
+use super::outputs::{Begin, KnownTypes, describe};
+use super::verdict::{Difference, ReplayReport, ReplayVerdict};
+use rohrpost_schema::Description;
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// How far it is, and where to tell the end.
+struct ReplayProgress {
+    #[cfg_attr(test, expect(dead_code, reason = "a test gets the report by a panic"))]
+    path: PathBuf,
+    report: RefCell<ReplayReport>,
+}
+
+impl ReplayProgress {
+    fn stop(&self, verdict: ReplayVerdict) -> ! {
+        let report = ReplayReport { verdict, ..self.report.borrow().clone() };
+        // A test goes on.
+        #[cfg(test)]
+        std::panic::resume_unwind(Box::new(report));
+        #[cfg(not(test))]
+        {
+            // What cannot be written is missing, and its reader says so.
+            let _ = postcard::to_stdvec(&report).map(|bytes| std::fs::write(&self.path, bytes));
+            std::process::exit(0)
+        }
+    }
+}
+
+/// A journal, and where in it the module is.
+pub(crate) struct Replay {
+    bytes: Rc<[u8]>,
+    at: usize,
+    /// Of the entry before.
+    sum: u32,
+    /// Content of the present event.
+    event: Range<usize>,
+    known: KnownTypes,
+    /// Why it is cut off at its end, if it is.
+    ends: Option<String>,
+    output: Vec<u8>,
+    progress: Rc<ReplayProgress>,
+}
+
+/// Content of an entry.
+pub(crate) struct Given {
+    bytes: Rc<[u8]>,
+    content: Range<usize>,
+    progress: Rc<ReplayProgress>,
+}
+
+impl Given {
+    /// What is in it.
+    pub(crate) fn read<'a, T: Deserialize<'a>>(&'a self) -> T {
+        let read = postcard::from_bytes(&self.bytes[self.content.clone()]);
+        read.unwrap_or_else(|error| {
+            let why = format!("what was noted then is not what this program asks for ({error})");
+            self.progress.stop(ReplayVerdict::Refused(why))
+        })
+    }
+}
+
+impl Replay {
+    pub(super) fn new(bytes: Rc<[u8]>, ends: Option<String>, report: PathBuf) -> Self {
+        let progress = Rc::new(ReplayProgress { path: report, report: RefCell::default() });
+        Self { bytes, at: 0, sum: 0, event: 0..0, known: KnownTypes::default(), ends, output: Vec::new(), progress }
+    }
+
+    /// The module's interfaces, under each of its names.
+    pub(crate) fn know_own(&mut self, own: Vec<Option<Description>>) {
+        self.known.own = own;
+    }
+
+    /// An interface that it calls.
+    pub(crate) fn know_called(&mut self, hash: u32, description: fn() -> Description) {
+        if !self.known.called.iter().any(|(known, _)| *known == hash) {
+            self.known.called.push((hash, description));
+        }
+    }
+
+    /// It is of this module and these settings, wherever their files are now.
+    pub(super) fn begin(&mut self, begin: &Begin<'_>) {
+        let given = self.answer(Tag::Begin);
+        let noted: Begin<'_> = given.read();
+        if noted.texts() != begin.texts() {
+            self.refuse("it is of another module, or of other settings");
+        }
+    }
+
+    /// The next entry. Where the journal ends, so does the replay.
+    fn look(&self) -> ReadEntry {
+        match entry::read(&self.bytes, self.at, self.sum) {
+            Ok(frame) if frame.tag == Tag::Hole => {
+                let why: &str = postcard::from_bytes(&self.bytes[frame.content]).unwrap_or("for no reason told");
+                self.progress.stop(ReplayVerdict::Refused(why.into()))
+            }
+            Ok(frame) => frame,
+            // What the module was in when it was killed, or when the recording ended.
+            Err(NoEntry::End | NoEntry::Cut) => match &self.ends {
+                Some(why) => self.refuse(why),
+                None => self.progress.stop(ReplayVerdict::Identical { is_whole: false }),
+            },
+            Err(NoEntry::Sum) => self.refuse("an entry of the journal is damaged or missing here"),
+            Err(NoEntry::Tag(tag)) => self.refuse(&format!("an entry of the journal is of an unknown kind, {tag}")),
+        }
+    }
+
+    fn pass(&mut self, frame: &ReadEntry) {
+        (self.at, self.sum) = (frame.content.end, frame.sum);
+    }
+
+    fn given(&self, frame: ReadEntry) -> Given {
+        Given { bytes: self.bytes.clone(), content: frame.content, progress: self.progress.clone() }
+    }
+
+    /// The event that comes next. The module's work for the one before is done; behind the last one ends the replay.
+    pub(crate) fn next_event(&self) -> NextEvent {
+        let frame = self.look();
+        match frame.tag {
+            Tag::Event => NextEvent(self.given(frame)),
+            Tag::End => self.progress.stop(ReplayVerdict::Identical { is_whole: true }),
+            _ => self.differ(self.describe(&frame), "its work is done".into()),
+        }
+    }
+
+    /// Events so far.
+    pub(crate) fn events(&self) -> u64 {
+        self.progress.report.borrow().events
+    }
+
+    /// The module is called with this.
+    pub(super) fn event(&mut self, event: &JournalEvent<'_>) {
+        let frame = self.look();
+        if frame.tag != Tag::Event {
+            self.differ(self.describe(&frame), format!("it {}", event.words()));
+        }
+        let given = self.given(frame.clone());
+        let EventAt { at_ns, event: noted } = given.read();
+        if noted != *event {
+            self.differ(format!("it {}", noted.words()), format!("it {}", event.words()));
+        }
+        self.pass(&frame);
+        self.event = frame.content;
+        let mut report = self.progress.report.borrow_mut();
+        if report.events == 0 {
+            report.first_ns = at_ns;
+        }
+        report.events += 1;
+        report.last_ns = at_ns;
+    }
+
+    /// What was noted, when the module asks this.
+    pub(super) fn answer(&mut self, tag: Tag) -> Given {
+        let frame = self.look();
+        if frame.tag != tag {
+            self.differ(self.describe(&frame), format!("it {}", tag.words()));
+        }
+        self.pass(&frame);
+        self.given(frame)
+    }
+
+    /// Compares what the module sends.
+    pub(super) fn output<T: Serialize + ?Sized>(&mut self, tag: Tag, output: &T) {
+        let mut bytes = std::mem::take(&mut self.output);
+        bytes.clear();
+        bytes = postcard::to_extend(output, bytes).unwrap_or_default();
+        let frame = self.look();
+        if frame.tag != tag || self.bytes[frame.content.clone()] != *bytes {
+            self.differ(self.describe(&frame), self.describe_sent(tag, &bytes));
+        }
+        self.pass(&frame);
+        self.output = bytes;
+        self.progress.report.borrow_mut().outputs += 1;
+    }
+
+    /// A file has the content that it had.
+    pub(super) fn file(&mut self, path: &Path, found: Option<(u64, u64)>) {
+        let noted: Option<(u64, u64)> = self.answer(Tag::File).read();
+        if noted != found {
+            let text = |file: Option<(u64, u64)>| match file {
+                Some((len, _)) => format!("{len} bytes"),
+                None => "no file".into(),
+            };
+            let path = path.display();
+            self.refuse(&format!("{path} is not the file that it was ({} then, {} now)", text(noted), text(found)));
+        }
+    }
+
+    /// An entry, in words.
+    fn describe(&self, frame: &ReadEntry) -> String {
+        let content = &self.bytes[frame.content.clone()];
+        match frame.tag {
+            Tag::Event => match postcard::from_bytes::<EventAt<'_>>(content) {
+                Ok(EventAt { event, .. }) => format!("its work is done, and next it {}", event.words()),
+                Err(_) => "its work is done".into(),
+            },
+            tag => self.describe_sent(tag, content),
+        }
+    }
+
+    /// The event that the module is at.
+    fn present(&self) -> Option<JournalEvent<'_>> {
+        postcard::from_bytes::<EventAt<'_>>(&self.bytes[self.event.clone()]).ok().map(|its| its.event)
+    }
+
+    fn describe_sent(&self, tag: Tag, content: &[u8]) -> String {
+        describe(tag, content, self.present().as_ref(), &self.known)
+    }
+
+    fn differ(&self, recorded: String, replayed: String) -> ! {
+        let event = self.present().map_or_else(|| "begins".into(), |event| event.words());
+        self.progress.stop(ReplayVerdict::Differs(Difference { event, recorded, replayed }))
+    }
+
+    fn refuse(&self, why: &str) -> ! {
+        self.progress.stop(ReplayVerdict::Refused(why.into()))
+    }
+
+    /// The module has ended.
+    pub(super) fn end(&self) -> ! {
+        let frame = self.look();
+        match frame.tag {
+            Tag::End => self.progress.stop(ReplayVerdict::Identical { is_whole: true }),
+            _ => self.differ(self.describe(&frame), "it ends".into()),
+        }
+    }
+
+    /// It cannot go on.
+    pub(crate) fn give_up(&self, why: &str) -> ! {
+        self.refuse(why)
+    }
+}
+
+/// An event that is to come.
+pub(crate) struct NextEvent(Given);
+
+impl NextEvent {
+    pub(crate) fn event(&self) -> JournalEvent<'_> {
+        self.0.read::<EventAt<'_>>().event
+    }
+}

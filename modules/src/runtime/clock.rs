@@ -1,0 +1,89 @@
+//! The clock that a module reads.
+
+use crate::journal::{ModuleJournal, Tag};
+use rohrpost_mailbox::{SystemClock, SystemTime, TimeRecord, TimeSource};
+use std::time::Duration;
+
+/// A module's view of system time: each reading is noted in its journal, if it has one, and given back in an exact
+/// replay. What another thread reads cannot be given back: an exact replay ends there.
+///
+/// ```
+/// use rohrpost_modules::runtime::{Context, ModuleClock};
+///
+/// struct Stopwatch {
+///     clock: ModuleClock,
+///     began_ns: u64,
+/// }
+///
+/// impl Stopwatch {
+///     fn new(context: &Context) -> Self {
+///         Self { clock: context.clock().clone(), began_ns: context.now().ns }
+///     }
+///
+///     fn passed_ns(&self) -> u64 {
+///         self.clock.now().ns.saturating_sub(self.began_ns)
+///     }
+/// }
+/// ```
+#[derive(Clone)]
+pub struct ModuleClock {
+    clock: SystemClock,
+    journal: ModuleJournal,
+}
+
+/// A reading, as a journal has it.
+type NotedTime = (u64, u64, Duration, Duration);
+/// What a clock goes by.
+type NotedTimeRecord = (u64, u8, u64, u64, u64, u64, u64);
+
+impl ModuleClock {
+    pub(crate) fn new(clock: SystemClock, journal: ModuleJournal) -> Self {
+        Self { clock, journal }
+    }
+
+    /// The node's clock, for what no module sees.
+    pub(crate) fn unseen(&self) -> &SystemClock {
+        &self.clock
+    }
+
+    pub(in crate::runtime) fn journal(&self) -> &ModuleJournal {
+        &self.journal
+    }
+
+    /// System time now. No system call, lock or heap.
+    pub fn now(&self) -> SystemTime {
+        let ask = || -> NotedTime {
+            let SystemTime { ns, epoch, error, age } = self.clock.now();
+            (ns, epoch, error, age)
+        };
+        let (ns, epoch, error, age) = self.journal.answer(Tag::Time, ask);
+        SystemTime { ns, epoch, error, age }
+    }
+
+    /// What the node's time goes by; none without a time page.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::Context;
+    /// fn pace(context: &Context) -> f64 {
+    ///     context.clock().record().map_or(1.0, |record| record.pace_ppb as f64 / 1e9)
+    /// }
+    /// ```
+    pub fn record(&self) -> Option<TimeRecord> {
+        let noted: Option<NotedTimeRecord> = self.journal.answer(Tag::TimeRecord, || self.clock.record().map(noted));
+        noted.and_then(recorded)
+    }
+}
+
+const SOURCES: [TimeSource; 4] = [TimeSource::Local, TimeSource::Simulation, TimeSource::Log, TimeSource::Master];
+
+fn noted(record: TimeRecord) -> NotedTimeRecord {
+    let TimeRecord { epoch, source, monotonic_ns, system_ns, pace_ppb, error_ns, drift_ns_s } = record;
+    (epoch, source as u8, monotonic_ns, system_ns, pace_ppb, error_ns, drift_ns_s)
+}
+
+fn recorded(
+    (epoch, source, monotonic_ns, system_ns, pace_ppb, error_ns, drift_ns_s): NotedTimeRecord,
+) -> Option<TimeRecord> {
+    let source = SOURCES.into_iter().find(|known| *known as u8 == source)?;
+    Some(TimeRecord { epoch, source, monotonic_ns, system_ns, pace_ppb, error_ns, drift_ns_s })
+}

@@ -1,0 +1,182 @@
+//! What the reader of a stream said, as a journal has it.
+
+use super::error::StreamReadError;
+use crate::journal::{Blob, ModuleJournal, Tag};
+use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo, Stamp};
+use serde::{Deserialize, Serialize};
+
+/// What is said of a record.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) struct NotedInfo {
+    sequence: u64,
+    epoch: u64,
+    ns: u64,
+    written_ns: u64,
+    len_bytes: usize,
+    incarnation: u32,
+}
+
+/// A record.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) struct NotedRecord<'a> {
+    info: NotedInfo,
+    #[serde(borrow)]
+    bytes: Blob<'a>,
+}
+
+/// What is next.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) enum NotedNext<'a> {
+    Record(#[serde(borrow)] NotedRecord<'a>),
+    Lost(u64),
+    Nothing,
+}
+
+/// What is around a time.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) enum NotedAround {
+    Records { before: NotedInfo, after: NotedInfo },
+    Empty,
+    BeforeOldest { by_ns: u64 },
+    NotYet { by_ns: u64 },
+    OtherEpoch { newest: u64 },
+}
+
+/// Why it could not be read. That a value cannot be read is found by the module, and not noted.
+#[derive(Clone, Serialize, Deserialize)]
+pub(in crate::runtime) enum NotedReadError {
+    Ring(String),
+    InterfaceDiffers { stream: String, module: String, theirs: u32, ours: u32 },
+}
+
+/// A record that is given back.
+pub(super) type GivenRecord = (RecordInfo, Vec<u8>);
+
+impl From<RecordInfo> for NotedInfo {
+    fn from(info: RecordInfo) -> Self {
+        let RecordInfo { sequence, stamp: Stamp { epoch, ns }, written_ns, len_bytes, incarnation } = info;
+        Self { sequence, epoch, ns, written_ns, len_bytes, incarnation }
+    }
+}
+
+impl From<NotedInfo> for RecordInfo {
+    fn from(info: NotedInfo) -> Self {
+        let NotedInfo { sequence, epoch, ns, written_ns, len_bytes, incarnation } = info;
+        Self { sequence, stamp: Stamp { epoch, ns }, written_ns, len_bytes, incarnation }
+    }
+}
+
+impl<'a> From<&'a HeldRecord<'_>> for NotedRecord<'a> {
+    fn from(held: &'a HeldRecord<'_>) -> Self {
+        Self { info: held.info().into(), bytes: Blob(held.body()) }
+    }
+}
+
+impl NotedRecord<'_> {
+    fn given(self) -> GivenRecord {
+        (self.info.into(), self.bytes.0.to_vec())
+    }
+}
+
+impl<'a> NotedNext<'a> {
+    /// What a reader said, and of which stream.
+    pub(super) fn of<S>(next: &'a Next<(HeldRecord<'_>, S)>) -> Self {
+        match next {
+            Next::Record((held, _)) => Self::Record(held.into()),
+            Next::Lost(lost) => Self::Lost(*lost),
+            Next::Nothing => Self::Nothing,
+        }
+    }
+}
+
+impl From<Around> for NotedAround {
+    fn from(around: Around) -> Self {
+        match around {
+            Around::Records { before, after } => Self::Records { before: before.into(), after: after.into() },
+            Around::Empty => Self::Empty,
+            Around::BeforeOldest { by_ns } => Self::BeforeOldest { by_ns },
+            Around::NotYet { by_ns } => Self::NotYet { by_ns },
+            Around::OtherEpoch { newest } => Self::OtherEpoch { newest },
+        }
+    }
+}
+
+impl From<NotedAround> for Around {
+    fn from(around: NotedAround) -> Self {
+        match around {
+            NotedAround::Records { before, after } => Self::Records { before: before.into(), after: after.into() },
+            NotedAround::Empty => Self::Empty,
+            NotedAround::BeforeOldest { by_ns } => Self::BeforeOldest { by_ns },
+            NotedAround::NotYet { by_ns } => Self::NotYet { by_ns },
+            NotedAround::OtherEpoch { newest } => Self::OtherEpoch { newest },
+        }
+    }
+}
+
+impl From<&StreamReadError> for NotedReadError {
+    fn from(error: &StreamReadError) -> Self {
+        match error.clone() {
+            StreamReadError::InterfaceDiffers { stream, module, theirs, ours } => {
+                Self::InterfaceDiffers { stream, module, theirs, ours }
+            }
+            StreamReadError::Ring(text) => Self::Ring(text),
+            StreamReadError::Unreadable(error) => Self::Ring(error.to_string()),
+        }
+    }
+}
+
+impl From<NotedReadError> for StreamReadError {
+    fn from(error: NotedReadError) -> Self {
+        match error {
+            NotedReadError::Ring(text) => Self::Ring(text),
+            NotedReadError::InterfaceDiffers { stream, module, theirs, ours } => {
+                Self::InterfaceDiffers { stream, module, theirs, ours }
+            }
+        }
+    }
+}
+
+/// Notes what a reader said.
+pub(in crate::runtime) fn note<'r, R, N: Serialize>(
+    journal: &ModuleJournal,
+    tag: Tag,
+    answer: &'r Result<R, StreamReadError>,
+    content: impl FnOnce(&'r R) -> N,
+) {
+    if !journal.is_none() {
+        journal.note(tag, &answer.as_ref().map(content).map_err(NotedReadError::from));
+    }
+}
+
+/// Whether it was opened then.
+pub(in crate::runtime) fn opened(journal: &ModuleJournal) -> Option<Result<(), StreamReadError>> {
+    let given = journal.given(Tag::Opened)?;
+    let opened: Result<(), NotedReadError> = given.read();
+    Some(opened.map_err(StreamReadError::from))
+}
+
+/// The record that was read then, if there was one.
+pub(super) fn record(journal: &ModuleJournal, tag: Tag) -> Option<Result<Option<GivenRecord>, StreamReadError>> {
+    let given = journal.given(tag)?;
+    let record: Result<Option<NotedRecord<'_>>, NotedReadError> = given.read();
+    Some(record.map(|record| record.map(NotedRecord::given)).map_err(StreamReadError::from))
+}
+
+/// What was next then.
+pub(super) fn next(journal: &ModuleJournal) -> Option<Result<Next<GivenRecord>, StreamReadError>> {
+    let given = journal.given(Tag::Next)?;
+    let next: Result<NotedNext<'_>, NotedReadError> = given.read();
+    let next = next.map(|next| match next {
+        NotedNext::Record(record) => Next::Record(record.given()),
+        NotedNext::Lost(lost) => Next::Lost(lost),
+        NotedNext::Nothing => Next::Nothing,
+    });
+    Some(next.map_err(StreamReadError::from))
+}
+
+/// What was around a time then.
+pub(super) fn around(journal: &ModuleJournal) -> Option<Result<Around, StreamReadError>> {
+    let given = journal.given(Tag::Around)?;
+    let around: Result<NotedAround, NotedReadError> = given.read();
+    Some(around.map(Around::from).map_err(StreamReadError::from))
+}

@@ -1,0 +1,281 @@
+//! Exact replay: the demo's modules repeat what they did on a loaded and disturbed node, and whatever differs is found.
+
+use crate::harness::{Place, Robot, halt, signal, wait};
+use crate::process::{Running, Said};
+use crate::seer::{OTHER_BUILD, entry};
+use nix::sys::signal::Signal;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Set where the replays of a run are to be more than two: 20 in the long proof.
+const REPLAYS: &str = "ROHRPOST_EXACT_REPLAYS";
+const HEAD: &str = r#"
+installation = "test"
+[system]
+name = "robot"
+id = 1
+[classes]
+motor = { id = 200 }
+odometry = { id = 160 }
+laser = { id = 150 }
+pilot = { id = 140 }
+seer = { id = 110 }
+mapper = { id = 96 }
+logd = { id = 24 }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+[nodes.main]
+[[module]]
+name = "logd.0"
+builtin = "logd"
+stop-within = "60 s"
+"#;
+
+const DEMO: &str = r#"
+[time]
+source = "simulation"
+speed = 4.0
+[[module]]
+name = "motor.0"
+aliases = ["odometry.0", "laser.0"]
+builtin = "sim"
+settings = { map = "building.map", seed = 1 }
+stop-within = "60 s"
+[module.stream.odometry]
+record = "128 B"
+keep = 1024
+[[module]]
+name = "mapper.0"
+builtin = "mapper"
+calls = ["laser.0", "odometry.0"]
+settings = { laser = "laser.0", odometry = "odometry.0" }
+stop-within = "60 s"
+[[module]]
+name = "pilot.0"
+builtin = "pilot"
+calls = ["laser.0", "motor.0"]
+settings = { laser = "laser.0", motor = "motor.0", cruise-m-s = 0.6, seed = 16 }
+stop-within = "60 s"
+[record]
+directory = "recordings"
+exact = ["motor.0", "mapper.0", "pilot.0"]
+leave-free = "0 B"
+flush = "20 ms"
+"#;
+
+const BUILDING: &str = include_str!("../../config/building.map");
+
+fn launched(place: &Place, modules: &str) -> (Running, Robot) {
+    let config = place.path("test.toml");
+    std::fs::write(&config, format!("{HEAD}{modules}")).unwrap();
+    std::fs::write(place.path("building.map"), BUILDING).unwrap();
+    std::fs::write(place.path("vision.map"), "far").unwrap();
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    (launch, robot)
+}
+
+/// Seers with these sources, all with journals.
+fn seers(place: &Place, sources: &[&str]) -> (Running, Robot) {
+    let entries: String = sources.iter().enumerate().map(|(number, source)| entry(number, source)).collect();
+    let names: Vec<String> = (0..sources.len()).map(|number| format!("seer.{number}")).collect();
+    let record =
+        format!("[record]\ndirectory = \"recordings\"\nexact = {names:?}\nleave-free = \"0 B\"\nflush = \"20 ms\"\n");
+    launched(place, &format!("{entries}{record}"))
+}
+
+fn recording(place: &Place, number: u32) -> PathBuf {
+    place.path(&format!("recordings/main-{number:04}.mcap"))
+}
+
+/// What each run of each module came to.
+fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Value> {
+    let said = replay(place, file, modules, &[]);
+    said.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str)]) -> Said {
+    let mut command = place.command(&[&["replay", "--exact", "--json", file.to_str().unwrap()], modules].concat());
+    command.envs(variables.iter().copied());
+    Running::start(command).said()
+}
+
+/// Messages of a journal in a file that is being written.
+fn journaled(file: &Path, module: &str) -> usize {
+    let topic = format!("{module}/journal");
+    let Ok(mut reader) = rohrpost_recording::Reader::open(file) else { return 0 };
+    let mut count = 0;
+    while let Ok(Some((channel, _))) = reader.next() {
+        count += usize::from(channel.topic == topic);
+    }
+    count
+}
+
+fn wait_journaled(file: &Path, module: &str, more: usize) {
+    let before = journaled(file, module);
+    wait(format!("{module} goes on"), || (journaled(file, module) >= before + more).then_some(()));
+}
+
+/// Keeps all processors busy until it is dropped.
+struct Load(Arc<AtomicBool>, Vec<std::thread::JoinHandle<()>>);
+
+impl Load {
+    fn begin() -> Self {
+        let ends = Arc::new(AtomicBool::new(false));
+        let threads = std::thread::available_parallelism().map_or(2, usize::from);
+        let work = |ends: Arc<AtomicBool>| std::thread::spawn(move || while !ends.load(Ordering::Relaxed) {});
+        Self(ends.clone(), (0..threads).map(|_| work(ends.clone())).collect())
+    }
+}
+
+impl Drop for Load {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+        self.1.drain(..).for_each(|thread| drop(thread.join()));
+    }
+}
+
+#[test]
+fn simulator_pilot_and_mapper_of_a_loaded_and_disturbed_run_repeat_exactly() {
+    let place = Place::new();
+    let (mut launch, robot) = launched(&place, DEMO);
+    let file = recording(&place, 1);
+    ["motor.0", "mapper.0", "pilot.0"].iter().for_each(|module| wait_journaled(&file, module, 5));
+    let load = Load::begin();
+    place.say(&["param", "set", "pilot.0", "cruise-m-s=0.4"]).ok();
+    place.say(&["param", "set", "pilot.0", "cruise-m-s=9"]).fails();
+    place.say(&["param", "set", "motor.0", "laser-rate-hz=15"]).ok();
+    place.say(&["call", "mapper.0", "counts"]).ok();
+    place.say(&["call", "mapper.0", "publish_all"]).ok();
+    for module in ["mapper.0", "pilot.0"] {
+        place.say(&["call", module, "off"]).ok();
+        place.say(&["call", module, "on"]).ok();
+    }
+    // The pilot hears nothing for a while, and its commands are late.
+    let motor = robot.pid("motor.0");
+    halt(motor);
+    std::thread::sleep(Duration::from_millis(300));
+    signal(motor, Signal::SIGCONT);
+    let pilot = robot.pid("pilot.0");
+    signal(pilot, Signal::SIGKILL);
+    robot.wait_restarted("pilot.0", pilot);
+    ["motor.0", "mapper.0", "pilot.0"].iter().for_each(|module| wait_journaled(&file, module, 20));
+    drop(load);
+    drop(robot);
+    launch.stop();
+
+    let times = std::env::var(REPLAYS).ok().and_then(|times| times.parse().ok()).unwrap_or(2);
+    for _ in 0..times {
+        let runs = replayed(&place, &file, &[]);
+        let mut modules: Vec<&str> = runs.iter().map(|run| run["module"].as_str().unwrap()).collect();
+        modules.sort_unstable();
+        assert_eq!(modules, ["mapper.0", "motor.0", "pilot.0", "pilot.0"], "{runs:#?}");
+        for run in &runs {
+            assert_eq!(run["result"], "identical", "{runs:#?}");
+            assert!(run["events"].as_u64() > Some(10) && run["outputs"].as_u64() > Some(5), "{run:#}");
+        }
+    }
+    let text = place.say(&["replay", "--exact", file.to_str().unwrap(), "mapper.0"]).ok();
+    assert!(text.starts_with("mapper.0: identical: "), "{text}");
+    let listed = place.say(&["replay", "--exact", file.to_str().unwrap(), "mapper.0", "--list"]).ok();
+    let events = text.split_whitespace().nth(2).unwrap();
+    let last = listed.lines().rfind(|line| !line.starts_with(' ')).unwrap();
+    assert!(last.starts_with(&format!("{events} at ")) && listed.contains("it publishes data: "), "{text}\n{last}");
+}
+
+#[test]
+fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
+    let place = Place::new();
+    let sources = ["clock", "hash-order", "taken-in", "map", "descriptor", "thread", "link"];
+    let (mut launch, robot) = seers(&place, &sources);
+    let file = recording(&place, 1);
+    ["seer.0", "seer.1", "seer.2", "seer.3"].iter().for_each(|module| wait_journaled(&file, module, 5));
+    drop(robot);
+    launch.stop();
+
+    let runs = replayed(&place, &file, &[]);
+    let of = |number: usize| runs.iter().find(|run| run["module"] == format!("seer.{number}")).unwrap();
+    for number in [0, 2, 3] {
+        let run = of(number);
+        assert_eq!(run["result"], "identical", "{run:#}");
+        assert!(run["outputs"].as_u64() > Some(5), "{run:#}");
+    }
+    // Made, switched on, and the first tick.
+    let (hashed, why) = (of(1), &of(1)["why"]);
+    assert_eq!((&hashed["result"], &hashed["events"], &why["event"]), (&"differs".into(), &3.into(), &"ticks".into()));
+    for side in ["recorded", "replayed"] {
+        let text = why[side].as_str().unwrap();
+        assert!(text.starts_with("it publishes data: vision of "), "{text}");
+    }
+    for (number, events, words) in [(4, 1, "Context::watch"), (5, 1, "in another thread"), (6, 3, "Context::link")] {
+        let run = of(number);
+        assert_eq!((&run["result"], &run["events"]), (&"refused".into(), &events.into()), "{run:#}");
+        assert!(run["why"].as_str().unwrap().contains(words), "{run:#}");
+    }
+    std::fs::write(place.path("vision.map"), "near").unwrap();
+    let run = &replayed(&place, &file, &["seer.3"])[0];
+    assert_eq!(run["result"], "refused");
+    assert!(run["why"].as_str().unwrap().contains("vision.map is not the file that it was"), "{run:#}");
+    let other = place.path("other");
+    std::fs::create_dir(&other).unwrap();
+    std::fs::write(other.join("vision.map"), "far").unwrap();
+    let command = ["replay", "--exact", file.to_str().unwrap(), "seer.3", "--folder", other.to_str().unwrap()];
+    let text = place.say(&command).ok();
+    assert!(text.starts_with("seer.3: identical: "), "{text}");
+}
+
+#[test]
+fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
+    let place = Place::new();
+    let (mut launch, robot) = seers(&place, &["clock", "clock", "clock"]);
+    let file = recording(&place, 1);
+    wait_journaled(&file, "seer.0", 2);
+    assert_eq!(place.say(&["call", "seer.0", "add", "7"]).ok().trim(), "7");
+    wait_journaled(&file, "seer.0", 2);
+    place.say(&["call", "seer.1", "fail"]).ok();
+    wait("it failed", || (robot.state("seer.1") == "error").then_some(()));
+    let panicking = robot.pid("seer.2");
+    place.say(&["call", "seer.2", "panic"]);
+    robot.wait_restarted("seer.2", panicking);
+    wait_journaled(&file, "seer.2", 2);
+    drop(robot);
+    launch.stop();
+
+    for run in replayed(&place, &file, &[]) {
+        assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
+    }
+    let said = replay(&place, &file, &["seer.0"], &[(OTHER_BUILD, "1")]);
+    assert_eq!(said.code, Some(1));
+    let run: Value = serde_json::from_str(&said.out).unwrap();
+    assert_eq!((&run["result"], &run["events"], &run["outputs"]), (&"differs".into(), &3.into(), &0.into()), "{run:#}");
+}
+
+#[test]
+fn a_journal_that_began_before_its_recording_is_refused_until_the_files_are_merged() {
+    let place = Place::new();
+    let (mut launch, robot) = seers(&place, &["clock"]);
+    let [first, second] = [1, 2].map(|number| recording(&place, number));
+    wait_journaled(&first, "seer.0", 3);
+    place.say(&["call", "logd.0", "off"]).ok();
+    place.say(&["call", "logd.0", "on"]).ok();
+    wait_journaled(&second, "seer.0", 3);
+    drop(robot);
+    launch.stop();
+
+    let run = &replayed(&place, &first, &[])[0];
+    assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &false.into()), "{run:#}");
+    let run = &replayed(&place, &second, &[])[0];
+    assert_eq!((&run["result"], &run["events"]), (&"refused".into(), &0.into()), "{run:#}");
+    assert!(run["why"].as_str().unwrap().contains("before the recording did"), "{run:#}");
+    let all = place.path("all.mcap");
+    place.say(&["record", "merge", all.to_str().unwrap(), first.to_str().unwrap(), second.to_str().unwrap()]).ok();
+    let run = &replayed(&place, &all, &[])[0];
+    assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
+    let told = place.say(&["replay", "--exact", all.to_str().unwrap(), "seer.7"]).fails();
+    assert!(told.contains("no journal of seer.7; name the module in [record]"), "{told}");
+}

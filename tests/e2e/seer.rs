@@ -1,0 +1,145 @@
+//! A module that keeps the rules of exact replay, or breaks one of them, as its settings say.
+//!
+//! It is this test program itself, as `probe` is.
+
+use rohrpost::serde::Deserialize;
+use rohrpost::{Context, Interest, Module, ModuleClock, ModuleError, Ready};
+use std::collections::HashMap;
+use std::time::Duration;
+
+/// It is another build if it finds this in its environment.
+pub(crate) const OTHER_BUILD: &str = "ROHRPOST_E2E_SEER_BIAS";
+
+/// Its lines in a configuration.
+pub(crate) fn entry(number: usize, source: &str) -> String {
+    let program = format!("{:?}", std::env::current_exe().unwrap());
+    format!(
+        "[[module]]\nname = \"seer.{number}\"\nprogram = [{program}, \"--exact\", \"seer::module\", \"--nocapture\"]\n\
+         settings = {{ source = \"{source}\" }}\nstop-within = \"60 s\"\n"
+    )
+}
+
+/// Not a test: a module that launch starts, or an exact replay. Run as a test it ends at once.
+#[test]
+fn module() {
+    if ["ROHRPOST_MODULE", "ROHRPOST_EXACT"].iter().any(|variable| std::env::var_os(variable).is_some()) {
+        let code = rohrpost::run::<Seer>();
+        std::process::exit(i32::from(code != std::process::ExitCode::SUCCESS));
+    }
+}
+
+/// Says what it sees.
+#[rohrpost::interface(class = "seer")]
+trait Seeing {
+    /// Adds to all that it says from now on.
+    #[command(16)]
+    fn add(&mut self, more: u64) -> u64;
+
+    /// Fails at the next tick.
+    #[command(17)]
+    fn fail(&mut self);
+
+    /// Panics at once.
+    #[command(18)]
+    fn panic(&mut self);
+
+    /// What it saw.
+    #[data(1)]
+    fn vision() -> u64;
+}
+
+/// Where a seer has its visions from.
+#[derive(Deserialize, Clone, Copy, PartialEq)]
+#[serde(crate = "rohrpost::serde", rename_all = "kebab-case")]
+enum Sight {
+    /// The clock.
+    Clock,
+    /// The order of a hash map.
+    HashOrder,
+    /// A file that the runtime sees it read.
+    TakenIn,
+    /// A file that is part of its settings.
+    Map,
+    /// A descriptor.
+    Descriptor,
+    /// The clock, in another thread.
+    Thread,
+    /// Its link.
+    Link,
+}
+
+#[derive(Deserialize)]
+#[serde(crate = "rohrpost::serde", deny_unknown_fields)]
+struct SeerSettings {
+    source: Sight,
+}
+
+struct Seer {
+    source: Sight,
+    clock: ModuleClock,
+    more: u64,
+    fails: bool,
+    map: Option<Vec<u8>>,
+}
+
+impl Module for Seer {
+    type Settings = SeerSettings;
+    type Interfaces = SeeingInterface;
+
+    fn new(settings: SeerSettings, context: &mut Context) -> Result<Self, ModuleError> {
+        context.set_period(Duration::from_millis(5));
+        let source = settings.source;
+        let map = (source == Sight::Map).then(|| std::fs::read(context.path("vision.map"))).transpose()?;
+        match source {
+            Sight::Descriptor => drop(context.watch(&std::io::stdin(), Interest::Read)?),
+            Sight::Thread => {
+                let clock = context.clock().clone();
+                drop(std::thread::spawn(move || clock.now()).join());
+            }
+            _ => {}
+        }
+        let bias = std::env::var(OTHER_BUILD).ok().and_then(|bias| bias.parse().ok()).unwrap_or(0);
+        Ok(Self { source, clock: context.clock().clone(), more: bias, fails: false, map })
+    }
+
+    fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+        if self.fails {
+            return Err(ModuleError::new(format!("it sees nothing at {}", self.clock.now().ns)));
+        }
+        let seen = match self.source {
+            Sight::HashOrder => {
+                let map: HashMap<u64, ()> = (0..64).map(|number| (number, ())).collect();
+                map.keys().fold(0, |sum: u64, number| sum.wrapping_mul(31).wrapping_add(*number))
+            }
+            Sight::TakenIn => {
+                let bytes = context.take_in(|| std::fs::read("/proc/sys/kernel/random/uuid"))?;
+                let missing = context.take_in(|| std::fs::read("/nowhere")).unwrap_err();
+                assert_eq!(missing.kind(), std::io::ErrorKind::NotFound);
+                bytes.iter().fold(0, |sum: u64, byte| sum.wrapping_mul(31).wrapping_add((*byte).into()))
+            }
+            Sight::Link => context.link().borrow().incarnation().into(),
+            _ => self.clock.now().ns ^ context.now().ns ^ self.map.as_ref().map_or(0, |map| map.len() as u64),
+        };
+        Ok(context.publish_now(SeeingInterface::VISION, &seen.wrapping_add(self.more))?)
+    }
+
+    fn ready(&mut self, context: &mut Context, ready: Ready) -> Result<(), ModuleError> {
+        context.unwatch(ready.watch);
+        Ok(())
+    }
+}
+
+impl Seeing for Seer {
+    fn add(&mut self, more: u64) -> u64 {
+        self.more += more;
+        self.more
+    }
+
+    fn fail(&mut self) {
+        self.fails = true;
+    }
+
+    fn panic(&mut self) {
+        panic!("it has seen too much: {}", self.more);
+    }
+}
