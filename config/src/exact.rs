@@ -18,6 +18,11 @@ pub struct ExactModule {
     pub line: usize,
 }
 
+/// Whether the journal of a module with this program would say all that it takes in. Programs of one's own are believed.
+pub fn may_have_journal(program: &Program) -> bool {
+    !matches!(program, Program::Builtin(builtin) if WITHOUT.contains(&builtin.as_str()))
+}
+
 pub(crate) fn read(section: &Section<'_>, directory: &Directory<'_>) -> Vec<ExactModule> {
     let items = section.get("exact").and_then(|item| item.list("[\"pilot.0\"]")).unwrap_or_default();
     let mut all: Vec<ExactModule> = Vec::new();
@@ -53,7 +58,7 @@ pub(crate) fn mistakes(
                     classes.format(module.name)
                 )
             }
-            Program::Builtin(builtin) if WITHOUT.contains(&builtin.as_str()) => {
+            program @ Program::Builtin(builtin) if !may_have_journal(program) => {
                 format!("runs the built-in `{builtin}`, which takes in what no journal sees; drop the entry")
             }
             _ if module.node != own.node => format!(

@@ -224,6 +224,8 @@ mod tests {
         let record = recorded.record.as_ref().unwrap();
         assert!(record.directory.is_absolute() && record.directory.ends_with("out.mcap.part"), "{record:?}");
         assert!(record.output.is_some());
+        let exact: Vec<_> = record.exact.iter().map(|its| recorded.classes.format(its.name)).collect();
+        assert_eq!(exact, ["motor.0", "mapper.0", "pilot.0"], "all that journals know, not the collector");
         let lower = SIMULATION.replace("output = { id = 32", "output = { id = 20");
         assert_eq!(copied(&lower, &["--record", "out.mcap"]).classes.id("logd").unwrap().0, 19);
         let line = TestArguments::parse_from(["demo", "--record", "out.mcap"]).arguments;

@@ -7,7 +7,7 @@ use crate::terminal::Failure;
 use crate::units::size;
 use rohrpost::interface::Interface;
 use rohrpost::interfaces::CollectorInterface;
-use rohrpost_config::{Installation, Module, Program, RECORDER};
+use rohrpost_config::{Installation, Module, Program, RECORDER, may_have_journal};
 use rohrpost_mailbox::Class;
 use rohrpost_recording::{info, is_closed, merge, recover, recovered_path};
 use std::ffi::OsStr;
@@ -158,6 +158,10 @@ pub(super) fn recorder(installation: &Installation, to: &Path) -> Result<String,
     let folder = folder(to)?;
     let directory = folder.to_str().ok_or_else(|| format!("{}: its name is no UTF-8 text", folder.display()))?;
     let output = installation.classes.id(CollectorInterface::CLASS);
+    let is_repeatable =
+        |module: &&Module| matches!(module.program, Program::Builtin(_)) && may_have_journal(&module.program);
+    let exact: Vec<String> =
+        installation.modules.iter().filter(is_repeatable).map(|its| installation.classes.format(its.name)).collect();
     let collector =
         |class: Class| installation.modules.iter().any(|module| module.names().any(|name| name.class() == class));
     Ok(format!(
@@ -176,8 +180,9 @@ directory = {directory}
 streams = [\"*\"]
 data = [\"*\"]
 output = {output}
+exact = {exact:?}
 rotate-size = \"1024 GiB\"
-rotate-after = \"87600 h\"
+rotate-after = \"24 h\"
 ",
         directory = value(directory),
         output = output.is_some_and(collector),
