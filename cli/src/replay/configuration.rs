@@ -174,7 +174,11 @@ impl ReplayWish<'_> {
         let entries = own.zip(written).filter(|(module, _)| running.iter().any(|one| one.name == module.name));
         let mut modules: Vec<Value> =
             entries.map(|(module, entry)| Value::Table(self.module(module, entry, class, played, is_there))).collect();
-        modules.push(Value::Table(self.player(&player, played, settings)));
+        // Right behind a collector: the others find its streams when they start. It waits until it is told to begin.
+        let is_collector =
+            |module: &&&Module| self.installation.classes.name(module.name.class()) == Some(rohrpost::output::CLASS);
+        let collectors = running.iter().take_while(is_collector).count();
+        modules.insert(collectors, Value::Table(self.player(&player, played, settings)));
         new.insert("module".into(), Value::Array(modules));
         Ok((toml::to_string(&new)?, player))
     }
@@ -192,8 +196,8 @@ impl ReplayWish<'_> {
         let free = || (least..=u8::MAX).filter(|id| !is_taken(*id));
         let id = free().filter(|id| is_ordinary(*id)).max().or_else(|| free().min());
         let id = id.ok_or(
-            "no number is free for the class of the player; add `replay = { id = … }` to [classes] of a \
-                           copy of the configuration: --config FILE",
+            "no number is free for the class of the player; add `replay = { id = … }` to [classes] of a copy of the \
+             configuration: --config FILE",
         )?;
         Ok((id, true))
     }

@@ -95,17 +95,20 @@ fn one_player_has_the_names_of_all_that_was_recorded() {
 #[test]
 fn modules_that_run_keep_their_configuration_but_for_what_is_not_here() {
     let (installation, played) = made(DEMO, &demo_modules(), &["mapper.0"], &["laser.0", "odometry.0/odometry"]);
-    assert_eq!(names(&installation), ["mapper.0", "replay.0", "laser.0", "odometry.0"]);
-    let [mapper, player] = [&installation.modules[0], &installation.modules[1]];
+    assert_eq!(names(&installation), ["replay.0", "laser.0", "odometry.0", "mapper.0"]);
+    let [player, mapper] = [&installation.modules[0], &installation.modules[1]];
     assert_eq!(mapper.calls.len(), 2);
     assert!(player.name.class() > mapper.name.class(), "it does not wait for something less important");
     assert_eq!(played.topics.len(), 2);
     // The pilot is more important than the number of any ordinary class; and its motor is not there.
     let (installation, _) = made(DEMO, &demo_modules()[1..], &["pilot.0"], &[]);
-    assert_eq!(names(&installation)[0], "pilot.0");
+    let [player, pilot] = [&installation.modules[0], &installation.modules[1]];
     let laser = installation.classes.parse_module("laser.0").unwrap();
-    assert_eq!(installation.modules[0].calls, [laser]);
-    assert!(installation.modules[1].name.class() > installation.modules[0].name.class());
+    assert_eq!(pilot.calls, [laser]);
+    assert!(player.name.class() > pilot.name.class());
+    let (installation, _) = made(DEMO, &demo_modules(), &["output.0", "pilot.0"], &[]);
+    let names = names(&installation);
+    assert_eq!((names[0].as_str(), names[1].as_str()), ("output.0", "replay.0"), "the collector hears all others");
 }
 
 #[test]
@@ -179,7 +182,7 @@ fn paths_in_settings_begin_where_they_did() {
     };
     let (text, _) = wish.text(&wish.played().unwrap(), Table::new()).unwrap();
     let installation = Installation::parse(&text, Path::new("replay.toml")).unwrap();
-    let mapper = &installation.modules[0];
+    let mapper = &installation.modules[1];
     assert_eq!(mapper.settings["map"], text_of(&folder.path().join("office.map")));
     assert_eq!(mapper.settings["laser"], "laser.0".into());
     let program = folder.path().join("./bin/mapper").display().to_string();

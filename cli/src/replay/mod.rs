@@ -49,7 +49,7 @@ const RATES: std::ops::RangeInclusive<f64> = 0.001..=player::RATE_MAX;
   rohrpost replay --exact main-0001.mcap                  all modules that have a journal there
   rohrpost replay --exact main-0001.mcap pilot.0 --program target/debug/pilot
 In another terminal, as with any node:
-  rohrpost call replay.0 pause                            also resume, step, step_by 0.5, seek 12.5, rate 2
+  rohrpost call replay.0 pause          also resume, step, step_by 0.5, seek 12.5
   rohrpost echo replay.0 state
   rohrpost stream read laser.0 scan --next 10
 It is a node of its own, called `replay`; no command reaches a module that is played. With --exact no node runs.")]

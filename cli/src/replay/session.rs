@@ -120,7 +120,8 @@ impl ReplaySession {
         let Some(position) = &self.last else { return Err("the player did not say what it has played".into()) };
         let took = self.took.or_else(|| Some(self.resumed?.elapsed())).unwrap_or_default();
         let (played, channels, seconds) = (position.played, position.channels, took.as_secs_f64());
-        let mut text = format!("played {played} values of {channels} channels in {seconds:.1} s");
+        let plural = if channels == 1 { "" } else { "s" };
+        let mut text = format!("played {played} values of {channels} channel{plural} in {seconds:.1} s");
         if !position.ended {
             text.push_str(&format!(", to {:.1} s of {:.1} s", position.at_s, position.length_s));
         }
