@@ -22,6 +22,7 @@ use crate::terminal::{Failure, say};
 pub(super) use arguments::Arguments;
 use arguments::GuiConnection;
 use asked::{FIRST_FUNCTION, map_line, running};
+pub(super) use copy::{is_built_in, write_map};
 pub(super) use drawing::{drawing, drawn};
 pub(super) use folder::{Folder, remove_abandoned};
 use recording::{DemoRecording, ONE_NODE};

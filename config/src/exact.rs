@@ -2,12 +2,12 @@
 
 use crate::classes::{ClassTable, ROUTER};
 use crate::directory::Directory;
-use crate::module::{Module, Program, RECORDER, TCP_CLIENT, TCP_ROUTER};
+use crate::module::{Module, Program, RECORDER, REPLAY, TCP_CLIENT, TCP_ROUTER};
 use crate::reader::Section;
 use rohrpost_mailbox::Name;
 
 /// Built-in modules that take in what no journal sees: descriptors, files, threads, packages past their proxies.
-const WITHOUT: [&str; 6] = [RECORDER, ROUTER, TCP_CLIENT, TCP_ROUTER, "output", "carmen"];
+const WITHOUT: [&str; 7] = [RECORDER, REPLAY, ROUTER, TCP_CLIENT, TCP_ROUTER, "output", "carmen"];
 
 /// A module of `exact`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct ExactModule {
     pub line: usize,
 }
 
-/// Whether the journal of a module with this program would say all that it takes in. Programs of one's own are believed.
+/// Whether the journal of a module with this program would say all that it takes in. Own programs are believed.
 pub fn may_have_journal(program: &Program) -> bool {
     !matches!(program, Program::Builtin(builtin) if WITHOUT.contains(&builtin.as_str()))
 }

@@ -52,6 +52,7 @@ mod installation;
 mod keys;
 mod lan;
 mod load;
+mod log_control;
 mod mailbox;
 mod module;
 mod network;

@@ -118,8 +118,7 @@ pub struct Module {
     pub spin: Duration,
     /// Its mailboxes.
     pub mailboxes: Mailboxes,
-    /// Its streams with a section in the file, by the names of their items in its interfaces. Any other stream of it
-    /// is the default.
+    /// Its streams with a section in the file, by the names of their items. Any other stream of it is the default.
     pub streams: BTreeMap<String, StreamSpec>,
     /// Line of its `[[module]]` in the file.
     pub line: usize,

@@ -3,6 +3,7 @@
 use crate::classes::ClassTable;
 use crate::directory::Directory;
 use crate::exact::{self, ExactModule};
+use crate::log_control;
 use crate::module::{Lines, Module, RECORDER};
 use crate::output::Level;
 use crate::reader::{Item, Section};
@@ -37,7 +38,7 @@ pub struct Recording {
     /// At most so many values a second of each item are in the files once more, as other programs draw them; none: not
     /// one.
     pub drawn: Option<f64>,
-    /// Modules whose journals are recorded, so that they can be replayed exactly.
+    /// Modules of which a journal is recorded, so that they can be replayed exactly.
     pub exact: Vec<ExactModule>,
     /// A file gets no longer.
     pub rotate_size: u64,
@@ -118,7 +119,7 @@ impl Recording {
         let leave_free = section.get("leave-free").and_then(|item| item.size(0..=1 << 50, "256 MiB"));
         let flush = section.get("flush").and_then(|item| item.duration_above_zero("500 ms"));
         let sync = section.get("sync").and_then(|item| item.duration_above_zero("2 s"));
-        let control = control(&section);
+        let control = log_control::read(&section);
         let line = section.line;
         section.finish();
         Some(Self {
@@ -140,11 +141,7 @@ impl Recording {
 
     /// Note of `check`, and of each start of the recorder, if log control takes commands from other computers.
     pub fn control_note(&self) -> Option<String> {
-        let control = self.control.filter(|control| !is_loopback(*control))?;
-        Some(format!(
-            "control-security = \"none\": any computer that reaches {control} may switch the recording off; use a \
-             network that nobody else reaches"
-        ))
+        log_control::note(self.control?)
     }
 
     /// Whether this module has a journal, which is recorded.
@@ -188,38 +185,6 @@ fn drawn(item: &Item<'_>) -> Option<Option<f64>> {
         Some(is_drawn) => Some(is_drawn.then_some(DRAWN_HZ)),
         None => item.number(RATE_HZ, "10.0").map(Some),
     }
-}
-
-/// Where log control listens. Beyond this computer only if the file says that it is not protected.
-fn control(section: &Section<'_>) -> Option<SocketAddr> {
-    const EXAMPLE: &str = "127.0.0.1:21121";
-    let item = section.get("control");
-    let security = section.get("control-security");
-    let is_open = security.as_ref().and_then(|item| item.choice(&[("none", ())])).is_some();
-    let Some(item) = item else {
-        if let Some(security) = security {
-            security.report(format!("`control-security` is of no use without `control = \"{EXAMPLE}\"`; drop it"));
-        }
-        return None;
-    };
-    let text = item.text(EXAMPLE)?;
-    let address = text.parse::<SocketAddr>().ok().filter(|address| address.port() > 0 && !address.ip().is_multicast());
-    let Some(address) = address else {
-        return item.wrong(&format!("the address and port to listen at, such as `control = \"{EXAMPLE}\"`"));
-    };
-    if !is_loopback(address) && !is_open {
-        item.report(format!(
-            "`control` {address} takes commands from other computers, and log control knows no password; write \
-             `control = \"127.0.0.1:{}\"`, or `control-security = \"none\"` beside it if nobody else reaches this \
-             address",
-            address.port()
-        ));
-    }
-    Some(address)
-}
-
-fn is_loopback(address: SocketAddr) -> bool {
-    address.ip().to_canonical().is_loopback()
 }
 
 fn at_least_a_second(item: &Item<'_>, example: &str) -> Option<Duration> {

@@ -51,7 +51,7 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     // The base of its relative paths; the built-in configuration's base is the folder of the copy.
     let folder = if there { Some(folder(&shown)?) } else { None };
     let copy = temporary.join(name);
-    std::fs::write(temporary.join("building.map"), BUILDING)?;
+    write_map(temporary)?;
     if arguments.secure {
         Keys::first(random()?).create(&Keys::file(&temporary.join(KEYS)))?;
     }
@@ -68,6 +68,16 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
         start_early(&mut installation);
     }
     Ok(installation)
+}
+
+/// Whether a configuration of this name is one that demos bring along, with [`write_map`] beside it.
+pub(crate) fn is_built_in(name: &str) -> bool {
+    ["demo.toml", "demo-log.toml", "demo-nodes.toml", "demo-tcp.toml", "demo-tdma.toml"].contains(&name)
+}
+
+/// The file that settings of the built-in configurations name.
+pub(crate) fn write_map(folder: &Path) -> std::io::Result<()> {
+    std::fs::write(folder.join("building.map"), BUILDING)
 }
 
 /// The folder of an existing file; a file named without one is in the present folder.

@@ -1,6 +1,7 @@
 //! The program of a module, run with a journal and nothing else.
 
 use super::journals::RecordedRun;
+use crate::demo::{is_built_in, write_map};
 use crate::terminal::Failure;
 use rohrpost_config::{Program, find_program};
 use rohrpost_modules::journal::{ExactRun, ReplayReport, VARIABLE};
@@ -26,7 +27,12 @@ impl ExactPrograms {
         let directory = tempfile::Builder::new().prefix("rohrpost-exact-").tempdir_in(SHARED_MEMORY)?;
         let (file, report) = (directory.path().join("run"), directory.path().join("report"));
         let folder = self.folder.as_ref().map(|folder| folder.canonicalize()).transpose()?;
-        let exact = Self::exact(run, report.display().to_string(), folder.map(|folder| folder.display().to_string()));
+        let mut exact =
+            Self::exact(run, report.display().to_string(), folder.map(|folder| folder.display().to_string()));
+        if self.folder.is_none() && is_of_demo(&exact) {
+            write_map(directory.path())?;
+            exact.folder = Some(directory.path().display().to_string());
+        }
         let mut command = match self.command(&exact) {
             Ok(command) => command,
             Err(why) => return Ok(ReplayReport::refused(why)),
@@ -76,4 +82,11 @@ impl ExactPrograms {
         };
         Ok(command)
     }
+}
+
+/// Whether the folder of the configuration was the copy that a demo made of its own, and removed at its end.
+fn is_of_demo(exact: &ExactRun) -> bool {
+    let Ok((installation, _)) = exact.installation() else { return false };
+    let name = installation.shown.file_name().unwrap_or_default().to_string_lossy().replace("built-in ", "");
+    is_built_in(&name) && !installation.folder.exists()
 }

@@ -100,7 +100,7 @@ fn flaws(info: &Info) -> Vec<String> {
         let is_other = |channel: &&ChannelInfo| channel.type_name == TYPE;
         flaws.push(match info.channels.iter().find(is_other) {
             Some(other) => format!(
-                "{path}: {} has lines of another version of Rohrpost; `rohrpost record export --format json` shows them",
+                "{path}: {} has lines of another version; `rohrpost record export --format json` shows them",
                 other.topic
             ),
             None => format!("{path} has no lines of output; `output = true` of [record] records them"),

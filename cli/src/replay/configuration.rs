@@ -11,6 +11,7 @@ use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::schema::Description;
 use rohrpost_config::{Installation, Module, Program, RECORDER, REPLAY, StreamSpec};
+use rohrpost_modules::journal::JOURNAL_NAME;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -123,7 +124,8 @@ impl ReplayWish<'_> {
         let all: BTreeSet<String> = self.recorded.topics(&described).into_iter().filter(is_wanted).collect();
         let meant = topics.iter().map(|topic| (*topic).to_owned()).filter(is_wanted);
         let meant = meant.filter(|topic| topic.split('/').next().is_some_and(|name| !runs(name) && !is_replay(name)));
-        let left_out = meant.filter(|topic| !all.contains(topic)).collect();
+        let is_journal = |topic: &String| topic.split('/').nth(1) == Some(JOURNAL_NAME);
+        let left_out = meant.filter(|topic| !all.contains(topic) && !is_journal(topic)).collect();
         if all.is_empty() {
             return Err("nothing is left to be played; name other modules, or let fewer run".into());
         }

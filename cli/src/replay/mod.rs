@@ -15,7 +15,7 @@ mod session;
 mod spacing;
 
 use crate::check;
-use crate::demo::{Folder, drawing, drawn};
+use crate::demo::{Folder, drawing, drawn, is_built_in, write_map};
 use crate::exact::{self, ExactArguments};
 use crate::launch::end;
 use crate::record::PartArguments;
@@ -169,7 +169,7 @@ struct MadeReplay {
 /// Writes the configuration and what belongs to it into a folder.
 fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) -> Result<MadeReplay, Failure> {
     let here = std::env::current_dir()?;
-    let (source, base) = source(arguments, recorded, &here)?;
+    let (source, base) = source(arguments, recorded, &here, folder)?;
     let saved = folder.join("parameters.toml");
     let saved_text = match (&source.parameters, &arguments.config) {
         (None, _) => None,
@@ -213,8 +213,14 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
     Ok(MadeReplay { installation, player, played })
 }
 
-/// The configuration that was recorded, or the one that is named; and where its paths begin.
-fn source(arguments: &Arguments, recorded: &RecordedFiles, here: &Path) -> Result<(Installation, PathBuf), Failure> {
+/// The configuration that was recorded, or the one that is named; and where its paths begin. What the demo's
+/// configuration names, comes to `own`.
+fn source(
+    arguments: &Arguments,
+    recorded: &RecordedFiles,
+    here: &Path,
+    own: &Path,
+) -> Result<(Installation, PathBuf), Failure> {
     if let Some(path) = &arguments.config {
         let base = path.canonicalize().map_err(|error| format!("{}: {error}", path.display()))?;
         let text = std::fs::read_to_string(path)?;
@@ -223,6 +229,10 @@ fn source(arguments: &Arguments, recorded: &RecordedFiles, here: &Path) -> Resul
     let recorded = recorded.configuration()?;
     let named = |errors| format!("{errors}\nthis is the configuration in the recording; name another: --config FILE");
     let installation = Installation::parse(&recorded.text, Path::new(&recorded.name)).map_err(named)?;
+    if is_built_in(&recorded.name) {
+        write_map(own)?;
+        return Ok((installation, own.to_owned()));
+    }
     Ok((installation, here.to_owned()))
 }
 

@@ -86,7 +86,7 @@ impl Newest {
         self.channels[at].kept = Some(KeptMessage { arrival_ns, stamp_ns, epoch, sequence, data: copied });
     }
 
-    /// What a file begins with whose first message is this one, with the numbers of the channels, in the order of its
+    /// What a file begins with if its first message is this one, with the numbers of the channels, in the order of its
     /// arrival.
     pub(crate) fn before(&self, first: &Message<'_>) -> Vec<(usize, Message<'_>)> {
         let kept = self.channels.iter().enumerate().filter_map(|(at, channel)| Some((at, channel.kept.as_ref()?)));

@@ -12,8 +12,8 @@
 //!  replayed:  events and answers are taken from there, outputs are compared with it, bit by bit
 //! ```
 //!
-//! The runtime, proxies, readers of streams and clocks of a module share one [`ModuleJournal`]. Without one each of them
-//! pays for a branch. Whatever no journal sees is noted as a hole, and a replay ends there, with the reason.
+//! The runtime, proxies, readers of streams and clocks of a module share one [`ModuleJournal`]. Without one each pays
+//! for a branch. Whatever no journal sees is noted as a hole, and a replay ends there, with the reason.
 
 mod bytes;
 mod entry;
@@ -31,7 +31,7 @@ pub(crate) use entry::Tag;
 use event::EventAt;
 pub(crate) use event::{JournalEvent, NotedOrigin};
 pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply, NotedValue};
-pub(crate) use replay::{Given, Replay};
+pub(crate) use replay::{Given, JournalReplay};
 pub use run::{ExactRun, Piece, RunError, VARIABLE};
 pub use verdict::{Difference, ReplayReport, ReplayVerdict};
 pub(crate) use write::{JournalWriter, SHAPE};
@@ -56,7 +56,7 @@ pub(crate) struct ModuleJournal(Option<Arc<AtomicBool>>);
 
 enum JournalMode {
     Write(Box<JournalWriter>),
-    Replay(Box<Replay>),
+    Replay(Box<JournalReplay>),
 }
 
 thread_local! {
@@ -78,7 +78,7 @@ impl ModuleJournal {
         Self::of(JournalMode::Write(Box::new(writer)))
     }
 
-    pub(crate) fn replayed(replay: Replay) -> Self {
+    pub(crate) fn replayed(replay: JournalReplay) -> Self {
         Self::of(JournalMode::Replay(Box::new(replay)))
     }
 
@@ -122,7 +122,7 @@ impl ModuleJournal {
     }
 
     /// Does this if it is replayed.
-    pub(crate) fn replay<T>(&self, part: impl FnOnce(&mut Replay) -> T) -> Option<T> {
+    pub(crate) fn replay<T>(&self, part: impl FnOnce(&mut JournalReplay) -> T) -> Option<T> {
         self.mode(|mode, _| match mode {
             JournalMode::Write(_) => None,
             JournalMode::Replay(replay) => Some(part(replay)),

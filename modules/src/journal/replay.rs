@@ -37,7 +37,7 @@ impl ReplayProgress {
 }
 
 /// A journal, and where in it the module is.
-pub(crate) struct Replay {
+pub(crate) struct JournalReplay {
     bytes: Rc<[u8]>,
     at: usize,
     /// Of the entry before.
@@ -69,7 +69,7 @@ impl Given {
     }
 }
 
-impl Replay {
+impl JournalReplay {
     pub(super) fn new(bytes: Rc<[u8]>, ends: Option<String>, report: PathBuf) -> Self {
         let progress = Rc::new(ReplayProgress { path: report, report: RefCell::default() });
         Self { bytes, at: 0, sum: 0, event: 0..0, known: KnownTypes::default(), ends, output: Vec::new(), progress }

@@ -4,7 +4,7 @@ use super::bytes::Blob;
 use super::entry::{self, NoEntry, Tag};
 use super::list;
 use super::outputs::Begin;
-use super::replay::Replay;
+use super::replay::JournalReplay;
 use rohrpost_config::{Installation, Saved};
 use rohrpost_mailbox::Name;
 use rohrpost_schema::Bytes;
@@ -149,7 +149,7 @@ impl ExactRun {
         self.folder.as_ref().map_or_else(|| path.to_owned(), |folder| Path::new(folder).join(name))
     }
 
-    pub(crate) fn replay(self) -> Replay {
-        Replay::new(self.journal.0.into(), self.ends, self.report.into())
+    pub(crate) fn replay(self) -> JournalReplay {
+        JournalReplay::new(self.journal.0.into(), self.ends, self.report.into())
     }
 }

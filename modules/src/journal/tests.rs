@@ -55,7 +55,7 @@ fn replayed(bytes: &[u8], ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) 
     let item = DataItem { number: 1, kind: DataKind::Data, field: Field::new("sum", Type::U64) };
     let (name, class, text) = ("Sums".into(), "pilot".into(), String::new());
     let own = Description { name, class, text, functions: Vec::new(), data: vec![item] };
-    let mut replay = Replay::new(bytes.into(), ends.map(Into::into), "".into());
+    let mut replay = JournalReplay::new(bytes.into(), ends.map(Into::into), "".into());
     replay.know_own(vec![Some(own)]);
     let journal = ModuleJournal::replayed(replay);
     let run = || {
@@ -198,7 +198,7 @@ fn another_module_or_other_settings_are_refused() {
     let bytes = written(|journal| run(journal, None));
     for (module, text) in [("pilot.1", "text"), ("pilot.0", "texT")] {
         let told = catch_unwind(AssertUnwindSafe(|| {
-            let journal = ModuleJournal::replayed(Replay::new(bytes[..].into(), None, "".into()));
+            let journal = ModuleJournal::replayed(JournalReplay::new(bytes[..].into(), None, "".into()));
             journal.begin(&Begin::new(module, ("robot.toml", text), None));
         }));
         let report = told.unwrap_err().downcast::<ReplayReport>().unwrap();

@@ -5,7 +5,7 @@ use super::context::Context;
 use super::hosted::Hosted;
 use super::received::Received;
 use super::runner::Running;
-use crate::journal::{JournalEvent, Replay};
+use crate::journal::{JournalEvent, JournalReplay};
 use crate::module::Module;
 
 impl<M: Module> Running<M> {
@@ -25,7 +25,7 @@ impl<M: Module> Running<M> {
         }
     }
 
-    fn replay<T>(&self, part: impl FnOnce(&mut Replay) -> T) -> T {
+    fn replay<T>(&self, part: impl FnOnce(&mut JournalReplay) -> T) -> T {
         self.context.journal.replay(part).expect("only a module with a journal repeats it")
     }
 
