@@ -125,7 +125,7 @@ enum Command {
     Param(param::Arguments),
     /// Describe, recover, cut and merge files of recordings.
     Record(record::Arguments),
-    /// Play recordings in the place of the modules that were recorded, or repeat modules exactly as they were recorded.
+    /// Play recordings, or repeat what modules did.
     Replay(replay::Arguments),
     /// Show how well each node knows the common time.
     Time(time::Arguments),

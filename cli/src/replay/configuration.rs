@@ -169,7 +169,8 @@ impl ReplayWish<'_> {
             );
         }
         if running.iter().any(|module| module.program == Program::Builtin(RECORDER.into())) {
-            new.insert("record".into(), Value::Table(self.record(&table_of(&source, "record"), is_there)));
+            let runs = |name: &str| running.iter().any(|module| self.format(module.name) == name);
+            new.insert("record".into(), Value::Table(self.record(&table_of(&source, "record"), is_there, runs)));
         }
         let written = source.get("module").and_then(Value::as_array).ok_or("no [[module]]")?;
         let own = self.installation.modules.iter().filter(|module| module.is_in_file());
@@ -278,12 +279,14 @@ impl ReplayWish<'_> {
     }
 
     /// What a recorder that runs records of this node.
-    fn record(&self, section: &Table, is_there: impl Fn(&str) -> bool) -> Table {
+    fn record(&self, section: &Table, is_there: impl Fn(&str) -> bool, runs: impl Fn(&str) -> bool) -> Table {
         let is_kept = |entry: &Value| {
             let name = entry.as_str().or_else(|| entry.get("name").and_then(Value::as_str)).unwrap_or_default();
             name == "*" || name.split('/').next().is_some_and(&is_there)
         };
         let mut record = entries(&entries(section, "streams", is_kept), "data", is_kept);
+        // What is played has no journal.
+        record = entries(&record, "exact", |entry| entry.as_str().is_some_and(&runs));
         if let Some(place) = record.get("directory").and_then(Value::as_str) {
             let place = self.folder.join(place);
             record.insert("directory".into(), text_of(&place));

@@ -204,7 +204,7 @@ fn a_loss_that_nothing_explains_is_found_however_many_slots_were_left_out() {
     let of_eight = [0, 8, 9].map(|lost| sealed("44 ms", lost, 0));
     assert_eq!(of_eight, [Some(true), Some(true), None], "a second of eight");
     assert_eq!(
-        [8, 9, 12].map(|lost| sealed("44 ms", lost, 100)),
+        [8, 9, 13].map(|lost| sealed("44 ms", lost, 100)),
         [Some(true), Some(false), None],
         "slots need a stall"
     );
