@@ -177,7 +177,7 @@ streams = [\"*\"]
 data = [\"*\"]
 output = {output}
 rotate-size = \"1024 GiB\"
-rotate-after = \"87600 h\"
+rotate-after = \"24 h\"
 ",
         directory = value(directory),
         output = output.is_some_and(collector),

@@ -127,8 +127,8 @@ fn as_json(info: &Info) -> Value {
             "topic": channel.topic, "name": channel.name, "item": channel.item, "type_name": channel.type_name,
             "type": channel.ty.as_ref().map(describe_type), "message_encoding": channel.message_encoding,
             "schema_encoding": channel.schema_encoding, "drawn_of": channel.drawn_of,
-            "messages": channel.messages, "repeated": channel.repeated, "lost": channel.lost, "first_ns": channel.first_ns,
-            "last_ns": channel.last_ns,
+            "messages": channel.messages, "repeated": channel.repeated, "lost": channel.lost,
+            "first_ns": channel.first_ns, "last_ns": channel.last_ns,
         })
     });
     let epochs = info.epochs.iter().map(

@@ -77,8 +77,8 @@ impl Drawer {
         self.carrier.as_ref()
     }
 
-    /// Draws a value of a channel; none if it contradicts itself, or is nowhere. With the first one in space comes where
-    /// the world is.
+    /// Draws a value of a channel; none if it contradicts itself, or is nowhere. With the first one in space comes
+    /// where the world is.
     pub(crate) fn draw(
         &mut self,
         id: u16,
