@@ -6,7 +6,7 @@ use super::show::Show;
 use crate::look::unknown_module;
 use crate::terminal::{Failure, complain};
 use rohrpost::Name;
-use rohrpost::output::{Format, OutputLine};
+use rohrpost::output::{Format, OutputLine, plain};
 use rohrpost::schema::Schema;
 use rohrpost::wire::from_bytes;
 use rohrpost_config::Installation;
@@ -57,15 +57,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 /// The configuration that was recorded with the first of these files that has one.
 fn recorded_installation(infos: &[Info]) -> Result<Installation, Failure> {
     let texts = infos.iter().flat_map(|info| info.configuration.iter().map(move |text| (info, text)));
-    let mut wrong = None;
+    let mut why = String::new();
     for (info, (name, text)) in texts {
         match Installation::parse(text, Path::new(name)) {
             Ok(installation) => return Ok(installation),
-            // Saved parameters are no installation.
-            Err(error) => wrong = wrong.or(Some(format!("{}: {error}", info.path.display()))),
+            // Saved parameters are no installation. Names and texts are those of others.
+            Err(error) => why += &format!("\n{}", plain::line(&format!("{}: {error}", info.path.display()))),
         }
     }
-    let why = wrong.map_or(String::new(), |wrong| format!(":\n{wrong}"));
     Err(format!("no recording has a configuration that is read here; name one with --config{why}").into())
 }
 

@@ -86,8 +86,7 @@ impl Newest {
         self.channels[at].kept = Some(KeptMessage { arrival_ns, stamp_ns, epoch, sequence, data: copied });
     }
 
-    /// What a file begins with if its first message is this one, with the numbers of the channels, in the order of its
-    /// arrival.
+    /// What a file begins with before this message, with the numbers of the channels, in the order of arrival.
     pub(crate) fn before(&self, first: &Message<'_>) -> Vec<(usize, Message<'_>)> {
         let kept = self.channels.iter().enumerate().filter_map(|(at, channel)| Some((at, channel.kept.as_ref()?)));
         let old = kept.filter(|(_, kept)| kept.is_old_at(first)).filter_map(|(at, kept)| {
