@@ -147,9 +147,9 @@ fn simulator_pilot_and_mapper_of_a_loaded_and_disturbed_run_repeat_exactly() {
     let file = recording(&place, 1);
     ["motor.0", "mapper.0", "pilot.0"].iter().for_each(|module| wait_journaled(&file, module, 5));
     let load = Load::begin();
-    place.say(&["param", "set", "pilot.0", "cruise-m-s=0.4"]).ok();
-    place.say(&["param", "set", "pilot.0", "cruise-m-s=9"]).fails();
-    place.say(&["param", "set", "motor.0", "laser-rate-hz=15"]).ok();
+    place.say(&["param", "set", "pilot.0", "cruise-m-s", "0.4"]).ok();
+    place.say(&["param", "set", "pilot.0", "cruise-m-s", "9"]).fails();
+    place.say(&["param", "set", "motor.0", "laser-rate-hz", "15"]).ok();
     place.say(&["call", "mapper.0", "counts"]).ok();
     place.say(&["call", "mapper.0", "publish_all"]).ok();
     for module in ["mapper.0", "pilot.0"] {
@@ -244,7 +244,9 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     robot.wait_restarted("seer.2", panicking);
     wait_journaled(&file, "seer.2", 2);
     drop(robot);
-    launch.stop();
+    // Not a success, since one is in error.
+    launch.signal(Signal::SIGINT);
+    launch.end();
 
     for run in replayed(&place, &file, &[]) {
         assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");

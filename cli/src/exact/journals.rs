@@ -1,6 +1,7 @@
 //! Journals in a recording, put together of their pieces.
 
 use crate::terminal::Failure;
+use rohrpost::output::plain;
 use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, Piece};
 use rohrpost_recording::{Reader, RecordedChannel};
 use std::path::Path;
@@ -81,8 +82,8 @@ fn take(runs: &mut Vec<RecordedRun>, module: &str, value: &[u8]) {
 }
 
 fn no_journal(file: &Path, module: Option<&String>) -> Failure {
-    let of = module.map_or_else(String::new, |module| format!(" of {module}"));
-    let name = module.map_or("pilot.0", String::as_str);
+    let name = plain::line(module.map_or("pilot.0", String::as_str));
+    let of = module.map_or_else(String::new, |_| format!(" of {name}"));
     format!(
         "{}: no journal{of}; name the module in [record] of the configuration before it is recorded, \
          `exact = [\"{name}\"]`",

@@ -120,7 +120,7 @@ impl Tag {
             Self::Next => "reads the next record of a stream",
             Self::Record => "reads a record of a stream",
             Self::Around => "looks for a time in a stream",
-            Self::Begun => "sends a command",
+            Self::Begun => "hands a command over",
             Self::Answered => "waits for an answer",
             Self::Wrote => "ends a record of its stream",
             Self::TakenIn => "takes something in (`take_in`)",
