@@ -17,6 +17,8 @@ const LOG: &str = include_str!("../../../config/demo-log.toml");
 const NODES: &str = include_str!("../../../config/demo-nodes.toml");
 const TDMA: &str = include_str!("../../../config/demo-tdma.toml");
 const TCP: &str = include_str!("../../../config/demo-tcp.toml");
+/// The end of a demo's own configuration, by which it is known in recordings: what it names is [`BUILDING`].
+const BUILT_IN: &str = "\n# Built into `rohrpost demo`.\n";
 const BUILDING: &str = include_str!("../../../config/building.map");
 
 /// Folders of keys and certificates, beside the copy.
@@ -70,9 +72,9 @@ pub(super) fn installation(arguments: &Arguments, temporary: &Path) -> Result<In
     Ok(installation)
 }
 
-/// Whether a configuration of this name is one that demos bring along, with [`write_map`] beside it.
-pub(crate) fn is_built_in(name: &str) -> bool {
-    ["demo.toml", "demo-log.toml", "demo-nodes.toml", "demo-tcp.toml", "demo-tdma.toml"].contains(&name)
+/// Whether this is the text of a configuration that a demo brought along, with [`write_map`] beside it.
+pub(crate) fn is_built_in(text: &str) -> bool {
+    text.ends_with(BUILT_IN)
 }
 
 /// The file that settings of the built-in configurations name.
@@ -113,7 +115,8 @@ fn rewritten(text: &str, shown: &Path, folder: Option<&Path>, arguments: &Argume
         }
     }
     let recorder = arguments.record.as_deref().map(|to| recorder(&installation, to)).transpose()?;
-    Ok(document.to_string() + &recorder.unwrap_or_default())
+    let end = if folder.is_none() { BUILT_IN } else { "" };
+    Ok(document.to_string() + &recorder.unwrap_or_default() + end)
 }
 
 /// Replaces a module by empty lines, so that the modules behind it keep their line numbers.

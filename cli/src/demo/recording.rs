@@ -99,17 +99,18 @@ impl DemoRecording {
             }
         }
         let mut parts = Vec::new();
-        for file in files {
-            if is_closed(&file)? {
-                parts.push(file);
+        let is_made_of = |file: &PathBuf| files.iter().any(|other| recovered_path(other) == *file);
+        for file in files.iter().filter(|file| !is_made_of(file)) {
+            if is_closed(file)? {
+                parts.push(file.clone());
                 continue;
             }
-            let to = recovered_path(&file);
+            let to = recovered_path(file);
             // The recorder itself may have made one.
             if !to.exists() {
-                recover(&file, &to, &mut |_, _| {})?;
-                parts.push(to);
+                recover(file, &to, &mut |_, _| {})?;
             }
+            parts.push(to);
         }
         parts.sort();
         Ok(parts)
@@ -180,6 +181,7 @@ directory = {directory}
 streams = [\"*\"]
 data = [\"*\"]
 output = {output}
+drawn = true
 exact = {exact:?}
 rotate-size = \"1024 GiB\"
 rotate-after = \"24 h\"

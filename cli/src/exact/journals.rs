@@ -23,6 +23,7 @@ pub(super) struct RecordedRun {
 pub(super) fn read(file: &Path, modules: &[String]) -> Result<Vec<RecordedRun>, Failure> {
     let mut runs: Vec<RecordedRun> = Vec::new();
     let mut reader = Reader::open(file)?;
+    let mut damage = None;
     loop {
         match reader.next() {
             Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
@@ -36,15 +37,18 @@ pub(super) fn read(file: &Path, modules: &[String]) -> Result<Vec<RecordedRun>, 
                 for run in &mut runs {
                     run.ends.get_or_insert_with(|| why.clone());
                 }
+                damage = Some(error);
                 break;
             }
         }
     }
     let missing = modules.iter().find(|module| !runs.iter().any(|run| run.module == **module));
-    match missing {
-        Some(module) => Err(no_journal(file, Some(module))),
-        None if runs.is_empty() => Err(no_journal(file, None)),
-        None => Ok(runs),
+    match (missing, damage) {
+        (Some(_), Some(error)) => Err(error.into()),
+        (None, Some(error)) if runs.is_empty() => Err(error.into()),
+        (Some(module), None) => Err(no_journal(file, Some(module))),
+        (None, None) if runs.is_empty() => Err(no_journal(file, None)),
+        (None, _) => Ok(runs),
     }
 }
 

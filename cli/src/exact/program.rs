@@ -26,7 +26,7 @@ impl ExactPrograms {
     pub(super) fn repeat(&self, run: &RecordedRun) -> Result<ReplayReport, Failure> {
         let directory = tempfile::Builder::new().prefix("rohrpost-exact-").tempdir_in(SHARED_MEMORY)?;
         let (file, report) = (directory.path().join("run"), directory.path().join("report"));
-        let folder = self.folder.as_ref().map(|folder| folder.canonicalize()).transpose()?;
+        let folder = self.folder.as_ref().map(|folder| canonical(folder)).transpose()?;
         let mut exact =
             Self::exact(run, report.display().to_string(), folder.map(|folder| folder.display().to_string()));
         if self.folder.is_none() && is_of_demo(&exact) {
@@ -86,7 +86,9 @@ impl ExactPrograms {
 
 /// Whether the folder of the configuration was the copy that a demo made of its own, and removed at its end.
 fn is_of_demo(exact: &ExactRun) -> bool {
-    let Ok((installation, _)) = exact.installation() else { return false };
-    let name = installation.shown.file_name().unwrap_or_default().to_string_lossy().replace("built-in ", "");
-    is_built_in(&name) && !installation.folder.exists()
+    exact.installation().is_ok_and(|(installation, _)| is_built_in(&installation.text) && !installation.folder.exists())
+}
+
+fn canonical(folder: &Path) -> Result<PathBuf, Failure> {
+    Ok(folder.canonicalize().map_err(|error| format!("--folder {}: {error}", folder.display()))?)
 }

@@ -20,6 +20,8 @@ use toml::{Table, Value};
 pub(super) const NODE: &str = "replay";
 /// The class of the module that draws.
 const GUI: &str = "gui";
+/// The program that shows what a node does.
+const BRIDGE: &str = "rohrpost-gui-bridge";
 /// Built-in modules that tell the node's time themselves.
 const TELLERS: [&str; 2] = ["carmen", REPLAY];
 /// Mailbox sizes that any module has.
@@ -78,7 +80,10 @@ impl ReplayWish<'_> {
             running.push(module);
         }
         let gui = installation.classes.id(GUI).filter(|_| self.drawing != ReplayDrawing::Nothing);
-        running.extend(installation.modules.iter().filter(|module| Some(module.name.class()) == gui));
+        // Others than the own one have to be asked for by `--run`: a recording could name any program.
+        let is_bridge = |module: &&Module| matches!(&module.program, Program::Command(words) if words.first().is_some_and(|first| first == BRIDGE));
+        let guis = installation.modules.iter().filter(|module| Some(module.name.class()) == gui);
+        running.extend(guis.filter(is_bridge));
         // In the order of their start.
         let is_running = |module: &&Module| running.iter().any(|running| running.name == module.name);
         Ok(installation.modules.iter().filter(is_running).collect())

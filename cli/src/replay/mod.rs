@@ -229,7 +229,7 @@ fn source(
     let recorded = recorded.configuration()?;
     let named = |errors| format!("{errors}\nthis is the configuration in the recording; name another: --config FILE");
     let installation = Installation::parse(&recorded.text, Path::new(&recorded.name)).map_err(named)?;
-    if is_built_in(&recorded.name) {
+    if is_built_in(&recorded.text) {
         write_map(own)?;
         return Ok((installation, own.to_owned()));
     }

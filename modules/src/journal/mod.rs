@@ -63,7 +63,7 @@ thread_local! {
     static PRESENT: RefCell<Option<JournalMode>> = const { RefCell::new(None) };
 }
 
-const STRAYED: &str = "the module reads the clock, or a stream, in another thread";
+const STRAYED: &str = "the module reads the clock, or a stream, in another thread or within `take_in`";
 
 /// Hands on what a module that has no journal any more, since it panicked in its making, has noted.
 pub(crate) fn flush_present() {
@@ -123,8 +123,9 @@ impl ModuleJournal {
 
     /// Does this if it is replayed.
     pub(crate) fn replay<T>(&self, part: impl FnOnce(&mut JournalReplay) -> T) -> Option<T> {
-        self.mode(|mode, _| match mode {
+        self.mode(|mode, has_strayed| match mode {
             JournalMode::Write(_) => None,
+            JournalMode::Replay(replay) if has_strayed => replay.give_up(STRAYED),
             JournalMode::Replay(replay) => Some(part(replay)),
         })
     }
@@ -171,6 +172,22 @@ impl ModuleJournal {
         if !self.is_none() && self.replay(|replay| replay.output(tag, output)).is_none() {
             self.note(tag, output);
         }
+    }
+
+    /// The same, made only if there is a journal: a long value would be read for it.
+    pub(crate) fn output_of<T: Serialize>(&self, tag: Tag, output: impl FnOnce() -> T) {
+        if !self.is_none() {
+            self.output(tag, &output());
+        }
+    }
+
+    /// Does this without the journal: what it asks of the module's runtime meanwhile is a hole, since a replay would not
+    /// ask it.
+    pub(crate) fn apart<T>(&self, part: impl FnOnce() -> T) -> T {
+        let present = PRESENT.take();
+        let done = part();
+        PRESENT.set(present);
+        done
     }
 
     /// What comes now is seen by no journal.

@@ -55,9 +55,12 @@ impl JournalWriter {
                 return;
             }
         }
-        while self.waiting.len() >= PIECE_BYTES {
-            self.piece(PIECE_BYTES);
+        let mut done = 0;
+        while self.waiting.len() >= done + PIECE_BYTES {
+            self.piece(done, PIECE_BYTES);
+            done += PIECE_BYTES;
         }
+        self.waiting.drain(..done.min(self.waiting.len()));
         if tag == Tag::Hole {
             self.flush();
             self.stream = None;
@@ -80,14 +83,16 @@ impl JournalWriter {
     pub(super) fn flush(&mut self) {
         self.due_ns = None;
         if !self.waiting.is_empty() {
-            self.piece(self.waiting.len());
+            self.piece(0, self.waiting.len());
+            self.waiting.clear();
         }
     }
 
-    /// Hands on so many bytes, at most as many as a record takes.
-    fn piece(&mut self, len: usize) {
+    /// Hands on so many bytes from there on, at most as many as a record takes. They stay where they are.
+    fn piece(&mut self, from: usize, len: usize) {
         let Some(stream) = &mut self.stream else { return self.waiting.clear() };
-        let piece = Piece { incarnation: self.incarnation, offset: self.offset, bytes: &self.waiting[..len] };
+        let bytes = &self.waiting[from..from + len];
+        let piece = Piece { incarnation: self.incarnation, offset: self.offset, bytes };
         let now = self.clock.now();
         // The length tells tools that these are bytes.
         let written = stream.begin(Stamp { epoch: now.epoch, ns: now.ns.max(1) }).and_then(|mut record| {
@@ -95,10 +100,7 @@ impl JournalWriter {
             record.finish(len)
         });
         match written {
-            Ok(_) => {
-                self.offset += len as u64;
-                self.waiting.drain(..len);
-            }
+            Ok(_) => self.offset += len as u64,
             Err(error) => self.fail(&error),
         }
     }

@@ -34,13 +34,13 @@ impl Context {
         self.scratch.clear();
         append(&mut self.scratch, value).map_err(|error| ContextError::Encode(port.name, error))?;
         let at = self.newest_at(endpoint, &port)?;
-        let noted = NotedItem {
+        let noted = || NotedItem {
             endpoint: endpoint as u16,
             number: port.number,
             stamp_ns,
             value: NotedValue::of(&self.scratch),
         };
-        self.journal.output(Tag::Published, &noted);
+        self.journal.output_of(Tag::Published, noted);
         let newest = &mut self.newest[at];
         (newest.name, newest.stamp_ns) = (port.name.into(), stamp_ns);
         std::mem::swap(&mut newest.value, &mut self.scratch);

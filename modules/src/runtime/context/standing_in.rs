@@ -57,8 +57,8 @@ impl Context {
                 self.newest.len() - 1
             }
         };
-        let noted = NotedItem { endpoint: endpoint as u16, number, stamp_ns, value: NotedValue::of(value) };
-        self.journal.output(Tag::Published, &noted);
+        let noted = || NotedItem { endpoint: endpoint as u16, number, stamp_ns, value: NotedValue::of(value) };
+        self.journal.output_of(Tag::Published, noted);
         let newest = &mut self.newest[at];
         newest.stamp_ns = stamp_ns;
         newest.value.clear();

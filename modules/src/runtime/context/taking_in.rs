@@ -26,7 +26,7 @@ type NotedError = (u8, String);
 impl Context {
     /// Takes in something from outside that comes by none of the module's interfaces: bytes of a device, of a file that
     /// changes, of chance. They are noted in the module's journal, if it has one. In an exact replay `read` is not
-    /// called, and this returns what it returned then; so let nothing else of it get out.
+    /// called, and this returns what it returned then; so let nothing else of it get out, and ask nothing of the context in it.
     ///
     /// ```
     /// # use rohrpost_modules::{ModuleError, runtime::Context};
@@ -47,7 +47,7 @@ impl Context {
             let taken: Result<Blob<'_>, NotedError> = given.read();
             return taken.map(|bytes| bytes.0.to_vec()).map_err(error);
         }
-        let taken = read().map_err(|error| noted(&error));
+        let taken = self.journal.apart(read).map_err(|error| noted(&error));
         self.journal.note(Tag::TakenIn, &taken.as_ref().map(|bytes| Blob(bytes)));
         taken.map_err(error)
     }

@@ -3,6 +3,7 @@
 use super::check::{CheckedReader, Source as Followed};
 use super::error::StreamReadError;
 use crate::common::DataHead;
+use crate::journal::JOURNAL_NAME;
 use crate::runtime::received::Received;
 use crate::runtime::subscribed::{Origin, Subscribed, seal};
 use rohrpost_mailbox::{HeldRecord, Name, Next, Source, Throttle, monotonic_ns};
@@ -201,10 +202,14 @@ impl Notices {
     fn lost(&mut self, lost: u64) {
         if self.throttle.note(monotonic_ns(), TELL_EVERY_NS).is_some() {
             let Self { stream, module, .. } = self;
+            let remedy = if stream == JOURNAL_NAME {
+                format!("it is replayed exactly up to there, and no further; let {module} take and say less at once")
+            } else {
+                format!("raise `keep` in [module.stream.{stream}] of {module}, or read only the newest")
+            };
             tracing::warn!(
                 "{lost} records of stream `{stream}` of {module} were overwritten before this module came to them: it \
-                 is slower than they are written; raise `keep` in [module.stream.{stream}] of {module}, or read only \
-                 the newest"
+                 is slower than they are written; {remedy}"
             );
         }
     }

@@ -110,8 +110,9 @@ impl<'a, T: Data> OpenValue<'a, T> {
         };
         let (_, bytes) = self.record.finish_seen(len).map_err(|error| self.about.explain(error))?;
         let (endpoint, number) = (self.about.endpoint as u16, self.about.item.number);
-        let noted = NotedItem { endpoint, number, stamp_ns: self.stamp_ns, value: NotedValue::of(bytes) };
-        self.outlet.journal.output(Tag::Written, &noted);
+        let stamp_ns = self.stamp_ns;
+        let noted = || NotedItem { endpoint, number, stamp_ns, value: NotedValue::of(bytes) };
+        self.outlet.journal.output_of(Tag::Written, noted);
         self.outlet.published(&Published {
             endpoint: self.about.endpoint,
             number: self.about.item.number,
