@@ -9,6 +9,7 @@
 use super::recorded::RecordedFiles;
 use crate::terminal::Failure;
 use rohrpost::Name;
+use rohrpost::output::plain::line;
 use rohrpost::schema::Description;
 use rohrpost_config::{Installation, Module, Program, RECORDER, REPLAY, StreamSpec};
 use rohrpost_modules::journal::JOURNAL_NAME;
@@ -102,7 +103,7 @@ impl ReplayWish<'_> {
             let known = rohrpost_config::nearest(unknown, topics.iter().copied());
             let known =
                 known.map_or_else(|| format!("it has {}", topics.join(", ")), |at| format!("did you mean {at}?"));
-            return Err(format!("--names {unknown}: nothing of it is recorded; {known}").into());
+            return Err(format!("--names {unknown}: nothing of it is recorded; {}", line(&known)).into());
         }
         let is_chosen = |name: &str| {
             let is_of = |wanted: &String| wanted.split('/').next() == Some(name);
@@ -115,6 +116,7 @@ impl ReplayWish<'_> {
             let class = &description.class;
             let known = self.installation.classes.parse_module(name).ok();
             if known.is_none_or(|name| self.installation.classes.name(name.class()) != Some(class)) {
+                let (name, class) = (line(name), line(class));
                 return Err(format!(
                     "{name} was recorded as a module of class `{class}`, which the configuration does not have; name \
                      the one that it was recorded with: --config FILE"

@@ -25,6 +25,7 @@ use configuration::{NODE, PlayedModules, ReplayDrawing, ReplayWish, saved_of};
 pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::launch::{Launch, events};
+use rohrpost::output::plain;
 use rohrpost_config::Installation;
 use session::ReplaySession;
 use std::path::{Path, PathBuf};
@@ -126,6 +127,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let folder = Folder::new()?;
     let made = installation(arguments, &recorded, folder.path())?;
     for topic in &made.played.left_out {
+        let topic = plain::line(topic);
         say(format_args!("{topic} is not played: its module is not described, or with another type"));
     }
     let installation = Arc::new(made.installation);
@@ -202,12 +204,8 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
     let (text, player) = wish.text(&played, settings)?;
     let path = folder.join(CONFIG);
     std::fs::write(&path, text)?;
-    let named = |errors: rohrpost_config::Errors| {
-        format!(
-            "the recorded configuration does not fit a replay with these modules:\n{}",
-            errors.to_string().replace(&path.display().to_string(), CONFIG)
-        )
-    };
+    let named =
+        |errors| format!("the recorded configuration does not fit a replay with these modules:\n{}", told(&errors));
     let mut installation = check::load(&path).map_err(named)?;
     installation.shown = CONFIG.into();
     Ok(MadeReplay { installation, player, played })
@@ -227,13 +225,24 @@ fn source(
         return Ok((Installation::parse(&text, path)?, base.parent().unwrap_or(here).to_owned()));
     }
     let recorded = recorded.configuration()?;
-    let named = |errors| format!("{errors}\nthis is the configuration in the recording; name another: --config FILE");
+    let named =
+        |errors| format!("{}\nthis is the configuration in the recording; name another: --config FILE", told(&errors));
     let installation = Installation::parse(&recorded.text, Path::new(&recorded.name)).map_err(named)?;
     if is_built_in(&recorded.text) {
         write_map(own)?;
         return Ok((installation, own.to_owned()));
     }
     Ok((installation, here.to_owned()))
+}
+
+/// Mistakes in a configuration that may be of others: a line each.
+fn told(errors: &rohrpost_config::Errors) -> String {
+    let file = plain::line(&errors.path().file_name().unwrap_or_default().to_string_lossy()).into_owned();
+    let problem = |problem: &rohrpost_config::Problem| {
+        let line = problem.line.map_or(String::new(), |line| format!(":{line}"));
+        format!("{file}{line}: {}", plain::line(&problem.message))
+    };
+    errors.problems().iter().map(problem).collect::<Vec<_>>().join("\n")
 }
 
 /// The player's settings, and files with the descriptions.

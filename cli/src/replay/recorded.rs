@@ -1,6 +1,7 @@
 //! What the files of a replay say together: modules, configuration, times.
 
 use crate::terminal::Failure;
+use rohrpost::output::plain::line;
 use rohrpost::schema::Description;
 use rohrpost_recording::format::{MESSAGE_ENCODING, PROFILE};
 use rohrpost_recording::{DescribedModule, Info, info};
@@ -27,7 +28,7 @@ impl RecordedFiles {
     pub(super) fn read(files: &[PathBuf]) -> Result<Self, Failure> {
         let infos = files.iter().map(|file| info(file)).collect::<Result<Vec<Info>, _>>()?;
         if let Some(foreign) = infos.iter().find(|info| info.profile != PROFILE) {
-            let (file, profile) = (foreign.path.display(), &foreign.profile);
+            let (file, profile) = (foreign.path.display(), line(&foreign.profile));
             return Err(format!(
                 "{file}: was not recorded by Rohrpost (profile `{profile}`): its messages are of no module that could \
                  publish them; name recordings of logd"
@@ -61,7 +62,7 @@ impl RecordedFiles {
             {
                 let (known, first) = described.entry(name.clone()).or_insert((description.clone(), info));
                 if known.hash() != description.hash() {
-                    let (first, second) = (first.path.display(), info.path.display());
+                    let (name, first, second) = (line(name), first.path.display(), info.path.display());
                     return Err(format!(
                         "{name} has one interface ({:08x}) in {first} and another ({:08x}) in {second}; replay the \
                          files one by one, or `--names` without it",
