@@ -234,6 +234,7 @@ fn options(recording: &Recording, node: &str) -> Options {
         flush: recording.flush,
         sync: recording.sync,
         leave_bytes: recording.leave_free,
+        root: Some(recording.directory.clone()),
         ..Options::new(&recording.directory, node)
     }
 }
