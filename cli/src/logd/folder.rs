@@ -19,7 +19,7 @@ pub(super) enum FolderError {
 
 /// The folder of this name below `root`, without links. It is made if the one above it exists.
 ///
-/// That is checked when the folder is named: what others put in its place later, with the rights to do so, is theirs.
+/// What is put in its place later, is checked with each file (`Options::root`).
 pub(super) fn below(root: &Path, name: &str) -> Result<PathBuf, FolderError> {
     let failed = |path: &Path| {
         let path = path.to_owned();

@@ -237,6 +237,7 @@ fn options(recording: &Recording, installation: &Installation, node: &str) -> Op
         flush: recording.flush,
         sync: recording.sync,
         leave_bytes: recording.leave_free,
+        root: Some(recording.directory.clone()),
         ..Options::new(&recording.directory, node)
     }
 }

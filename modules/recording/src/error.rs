@@ -46,6 +46,14 @@ pub enum DiskError {
         /// What is not there.
         path: Shown,
     },
+    /// A link leads to where no files are to be made.
+    #[error("{folder}: leads out of {root}, where files are to be made; remove the link")]
+    Outside {
+        /// Where recordings are.
+        folder: Shown,
+        /// Where they may be.
+        root: Shown,
+    },
     /// What was written may not be on the disk.
     #[error("{path}: sync failed, what was written since the last sync may be lost: {error}")]
     Sync {

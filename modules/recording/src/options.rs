@@ -11,6 +11,8 @@ use std::time::Duration;
 pub struct Options {
     /// Where its files are; it must exist.
     pub folder: PathBuf,
+    /// Files are made here and below only, wherever links lead; looked at for each file. None: anywhere.
+    pub root: Option<PathBuf>,
     /// How their names begin: `STEM-0001.mcap`.
     pub stem: String,
     /// When the next file begins.
@@ -34,6 +36,7 @@ impl Options {
     pub fn new(folder: impl Into<PathBuf>, stem: impl Into<String>) -> Self {
         Self {
             folder: folder.into(),
+            root: None,
             stem: stem.into(),
             rotation: Rotation::default(),
             flush: Duration::from_millis(500),

@@ -29,6 +29,7 @@ use crate::status::ChannelState;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -242,6 +243,7 @@ impl Recorder {
     fn create(&mut self) -> Result<OpenFile, DiskError> {
         loop {
             let path = rotate::path(&self.options.folder, &self.options.stem, self.number);
+            self.check_root(&path)?;
             match OpenFile::create(&mut *self.disk, &path) {
                 Err(DiskError::Other { error, .. })
                     if error.kind() == io::ErrorKind::AlreadyExists && self.number < NUMBER_MAX =>
@@ -251,6 +253,17 @@ impl Recorder {
                 told => return told,
             }
         }
+    }
+
+    /// Whether a file is where files may be. A folder may be a link by now.
+    fn check_root(&self, path: &Path) -> Result<(), DiskError> {
+        let Options { folder, root: Some(root), .. } = &self.options else { return Ok(()) };
+        let found =
+            |folder: &Path| folder.canonicalize().map_err(|error| DiskError::new("find the folder", path, error));
+        if found(folder)?.starts_with(found(root)?) {
+            return Ok(());
+        }
+        Err(DiskError::Outside { folder: Shown(folder.clone()), root: Shown(root.clone()) })
     }
 
     /// Closes the file, if there is one.

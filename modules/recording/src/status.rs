@@ -77,7 +77,7 @@ pub struct Failures {
     pub gone: u64,
     /// [`DiskError::Sync`].
     pub sync: u64,
-    /// [`DiskError::Other`].
+    /// [`DiskError::Outside`] and [`DiskError::Other`].
     pub other: u64,
 }
 
@@ -90,7 +90,7 @@ impl Failures {
             DiskError::Denied { .. } => &mut self.denied,
             DiskError::Gone { .. } => &mut self.gone,
             DiskError::Sync { .. } => &mut self.sync,
-            DiskError::Other { .. } => &mut self.other,
+            DiskError::Outside { .. } | DiskError::Other { .. } => &mut self.other,
         };
         *counter += 1;
     }

@@ -138,6 +138,30 @@ fn it_goes_on_in_another_folder_and_stays_if_that_takes_no_file() {
     assert_eq!(content(&moved.file), ["3"]);
 }
 
+#[test]
+fn a_folder_that_becomes_a_link_leads_nowhere() {
+    let folder = memory_folder();
+    let (root, away) = (folder.path().join("root"), folder.path().join("away"));
+    let there = root.join("there");
+    [&root, &there, &away].iter().for_each(|folder| std::fs::create_dir(folder).unwrap());
+    let options = crate::Options { root: Some(root.clone()), ..options(&root) };
+    let mut writer = Writer::start(options, session()).unwrap();
+    done(writer.move_to(there.clone()));
+    done(writer.mark(mark(1, "inside")));
+    std::fs::rename(&there, root.join("before")).unwrap();
+    std::os::unix::fs::symlink(&away, &there).unwrap();
+    let refused = writer.rotate().unwrap().wait(PATIENCE).unwrap();
+    assert!(matches!(refused, Err(OrderError::Disk(DiskError::Outside { .. }))), "{refused:?}");
+    let refused = writer.move_to(away.clone()).unwrap().wait(PATIENCE).unwrap();
+    assert!(matches!(refused, Err(OrderError::Disk(DiskError::Outside { .. }))), "{refused:?}");
+    std::fs::remove_file(&there).unwrap();
+    std::fs::create_dir(&there).unwrap();
+    // Tried again all the time; or the order comes before that.
+    assert_eq!(done(writer.move_to(root.clone())).file.parent(), Some(&*root));
+    writer.finish().1.unwrap();
+    assert!(files(&away).is_empty());
+}
+
 /// What waits while the disk fails comes to the folder that it is told instead.
 #[test]
 fn another_folder_helps_while_the_disk_fails() {
