@@ -31,7 +31,7 @@ pub struct Recording {
     pub data: Vec<RecordedItems>,
     /// Lines of output from this level on; none: no line.
     pub output: Option<Level>,
-    /// Modules whose journals are recorded, so that they can be replayed exactly.
+    /// Modules that write a journal, which is recorded: so they can be replayed exactly.
     pub exact: Vec<ExactModule>,
     /// A file gets no longer.
     pub rotate_size: u64,
