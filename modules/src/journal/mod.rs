@@ -12,8 +12,8 @@
 //!  replayed:  events and answers are taken from there, outputs are compared with it, bit by bit
 //! ```
 //!
-//! The runtime, proxies, readers of streams and clocks of a module share one [`ModuleJournal`]. Without one each pays
-//! for a branch. Whatever no journal sees is noted as a hole, and a replay ends there, with the reason.
+//! The runtime, proxies, readers of streams and clocks of a module share one `ModuleJournal`. Without one each of them
+//! pays for a branch. Whatever no journal sees is noted as a hole, and a replay ends there, with the reason.
 
 mod bytes;
 mod entry;
