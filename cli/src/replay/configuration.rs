@@ -82,7 +82,10 @@ impl ReplayWish<'_> {
         }
         let gui = installation.classes.id(GUI).filter(|_| self.drawing != ReplayDrawing::Nothing);
         // Others than the own one have to be asked for by `--run`: a recording could name any program.
-        let is_bridge = |module: &&Module| matches!(&module.program, Program::Command(words) if words.first().is_some_and(|first| first == BRIDGE));
+        let is_bridge = |module: &&Module| match &module.program {
+            Program::Command(words) => words.first().is_some_and(|first| first == BRIDGE),
+            Program::Builtin(_) => false,
+        };
         let guis = installation.modules.iter().filter(|module| Some(module.name.class()) == gui);
         running.extend(guis.filter(is_bridge));
         // In the order of their start.

@@ -181,7 +181,7 @@ impl ModuleJournal {
         }
     }
 
-    /// Does this without the journal: what it asks of the module's runtime meanwhile is a hole, since a replay would not
+    /// Does this without the journal. What it asks of the module's runtime meanwhile is a hole, since a replay does not
     /// ask it.
     pub(crate) fn apart<T>(&self, part: impl FnOnce() -> T) -> T {
         let present = PRESENT.take();

@@ -26,7 +26,8 @@ type NotedError = (u8, String);
 impl Context {
     /// Takes in something from outside that comes by none of the module's interfaces: bytes of a device, of a file that
     /// changes, of chance. They are noted in the module's journal, if it has one. In an exact replay `read` is not
-    /// called, and this returns what it returned then; so let nothing else of it get out, and ask nothing of the context in it.
+    /// called, and this returns what it returned then; so let nothing else of it get out, and ask
+    /// nothing of the context in it.
     ///
     /// ```
     /// # use rohrpost_modules::{ModuleError, runtime::Context};
