@@ -39,7 +39,7 @@ pub(crate) const FRAME_BYTES: usize = 10_000;
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The bytes of a frame. As those of a camera, they do not get shorter by compression.
-fn noise(number: u64) -> Vec<u8> {
+pub(crate) fn noise(number: u64) -> Vec<u8> {
     let mut bytes = vec![0; FRAME_BYTES];
     ChaCha8Rng::seed_from_u64(number).fill_bytes(&mut bytes);
     bytes
