@@ -28,7 +28,7 @@ pub(crate) fn at_a_node(command: &str) -> Option<Vec<&str>> {
         "send" => &["probe.0", "count", "1", "--count", "1"],
         "param" | "stream" => &["list"],
         "check" | "launch" | "demo" | "clean" | "doctor" | "bench" | "new" | "completions" | "version" | "run"
-        | "keys" | "record" => {
+        | "keys" | "record" | "replay" => {
             return None;
         }
         // Of several nodes, see `lan`; of several systems, see `beyond`.
