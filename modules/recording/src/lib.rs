@@ -43,8 +43,8 @@
 //!   chunk has no length, and readers stop before it if the writer was killed.
 //! - **Channels are described in a chunk of their own,** and again in the index: one damaged chunk costs its messages
 //!   only.
-//! - **Each file stands alone:** session, configuration, descriptions of modules, types and channels are in each; counts
-//!   of lost messages are those since its beginning.
+//! - **Each file stands alone:** session, configuration, descriptions of modules, types and channels are in each;
+//!   counts of lost messages are those since its beginning.
 //! - **A failed file is cut back** to its last whole chunk, so that no message is in two files.
 //! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut`, `merge` and `draw`.
 //! - **What other programs draw is made afterwards** ([`draw`]), in channels that say so: Rerun shows postcard as bytes
