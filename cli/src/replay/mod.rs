@@ -269,6 +269,12 @@ fn settings(
     {
         return Err("the time range is empty: --until is not behind --from".into());
     }
+    if part.from_ns.is_some_and(|from_ns| from_ns > recorded.end_ns)
+        || part.until_ns.is_some_and(|until_ns| until_ns <= recorded.begin_ns)
+    {
+        let seconds = (recorded.end_ns - recorded.begin_ns) as f64 / 1e9;
+        return Err(format!("nothing lies between --from and --until; the recording lasts {seconds:.1} s").into());
+    }
     let ns = |ns: u64| i64::try_from(ns).map(Value::Integer).map_err(|_| format!("{ns} ns is beyond the year 2262"));
     let mut settings = Table::new();
     for (key, value) in [

@@ -292,7 +292,7 @@ impl Replay for RecordingPlayer {
         let step = step.ok_or(ReplayRefusal::Step(seconds))?;
         self.course.pause();
         self.let_time_pass();
-        self.course.step_until(self.clock.now().ns.saturating_add(step.as_nanos() as u64));
+        self.course.step_until(self.clock.now().ns.saturating_add(u64::try_from(step.as_nanos()).unwrap_or(u64::MAX)));
         Ok(())
     }
 

@@ -3,8 +3,8 @@
 use crate::terminal::Failure;
 use rohrpost::output::plain::line;
 use rohrpost::schema::Description;
-use rohrpost_recording::format::{MESSAGE_ENCODING, PROFILE};
-use rohrpost_recording::{DescribedModule, Info, info};
+use rohrpost_recording::format::{MESSAGE_ENCODING, PROFILE, session_key};
+use rohrpost_recording::{DescribedModule, Info, info, recovered_path};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -26,7 +26,9 @@ pub(super) struct RecordedFiles {
 impl RecordedFiles {
     /// Reads what the files say of themselves.
     pub(super) fn read(files: &[PathBuf]) -> Result<Self, Failure> {
-        let infos = files.iter().map(|file| info(file)).collect::<Result<Vec<Info>, _>>()?;
+        let files = without_torn(files);
+        let infos = files.into_iter().map(|file| info(file)).collect::<Result<Vec<Info>, _>>()?;
+        in_order(&infos)?;
         if let Some(foreign) = infos.iter().find(|info| info.profile != PROFILE) {
             let (file, profile) = (foreign.path.display(), line(&foreign.profile));
             return Err(format!(
@@ -123,5 +125,71 @@ impl RecordedFiles {
     /// Another text that was recorded, by its file's name: the last one.
     pub(super) fn text(&self, name: &str) -> Option<&str> {
         self.infos.iter().rev().find_map(|info| info.configuration.get(name)).map(String::as_str)
+    }
+}
+
+/// Files without those of which a whole one was recovered, if that is named too: `main-*.mcap` means each message once.
+fn without_torn(files: &[PathBuf]) -> Vec<&PathBuf> {
+    let is_torn = |file: &&PathBuf| files.contains(&recovered_path(file));
+    files.iter().filter(|file| !is_torn(file)).collect()
+}
+
+/// Files of one recording come one after the other, each once.
+fn in_order(infos: &[Info]) -> Result<(), Failure> {
+    for (at, later) in infos.iter().enumerate() {
+        let recording = later.session.get(session_key::RECORDING);
+        let mut earlier = infos[..at].iter().filter(|info| info.session.get(session_key::RECORDING) == recording);
+        let is_overlapped = |info: &&Info| {
+            let last = info.epochs.iter().filter_map(|its| Some((its.epoch, its.last_ns?))).max();
+            let first = later.epochs.iter().filter_map(|its| Some((its.epoch, its.first_ns?))).min();
+            info.path == later.path || last.zip(first).is_some_and(|(last, first)| first < last)
+        };
+        if let (Some(_), Some(before)) = (recording, earlier.find(is_overlapped)) {
+            return Err(format!(
+                "{} begins before {} ends, and both are of one recording; name each file once, in order",
+                later.path.display(),
+                before.path.display()
+            )
+            .into());
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod file_tests {
+    use super::*;
+    use rohrpost::schema::Type;
+    use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+
+    /// Two files of one recording.
+    fn two_files(folder: &std::path::Path) -> [PathBuf; 2] {
+        let mut writer = Writer::start(Options::new(folder, "main"), Session::default()).unwrap();
+        let spec = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: Default::default() };
+        let speed = writer.channel(&spec).unwrap();
+        let write = |writer: &mut Writer, sequence: u32| {
+            let arrival_ns = 1_000_000_000 * u64::from(sequence);
+            writer.write(speed, &Message { arrival_ns, stamp_ns: arrival_ns, epoch: 1, sequence, data: &[7] }).unwrap();
+        };
+        write(&mut writer, 1);
+        let rotated = writer.rotate().unwrap();
+        write(&mut writer, 2);
+        drop(rotated);
+        writer.finish().1.unwrap();
+        ["main-0001.mcap", "main-0002.mcap"].map(|name| folder.join(name))
+    }
+
+    #[test]
+    fn files_of_one_recording_are_named_in_order_and_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, second] = two_files(folder.path());
+        let infos = |files: &[&PathBuf]| files.iter().map(|file| info(file).unwrap()).collect::<Vec<_>>();
+        assert!(in_order(&infos(&[&first, &second])).is_ok());
+        for wrong in [[&second, &first], [&first, &first]] {
+            let told = in_order(&infos(&wrong)).unwrap_err().to_string();
+            assert!(told.contains("name each file once, in order"), "{told}");
+        }
+        let torn = [first.clone(), recovered_path(&first), second.clone()];
+        assert_eq!(without_torn(&torn), [&recovered_path(&first), &second]);
     }
 }
