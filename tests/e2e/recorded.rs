@@ -194,12 +194,12 @@ pub(crate) fn feed_until_recorded(place: &Place, module: &str) {
     });
 }
 
-/// Messages of a topic in a file, also in one that is being written.
+/// Messages of a topic in a file but those that it repeats, also in one that is being written.
 fn messages<T>(file: &Path, topic: &str, read: impl Fn(&[u8]) -> T) -> Vec<T> {
     let mut messages = Vec::new();
     let Ok(mut reader) = Reader::open(file) else { return messages };
     while let Ok(Some((channel, message))) = reader.next() {
-        if channel.topic == topic {
+        if channel.topic == topic && !channel.is_repeated() {
             messages.push(read(message.data));
         }
     }

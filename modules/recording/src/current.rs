@@ -104,7 +104,7 @@ impl Current {
         self.file.end_chunk()
     }
 
-    /// Begins with the newest message of each channel that would be missing for long, before the first messages.
+    /// Begins with the newest message of each channel that would be missing, before the first messages.
     pub(crate) fn begin(
         &mut self,
         newest: &Newest,
@@ -113,7 +113,7 @@ impl Current {
     ) -> Result<(), DiskError> {
         let Some((_, first)) = batch.messages().next().filter(|_| !self.has_begun) else { return Ok(()) };
         self.has_begun = true;
-        let repeated = newest.before(&first);
+        let repeated = newest.before(batch);
         if repeated.is_empty() {
             return Ok(());
         }
@@ -257,6 +257,12 @@ impl Current {
         self.unsynced = 0;
         self.synced = now;
         Ok(())
+    }
+
+    /// Earlier files tell these losses: the one before it was still open when it was made.
+    pub(crate) fn follow(&mut self, lost_before: Vec<u64>) {
+        self.lost_told = lost_before.clone();
+        self.lost_before = lost_before;
     }
 
     /// Losses that files tell, if this one is kept.

@@ -31,8 +31,8 @@ const EARLIER: usize = 1;
 /// Writes what is selected to a new file; its messages and bytes. Reads only the chunks that have some of it. Counts of
 /// lost messages remain those of the whole file.
 ///
-/// The new file begins with the newest message of each selected topic of which none came for a second before, as each
-/// file of a recording does. They do not count as its messages.
+/// The new file begins with the newest message of each selected topic from before the time range, as each file of a
+/// recording does. They do not count as its messages.
 ///
 /// # Errors
 /// When the file was not closed or is damaged, has no such name, or the new one cannot be written.

@@ -2,6 +2,7 @@
 //! never waits for the disk.
 
 use crate::batch::{Batch, Message};
+use crate::format::CHUNK_BYTES_MAX;
 use crate::order::{Order, OrderError, OrderKind};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -14,7 +15,7 @@ const ORDERS_MAX: usize = 16;
 pub(crate) struct Inbox {
     queue: Mutex<Queue>,
     bell: Condvar,
-    chunks_max: usize,
+    bytes_max: usize,
 }
 
 #[derive(Default)]
@@ -42,6 +43,13 @@ impl Queue {
         })
     }
 
+    /// Whether what is being filled may wait with the others, of which one may be longer than all that should be there.
+    /// An order ends a batch early: bytes say what waits, a number of batches does not.
+    fn has_room(&self, bytes_max: usize) -> bool {
+        let bytes: usize = self.batches().map(Batch::bytes).sum();
+        self.open.is_empty() || bytes == 0 || bytes + self.open.bytes() <= bytes_max
+    }
+
     /// What is being filled waits from now on.
     fn end_open(&mut self) {
         let next = self.free.pop().unwrap_or_default();
@@ -63,9 +71,9 @@ pub(crate) enum Taken {
 }
 
 impl Inbox {
-    /// For so many chunks.
+    /// For so many whole chunks.
     pub(crate) fn new(chunks_max: usize) -> Self {
-        Self { queue: Mutex::default(), bell: Condvar::new(), chunks_max }
+        Self { queue: Mutex::default(), bell: Condvar::new(), bytes_max: chunks_max.saturating_mul(CHUNK_BYTES_MAX) }
     }
 
     /// Puts a message in. Not if the queue is full or closed.
@@ -75,7 +83,7 @@ impl Inbox {
             return false;
         }
         if !queue.open.has_room(message.data.len()) {
-            if queue.batches().count() >= self.chunks_max {
+            if !queue.has_room(self.bytes_max) {
                 return false;
             }
             queue.end_open();
@@ -91,10 +99,10 @@ impl Inbox {
         if queue.has_ended {
             return Err(OrderError::Ended);
         }
-        let batches = queue.batches().count();
+        let orders = queue.full.len() - queue.batches().count();
         // One that leads to another disk needs no room: it is what helps.
-        let has_room = queue.full.len() - batches < ORDERS_MAX
-            && (batches < self.chunks_max || queue.open.is_empty() || matches!(order.kind, OrderKind::Move(_)));
+        let has_room =
+            orders < ORDERS_MAX && (queue.has_room(self.bytes_max) || matches!(order.kind, OrderKind::Move(_)));
         if !has_room {
             return Err(OrderError::Full);
         }
@@ -161,5 +169,44 @@ impl Inbox {
     /// Nothing panics while it is locked; if something did, the queue is whole between any two lines.
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::MESSAGE_OVERHEAD_BYTES;
+    use std::path::PathBuf;
+
+    const CHUNKS: usize = 4;
+
+    #[test]
+    fn orders_between_messages_cost_no_room() {
+        let data = [7; 1_000];
+        let message = Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: 0, data: &data };
+        for orders in [0, 1, ORDERS_MAX] {
+            let inbox = Inbox::new(CHUNKS);
+            for _ in 0..orders {
+                assert!(inbox.put(0, &message));
+                inbox.put_order(Order::new(OrderKind::Rotate).0).unwrap();
+            }
+            while inbox.put(0, &message) {}
+            let bytes = inbox.waiting() as usize * (data.len() + MESSAGE_OVERHEAD_BYTES);
+            let bounds = CHUNKS * CHUNK_BYTES_MAX..=(CHUNKS + 1) * CHUNK_BYTES_MAX;
+            assert!(bounds.contains(&bytes), "{bytes} bytes beside {orders} orders");
+            let told =
+                [OrderKind::Rotate, OrderKind::Move(PathBuf::new())].map(|kind| inbox.put_order(Order::new(kind).0));
+            let leads_away = told[1].is_ok() || orders == ORDERS_MAX;
+            assert!(matches!(told[0], Err(OrderError::Full)) && leads_away, "{orders} orders: {told:?}");
+        }
+    }
+
+    #[test]
+    fn one_message_may_be_longer_than_the_room() {
+        let long = vec![7; 2 * CHUNK_BYTES_MAX];
+        let message = |data| Message { arrival_ns: 1, stamp_ns: 1, epoch: 1, sequence: 0, data };
+        let inbox = Inbox::new(1);
+        let told = [&long[..], &long, &long, &[7]].map(|data| inbox.put(0, &message(data)));
+        assert_eq!((told, inbox.waiting()), ([true, true, false, false], 2));
     }
 }

@@ -44,8 +44,9 @@
 //! - **Channels are described in a chunk of their own,** and again in the index: one damaged chunk costs its messages
 //!   only.
 //! - **Each file stands alone:** session, configuration, descriptions of modules, types and channels are in each;
-//!   counts of lost messages are those since its beginning. It begins with the newest message of each channel of which
-//!   nothing came for a second, in channels that say so ([`format::key::REPEATED`]): nothing counts them a second time.
+//!   counts of lost messages are those since its beginning. It begins with the newest message of each channel that
+//!   is not among its first messages, in channels that say so ([`format::key::REPEATED`]): nothing counts them a second
+//!   time.
 //! - **A failed file is cut back** to its last whole chunk, so that no message is in two files.
 //! - **Nothing is overwritten,** neither by a recorder nor by `recover`, `cut`, `merge` and `draw`.
 //! - **What other programs draw is made afterwards** ([`draw`]), or beside what is recorded ([`Options::drawn`]), in

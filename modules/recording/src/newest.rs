@@ -1,4 +1,4 @@
-//! The newest message of each channel: the next file begins with those that would be missing there for long.
+//! The newest message of each channel: the next file begins with those that would be missing at its beginning.
 
 use crate::batch::{Batch, Message};
 use crate::shape::Shape;
@@ -6,8 +6,8 @@ use crate::status::ChannelState;
 use rohrpost_schema::Type;
 use std::sync::Arc;
 
-/// A channel of which nothing came for so long is slow: its next message may be far.
-pub(crate) const SLOW_NS: u64 = 1_000_000_000;
+/// A channel of which nothing came for so long is slow.
+const SLOW_NS: u64 = 1_000_000_000;
 /// Memory for all of them, and what a file begins with at most.
 pub(crate) const KEPT_BYTES_MAX: usize = 32 << 20;
 /// A longer message is copied only if its channel is slow.
@@ -86,17 +86,26 @@ impl Newest {
         self.channels[at].kept = Some(KeptMessage { arrival_ns, stamp_ns, epoch, sequence, data: copied });
     }
 
-    /// What a file begins with before this message, with the numbers of the channels, in the order of arrival.
-    pub(crate) fn before(&self, first: &Message<'_>) -> Vec<(usize, Message<'_>)> {
-        let kept = self.channels.iter().enumerate().filter_map(|(at, channel)| Some((at, channel.kept.as_ref()?)));
-        let old = kept.filter(|(_, kept)| kept.is_old_at(first)).filter_map(|(at, kept)| {
+    /// What a file begins with before these first messages, with the numbers of the channels, in the order of arrival:
+    /// nobody knows how far the next message of a channel is that is not among them.
+    pub(crate) fn before(&self, batch: &Batch) -> Vec<(usize, Message<'_>)> {
+        let Some((_, first)) = batch.messages().next() else { return Vec::new() };
+        let mut comes = vec![false; self.channels.len()];
+        for (at, _) in batch.messages() {
+            if let Some(comes) = comes.get_mut(at) {
+                *comes = true;
+            }
+        }
+        let kept = self.channels.iter().zip(comes).enumerate();
+        let kept = kept.filter_map(|(at, (channel, comes))| Some((at, channel.kept.as_ref()?, comes)));
+        let missing = kept.filter(|(_, kept, comes)| !comes || kept.is_old_at(&first)).filter_map(|(at, kept, _)| {
             let KeptMessage { arrival_ns, stamp_ns, epoch, sequence, .. } = *kept;
             let data = kept.data.as_deref()?;
             Some((at, Message { arrival_ns, stamp_ns, epoch, sequence, data }))
         });
-        let mut old: Vec<_> = old.collect();
-        old.sort_by_key(|(_, message)| (message.epoch, message.arrival_ns));
-        old
+        let mut missing: Vec<_> = missing.collect();
+        missing.sort_by_key(|(_, message)| (message.epoch, message.arrival_ns));
+        missing
     }
 }
 
@@ -128,17 +137,31 @@ mod tests {
         newest
     }
 
+    /// Before these first messages.
+    fn found_before(newest: &Newest, all: &[(usize, Message<'_>)]) -> Vec<(usize, u64, usize)> {
+        let mut batch = Batch::default();
+        all.iter().for_each(|(at, message)| batch.push(*at, message));
+        newest.before(&batch).iter().map(|(at, its)| (*at, its.arrival_ns, its.data.len())).collect()
+    }
+
+    /// Before a message of the last channel.
     fn found(newest: &Newest, first: &Message<'_>) -> Vec<(usize, u64, usize)> {
-        newest.before(first).iter().map(|(at, its)| (*at, its.arrival_ns, its.data.len())).collect()
+        found_before(newest, &[(3, *first)])
     }
 
     #[test]
-    fn a_file_begins_with_what_is_old() {
+    fn a_file_begins_with_what_is_old_or_does_not_come_soon() {
         let newest =
             noted(1 << 30, &[(2, message(5, 1, b"old")), (0, message(1, 1, b"x")), (1, message(SLOW_NS + 1, 1, b"y"))]);
-        assert_eq!(found(&newest, &message(SLOW_NS, 1, b"")), [], "not a second old");
-        assert_eq!(found(&newest, &message(SLOW_NS + 5, 1, b"")), [(0, 1, 1), (2, 5, 3)], "in the order of arrival");
-        assert_eq!(found(&newest, &message(9, 2, b"")).len(), 3, "times of two epochs say nothing of each other");
+        let [x, old, y] = [(0, 1, 1), (2, 5, 3), (1, SLOW_NS + 1, 1)];
+        let first = |at_ns, epoch| message(at_ns, epoch, b"");
+        assert_eq!(found(&newest, &first(SLOW_NS + 2, 1)), [x, old, y], "in the order of arrival, however new");
+        let all = |first: Message<'static>| [0, 1, 2, 7].map(|at| (at, first));
+        assert_eq!(found_before(&newest, &all(first(SLOW_NS, 1))), [], "not a second old, and each comes");
+        assert_eq!(found_before(&newest, &all(first(SLOW_NS + 5, 1))), [x, old], "two are that old");
+        assert_eq!(found_before(&newest, &all(first(SLOW_NS, 1))[1..]), [x], "one does not come");
+        assert_eq!(found_before(&newest, &all(first(9, 2))).len(), 3, "times of two epochs say nothing of each other");
+        assert_eq!(found_before(&newest, &[]), []);
     }
 
     #[test]

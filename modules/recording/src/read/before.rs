@@ -2,7 +2,7 @@
 
 use crate::error::ReadError;
 use crate::format::key;
-use crate::newest::{KEPT_BYTES_MAX, SLOW_NS};
+use crate::newest::KEPT_BYTES_MAX;
 use crate::read::contents::{Contents, Item};
 use crate::read::definitions::Definition;
 use crate::read::frames::Frames;
@@ -29,8 +29,8 @@ struct Place {
     log_ns: u64,
 }
 
-/// The newest message of each topic that is selected, but for its time, and slow there, in the order of their arrival.
-/// None if the selection or the index does not say where to look.
+/// The newest message of each topic that is selected, but for its time, in the order of their arrival; also of those
+/// that the file repeats itself. None if the selection or the index does not say where to look.
 pub(crate) fn newest_before(path: &Path, selection: &Selection) -> Result<Vec<EarlierMessage>, ReadError> {
     let Some(from_ns) = selection.from_ns else { return Ok(Vec::new()) };
     let mut frames = Frames::open(path)?;
@@ -39,7 +39,6 @@ pub(crate) fn newest_before(path: &Path, selection: &Selection) -> Result<Vec<Ea
         return Ok(Vec::new());
     }
     let mut places = places(&mut frames, &index, selection, from_ns)?;
-    places.retain(|place| from_ns.saturating_sub(place.log_ns) >= SLOW_NS);
     places.sort_by_key(|place| place.chunk_at);
     let mut contents = Contents::new(frames, index.definitions);
     let (mut found, mut bytes) = (Vec::new(), 0);

@@ -1,6 +1,7 @@
 //! Orders to the thread that writes, carried out where they stand among the messages.
 
 use super::Recorder;
+use crate::current::Current;
 use crate::error::DiskError;
 use crate::order::{FileChange, Mark, Order, OrderKind};
 use std::path::{Path, PathBuf};
@@ -45,15 +46,15 @@ impl Recorder {
         Ok(closed)
     }
 
-    /// The present file stays until the new folder has taken one: a mistaken folder ends nothing. Numbers begin anew in
-    /// each folder.
+    /// The present file stays until the new folder has taken one with its beginning: a mistaken folder ends nothing,
+    /// nor does a full disk, which makes files and takes no byte. Numbers begin anew in each folder.
     fn move_to(&mut self, folder: &Path, now: Instant) -> Result<Option<PathBuf>, DiskError> {
-        let before = std::mem::replace(&mut self.options.folder, folder.to_owned());
+        let folder = std::mem::replace(&mut self.options.folder, folder.to_owned());
         let number = std::mem::replace(&mut self.number, 1);
-        let file = match self.check_free(0).and_then(|()| self.create()) {
-            Ok(file) => file,
+        let mut next = match self.introduced(now) {
+            Ok(next) => next,
             Err(error) => {
-                (self.options.folder, self.number) = (before, number);
+                (self.options.folder, self.number) = (folder, number);
                 return Err(error);
             }
         };
@@ -67,7 +68,30 @@ impl Recorder {
         if let Err(error) = self.close("rotated") {
             self.fail(error, now);
         }
-        self.begin(file, now).map_err(|error| self.failed(error, now))?;
+        self.number += 1;
+        next.follow(self.lost_told.clone());
+        let mut counts = self.shared.counts();
+        counts.file = Some(next.file.path().to_owned());
+        counts.bytes_now = next.file.bytes();
+        drop(counts);
+        self.current = Some(next);
         Ok(closed)
+    }
+
+    /// A file with its beginning, beside the present one. Of one that does not take it, nothing is left.
+    fn introduced(&mut self, now: Instant) -> Result<Current, DiskError> {
+        self.check_free(0)?;
+        let mut next = Current::new(self.create()?, &self.options, self.lost_told.clone(), now);
+        let told = next.introduce(&self.session, &self.identity, self.number);
+        match told {
+            Ok(()) => Ok(next),
+            Err(error) => {
+                let path = next.file.path().to_owned();
+                next.file.abandon();
+                // If it cannot be removed either, it stays, as what is discarded does.
+                let _ = self.disk.remove(&path);
+                Err(error)
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! A file begins with the newest message of each slow channel, and nothing takes that for a second one.
+//! A file begins with the newest message of each channel, and nothing takes that for a second one.
 
 use super::support::{files, memory_folder, noise, options, session};
 use crate::{
@@ -89,6 +89,11 @@ fn three_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// The scan of a number.
+fn scan(number: u32) -> Kept {
+    ("laser.0/scan".into(), 5 * SECOND_NS + u64::from(number) * SECOND_NS / 10 - 7, 1, number)
+}
+
 /// Numbers of the messages that files do not repeat, without lines.
 fn numbers(files: &[PathBuf]) -> Vec<u32> {
     let mut numbers = Vec::new();
@@ -132,18 +137,20 @@ fn played(files: &[PathBuf], from_ns: u64) -> Vec<u32> {
 }
 
 #[test]
-fn each_file_begins_with_the_newest_of_what_comes_rarely() {
+fn each_file_begins_with_the_newest_of_what_does_not_come_at_once() {
     let folder = memory_folder();
     let files = three_files(folder.path());
     assert_eq!(beginning(&files[0]).0, [], "nothing came before");
     let map: Kept = ("mapper.0/map".into(), 5 * SECOND_NS + SECOND_NS / 5 - 7, 1, 2);
-    for file in &files[1..] {
+    // The scan came a fifth of a second before the second file, and six tenths before the third.
+    for (file, number) in [(&files[1], 23), (&files[2], 30)] {
         let (repeated, first_ns) = beginning(file);
-        assert_eq!(repeated, [(map.clone(), first_ns, b"first map".to_vec())], "neither scans nor lines");
+        let scan = (scan(number), first_ns, vec![3; 100]);
+        assert_eq!(repeated, [(map.clone(), first_ns, b"first map".to_vec()), scan], "no lines");
         let told = info(file).unwrap();
-        assert_eq!((told.repeated, told.first_ns), (1, Some(first_ns)));
+        assert_eq!((told.repeated, told.first_ns), (2, Some(first_ns)));
         let of = |topic: &str| told.channels.iter().find(|its| its.topic == topic).unwrap();
-        assert_eq!((of("mapper.0/map").repeated, of("laser.0/scan").repeated), (1, 0));
+        assert_eq!((of("mapper.0/map").repeated, of("laser.0/scan").repeated), (1, 1));
     }
     let told: Vec<_> = files.iter().map(|file| info(file).unwrap()).collect();
     let maps = |at: usize| told[at].channels.iter().find(|its| its.topic == "mapper.0/map").unwrap();
@@ -158,7 +165,7 @@ fn a_replay_has_what_its_first_file_repeats_and_nothing_twice() {
     let files = three_files(folder.path());
     assert_eq!(played(&files, 0), numbers(&files));
     let later = numbers(&files[1..]);
-    assert_eq!(played(&files[1..], 0), [&[2], &later[..]].concat(), "the map is there from the beginning");
+    assert_eq!(played(&files[1..], 0), [&[2, 23], &later[..]].concat(), "the map is there from the beginning");
     let (_, first_ns) = beginning(&files[1]);
     assert_eq!(played(&files, first_ns + 1), later, "what comes later");
 }
@@ -176,7 +183,7 @@ fn merged_files_repeat_nothing_that_is_there() {
     let (messages, _) = merge(&files[1..], &to, &mut |_, _| {}).unwrap();
     let told = info(&to).unwrap();
     let first = info(&files[0]).unwrap().messages;
-    assert_eq!((messages, told.messages, told.repeated), (all - first, all - first, 1));
+    assert_eq!((messages, told.messages, told.repeated), (all - first, all - first, 2));
     assert_eq!(beginning(&to), beginning(&files[1]));
 }
 
@@ -202,17 +209,23 @@ fn a_part_from_the_middle_begins_with_what_was_true_there() {
     cut(&files[0], &to("late"), &from(first_ns + SECOND_NS * 2), &mut |_, _| {}).unwrap();
     let map: Kept = ("mapper.0/map".into(), first_ns + SECOND_NS / 5 - 7, 1, 2);
     let begin_ns = first_ns + SECOND_NS * 2;
-    assert_eq!(beginning(&to("late")), (vec![(map.clone(), begin_ns, b"first map".to_vec())], begin_ns));
-    cut(&files[0], &to("early"), &from(first_ns + SECOND_NS), &mut |_, _| {}).unwrap();
-    assert_eq!(beginning(&to("early")).0, [], "the map is not a second old");
-    // What is repeated in a file is repeated in its parts.
+    let map_at = |begin_ns: u64| (map.clone(), begin_ns, b"first map".to_vec());
+    let scan_at = |number: u32, begin_ns: u64| (scan(number), begin_ns, vec![3; 100]);
+    assert_eq!(beginning(&to("late")), (vec![map_at(begin_ns), scan_at(19, begin_ns)], begin_ns));
+    let begin_ns = first_ns + SECOND_NS;
+    cut(&files[0], &to("early"), &from(begin_ns), &mut |_, _| {}).unwrap();
+    assert_eq!(beginning(&to("early")), (vec![map_at(begin_ns), scan_at(9, begin_ns)], begin_ns), "however new");
+    // What is repeated in a file is repeated in its parts, also in those that begin soon behind its beginning.
     let (_, second_ns) = beginning(&files[1]);
+    cut(&files[1], &to("soon"), &from(second_ns + 1), &mut |_, _| {}).unwrap();
+    let begin_ns = second_ns + SECOND_NS / 10;
+    assert_eq!(beginning(&to("soon")), (vec![map_at(begin_ns), scan_at(23, begin_ns)], begin_ns));
     cut(&files[1], &to("second"), &from(second_ns + SECOND_NS * 2), &mut |_, _| {}).unwrap();
     let told = info(&to("second")).unwrap();
     assert_eq!((told.messages, told.repeated), (0, 2), "nothing is left but the map and a scan");
     let names = Selection { names: vec!["laser.0".into()], ..from(first_ns + SECOND_NS * 2) };
     cut(&files[0], &to("named"), &names, &mut |_, _| {}).unwrap();
-    assert_eq!(beginning(&to("named")).0, [], "the map is not selected");
+    assert_eq!(beginning(&to("named")).0, [scan_at(19, first_ns + SECOND_NS * 2)], "the map is not selected");
 }
 
 #[test]

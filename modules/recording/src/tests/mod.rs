@@ -8,6 +8,7 @@ mod dying;
 mod failing;
 mod foreign;
 mod merging;
+mod moved;
 mod ordered;
 mod playing;
 mod support;

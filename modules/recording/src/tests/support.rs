@@ -86,12 +86,13 @@ pub(super) fn record(disk: Box<dyn Disk>, options: Options, all: &[Said]) -> (St
     (status, refused)
 }
 
-/// All of a file, and what is wrong with it.
+/// All of a file but what it repeats, and what is wrong with it.
 pub(super) fn read(path: &Path) -> (Vec<Said>, usize) {
     let mut contents = Contents::open(path).unwrap();
     let (mut all, mut damages) = (Vec::new(), 0);
     while let Some(item) = contents.next().unwrap() {
         match item {
+            Item::Message(found) if found.channel.is_repeated() => {}
             Item::Message(found) => all.push(Said {
                 topic: found.channel.topic.clone(),
                 arrival_ns: found.header.log_time,

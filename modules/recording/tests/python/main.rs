@@ -54,11 +54,12 @@ fn python(script: &str, files: &[PathBuf]) -> Vec<String> {
     String::from_utf8(told.stdout).unwrap().lines().map(String::from).collect()
 }
 
-/// What `read.py` says, by us: messages of each topic.
+/// What `read.py` says, by us: messages of each topic, with those that are repeated.
 fn ours(path: &Path) -> String {
     let told = info(path).unwrap();
-    let channels = told.channels.iter().map(|channel| format!(" {}={}", channel.topic, channel.messages));
-    format!("{}{}", told.messages, channels.collect::<String>())
+    let channels =
+        told.channels.iter().map(|channel| format!(" {}={}", channel.topic, channel.messages + channel.repeated));
+    format!("{}{}", told.messages + told.repeated, channels.collect::<String>())
 }
 
 #[test]
