@@ -95,10 +95,15 @@ impl ControlServer {
         self.clients[client].wait_for(order);
     }
 
+    /// Answers the connection at once.
+    pub(in crate::logd) fn answer(&mut self, client: usize, answer: &ControlAnswer) {
+        self.clients[client].answer(answer);
+    }
+
     /// Tells answers that are there by now.
-    pub(in crate::logd) fn tell(&mut self, answer: impl Fn(u32) -> Option<ControlAnswer>) {
+    pub(in crate::logd) fn tell(&mut self, mut take: impl FnMut(u32) -> Option<ControlAnswer>) {
         for client in &mut self.clients {
-            if let Some(answer) = client.order().and_then(&answer) {
+            if let Some(answer) = client.order().and_then(&mut take) {
                 client.answer(&answer);
             }
         }
