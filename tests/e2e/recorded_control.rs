@@ -148,6 +148,19 @@ fn connections_are_answered_line_by_line_and_none_holds_the_recorder_up() {
     assert!(two.hear().starts_with("ERR the line is too long"));
     two.say(b"\n");
     assert!(two.ask("status").starts_with("OK "));
+    // A web page that is open on this computer: its request carries lines of its choice.
+    let long = format!("/{}", "a".repeat(2_000));
+    for path in ["/", &long] {
+        let mut page = ControlConnection::open(address);
+        page.say(format!("POST {path} HTTP/1.1\r\nHost: {address}\r\nAccept: */*\r\n\r\noff\n").as_bytes());
+        assert!(page.hear().starts_with("ERR this is HTTP"));
+        assert_eq!(page.hear(), "", "and the connection ends");
+    }
+    let mut page = ControlConnection::open(address);
+    page.say(format!("hOST: {address}\r\n\r\noff\n").as_bytes());
+    assert!(page.hear().starts_with("ERR this is HTTP"));
+    assert_eq!(page.hear(), "", "and the connection ends");
+    assert!(two.ask("status").starts_with("OK recording=on "));
     // One that asks and asks, and never takes an answer.
     let mut deaf = TcpStream::connect(address).unwrap();
     deaf.set_write_timeout(Some(Duration::from_millis(100))).unwrap();

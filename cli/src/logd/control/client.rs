@@ -82,7 +82,13 @@ impl ControlClient {
 
     /// The next command, as soon as the one before is answered and the answer taken.
     pub(super) fn next_command(&mut self) -> Option<Result<ControlCommand, ControlError>> {
-        if self.is_free() && !self.is_broken { self.lines.next_command() } else { None }
+        let command = if self.is_free() && !self.is_broken { self.lines.next_command() } else { None };
+        if matches!(command, Some(Err(ControlError::Http))) {
+            // What is behind it is from a web page, too.
+            self.has_ended = true;
+            self.lines = ControlLines::default();
+        }
+        command
     }
 
     pub(super) fn answer(&mut self, answer: &ControlAnswer) {
