@@ -162,13 +162,14 @@ impl Logd {
 
     /// Obeys what connections say, as far as it goes without waiting.
     fn serve(&mut self, context: &mut Context) {
-        self.control.tell(|order| self.orders.take_answer(order));
+        let now = Instant::now();
+        self.control.tell(|order| self.orders.take_answer(order), now);
         while let Some((client, command)) = self.control.next_command() {
             match command.map_or_else(|error| Told::Now(ControlAnswer::err(&error)), |command| self.obey(command)) {
-                Told::Now(answer) => self.control.answer(client, &answer),
+                Told::Now(answer) => self.control.answer(client, &answer, now),
                 Told::Later(order) => {
                     self.control.wait_for(client, order);
-                    self.control.tell(|order| self.orders.take_answer(order));
+                    self.control.tell(|order| self.orders.take_answer(order), now);
                 }
             }
         }
