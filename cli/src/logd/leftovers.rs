@@ -7,8 +7,8 @@ use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Folders below folders that are looked through.
-const FOLDERS_DEEP: usize = 8;
+/// Folders below folders that are looked through. Log control leads no deeper.
+pub(super) const FOLDERS_DEEP: usize = 8;
 
 /// Begins. What is there now is looked at, and no file that comes later. Of the disk so much is left as recordings
 /// leave.
@@ -84,6 +84,7 @@ fn has_room_for(file: &Path, leave_bytes: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::folder::below;
     use super::*;
 
     #[test]
@@ -105,6 +106,28 @@ mod tests {
         std::fs::write(below.join("arm-0001.mcap"), "").unwrap();
         assert_eq!(files(place.path(), "base"), wanted);
         assert!(files(&place.path().join("gone"), "base").is_empty());
+    }
+
+    #[test]
+    fn files_are_found_wherever_log_control_leads() {
+        let place = tempfile::tempdir().unwrap();
+        let root = place.path().canonicalize().unwrap();
+        let mut name = PathBuf::new();
+        let led = |name: &Path| below(&root, name.to_str().unwrap());
+        for _ in 0..FOLDERS_DEEP {
+            name.push("deeper");
+            std::fs::write(led(&name).unwrap().join("base-0001.mcap"), "").unwrap();
+        }
+        assert_eq!(files(&root, "base").len(), FOLDERS_DEEP);
+        let deepest = root.join(&name);
+        name.push("deeper");
+        let refused = led(&name).unwrap_err().to_string();
+        assert!(refused.contains("name one that is at most 8 folders below"), "{refused}");
+        assert_eq!(std::fs::read_dir(&deepest).unwrap().count(), 1, "nothing is made there");
+        // Nor if it is there, or is named otherwise.
+        std::fs::create_dir(deepest.join("deeper")).unwrap();
+        std::os::unix::fs::symlink(deepest.join("deeper"), root.join("link")).unwrap();
+        assert!(led(&name).is_err() && led(Path::new("link")).is_err() && led(Path::new("link/..")).is_ok());
     }
 
     #[test]
