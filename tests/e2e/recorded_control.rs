@@ -6,6 +6,7 @@ use rohrpost_recording::info;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// A connection of a test.
@@ -149,6 +150,19 @@ fn connections_are_answered_line_by_line_and_none_holds_the_recorder_up() {
     assert!(two.hear().starts_with("ERR the line is too long"));
     two.say(b"\n");
     assert!(two.ask("status").starts_with("OK "));
+    // A web page that is open on this computer: its request carries lines of its choice.
+    let long = format!("/{}", "a".repeat(2_000));
+    for path in ["/", &long] {
+        let mut page = ControlConnection::open(address);
+        page.say(format!("POST {path} HTTP/1.1\r\nHost: {address}\r\nAccept: */*\r\n\r\noff\n").as_bytes());
+        assert!(page.hear().starts_with("ERR this is HTTP"));
+        assert_eq!(page.hear(), "", "and the connection ends");
+    }
+    let mut page = ControlConnection::open(address);
+    page.say(format!("hOST: {address}\r\n\r\noff\n").as_bytes());
+    assert!(page.hear().starts_with("ERR this is HTTP"));
+    assert_eq!(page.hear(), "", "and the connection ends");
+    assert!(two.ask("status").starts_with("OK recording=on "));
     // One that asks and asks, and never takes an answer.
     let mut deaf = TcpStream::connect(address).unwrap();
     deaf.set_write_timeout(Some(Duration::from_millis(100))).unwrap();
@@ -183,6 +197,32 @@ fn connections_are_answered_line_by_line_and_none_holds_the_recorder_up() {
     let all: Vec<u64> = files.iter().flat_map(|file| numbers(file, "feeder.0/frame")).collect();
     assert_eq!(all, (all[0]..=last).collect::<Vec<u64>>(), "each is in one file");
     assert!(all[0] <= before);
+}
+
+/// Both come at the same time, and the command line fetches its answers.
+#[test]
+fn a_connection_that_chatters_takes_no_answers_from_the_command_line() {
+    let place = Place::new();
+    let address = own_address(21_123);
+    let (mut launch, robot) = launched(&place, &controlled(RECORD, address));
+    feed_until_recorded(&place, "feeder.0");
+    let ends = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let chatter = scope.spawn(|| {
+            let (mut connection, mut answers) = (ControlConnection::open(address), 0);
+            while !ends.load(Ordering::Relaxed) {
+                connection.say(&b"status\nnonsense\n".repeat(20));
+                answers += (0..40).filter(|_| !connection.hear().is_empty()).count();
+            }
+            answers
+        });
+        let told: Vec<_> = (0..8).map(|_| place.say(&["record", "rotate", "--timeout", "60"])).collect();
+        ends.store(true, Ordering::Relaxed);
+        assert!(chatter.join().unwrap() > 64, "or nothing was tried");
+        told.into_iter().for_each(|told| drop(told.ok()));
+    });
+    drop(robot);
+    launch.stop();
 }
 
 /// Recording does not depend on it.

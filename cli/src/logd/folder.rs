@@ -1,5 +1,6 @@
 //! Folders that log control may name: those below the configured one, wherever links lead.
 
+use super::leftovers::FOLDERS_DEEP;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -13,6 +14,11 @@ pub(super) enum FolderError {
         "{} is not below {}, where this recorder makes its files; name a folder below it", .0.display(), .1.display()
     )]
     Outside(PathBuf, PathBuf),
+    #[error(
+        "{} is too deep: files that are not closed would not be found there after a restart; name one that is at most \
+         {FOLDERS_DEEP} folders below {}", .0.display(), .1.display()
+    )]
+    TooDeep(PathBuf, PathBuf),
     #[error("{}: is no folder", .0.display())]
     NoFolder(PathBuf),
 }
@@ -27,8 +33,10 @@ pub(super) fn below(root: &Path, name: &str) -> Result<PathBuf, FolderError> {
     };
     let root = root.canonicalize().map_err(failed(root))?;
     let wanted = root.join(name);
-    let inside = |path: PathBuf| {
-        if path.starts_with(&root) { Ok(path) } else { Err(FolderError::Outside(wanted.clone(), root.clone())) }
+    let inside = |path: PathBuf| match path.strip_prefix(&root).map(|rest| rest.components().count()) {
+        Ok(0..=FOLDERS_DEEP) => Ok(path),
+        Ok(_) => Err(FolderError::TooDeep(wanted.clone(), root.clone())),
+        Err(_) => Err(FolderError::Outside(wanted.clone(), root.clone())),
     };
     let found = match wanted.canonicalize() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -36,7 +44,7 @@ pub(super) fn below(root: &Path, name: &str) -> Result<PathBuf, FolderError> {
                 return Err(FolderError::Io(wanted, error));
             };
             // The one above is inside, before anything is made; then a new folder is, too.
-            let made = inside(above.canonicalize().map_err(failed(above))?)?.join(name);
+            let made = inside(inside(above.canonicalize().map_err(failed(above))?)?.join(name))?;
             std::fs::create_dir(&made).map_err(failed(&made))?;
             made
         }

@@ -4,11 +4,12 @@
 use nix::sys::statvfs::statvfs;
 use rohrpost_recording::{is_closed, recover as recovered, recovered_path};
 use std::ffi::OsStr;
+use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Folders below folders that are looked through.
-const FOLDERS_DEEP: usize = 8;
+/// Folders below folders that are looked through. Log control leads no deeper.
+pub(super) const FOLDERS_DEEP: usize = 8;
 
 /// Begins. What is there now is looked at, and no file that comes later. Of the disk so much is left as recordings
 /// leave.
@@ -55,7 +56,14 @@ fn is_file(name: &str, stem: &str) -> bool {
 
 /// Whether its writer did not close it, and nothing was made of it yet. A file without a beginning has nothing in it.
 fn is_leftover(file: &Path) -> bool {
-    !recovered_path(file).exists() && matches!(is_closed(file), Ok(false))
+    !recovered_path(file).exists() && matches!(is_closed(file), Ok(false)) && !is_being_written(file)
+}
+
+/// Another recorder may make its files in a folder below. A writer holds a lock, which ends with its process; on a disk
+/// without locks nobody can tell.
+fn is_being_written(file: &Path) -> bool {
+    // A shared one: network file systems give no other for a file that is read.
+    File::open(file).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
 fn make_whole(file: &Path, leave_bytes: u64) {
@@ -84,7 +92,11 @@ fn has_room_for(file: &Path, leave_bytes: u64) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::folder::below;
     use super::*;
+    use rohrpost_recording::{Options, Session, Writer};
+    use std::collections::BTreeMap;
+    use std::time::Duration;
 
     #[test]
     fn what_is_to_be_left_free_is_left() {
@@ -105,6 +117,45 @@ mod tests {
         std::fs::write(below.join("arm-0001.mcap"), "").unwrap();
         assert_eq!(files(place.path(), "base"), wanted);
         assert!(files(&place.path().join("gone"), "base").is_empty());
+    }
+
+    #[test]
+    fn files_are_found_wherever_log_control_leads() {
+        let place = tempfile::tempdir().unwrap();
+        let root = place.path().canonicalize().unwrap();
+        let mut name = PathBuf::new();
+        let led = |name: &Path| below(&root, name.to_str().unwrap());
+        for _ in 0..FOLDERS_DEEP {
+            name.push("deeper");
+            std::fs::write(led(&name).unwrap().join("base-0001.mcap"), "").unwrap();
+        }
+        assert_eq!(files(&root, "base").len(), FOLDERS_DEEP);
+        let deepest = root.join(&name);
+        name.push("deeper");
+        let refused = led(&name).unwrap_err().to_string();
+        assert!(refused.contains("name one that is at most 8 folders below"), "{refused}");
+        assert_eq!(std::fs::read_dir(&deepest).unwrap().count(), 1, "nothing is made there");
+        // Nor if it is there, or is named otherwise.
+        std::fs::create_dir(deepest.join("deeper")).unwrap();
+        std::os::unix::fs::symlink(deepest.join("deeper"), root.join("link")).unwrap();
+        assert!(led(&name).is_err() && led(Path::new("link")).is_err() && led(Path::new("link/..")).is_ok());
+    }
+
+    #[test]
+    fn a_file_that_is_being_written_is_no_leftover() {
+        let place = tempfile::tempdir().unwrap();
+        let session = Session { node: "base".into(), versions: BTreeMap::new(), configuration: BTreeMap::new() };
+        let options = Options { flush: Duration::from_millis(1), ..Options::new(place.path(), "base") };
+        let writer = Writer::start(options, session).unwrap();
+        let [file, killed] = ["base-0001.mcap", "base-0002.mcap"].map(|name| place.path().join(name));
+        while !matches!(is_closed(&file), Ok(false)) {
+            assert!(writer.status().problem.is_none());
+            std::thread::yield_now();
+        }
+        // The same, without a writer.
+        std::fs::copy(&file, &killed).unwrap();
+        assert_eq!((is_leftover(&file), is_leftover(&killed)), (false, true));
+        drop(writer);
     }
 
     #[test]

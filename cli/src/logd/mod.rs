@@ -21,7 +21,7 @@ mod taps;
 
 use crate::router::NoSettings;
 use crate::version;
-use control::{ControlServer, Orders};
+use control::{ControlServer, Orders, Told};
 use health::Health;
 use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
 use rohrpost::{Context, Module, ModuleClock, ModuleError, Ready, Received, Start, StartError};
@@ -162,14 +162,16 @@ impl Logd {
 
     /// Obeys what connections say, as far as it goes without waiting.
     fn serve(&mut self, context: &mut Context) {
-        self.control.tell(|order| self.orders.answer(order));
+        let now = Instant::now();
+        self.control.tell(|order| self.orders.take_answer(order), now);
         while let Some((client, command)) = self.control.next_command() {
-            let order = match command {
-                Ok(command) => self.obey(command),
-                Err(error) => self.orders.add_answered(ControlAnswer::err(&error)),
-            };
-            self.control.wait_for(client, order);
-            self.control.tell(|order| self.orders.answer(order));
+            match command.map_or_else(|error| Told::Now(ControlAnswer::err(&error)), |command| self.obey(command)) {
+                Told::Now(answer) => self.control.answer(client, &answer, now),
+                Told::Later(order) => {
+                    self.control.wait_for(client, order);
+                    self.control.tell(|order| self.orders.take_answer(order), now);
+                }
+            }
         }
         self.control.watch(context);
     }
@@ -194,9 +196,10 @@ impl Recorder for Logd {
     }
 
     fn order(&mut self, line: String) -> u32 {
-        match line.parse::<ControlCommand>() {
-            Ok(command) => self.obey(command),
-            Err(error) => self.orders.add_answered(ControlAnswer::err(&error)),
+        let command = line.parse::<ControlCommand>();
+        match command.map_or_else(|error| Told::Now(ControlAnswer::err(&error)), |command| self.obey(command)) {
+            Told::Now(answer) => self.orders.add_answered(answer),
+            Told::Later(order) => order,
         }
     }
 

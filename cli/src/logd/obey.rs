@@ -1,6 +1,6 @@
 //! What the commands of log control do, however they came.
 
-use super::control::OpenOrder;
+use super::control::{OpenOrder, Told};
 use super::folder::below;
 use super::{Logd, finish, has_begun};
 use rohrpost_recording::{ControlAnswer, ControlCommand, FileChange, Mark, OrderError, PendingOrder, Status, Writer};
@@ -10,8 +10,8 @@ use std::path::Path;
 const NS_PER_S: u64 = 1_000_000_000;
 
 impl Logd {
-    /// Carries out a command, or begins to; the number of its answer.
-    pub(super) fn obey(&mut self, command: ControlCommand) -> u32 {
+    /// Carries out a command, or begins to.
+    pub(super) fn obey(&mut self, command: ControlCommand) -> Told {
         let told = match command {
             ControlCommand::On => self.switch_on(),
             ControlCommand::Off => self.switch_off(),
@@ -24,11 +24,11 @@ impl Logd {
         };
         match told {
             Ok(order) => {
-                let number = self.orders.add_open(order);
+                let told = self.orders.add_open(order);
                 self.look_at_orders();
-                number
+                told
             }
-            Err(answer) => self.orders.add_answered(answer),
+            Err(answer) => Told::Now(answer),
         }
     }
 

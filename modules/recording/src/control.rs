@@ -14,6 +14,9 @@ use thiserror::Error;
 
 /// Bytes of a line, with its end.
 pub const CONTROL_LINE_BYTES_MAX: usize = 1024;
+/// A line that begins with one of them is a request of HTTP, as any web page can have a browser send it.
+const HTTP_METHODS: [&[u8]; 9] =
+    [b"GET", b"POST", b"PUT", b"HEAD", b"OPTIONS", b"PATCH", b"DELETE", b"CONNECT", b"TRACE"];
 /// So much of a wrong word is repeated in the answer.
 const WORD_CHARS_MAX: usize = 20;
 
@@ -43,6 +46,9 @@ pub enum ControlError {
     /// It is no text, or has control characters.
     #[error("the line is no text; write one command in letters, and end it with a line feed")]
     NoText,
+    /// It belongs to a request of HTTP. Nothing behind it is to be obeyed: it may be from a web page.
+    #[error("this is HTTP, and nothing of it is obeyed; open a connection of its own, and send commands alone")]
+    Http,
     /// A word that is no command.
     #[error("no command `{0}`; there are on, off, directory PATH, status, mark TEXT, rotate")]
     Unknown(String),
@@ -123,9 +129,10 @@ impl ControlLines {
                 if self.skips {
                     self.bytes.clear();
                 } else if self.room() == 0 {
+                    let error = if is_http(&self.bytes) { ControlError::Http } else { ControlError::TooLong };
                     self.bytes.clear();
                     self.skips = true;
-                    return Some(Err(ControlError::TooLong));
+                    return Some(Err(error));
                 }
                 return None;
             };
@@ -136,12 +143,22 @@ impl ControlLines {
             // As telnet ends a line.
             let line = &line[..end];
             let line = line.strip_suffix(b"\r").unwrap_or(line);
+            if is_http(line) {
+                return Some(Err(ControlError::Http));
+            }
             if !line.is_empty() {
                 let text = std::str::from_utf8(line).map_err(|_| ControlError::NoText);
                 return Some(text.and_then(str::parse));
             }
         }
     }
+}
+
+/// Whether a line, or what came of it, is of a request.
+fn is_http(line: &[u8]) -> bool {
+    let line = line.trim_ascii_start();
+    let word = line.split(|byte| *byte == b' ').next().unwrap_or_default();
+    HTTP_METHODS.contains(&word) || line.get(..5).is_some_and(|name| name.eq_ignore_ascii_case(b"Host:"))
 }
 
 /// The answer to one command: one line of ASCII.
@@ -229,6 +246,11 @@ mod tests {
             (b"\xff\xfb\x01", "no text"),
             (&b"a".repeat(500), "no command `aaaaaaaaaaaaaaaaaaaa`;"),
             (&b"a".repeat(1500), "too long"),
+            (b"POST /off HTTP/1.1\r", "this is HTTP"),
+            (b"GET /\xff", "this is HTTP"),
+            (b"host: 127.0.0.1:21121\r", "this is HTTP"),
+            (&[b"POST /", &b"a".repeat(1500)[..]].concat(), "this is HTTP"),
+            (b"POSTS", "no command `POSTS`"),
         ] {
             let told = read(&[line, b"\nstatus\n"].concat());
             assert_eq!((told.len(), &told[1]), (2, &Ok(ControlCommand::Status)), "{told:?}");

@@ -38,7 +38,11 @@ pub(crate) struct RealDisk;
 
 impl Disk for RealDisk {
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        Ok(Box::new(OpenOptions::new().write(true).create_new(true).open(path)?))
+        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        // As long as it is open, others see that it is being written. Where there are no locks, it is written all the
+        // same.
+        let _ = file.try_lock();
+        Ok(Box::new(file))
     }
 
     fn free_bytes(&mut self, folder: &Path) -> io::Result<u64> {

@@ -18,6 +18,7 @@ pub(super) struct ControlClient {
     /// It says nothing more, but may wait for answers.
     has_ended: bool,
     is_broken: bool,
+    /// When it said something, or took some of an answer.
     heard: Instant,
 }
 
@@ -40,9 +41,15 @@ impl ControlClient {
         self.watch.is_some_and(|(its, _)| its == watch)
     }
 
-    /// For so long nothing came, and nothing is under way.
+    /// For so long nothing came, no answer was taken, and no order is under way.
     pub(super) fn silent(&self, now: Instant) -> Duration {
-        if self.is_free() { now.saturating_duration_since(self.heard) } else { Duration::ZERO }
+        if self.order.is_some() { Duration::ZERO } else { now.saturating_duration_since(self.heard) }
+    }
+
+    /// It did not take all of its answer yet.
+    #[cfg(test)]
+    pub(super) fn has_rest(&self) -> bool {
+        !self.rest.is_empty()
     }
 
     /// The order that it waits for.
@@ -59,7 +66,7 @@ impl ControlClient {
         if self.is_free() && !self.has_ended {
             self.read(now);
         }
-        self.write();
+        self.write(now);
     }
 
     fn is_free(&self) -> bool {
@@ -82,21 +89,30 @@ impl ControlClient {
 
     /// The next command, as soon as the one before is answered and the answer taken.
     pub(super) fn next_command(&mut self) -> Option<Result<ControlCommand, ControlError>> {
-        if self.is_free() && !self.is_broken { self.lines.next_command() } else { None }
+        let command = if self.is_free() && !self.is_broken { self.lines.next_command() } else { None };
+        if matches!(command, Some(Err(ControlError::Http))) {
+            // What is behind it is from a web page, too.
+            self.has_ended = true;
+            self.lines = ControlLines::default();
+        }
+        command
     }
 
-    pub(super) fn answer(&mut self, answer: &ControlAnswer) {
+    pub(super) fn answer(&mut self, answer: &ControlAnswer, now: Instant) {
         self.order = None;
         self.rest.extend_from_slice(answer.line().as_bytes());
         self.rest.push(b'\n');
-        self.write();
+        self.write(now);
     }
 
-    fn write(&mut self) {
+    fn write(&mut self, now: Instant) {
         while !self.rest.is_empty() && !self.is_broken {
             match self.socket.write(&self.rest) {
                 Ok(0) => self.is_broken = true,
-                Ok(count) => drop(self.rest.drain(..count)),
+                Ok(count) => {
+                    self.rest.drain(..count);
+                    self.heard = now;
+                }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
                 Err(error) => self.note(&error),
             }

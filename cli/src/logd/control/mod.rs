@@ -4,5 +4,5 @@ mod client;
 mod orders;
 mod server;
 
-pub(super) use orders::{OpenOrder, Orders};
+pub(super) use orders::{OpenOrder, Orders, Told};
 pub(super) use server::ControlServer;

@@ -23,6 +23,14 @@ pub(in crate::logd) enum OpenOrder {
     Moved(PendingOrder, PathBuf),
 }
 
+/// What a command brought.
+pub(in crate::logd) enum Told {
+    /// It is answered.
+    Now(ControlAnswer),
+    /// It is an order of this number, and answered once that is carried out.
+    Later(u32),
+}
+
 /// All orders so far.
 #[derive(Default)]
 pub(in crate::logd) struct Orders {
@@ -32,21 +40,21 @@ pub(in crate::logd) struct Orders {
 }
 
 impl Orders {
-    /// Notes an order with its answer; its number.
+    /// Keeps an answer for a caller that fetches it; its number.
     pub(in crate::logd) fn add_answered(&mut self, answer: ControlAnswer) -> u32 {
         let number = self.number();
         self.keep(number, answer);
         number
     }
 
-    /// Notes an order that is carried out later; its number.
-    pub(in crate::logd) fn add_open(&mut self, order: OpenOrder) -> u32 {
+    /// Notes an order that is carried out later, if there is room.
+    pub(in crate::logd) fn add_open(&mut self, order: OpenOrder) -> Told {
         if self.open.len() >= OPEN_MAX {
-            return self.add_answered(ControlAnswer::err(&format!("{OPEN_MAX} orders wait already; try again")));
+            return Told::Now(ControlAnswer::err(&format!("{OPEN_MAX} orders wait already; try again")));
         }
         let number = self.number();
         self.open.push((number, order));
-        number
+        Told::Later(number)
     }
 
     /// Asks what became of those that are open.
@@ -71,6 +79,13 @@ impl Orders {
         ))
     }
 
+    /// The same, for one that asks no more: the answer makes room for those that others fetch.
+    pub(in crate::logd) fn take_answer(&mut self, number: u32) -> Option<ControlAnswer> {
+        let answer = self.answer(number)?;
+        self.answers.retain(|(answered, _)| *answered != number);
+        Some(answer)
+    }
+
     fn number(&mut self) -> u32 {
         self.next = self.next.wrapping_add(1);
         self.next
@@ -91,7 +106,8 @@ mod tests {
     #[test]
     fn orders_are_answered_once_they_are_carried_out_and_bounded() {
         let mut orders = Orders::default();
-        let (at_once, later) = (orders.add_answered(ControlAnswer::ok()), orders.add_open(OpenOrder::Begun));
+        let (at_once, later) =
+            (orders.add_answered(ControlAnswer::ok()), added(&mut orders, OpenOrder::Begun).unwrap());
         assert_eq!((orders.answer(at_once), orders.answer(later)), (Some(ControlAnswer::ok()), None));
         orders.poll(|_| None);
         assert_eq!(orders.answer(later), None);
@@ -99,13 +115,33 @@ mod tests {
         assert_eq!(orders.answer(later).unwrap().line(), "OK lost=0");
         assert_eq!(orders.answer(later).unwrap().line(), "OK lost=0", "a caller may ask again");
         assert!(orders.answer(77).unwrap().line().starts_with("ERR order 77 is unknown"));
-        let open: Vec<u32> = (0..=OPEN_MAX).map(|_| orders.add_open(OpenOrder::Ending)).collect();
-        let answers: Vec<_> = open.iter().map(|number| orders.answer(*number)).collect();
-        assert!(answers[..OPEN_MAX].iter().all(Option::is_none));
-        assert!(answers[OPEN_MAX].as_ref().is_some_and(|answer| !answer.is_ok()), "{answers:?}");
+        for _ in 0..OPEN_MAX {
+            let number = added(&mut orders, OpenOrder::Ending).unwrap();
+            assert_eq!(orders.answer(number), None);
+        }
+        assert!(!added(&mut orders, OpenOrder::Ending).unwrap_err().is_ok());
         for _ in 0..ANSWERS_MAX {
             orders.add_answered(ControlAnswer::ok());
         }
         assert!(!orders.answer(at_once).unwrap().is_ok(), "too long ago");
+    }
+
+    #[test]
+    fn answers_that_a_connection_took_push_out_none_that_are_fetched() {
+        let mut orders = Orders::default();
+        let fetched = orders.add_answered(ControlAnswer::ok());
+        for _ in 0..2 * ANSWERS_MAX {
+            let taken = added(&mut orders, OpenOrder::Ending).unwrap();
+            orders.poll(|_| Some(ControlAnswer::ok()));
+            assert_eq!(orders.take_answer(taken), Some(ControlAnswer::ok()));
+        }
+        assert_eq!(orders.answer(fetched), Some(ControlAnswer::ok()));
+    }
+
+    fn added(orders: &mut Orders, order: OpenOrder) -> Result<u32, ControlAnswer> {
+        match orders.add_open(order) {
+            Told::Later(number) => Ok(number),
+            Told::Now(answer) => Err(answer),
+        }
     }
 }

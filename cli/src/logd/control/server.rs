@@ -95,11 +95,16 @@ impl ControlServer {
         self.clients[client].wait_for(order);
     }
 
+    /// Answers the connection at once.
+    pub(in crate::logd) fn answer(&mut self, client: usize, answer: &ControlAnswer, now: Instant) {
+        self.clients[client].answer(answer, now);
+    }
+
     /// Tells answers that are there by now.
-    pub(in crate::logd) fn tell(&mut self, answer: impl Fn(u32) -> Option<ControlAnswer>) {
+    pub(in crate::logd) fn tell(&mut self, mut take: impl FnMut(u32) -> Option<ControlAnswer>, now: Instant) {
         for client in &mut self.clients {
-            if let Some(answer) = client.order().and_then(&answer) {
-                client.answer(&answer);
+            if let Some(answer) = client.order().and_then(&mut take) {
+                client.answer(&answer, now);
             }
         }
     }
@@ -133,9 +138,7 @@ impl ControlServer {
 
     fn take_in(&mut self, socket: TcpStream, context: &mut Context, now: Instant) {
         if self.clients.len() >= CLIENTS_MAX {
-            let all = self.clients.iter().enumerate();
-            let silent = all.max_by_key(|(_, client)| client.silent(now));
-            match silent.filter(|(_, client)| client.silent(now) >= SILENT).map(|(at, _)| at) {
+            match replaceable(&self.clients, now) {
                 Some(at) => self.clients.remove(at).forget(context),
                 None => return refuse(socket),
             }
@@ -145,10 +148,57 @@ impl ControlServer {
     }
 }
 
+/// The connection that makes room for another one.
+fn replaceable(clients: &[ControlClient], now: Instant) -> Option<usize> {
+    let silent = clients.iter().map(|client| client.silent(now)).enumerate();
+    silent.filter(|(_, silent)| *silent >= SILENT).max_by_key(|(_, silent)| *silent).map(|(at, _)| at)
+}
+
 /// Says why, if that goes without waiting.
 fn refuse(mut socket: TcpStream) {
     let why = ControlAnswer::err(&format!("{CLIENTS_MAX} connections are open already; close one"));
     if socket.set_nonblocking(true).is_ok() {
         let _ = socket.write_all(format!("{}\n", why.line()).as_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Read;
+
+    /// Connections that all are there, and their other ends.
+    fn connected(now: Instant) -> (Vec<ControlClient>, Vec<TcpStream>) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let pair = |_| {
+            let other = TcpStream::connect(address).unwrap();
+            (ControlClient::new(listener.accept().unwrap().0, now).unwrap(), other)
+        };
+        (0..CLIENTS_MAX).map(pair).unzip()
+    }
+
+    /// Nothing is heard of an order that takes long, either.
+    #[test]
+    fn connections_that_take_no_answers_make_room_and_those_that_wait_for_one_do_not() {
+        let began = Instant::now();
+        let (mut clients, mut others) = connected(began);
+        let answer = ControlAnswer::ok().with_text("text", &"x".repeat(100_000));
+        for client in &mut clients {
+            while !client.has_rest() {
+                client.answer(&answer, began);
+            }
+        }
+        assert_eq!(replaceable(&clients, began + SILENT / 2), None, "not so soon");
+        let later = began + SILENT;
+        assert!(replaceable(&clients, later).is_some());
+        // One of them goes on reading, however slowly.
+        let mut taken = vec![0; 10_000_000];
+        while clients[0].silent(later) > Duration::ZERO {
+            assert!(others[0].read(&mut taken).unwrap() > 0);
+            clients[0].move_bytes(later);
+        }
+        clients[1..].iter_mut().for_each(|client| client.wait_for(1));
+        assert_eq!(replaceable(&clients, later), None);
     }
 }
