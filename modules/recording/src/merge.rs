@@ -1,7 +1,7 @@
 //! Several files in one, by time of arrival.
 
 use crate::error::{ReadError, Shown};
-use crate::format::{self, metadata};
+use crate::format::{self, key, metadata};
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::{Definition, Definitions, SchemaText};
 use crate::read::frames::Frames;
@@ -46,7 +46,7 @@ pub enum MergeError {
 
 /// Writes messages of all files to a new one: always the one that arrived first of those that are next in their files.
 /// So each file's order stays, also where its time steps back. What a file repeats at its beginning is left out if it
-/// is there already. Its messages and bytes.
+/// is there already; what is drawn of that, once there is anything of its topic. Its messages and bytes.
 ///
 /// # Errors
 /// When one was not closed or is damaged, one name has two types, or the new file cannot be written.
@@ -94,8 +94,10 @@ impl Written {
     fn takes(&mut self, found: &Found) -> bool {
         let Found { channel, header, .. } = found;
         let its = (channel.epoch(), header.sequence, header.publish_time);
+        // Not each message is drawn, and some are drawn once in a file, of whichever message came first there.
+        let is_drawn = channel.texts.contains_key(key::DRAWN);
         match self.0.get_mut(&channel.topic) {
-            Some(last) if channel.is_repeated() && *last == its => return false,
+            Some(last) if channel.is_repeated() && (is_drawn || *last == its) => return false,
             Some(last) => *last = its,
             None => drop(self.0.insert(channel.topic.clone(), its)),
         }

@@ -10,7 +10,7 @@ use rohrpost_recording::{
     DrawError, DrawOptions, Drawn, DrawnBeside, Options, ReadError, Reader, RewriteError, SelectError, Selection, cut,
     draw, info, merge,
 };
-use sights::{Sight, line, pose, record, record_with, scan, sight, sights};
+use sights::{Sight, line, pose, record, record_files, record_with, scan, sight, sights};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -234,4 +234,26 @@ fn what_is_drawn_while_it_is_recorded_is_sampled_and_short() {
     let told = info(&path).unwrap();
     let image = told.channels.iter().find(|channel| channel.topic == "camera.0/image").unwrap();
     assert_eq!((image.messages, told.lost), (1, 0));
+}
+
+#[test]
+fn what_is_drawn_of_what_files_repeat_is_merged_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawn = Some(DrawnBeside { period_ns: 1, classes: BTreeMap::new() });
+    let options = Options { drawn, ..Options::new(folder.path(), "base") };
+    let all = sights();
+    // The world is drawn of the odometry in the first file, and of the pose in the others.
+    record_files(options, &[&all, &all[..1], &all[9..]]);
+    let files = ["base-0001.mcap", "base-0002.mcap", "base-0003.mcap"].map(|name| folder.path().join(name));
+    let told = files.each_ref().map(|path| info(path).unwrap());
+    let messages: u64 = told.iter().map(|info| info.messages).sum();
+    let worlds = |path: &Path| drawn_of(path).iter().filter(|(topic, ..)| topic == "world/transform").count();
+    assert!(files.iter().all(|path| worlds(path) == 1) && told[1].repeated > 10, "{told:?}");
+    let to = folder.path().join("all.merged");
+    merge(&files, &to, &mut |_, _| {}).unwrap();
+    let merged = info(&to).unwrap();
+    assert_eq!((merged.messages, merged.repeated, worlds(&to)), (messages, 0, 1), "{merged:?}");
+    let to = folder.path().join("rest.merged");
+    merge(&files[1..], &to, &mut |_, _| {}).unwrap();
+    assert_eq!((info(&to).unwrap().repeated, worlds(&to)), (told[1].repeated, 1));
 }

@@ -77,9 +77,18 @@ pub(crate) fn record(folder: &Path, stem: &str, sights: &[Sight]) -> PathBuf {
 
 /// The same with other options.
 pub(crate) fn record_with(options: Options, sights: &[Sight]) {
+    record_files(options, &[sights]);
+}
+
+/// The same, each of these in a file of its own.
+pub(crate) fn record_files(options: Options, files: &[&[Sight]]) {
     let session = Session { node: "base".into(), ..Session::default() };
     let mut writer = Writer::start(Options { leave_bytes: 0, ..options }, session).unwrap();
-    for (number, (name, item, ty, data)) in (0_u32..).zip(sights) {
+    let sights = files.iter().flat_map(|file| file.iter().enumerate());
+    for (number, (at, (name, item, ty, data))) in (0_u32..).zip(sights) {
+        if number > 0 && at == 0 {
+            writer.rotate().unwrap();
+        }
         let channel = writer.channel(&ChannelSpec { name, item, ty, texts: BTreeMap::new() }).unwrap();
         let stamp_ns = STAMP_NS + u64::from(number) * 10_000_000;
         let message = Message { arrival_ns: stamp_ns + 1_000, stamp_ns, epoch: 1, sequence: number, data };
