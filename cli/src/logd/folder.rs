@@ -16,7 +16,7 @@ pub(super) enum FolderError {
     Outside(PathBuf, PathBuf),
     #[error(
         "{} is too deep: files that are not closed would not be found there after a restart; name one that is at most \
-         {FOLDERS_DEEP} folders below {}", .0.display(), .1.display()
+         {} folders below {}", .0.display(), FOLDERS_DEEP, .1.display()
     )]
     TooDeep(PathBuf, PathBuf),
     #[error("{}: is no folder", .0.display())]

@@ -56,7 +56,8 @@ fn is_file(name: &str, stem: &str) -> bool {
 
 /// Whether its writer did not close it, and nothing was made of it yet. A file without a beginning has nothing in it.
 fn is_leftover(file: &Path) -> bool {
-    !recovered_path(file).exists() && matches!(is_closed(file), Ok(false)) && !is_being_written(file)
+    // In this order: a writer that ends meanwhile closes it.
+    !recovered_path(file).exists() && !is_being_written(file) && matches!(is_closed(file), Ok(false))
 }
 
 /// Another recorder may make its files in a folder below. A writer holds a lock, which ends with its process; on a disk

@@ -249,7 +249,7 @@ mod tests {
             (b"POST /off HTTP/1.1\r", "this is HTTP"),
             (b"GET /\xff", "this is HTTP"),
             (b"host: 127.0.0.1:21121\r", "this is HTTP"),
-            (&[b"POST /", &b"a".repeat(1500)[..]].concat(), "this is HTTP"),
+            (&[&b"POST /"[..], &b"a".repeat(1500)].concat(), "this is HTTP"),
             (b"POSTS", "no command `POSTS`"),
         ] {
             let told = read(&[line, b"\nstatus\n"].concat());
