@@ -1,6 +1,7 @@
 //! `rohrpost clean`.
 
 use super::demo::remove_abandoned;
+use super::exact::SHARED_MEMORY;
 use crate::terminal::{Failure, say};
 use rohrpost_mailbox::{Node, NodeError, base_directory, remove_base_if_empty};
 use std::path::Path;
@@ -25,7 +26,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             outcome => done.push((path, outcome)),
         }
     }
-    let demos = remove_abandoned(&std::env::temp_dir());
+    let mut demos = remove_abandoned(&std::env::temp_dir());
+    demos.extend(remove_abandoned(Path::new(SHARED_MEMORY)));
     if arguments.json {
         let nodes: Vec<serde_json::Value> = done.iter().map(|(path, outcome)| json(path, outcome)).collect();
         say(serde_json::json!({ "directory": base, "nodes": nodes, "demos": demos }));
@@ -39,7 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say(text(path, outcome));
     }
     for folder in demos {
-        say(format_args!("removed {}, the files of a demo", folder.display()));
+        say(format_args!("removed {}, the files of a demo or a replay", folder.display()));
     }
     remove_base_if_empty();
     Ok(ExitCode::SUCCESS)

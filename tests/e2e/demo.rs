@@ -272,7 +272,7 @@ fn the_files_of_a_killed_demo_are_removed_and_those_of_one_that_runs_are_not() {
         let said = Running::start(command).said();
         assert_eq!(said.code, Some(0), "{said:?}");
         if remover == ["clean"] {
-            let line = format!("removed {}, the files of a demo", left[0].display());
+            let line = format!("removed {}, the files of a demo or a replay", left[0].display());
             assert_eq!(
                 said.out.lines().filter(|told| told.contains("the files of a demo")).collect::<Vec<_>>(),
                 [line]

@@ -22,9 +22,13 @@ pub(crate) struct Folder {
 impl Folder {
     /// Creates a folder among temporary files. Removes the folders of killed demos.
     pub(crate) fn new() -> io::Result<Self> {
-        let temp = std::env::temp_dir();
-        remove_abandoned(&temp);
-        Self::new_in(&temp)
+        Self::within(&std::env::temp_dir())
+    }
+
+    /// The same in another folder.
+    pub(crate) fn within(base: &Path) -> io::Result<Self> {
+        remove_abandoned(base);
+        Self::new_in(base)
     }
 
     fn new_in(temp: &Path) -> io::Result<Self> {

@@ -11,6 +11,7 @@ mod program;
 use crate::terminal::{Failure, complain, say};
 use journals::RecordedRun;
 use program::ExactPrograms;
+pub(super) use program::SHARED_MEMORY;
 use rohrpost::output::plain;
 use rohrpost_modules::journal::{Difference, ReplayReport, ReplayVerdict};
 use serde_json::{Value, json};

@@ -1,7 +1,7 @@
 //! The program of a module, run with a journal and nothing else.
 
 use super::journals::RecordedRun;
-use crate::demo::{is_built_in, write_map};
+use crate::demo::{Folder, is_built_in, write_map};
 use crate::terminal::Failure;
 use rohrpost_config::{Program, find_program};
 use rohrpost_modules::journal::{ExactRun, ReplayReport, VARIABLE};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Where shared memory is; a program that runs alone has its mailboxes and streams there, too.
-const SHARED_MEMORY: &str = "/dev/shm";
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
 /// Runs programs of recorded modules.
 pub(super) struct ExactPrograms {
@@ -24,7 +24,7 @@ impl ExactPrograms {
 
     /// Repeats a run, and reads what the program found.
     pub(super) fn repeat(&self, run: &RecordedRun) -> Result<ReplayReport, Failure> {
-        let directory = tempfile::Builder::new().prefix("rohrpost-exact-").tempdir_in(SHARED_MEMORY)?;
+        let directory = Folder::within(Path::new(SHARED_MEMORY))?;
         let (file, report) = (directory.path().join("run"), directory.path().join("report"));
         let folder = self.folder.as_ref().map(|folder| canonical(folder)).transpose()?;
         let mut exact =

@@ -13,6 +13,7 @@ use crate::interface::StandIn;
 use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal, SHAPE, Tag};
 use crate::module::{Module, ModuleError};
 use crate::output;
+use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
 use rohrpost_config::{Installation, MailboxSpec, Scheduling, Start as StartState};
 use rohrpost_mailbox::{
@@ -89,6 +90,8 @@ impl Start {
         let restarts = variable(environment::RESTARTS).and_then(|count| count.parse().ok()).unwrap_or(0);
         let mut off = std::env::var_os(environment::OFF).is_some();
         if let Some(run) = ExactRun::from_environment()? {
+            // It ends with the tool that compares: nobody else waits for it.
+            set_pdeathsig(Some(Signal::SIGKILL)).map_err(|error| StartError::System("prctl", error.into()))?;
             let (installation, name) = run.installation()?;
             return Ok(Self { installation: Arc::new(installation), name, launcher: None, restarts: 0, off: true });
         }
@@ -262,7 +265,7 @@ pub(crate) fn shape(spec: &MailboxSpec) -> Shape {
 /// Ends this process when launch dies, whatever killed it: no orphan drives a robot.
 fn die_with_launch(launcher: Option<u32>) -> Result<(), StartError> {
     let Some(launcher) = launcher else { return Ok(()) };
-    nix::sys::prctl::set_pdeathsig(Some(Signal::SIGTERM)).map_err(|error| StartError::System("prctl", error.into()))?;
+    set_pdeathsig(Some(Signal::SIGTERM)).map_err(|error| StartError::System("prctl", error.into()))?;
     // It may have died before the call above.
     if nix::unistd::getppid().as_raw().unsigned_abs() == launcher { Ok(()) } else { Err(StartError::Orphan(launcher)) }
 }
