@@ -92,7 +92,6 @@ const LONG: &[(&str, usize)] = &[
     ("modules/src/call/deduplicator_simulation.rs", 403),
     ("modules/src/output/way.rs", 438),
     ("modules/tests/launch.rs", 404),
-    ("routers/src/frame/mod.rs", 429),
     ("routers/src/outbound/tests/mod.rs", 461),
     ("routers/src/session/client/mod.rs", 414),
     ("routers/src/time/clock.rs", 420),

@@ -67,6 +67,12 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
             "at_worst": bound.map(at_worst),
         })
     });
+    let replicas = installation.replicas.iter().map(|replica| {
+        json!({
+            "from": text(replica.from), "stream": replica.item, "to": replica.to,
+            "sampling": replica.sampling.to_string(),
+        })
+    });
     let access = installation.access.iter().map(|rule| {
         let callers = rule.callers.iter().map(|class| classes.name(*class));
         json!({ "class": classes.name(rule.class), "callers": callers.collect::<Vec<_>>() })
@@ -88,6 +94,7 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
         "gui": show.collect::<Vec<_>>(),
         "record": installation.record.as_ref().map(|it| record(installation, it)),
         "flows": flows.collect::<Vec<_>>(),
+        "replicas": replicas.collect::<Vec<_>>(),
         "access": access.collect::<Vec<_>>(),
     })
 }
@@ -176,11 +183,12 @@ fn scheduling(scheduling: Scheduling) -> Value {
     }
 }
 
-/// `rest_port`: null where there are time slots.
+/// `rest_port`: null where there are time slots; `replica_port`: null without a replica.
 fn network(installation: &Installation, network: Network) -> Value {
     json!({
         "security": network.security.as_str(), "port": network.port, "time_port": network.time_port(),
-        "rest_port": installation.rest_port(), "mtu": network.mtu, "datagram_bytes_max": network.datagram_bytes_max,
+        "rest_port": installation.rest_port(), "replica_port": installation.replica_port(), "mtu": network.mtu,
+        "datagram_bytes_max": network.datagram_bytes_max,
         "rate_bytes_s": network.rate_bytes_s, "quota_bytes": network.quota_bytes, "bulk_below": network.bulk_below,
     })
 }

@@ -1,6 +1,7 @@
 //! Rules across modules.
 
 mod access;
+mod replica;
 
 use crate::flow::Flow;
 use crate::installation::Installation;
@@ -32,6 +33,7 @@ pub(crate) fn across(installation: &Installation, lines: &[Lines], slots: Option
         self::flow(installation, flow, lines, reader);
     }
     carried_twice(installation, reader);
+    replica::validate(installation, reader);
     // Consequences of other mistakes are not reported.
     if let Some(slots) = slots.filter(|_| reader.is_content()) {
         tdma::validate(installation, slots, reader);

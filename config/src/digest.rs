@@ -18,7 +18,8 @@ pub struct Digest {
     /// Equal wherever packages are exchanged: the classes, by id and name.
     pub common: u64,
     /// Equal inside a system: its nodes, which of them are on the LAN, their tool instances, the node of each module,
-    /// and the agreements of routers: port, MTU, masters of time and their interval, the time slots and their tunnel.
+    /// and the agreements of routers: port, MTU, masters of time and their interval, the time slots and their tunnel,
+    /// the replicas.
     pub system: u64,
 }
 
@@ -75,6 +76,7 @@ impl Installation {
                 self.time.lan_text()
             ));
         }
+        lines.extend(self.replica_text());
         lines.sort();
         format!("rohrpost system 1\nsystem {} {:?}\n{}\n", self.system.id, self.system.name, lines.join("\n"))
     }

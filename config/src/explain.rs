@@ -13,7 +13,7 @@ use crate::output::LineFormat;
 use crate::saved::SavedValue;
 use crate::time::TimeSource;
 use crate::units::{count_text, duration_text, size_text};
-use rohrpost_mailbox::Name;
+use rohrpost_mailbox::{Name, saturating_sum};
 use rohrpost_network::LEVEL_NOT_REAL_TIME;
 use std::fmt::Write;
 use std::time::Duration;
@@ -41,6 +41,7 @@ pub fn explain(installation: &Installation, node: Option<&str>) -> String {
     page.record();
     page.gui();
     page.flows();
+    page.replicas();
     page.at_worst();
     page.text
 }
@@ -125,9 +126,15 @@ impl Page<'_> {
             Some(_) => "in its time slots only".into(),
         };
         let (port, time_port) = (network.port, network.time_port());
-        let ports = match self.installation.rest_port() {
-            Some(rest) => format!("{port} (packages), {time_port} (time) and {rest} (packages that are not real time)"),
-            None => format!("{port} (packages) and {time_port} (time)"),
+        let ports = match (self.installation.rest_port(), self.installation.replica_port()) {
+            (Some(rest), Some(replicas)) => format!(
+                "{port} (packages), {time_port} (time), {rest} (packages that are not real time) and {replicas} \
+                 (replicas)"
+            ),
+            (Some(rest), None) => {
+                format!("{port} (packages), {time_port} (time) and {rest} (packages that are not real time)")
+            }
+            (None, _) => format!("{port} (packages) and {time_port} (time)"),
         };
         self.entry(
             "network",
@@ -193,7 +200,8 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let (number, memory) = (count_text(modules.len(), "module"), memory::of_node(&modules));
+        let replicas = saturating_sum(self.installation.replica_memory_on(&node.name));
+        let (number, memory) = (count_text(modules.len(), "module"), memory::of_node(&modules, replicas));
         self.line("");
         self.line(format!("Node `{}`: {number}, {memory}", node.name));
         self.line("");

@@ -8,6 +8,7 @@ use crate::module::Module;
 use crate::node::{self, Node, System};
 use crate::output::{Level, Output};
 use crate::record::Recording;
+use crate::replica::Replica;
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tcp::Tcp;
@@ -58,6 +59,8 @@ pub struct Installation {
     pub record: Option<Recording>,
     /// Regular traffic between modules.
     pub flows: Vec<Flow>,
+    /// Streams that other nodes have, too.
+    pub replicas: Vec<Replica>,
     /// Where values of parameters are saved, if anywhere.
     pub parameters: Option<PathBuf>,
     /// What is saved there.
@@ -83,7 +86,7 @@ impl Installation {
 
     /// Bytes of shared memory that the mailboxes and streams of a node take, as far as the file names them.
     pub fn memory_on(&self, node: &str) -> u64 {
-        saturating_sum(self.modules_on(node).map(Module::memory))
+        saturating_sum(self.modules_on(node).map(Module::memory).chain(self.replica_memory_on(node)))
     }
 
     /// The nodes that are on the LAN, or the only one; they come first in [`nodes`](Self::nodes).
@@ -136,6 +139,11 @@ impl Installation {
     /// The UDP port of what is not real time, if that is separate. In time slots all goes through one port, by level.
     pub fn rest_port(&self) -> Option<u16> {
         self.network.filter(|_| self.tdma.is_none()).map(|network| network.rest_port())
+    }
+
+    /// The UDP port of parts of replicas, if there are any.
+    pub fn replica_port(&self) -> Option<u16> {
+        self.network.filter(|_| !self.replicas.is_empty()).map(|network| network.replica_port())
     }
 
     /// A path of the file as the process sees it: relative ones start from the file's folder.

@@ -14,6 +14,7 @@ use crate::node::{self, Node, System};
 use crate::output::Output;
 use crate::reader::{Reader, Section};
 use crate::record::{self, Recording};
+use crate::replica::Replica;
 use crate::saved::Saved;
 use crate::scheduling::SchedulingRule;
 use crate::tcp::{self, Tcp};
@@ -99,7 +100,12 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let output = Output::read(file.section("output", "[output]"), &directory, &folder);
     let gui = Gui::read(file.section("gui", "[gui]"), &directory);
     let record = Recording::read(file.section("record", "[record]"), &directory, &folder);
-    record::connect(record.as_ref(), &file, &classes, &mut modules, &mut lines);
+    let replica_sections = self::sections(&file, "replica").into_iter();
+    let ways = (network.as_ref(), tdma.as_ref());
+    let replicas = replica_sections.filter_map(|section| Replica::read(section, &directory, &nodes, ways));
+    let replicas: Vec<Replica> = replicas.collect();
+    let has_replica = |items: &_, node: &_| replicas.iter().any(|replica| replica.is_of(items, node));
+    record::connect((record.as_ref(), &has_replica), &file, &classes, &mut modules, &mut lines);
     let flow_sections = self::sections(&file, "flow").into_iter();
     let flows = flow_sections.filter_map(|section| Flow::read(section, &directory)).collect();
     file.finish();
@@ -126,6 +132,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
         gui,
         record,
         flows,
+        replicas,
         parameters,
         saved: None,
         scheduling,

@@ -40,7 +40,7 @@ pub(crate) fn read(section: Section<'_>, nodes: &[Node], tdma: Option<&Tdma>) ->
         );
     }
     let security = read_security(&section);
-    let port = section.get("port").and_then(|item| item.whole(1024..=65_533, PORT.into()));
+    let port = section.get("port").and_then(|item| item.whole(1024..=65_532, PORT.into()));
     let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
     let least = if is_v6 { MTU_V6_MIN } else { *MTUS.start() };
     let mtu = section.get("mtu").and_then(|item| item.whole(least..=*MTUS.end(), MTU)).unwrap_or(MTU) as usize;

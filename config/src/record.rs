@@ -212,7 +212,7 @@ impl RecordedItems {
         let items = section.get(key).and_then(|item| item.list(example)).unwrap_or_default();
         let mut all: Vec<Self> = Vec::new();
         for item in &items {
-            let Some(read) = Self::read(item, directory) else { continue };
+            let Some(read) = Self::read(item, "[record]", directory) else { continue };
             if let Some(first) = all.iter().find(|first| (first.from, &first.item) == (read.from, &read.item)) {
                 let text = read.text(directory.classes);
                 item.report(format!("`{text}` is in line {} of `{key}` already; drop one", first.line));
@@ -222,9 +222,10 @@ impl RecordedItems {
         all
     }
 
-    fn read(item: &Item<'_>, directory: &Directory<'_>) -> Option<Self> {
+    /// `section`: where it stands.
+    pub(crate) fn read(item: &Item<'_>, section: &str, directory: &Directory<'_>) -> Option<Self> {
         let (text, sampling) = match item.is_table() {
-            true => sampled(item)?,
+            true => sampled(item, section)?,
             false => (item.text_of_list("laser.0/scan")?, Sampling::Each),
         };
         let line = item.line;
@@ -253,8 +254,8 @@ impl RecordedItems {
 }
 
 /// A table of a name, and which of its values.
-fn sampled<'d>(item: &Item<'d>) -> Option<(&'d str, Sampling)> {
-    let section = item.section("[record]")?;
+fn sampled<'d>(item: &Item<'d>, section: &str) -> Option<(&'d str, Sampling)> {
+    let section = item.section(section)?;
     let name = section.required("name", "name = \"laser.0/scan\"").and_then(|item| item.text("laser.0/scan"));
     let every = section.get("every");
     let rate = section.get("rate");
@@ -277,7 +278,7 @@ fn sampled<'d>(item: &Item<'d>) -> Option<(&'d str, Sampling)> {
 
 /// Finds the module that records, and adds to its `calls` what it subscribes to.
 pub(crate) fn connect(
-    recording: Option<&Recording>,
+    (recording, has_replica): (Option<&Recording>, HasReplica<'_>),
     file: &Section<'_>,
     classes: &ClassTable,
     modules: &mut [Module],
@@ -294,7 +295,7 @@ pub(crate) fn connect(
     }
     match (first, recording) {
         (Some(at), Some(recording)) => {
-            let (calls, mut wrong) = connections(recording, classes, modules, &modules[at]);
+            let (calls, mut wrong) = connections((recording, has_replica), classes, modules, &modules[at]);
             wrong.extend(exact::mistakes(&recording.exact, classes, modules, &modules[at]));
             wrong.into_iter().for_each(|(line, message)| file.reader.report(line, format!("[record]: {message}")));
             for (name, line) in calls {
@@ -323,22 +324,35 @@ pub(crate) fn connect(
     }
 }
 
+/// Whether a node has a replica of the streams of an entry.
+type HasReplica<'f> = &'f dyn Fn(&RecordedItems, &str) -> bool;
+
 /// Names that the recorder subscribes to, and mistakes, each with its line.
 type Connections = (Vec<(Name, usize)>, Vec<(usize, String)>);
 
-fn connections(recording: &Recording, classes: &ClassTable, modules: &[Module], own: &Module) -> Connections {
+fn connections(
+    (recording, has_replica): (&Recording, HasReplica<'_>),
+    classes: &ClassTable,
+    modules: &[Module],
+    own: &Module,
+) -> Connections {
     let (mut calls, mut wrong) = (Vec::new(), Vec::new());
     let host = |name: Name| modules.iter().find(|module| module.names().any(|known| known == name));
     let collector = modules.iter().flat_map(Module::names).find(|name| classes.name(name.class()) == Some(OUTPUT));
     for stream in &recording.streams {
         let Some(module) = stream.from.and_then(host).filter(|module| module.node != own.node) else { continue };
+        if has_replica(stream, &own.node) {
+            continue;
+        }
         let (text, node) = (stream.text(classes), &module.node);
         wrong.push((
             stream.line,
             format!(
                 "`{text}` is a stream on node {node}, and `{}` records on node {}: streams are read on their own node; \
-                 name it in `data` if its records fit a package, or record on node {node}",
+                 name it in `data` if its records fit a package, give node {} a [[replica]] of it, or record on node \
+                 {node}",
                 classes.format(own.name),
+                own.node,
                 own.node
             ),
         ));

@@ -51,6 +51,7 @@ fn files_that_ship_load_and_explain_themselves() {
         "tests/tcp.toml",
         "tests/beyond.toml",
         "tests/record.toml",
+        "tests/replica.toml",
         "tests/full.toml",
     ] {
         let text = fs::read_to_string(folder().join(file)).unwrap();
@@ -89,6 +90,8 @@ fn manual_names_every_key_and_its_example_loads() {
     let manual = fs::read_to_string(folder().join("../docs/src/configuration.md")).unwrap();
     let read = |file: &str| fs::read_to_string(folder().join("tests").join(file)).unwrap();
     let (full, tcp, record) = (read("full.toml"), read("tcp.toml"), read("record.toml"));
+    let replica = read("replica.toml");
+    let replicated = replica.split_once("\n[[replica]]\n").unwrap().1;
     let modules = full.split_once("[[module]]").unwrap().1;
     let beyond = tcp.split_once("[tcp]").unwrap().1;
     let recorded = record.split_once("\n[record]\n").unwrap().1;
@@ -96,6 +99,7 @@ fn manual_names_every_key_and_its_example_loads() {
         .lines()
         .chain(beyond.lines())
         .chain(recorded.lines())
+        .chain(replicated.lines())
         .filter(|line| !line.starts_with("settings"))
         .filter_map(|line| line.split_once(" = "));
     for (key, _) in keys {

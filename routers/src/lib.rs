@@ -19,7 +19,8 @@
 //! 2. `time`: master, follower, election. `tdma`: the scheduler of time slots.
 //! 3. `session`, `tcp`: clients and server beyond the LAN. `shell`: threads and sockets of the LAN.
 //! 4. `driver`: what the threads that send, receive and keep time do, over clock, mailbox and wire.
-//! 5. `stats`, `flows`, `report`: what is counted and reported. `impair`, `lab`: a bad network, nodes in namespaces.
+//! 5. `replication`: streams of one node on others.
+//! 6. `stats`, `flows`, `report`: what is counted and reported. `impair`, `lab`: a bad network, nodes in namespaces.
 //!
 //! # Invariants
 //!
@@ -45,6 +46,7 @@ pub mod link;
 mod netlink;
 pub mod outbound;
 pub mod queue;
+pub mod replication;
 pub mod report;
 pub mod security;
 pub mod session;

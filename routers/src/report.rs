@@ -1,7 +1,7 @@
 //! What the cores tell of: packages that go no further, and what happens to peers.
 
 use crate::counts::Cause;
-use crate::frame::{NodeIndex, RefusalReason};
+use crate::frame::{FrameHead, NodeIndex, RefusalReason, ReplicaFrame};
 use crate::security::NotOpened;
 use rohrpost_mailbox::{Head, SendError};
 use std::net::IpAddr;
@@ -30,6 +30,11 @@ pub trait Deliver: Report {
     /// [`NotDelivered`]
     fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered>;
 
+    /// Takes a part of what a replica needs; false: not at this port.
+    fn replica(&mut self, _head: &FrameHead, _part: &ReplicaFrame<'_>) -> bool {
+        false
+    }
+
     /// Something happened that people want to know of, each once until it is over.
     fn event(&mut self, event: RouterEvent);
 }
@@ -37,6 +42,10 @@ pub trait Deliver: Report {
 impl<D: Deliver> Deliver for &mut D {
     fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered> {
         (**self).deliver(from, head, body)
+    }
+
+    fn replica(&mut self, head: &FrameHead, part: &ReplicaFrame<'_>) -> bool {
+        (**self).replica(head, part)
     }
 
     fn event(&mut self, event: RouterEvent) {

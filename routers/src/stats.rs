@@ -113,6 +113,11 @@ impl Stats {
         })
     }
 
+    /// The incarnation of a peer that is heard at the port of what is real time; 0: none.
+    pub(crate) fn incarnation_of(&self, peer: NodeIndex) -> u64 {
+        self.knows.as_deref().unwrap_or(self).peer(peer).link.incarnation.get()
+    }
+
     /// Whether it is that incarnation.
     pub(crate) fn is_known_incarnation(&self, peer: NodeIndex, incarnation: u64) -> bool {
         self.knows.as_ref().is_some_and(|all| all.peer(peer).link.incarnation.get() == incarnation)

@@ -214,7 +214,7 @@ fn what_comes_at_either_port_while_there_is_no_router_waits_for_the_next() {
     });
     let [there, here] = [0, 1].map(|node: usize| pair.sides[1].settings.nodes[node].address);
     let port = pair.sides[1].settings.network.port;
-    pair.sides[1].sockets = listen(here, (port, Some(rest_port)), &[there]);
+    pair.sides[1].sockets = listen(here, (port, [Some(rest_port), None]), &[there]);
     pair.sides.iter_mut().for_each(Side::start);
     let mailbox = module(1).with_local(local::DATA);
     let mut receiver = pair.sides[1].receiver(mailbox, Shape { slots: 64, ..Shape::default() });
@@ -252,7 +252,7 @@ fn what_waited_for_a_router_for_long_says_nothing_of_the_present_incarnation() {
     pair.sides.iter_mut().for_each(|side| side.shell = None);
     let [there, here] = [0, 1].map(|node: usize| pair.sides[1].settings.nodes[node].address);
     let at = SocketAddr::new(here, pair.sides[1].settings.network.port);
-    pair.sides[1].sockets = listen(here, (at.port(), None), &[there]);
+    pair.sides[1].sockets = listen(here, (at.port(), [None, None]), &[there]);
     let peer = UdpSocket::bind((there, 0)).unwrap();
     let says = |sequence: u32| {
         let (incarnation, told) = (99, [0; 24]);

@@ -55,6 +55,7 @@ mod recorded_control;
 mod recorded_killed;
 mod recorded_nodes;
 mod replayed;
+mod replicas;
 mod restart;
 mod screen;
 mod seer;

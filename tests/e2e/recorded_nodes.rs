@@ -47,7 +47,7 @@ flush = "20 ms"
 "#;
 
 /// Numbers of packages and of the values in them.
-fn values(file: &Path, topic: &str) -> Vec<(u32, u64)> {
+pub(crate) fn values(file: &Path, topic: &str) -> Vec<(u32, u64)> {
     let mut values = Vec::new();
     let Ok(mut reader) = Reader::open(file) else { return values };
     while let Ok(Some((channel, message))) = reader.next() {

@@ -196,7 +196,7 @@ fn note(seen: &CaptureMemory, at_ns: u64, datagram: &[u8]) {
             Ok(TimeMessage::Sync(_)) => FrameKind::Sync,
             _ => FrameKind::Said,
         },
-        Frame::Alive(_) | Frame::Refusal(_) => FrameKind::Said,
+        Frame::Alive(_) | Frame::Refusal(_) | Frame::Replica(_) => FrameKind::Said,
     };
     seen.frame(&Crossed { at_ns, from, what });
 }

@@ -13,6 +13,8 @@ pub(super) fn of(installation: Arc<Installation>, node: String) -> impl Fn(&Modu
         let (Some(network), Some(address)) = (network, address) else { return Vec::new() };
         let others = installation.lan_nodes().iter().filter(|other| other.name != node);
         let peers: Vec<_> = others.filter_map(|other| other.address).collect();
-        rohrpost_routers::shell::listen(address, (network.port, installation.rest_port()), &peers)
+        let has_replica = installation.replicas.iter().any(|replica| replica.to.contains(&node));
+        let replicas = installation.replica_port().filter(|_| has_replica);
+        rohrpost_routers::shell::listen(address, (network.port, [installation.rest_port(), replicas]), &peers)
     }
 }

@@ -36,6 +36,8 @@ struct SourceModule {
     name: String,
     /// The module of its process, if that is on this node.
     own: Option<Name>,
+    /// Streams of it of which this node has replicas.
+    replicas: Vec<String>,
     /// As it has described itself.
     description: Option<Description>,
     asking: DescriptionRequest,
@@ -71,12 +73,17 @@ enum Source {
 impl Taps {
     /// What the configuration names, as seen from module `own` on its node.
     pub(super) fn new(installation: &Installation, recording: Recording, own: Name, node: &str) -> Self {
+        let replicas = |from: Name| {
+            let here = installation.replicas.iter().filter(|replica| replica.from == from);
+            here.filter(|replica| replica.to.iter().any(|to| to == node)).map(|replica| replica.item.clone()).collect()
+        };
         let source = |from: Name| {
             let host = installation.module(from).filter(|host| host.node == node);
             SourceModule {
                 from,
                 name: installation.classes.format(from),
                 own: host.map(|host| host.name),
+                replicas: replicas(from),
                 description: None,
                 asking: DescriptionRequest::default(),
             }
@@ -111,6 +118,8 @@ impl Taps {
             let description = match source.own {
                 Some(host) if runs(&node, host) => noted(&node, source.from),
                 Some(_) => None,
+                // With a replica comes the description.
+                None if !source.replicas.is_empty() => noted(&node, source.from),
                 None => source.asking.poll(context, source.from),
             };
             let Some(description) = description else { continue };
@@ -197,11 +206,16 @@ impl SourceModule {
         self.tap_of(&item, description, (Sampling::Each, Numbering::Records), None)
     }
 
+    /// Whether this node has the stream: the module is its own, or there is a replica.
+    fn is_here(&self, stream: &str) -> bool {
+        self.own.is_some() || self.replicas.iter().any(|replica| replica == stream)
+    }
+
     fn tap(&self, recording: &Recording, description: &Description, item: &DataItem) -> Option<Tap> {
         let name = &item.field.name;
         let is_stream = item.kind == DataKind::Stream;
         let is_line = description.class == CollectorInterface::CLASS && name == LINE;
-        let ring = recording.stream(self.from, name).filter(|_| is_stream && self.own.is_some());
+        let ring = recording.stream(self.from, name).filter(|_| is_stream && self.is_here(name));
         // `*` is not meant for streams, which may have records that fit no package.
         let named = |items: &&RecordedItems| !is_stream || items.item.is_some();
         let (sampling, numbering) = match (ring, recording.datum(self.from, name).filter(named)) {

@@ -112,11 +112,13 @@ fn ask_router(round: &mut Round, node: String) -> NodeReport {
     let slots = in_slots.then(|| round.newest(&node, RouterInterface::SLOTS).ok()).flatten();
     let declares = links.is_ok() && !round.running.installation.flows.is_empty();
     let flows = declares.then(|| round.newest(&node, RouterInterface::FLOWS).ok()).flatten();
+    let replicates = links.is_ok() && !round.running.installation.replicas.is_empty();
+    let replicas = replicates.then(|| round.newest(&node, RouterInterface::REPLICAS).ok()).flatten();
     let (time_ns, links, failure) = match links {
         Ok((time_ns, links)) => (time_ns, Some(links), None),
         Err(failure) => (0, None, Some(failure)),
     };
     let (clock, slots) = (clock.map(|(_, clock)| clock), slots.map(|(_, slots)| slots));
-    let flows = flows.map(|(_, flows)| flows);
-    NodeReport { node, time_ns, links, clock, slots, flows, failure, ..NodeReport::default() }
+    let (flows, replicas) = (flows.map(|(_, flows)| flows), replicas.map(|(_, replicas)| replicas));
+    NodeReport { node, time_ns, links, clock, slots, flows, replicas, failure, ..NodeReport::default() }
 }

@@ -1,7 +1,7 @@
 //! The reports of a node's routers.
 
 use rohrpost::interfaces::{
-    BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, LinkState, Links, SlotState,
+    BeyondClients, BeyondLink, BeyondState, ClockState, FlowStates, LinkState, Links, ReplicaStates, SlotState,
 };
 use serde::Serialize;
 
@@ -15,6 +15,9 @@ pub(super) struct NodeReport {
     pub(super) clock: Option<ClockState>,
     pub(super) slots: Option<SlotState>,
     pub(super) flows: Option<FlowStates>,
+    /// Streams that it carries to or from other nodes, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) replicas: Option<ReplicaStates>,
     /// The state of its client of the TCP router.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) beyond: Option<BeyondLink>,

@@ -9,7 +9,7 @@ use crate::target::Running;
 use crate::units::{bytes, fine};
 use crate::vocabulary::Vocabulary;
 use crate::{carried, flows};
-use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected};
+use rohrpost::interfaces::{ClockRole, ClockState, LinkState, Links, PeerLink, Rejected, ReplicaState};
 use rohrpost::output::plain;
 use std::time::Duration;
 
@@ -43,6 +43,7 @@ pub(super) fn text(running: &Running, all: &[NodeReport], vocabulary: &mut Vocab
         kept(slots),
     ]);
     parts.push(measured(running, all, vocabulary));
+    parts.push(replicas(all));
     parts.extend(beyond::text(running, all));
     parts.retain(|part| !part.is_empty());
     parts.join("\n")
@@ -162,6 +163,32 @@ fn measured(running: &Running, all: &[NodeReport], vocabulary: &mut Vocabulary) 
     let table =
         flows::measured(&running.installation, states, &links, vocabulary, |module| running.describe(module).ok());
     if table.is_empty() { table } else { format!("{table}{}", flows::legend()) }
+}
+
+/// Replicas, each on both of its ends; empty if there is none.
+fn replicas(all: &[NodeReport]) -> String {
+    let row = |node: &str, way: &str, state: &ReplicaState| {
+        let lost: Vec<String> = state.lost.iter().map(|lost| format!("{} {}", lost.times, lost.cause)).collect();
+        [
+            node.to_owned(),
+            state.stream.clone(),
+            format!("{way} {}", state.node),
+            state.records.to_string(),
+            bytes(state.bytes as f64),
+            state.gaps.map_or("-".into(), |gaps| gaps.to_string()),
+            state.delay_p99_ns.map_or("-".into(), |ns| fine(ns as f64 * 1e-9)),
+            if lost.is_empty() { "nothing".into() } else { lost.join(", ") },
+        ]
+    };
+    let mut rows = Vec::new();
+    for states in all.iter().filter_map(|told| told.replicas.as_ref()) {
+        rows.extend(states.sent.iter().map(|state| row(&states.node, "to", state)));
+        rows.extend(states.received.iter().map(|state| row(&states.node, "from", state)));
+    }
+    if rows.is_empty() {
+        return String::new();
+    }
+    table(["node", "replica", "way", ">records", ">bytes", ">gaps", ">delay p99", "not in it"], rows)
 }
 
 fn clocks(all: &[NodeReport]) -> String {

@@ -5,6 +5,7 @@ pub(super) mod faults;
 mod flows;
 pub(crate) mod keys;
 mod links;
+mod replicas;
 mod slots;
 
 use crate::terminal::Failure;
@@ -12,9 +13,10 @@ use rohrpost::interfaces::{Router, RouterInterface};
 use rohrpost::{Context, Module, ModuleError, Start};
 use rohrpost_modules::runtime::{exit, kept, run_started};
 use rohrpost_routers::impair;
+use rohrpost_routers::replication::ReplicaSettings;
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::shell::clock::ClockParts;
-use rohrpost_routers::shell::{Parts, Shell};
+use rohrpost_routers::shell::{Parts, ReplicaParts, Shell};
 use serde::Deserialize;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -45,6 +47,8 @@ pub(super) struct NoSettings {}
 
 struct RouterModule {
     shell: Shell,
+    /// All of the installation.
+    replicas: Vec<ReplicaSettings>,
 }
 
 impl Router for RouterModule {}
@@ -71,15 +75,22 @@ impl Module for RouterModule {
         let faults = Arc::new(faults::Encoded::of(installation));
         let node = context.link().borrow().participant().node().clone();
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
-        let (name, sockets) = (context.me(), kept());
+        let (name, mut sockets) = (context.me(), kept());
+        // In the order of `listen`.
+        let socket = if sockets.len() > 2 { sockets.pop() } else { None };
+        let replicas = ReplicaSettings::all(installation);
         let parts = Parts { node: &node, name, settings, faults, sockets, impair, clock };
-        let shell = match keys {
+        let mut shell = match keys {
             Some(keys) => Shell::start_sealed(parts, keys)?,
             None => Shell::start(parts)?,
         };
+        if !replicas.is_empty() {
+            let describe = Arc::new(replicas::Descriptions);
+            shell.replicate(&node, ReplicaParts { replicas: &replicas, describe, socket, impair })?;
+        }
         context.use_computer_clock();
         context.set_period(PERIOD);
-        Ok(Self { shell })
+        Ok(Self { shell, replicas })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -94,6 +105,9 @@ impl Module for RouterModule {
         }
         let flows = flows::of(&self.shell, &context.installation().classes);
         context.publish_now(RouterInterface::FLOWS, &flows)?;
+        if let Some(states) = replicas::of(&self.shell, context.installation(), &self.replicas) {
+            context.publish_now(RouterInterface::REPLICAS, &states)?;
+        }
         Ok(())
     }
 }

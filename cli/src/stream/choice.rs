@@ -74,7 +74,7 @@ impl StreamChoice {
         let running = node_here(&self.target)?;
         let name = running.installation.classes.parse_name(&self.stream)?;
         let node = running.node_of(name);
-        if node != running.node_name {
+        if node != running.node_name && !has_replica(&running, name) {
             return Err(format!(
                 "{} is a module of node {node}, and a stream lies in the memory of its node; use `--node {node}` on \
                  its computer",
@@ -86,6 +86,12 @@ impl StreamChoice {
         let (number, item) = find_item(&self.stream, &self.item, description.as_ref())?;
         Ok(ChosenStream { id: StreamId { name, number }, item, running })
     }
+}
+
+/// Whether the node has a replica of a stream of this module.
+fn has_replica(running: &Running, module: Name) -> bool {
+    let of_it = running.installation.replicas.iter().filter(|replica| replica.from == module);
+    of_it.flat_map(|replica| &replica.to).any(|to| *to == running.node_name)
 }
 
 /// The number of the stream that is named by its name or number, and what the description says of it.

@@ -86,7 +86,7 @@ pub(super) fn info(arguments: &InfoArguments) -> Result<ExitCode, Failure> {
     let info = chosen.inspect()?;
     let seen = StreamSurvey { node: chosen.running.node_name.clone(), at_ns: monotonic_ns(), info };
     let item = chosen.item.as_ref().map(|item| item.field.name.clone());
-    let view = StreamView::new(&seen, item, |name| chosen.running.text(name));
+    let view = StreamView::new(&seen, item, |name| chosen.running.text(name)).of(&chosen.running.installation);
     say(if arguments.json { serde_json::to_string(&view)? } else { print_stream(&view) });
     Ok(ExitCode::SUCCESS)
 }

@@ -27,7 +27,9 @@ pub(crate) struct StreamView {
     late_s: f64,
     /// Size of its shared memory.
     memory_bytes: usize,
-    /// The present writer, or the last one.
+    /// The node on which it is written, if this is a replica.
+    origin: Option<String>,
+    /// The present writer, or the last one; of a replica the router that writes it here.
     writer: Option<WriterView>,
     adoptions: u32,
     written: u64,
@@ -99,6 +101,7 @@ impl StreamView {
             keep: shape.keep,
             late_s: shape.late.as_secs_f64(),
             memory_bytes: shape.segment_bytes(),
+            origin: None,
             writer: info.writer.as_ref().map(|writer| WriterView {
                 module: (writer.module != Name::NONE).then(|| name(writer.module)),
                 pid: writer.pid,
@@ -115,11 +118,25 @@ impl StreamView {
             sleeping: info.sleeping,
         }
     }
+
+    /// The same as a part of this installation: it tells which streams are replicas.
+    pub(super) fn of(self, installation: &Installation) -> Self {
+        let origin = installation.node_of(self.id.name).filter(|node| *node != self.node).map(Into::into);
+        Self { origin, ..self }
+    }
+
+    fn written_by(&self, writer: &WriterView) -> String {
+        match &self.origin {
+            Some(node) => format!("the router, from node {node}"),
+            None => writer.text(),
+        }
+    }
 }
 
 /// Streams as people and programs read them.
 pub(crate) fn stream_views(installation: &Installation, streams: &[StreamSurvey]) -> Vec<StreamView> {
-    streams.iter().map(|seen| StreamView::new(seen, None, |name| installation.classes.format(name))).collect()
+    let view = |seen: &StreamSurvey| StreamView::new(seen, None, |name| installation.classes.format(name));
+    streams.iter().map(|seen| view(seen).of(installation)).collect()
 }
 
 /// Names the streams of the node that the tool runs on, where descriptions of their modules tell the names.
@@ -144,7 +161,7 @@ pub(crate) fn print_streams(streams: &[StreamView], several: bool) -> String {
             stream.number.to_string(),
             format!("{} x {} B", stream.keep, stream.record_bytes),
             format!("{} of {}", stream.readers, stream.readers_max),
-            stream.writer.as_ref().filter(|writer| writer.alive).map_or("nobody".into(), WriterView::text),
+            stream.writer.as_ref().filter(|it| it.alive).map_or("nobody".into(), |it| stream.written_by(it)),
             stream.written.to_string(),
             stream.refused.to_string(),
             stream.newest.as_ref().map_or("none".into(), |newest| format!("{} ago", short(newest.age_s))),
@@ -159,8 +176,8 @@ pub(crate) fn print_streams(streams: &[StreamView], several: bool) -> String {
 pub(super) fn print_stream(stream: &StreamView) -> String {
     let writer = match &stream.writer {
         None => "nobody yet".into(),
-        Some(writer) if writer.alive => writer.text(),
-        Some(writer) => format!("nobody; the last was {}", writer.text()),
+        Some(writer) if writer.alive => stream.written_by(writer),
+        Some(writer) => format!("nobody; the last was {}", stream.written_by(writer)),
     };
     let late = match Duration::try_from_secs_f64(stream.late_s).unwrap_or_default() {
         Duration::ZERO => "a stamp behind the newest is refused".into(),

@@ -46,7 +46,8 @@ impl Security {
 pub struct Network {
     /// Whether datagrams are sealed.
     pub security: Security,
-    /// UDP port of packages; time has the next one, and packages that are not real time the one after that.
+    /// UDP port of packages; time has the next one, packages that are not real time and parts of replicas the two
+    /// after that.
     pub port: u16,
     /// Largest IP packet that every link carries, in bytes.
     pub mtu: u16,
@@ -81,6 +82,11 @@ impl Network {
     /// UDP port of packages that are not real time, without time slots.
     pub fn rest_port(&self) -> u16 {
         self.port + 2
+    }
+
+    /// UDP port of parts of replicas.
+    pub fn replica_port(&self) -> u16 {
+        self.port + 3
     }
 
     /// The level of a priority in a router's queue: 0 goes first, 30 is the last real-time level,

@@ -9,14 +9,16 @@ use rohrpost_mailbox::saturating_sum;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What all modules of a node keep there.
-pub(super) fn of_node(modules: &[&Module]) -> String {
+/// What all modules of a node, and its replicas, keep there.
+pub(super) fn of_node(modules: &[&Module], replicas: u64) -> String {
     let sum = |memory: fn(&Module) -> u64| saturating_sum(modules.iter().map(|module| memory(module)));
     let mailboxes = format!("{} of mailboxes", about(sum(Module::mailbox_memory)));
-    match sum(Module::stream_memory) {
-        0 => mailboxes,
-        streams => format!("{mailboxes}, {} of streams", about(streams)),
-    }
+    let streams = match sum(Module::stream_memory) {
+        0 => String::new(),
+        streams => format!(", {} of streams", about(streams)),
+    };
+    let replicas = if replicas == 0 { String::new() } else { format!(", {} of replicas", about(replicas)) };
+    format!("{mailboxes}{streams}{replicas}")
 }
 
 pub(super) fn mailbox(spec: &MailboxSpec) -> String {

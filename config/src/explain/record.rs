@@ -1,4 +1,4 @@
-//! What is recorded, in words.
+//! What is recorded, and what is replicated, in words.
 
 use super::Page;
 use crate::output::Level;
@@ -50,6 +50,27 @@ impl Page<'_> {
         }
         let (flush, sync) = (duration_text(record.flush), duration_text(record.sync));
         self.entry("may lose", &format!("the last {flush} if it is killed, {sync} more if the power fails"));
+    }
+
+    pub(super) fn replicas(&mut self) {
+        if self.installation.replicas.is_empty() {
+            return;
+        }
+        self.line("");
+        self.line("Replicas");
+        self.line("");
+        for replica in &self.installation.replicas {
+            let node = self.installation.node_of(replica.from).unwrap_or_default();
+            let words = format!(
+                "{} of node {node} to {}: {} of its records, each of at most {}; told if later than {}",
+                replica.text(self.installation),
+                replica.to.join(", "),
+                replica.sampling,
+                size_text(replica.spec(self.installation).record_bytes.into()),
+                duration_text(replica.delay_alarm)
+            );
+            self.entry("sends", &words);
+        }
     }
 
     /// `of_all`: what an entry without a name means.

@@ -133,3 +133,21 @@ pub enum WriteError {
     #[error("stream {0}: its index is damaged; end its users, and remove its file with `rohrpost clean`")]
     Damaged(StreamId),
 }
+
+/// Why a record of a replica was not begun. The stream is as it was.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum ReplicaError {
+    /// It has come to a later one already.
+    #[error("stream {id}: a replica has passed record {sequence}; the next is {next} at the least")]
+    Passed {
+        /// The stream.
+        id: StreamId,
+        /// The record's.
+        sequence: u64,
+        /// The least that it may be.
+        next: u64,
+    },
+    /// As for any stream.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

@@ -89,11 +89,11 @@ fn first_reached(ring: &Ring<'_>, (low, newest): (u64, &Line), at: Stamp) -> Loo
     ring.look(Left::of(at, low, newest).first(|sequence| reached(ring, sequence)))
 }
 
-/// What a record has reached; none: it is gone.
+/// What a record has reached, or, where one was left out, those before; none: it is gone.
 fn reached(ring: &Ring<'_>, sequence: u64) -> Option<Stamp> {
     match ring.look(sequence) {
         Look::There(line) => Some(line.reached()),
-        Look::Gone => None,
+        Look::Gone => ring.left_out(sequence),
         Look::NotYet => Some(Stamp { epoch: u64::MAX, ns: u64::MAX }),
     }
 }
@@ -218,6 +218,7 @@ fn nearest(ring: &Ring<'_>, reached: Line, end: u64, at: Stamp, late_ns: u64) ->
         }
         let line = match ring.look(sequence) {
             Look::There(line) => line,
+            Look::NotYet | Look::Gone if ring.left_out(sequence).is_some() => continue,
             Look::NotYet | Look::Gone => return None,
         };
         let stamp = line.about.stamp;
@@ -237,8 +238,9 @@ fn nearest(ring: &Ring<'_>, reached: Line, end: u64, at: Stamp, late_ns: u64) ->
 
 /// The oldest record that is there.
 pub(super) fn oldest(ring: &Ring<'_>) -> Option<Line> {
-    let first = ring.oldest_before(ring.written());
-    (first..first + TRIES as u64).find_map(|sequence| match ring.look(sequence) {
+    let written = ring.written();
+    let there = (ring.oldest_before(written)..written).filter(|sequence| ring.left_out(*sequence).is_none());
+    there.take(TRIES).find_map(|sequence| match ring.look(sequence) {
         Look::There(line) => Some(line),
         Look::NotYet | Look::Gone => None,
     })

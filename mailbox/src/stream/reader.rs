@@ -300,7 +300,9 @@ impl StreamReader {
         self.registry_epoch = registry_epoch;
         let Some(place) = place else { return Ok(false) };
         // It was removed and made anew: what replaces a stream goes on with its sequence.
-        if self.place.as_ref().is_some_and(|old| place.ring().first() < old.ring().written()) {
+        let is_anew = self.place.as_ref().is_some_and(|old| place.ring().first() < old.ring().written());
+        let is_first = self.place.is_none() && self.next == 0 && place.segment.is_replica();
+        if is_anew || is_first {
             self.next = place.ring().first();
         }
         self.place = Some(place);

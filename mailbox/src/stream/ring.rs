@@ -44,9 +44,11 @@ const FRAME_BITS: u32 = 20;
 const FRAME: u64 = (1 << FRAME_BITS) - 1;
 /// Most frames of a stream.
 pub(crate) const FRAMES_MAX: usize = FRAME as usize;
+/// In place of a frame: a replica has no such record, it is gone. Its ring has fewer frames than there may be.
+pub(super) const LEFT_OUT: usize = FRAMES_MAX - 1;
 /// No stream comes to more records, in two thousand years of a million a second: a larger number is damage. So sums of
 /// sequences do not overflow.
-pub(crate) const SEQUENCE_MAX: u64 = 1 << 56;
+pub const SEQUENCE_MAX: u64 = 1 << 56;
 /// Most readers of a stream at a time.
 pub const STREAM_READERS_MAX: usize = 64;
 
@@ -258,6 +260,18 @@ impl<'a> Ring<'a> {
         if self.is_there(&line) { Look::There(line) } else { Look::Gone }
     }
 
+    /// What the stream had reached before a sequence that was left out; none: it was not, or a newer one has its place.
+    /// ORDERING: Acquire (B), then (D), as in `look`.
+    pub(crate) fn left_out(&self, sequence: u64) -> Option<Stamp> {
+        let (entry, expected) = (self.entry(sequence), word(sequence, Some(LEFT_OUT)));
+        if entry.word.load(Ordering::Acquire) != expected || self.frames() > LEFT_OUT {
+            return None;
+        }
+        let [epoch, ns] = [&entry.epoch, &entry.before_ns].map(|field| field.load(Ordering::Relaxed));
+        fence(Ordering::Acquire);
+        (entry.word.load(Ordering::Relaxed) == expected).then_some(Stamp { epoch, ns })
+    }
+
     /// Whether the record has not been overwritten since it was looked at: what was copied since then is whole.
     #[inline]
     pub(crate) fn is_there(&self, line: &Line) -> bool {
@@ -350,10 +364,15 @@ impl IndexEntry {
     /// The frame of the record of this sequence; none if this is another's entry, or its writer died over it. For the
     /// writer, which alone changes it.
     pub(super) fn frame(&self, sequence: u64, frames: usize) -> Option<u32> {
+        let is_its = ahead(self.word.load(Ordering::Relaxed), sequence) == 0;
+        self.named_frame(frames).filter(|_| is_its)
+    }
+
+    /// The frame of whichever record has this entry.
+    pub(super) fn named_frame(&self, frames: usize) -> Option<u32> {
         let word = self.word.load(Ordering::Relaxed);
         // Of a damaged file any number is possible.
-        let frame = ((word & FRAME) as u32).checked_sub(1).filter(|frame| (*frame as usize) < frames);
-        frame.filter(|_| ahead(word, sequence) == 0)
+        ((word & FRAME) as u32).checked_sub(1).filter(|frame| (*frame as usize) < frames)
     }
 
     /// Makes this the entry of a record; the writer alone. The word is the last to be written.

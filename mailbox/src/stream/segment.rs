@@ -111,6 +111,11 @@ impl StreamSegment {
         Ring::new(&self.page.written.0, self.first, (&self.entries, &self.hints), &self.seats)
     }
 
+    /// Whether it is a replica, which may begin with any sequence.
+    pub(crate) fn is_replica(&self) -> bool {
+        self.page.writer.replica.load(Ordering::Relaxed) != 0
+    }
+
     /// Whether nothing more is written here.
     pub(crate) fn is_retired(&self) -> bool {
         // ORDERING: Acquire; pairs with the store of `retire`: all records are seen.
@@ -197,13 +202,14 @@ impl StreamSegment {
 impl Owned for StreamSegment {
     const WHAT: &'static str = "stream";
     type Id = StreamId;
-    type Shape = StreamShape;
+    /// With where it begins, if not behind what was there before: a replica has the sequences of its origin.
+    type Shape = (StreamShape, Option<u64>);
 
     fn path(node: &Path, id: StreamId) -> PathBuf {
         path_of(node, id)
     }
 
-    fn bytes(shape: &StreamShape) -> usize {
+    fn bytes((shape, _): &Self::Shape) -> usize {
         shape.segment_bytes()
     }
 
@@ -211,17 +217,19 @@ impl Owned for StreamSegment {
         Ok(Self::map(file, id, Self::identify(file, id)?, used)?)
     }
 
-    fn format(file: &File, id: StreamId, shape: StreamShape, old: Option<&Self>) -> io::Result<Self> {
+    fn format(file: &File, id: StreamId, (shape, first): Self::Shape, old: Option<&Self>) -> io::Result<Self> {
         let mut segment = Self::map(file, id, shape, Use::Keep)?;
-        segment.first = old.map_or(0, |old| Progress::resume(&old.ring()).next());
+        segment.first = first.unwrap_or_else(|| old.map_or(0, |old| Progress::resume(&old.ring()).next()));
         segment.page.identity.first.store(segment.first, Ordering::Relaxed);
+        segment.page.writer.replica.store(first.is_some().into(), Ordering::Relaxed);
         segment.ring().format();
         segment.page.identity.write(id, &shape);
         Ok(segment)
     }
 
-    fn goes_on_as(&self, shape: &StreamShape) -> bool {
-        self.shape == *shape && !self.is_retired()
+    fn goes_on_as(&self, (shape, first): &Self::Shape) -> bool {
+        let is_behind = || first.is_none_or(|first| Progress::resume(&self.ring()).next() <= first);
+        self.shape == *shape && !self.is_retired() && is_behind()
     }
 
     /// Nothing: the writer looks through the index when it begins.

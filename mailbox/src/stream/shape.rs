@@ -231,7 +231,8 @@ pub(crate) struct WriterSays {
     pub(crate) adoptions: AtomicU32,
     /// Not 0: the stream was given up, and another has its name; nothing more is written here.
     pub(crate) retired: AtomicU32,
-    unused: AtomicU32,
+    /// Not 0: a replica. It begins with what came first: what its origin wrote before that was never lost here.
+    pub(crate) replica: AtomicU32,
     /// Records refused since their stamps were too far behind.
     pub(crate) refused: AtomicU64,
 }

@@ -37,13 +37,13 @@ use std::sync::atomic::Ordering;
 /// ```
 pub struct StreamWriter {
     participant: Arc<Participant>,
-    segment: StreamSegment,
-    progress: Progress,
+    pub(super) segment: StreamSegment,
+    pub(super) progress: Progress,
     /// Tells this writer's records from those of earlier ones.
-    incarnation: u32,
+    pub(super) incarnation: u32,
     late_ns: u64,
     /// Where a record is filled in place that may be copied while it is written.
-    draft: Vec<u8>,
+    pub(super) draft: Vec<u8>,
     /// Holds the writer's lock. Below `segment`: fields drop in order, and the lock must outlast the map.
     _lock: Held,
 }
@@ -55,6 +55,16 @@ impl Participant {
     /// # Errors
     /// See [`StreamError`].
     pub fn stream_writer(self: &Arc<Self>, id: StreamId, shape: StreamShape) -> Result<StreamWriter, StreamError> {
+        self.obtain_stream(id, shape, None)
+    }
+
+    /// The same; a new one may begin with a sequence other than 0.
+    pub(super) fn obtain_stream(
+        self: &Arc<Self>,
+        id: StreamId,
+        shape: StreamShape,
+        first: Option<u64>,
+    ) -> Result<StreamWriter, StreamError> {
         if !id.name.is_mailbox() {
             return Err(StreamError::Reserved(id));
         }
@@ -64,7 +74,7 @@ impl Participant {
             NodeError::Descriptors(_) => StreamError::Descriptors(id),
             error => StreamError::Node(error),
         })?;
-        let obtained = owned::obtain::<StreamSegment>(node, id, shape, &registry);
+        let obtained = owned::obtain::<StreamSegment>(node, id, (shape, first), &registry);
         let (segment, lock) = obtained.map_err(|why| match why {
             Refused::Owned(Ok(there)) => {
                 let says = &there.page().writer;
@@ -160,7 +170,7 @@ impl StreamWriter {
         (RecordInfo::of(&self.segment, &line), self.segment.body(&line))
     }
 
-    fn check(&self, stamp: Stamp, len: usize) -> Result<(), WriteError> {
+    pub(super) fn check(&self, stamp: Stamp, len: usize) -> Result<(), WriteError> {
         let (id, max, late_ns) = (self.id(), self.segment.shape.record_bytes as usize, self.late_ns);
         if len > max {
             return Err(WriteError::TooLarge { id, len, max });
@@ -179,11 +189,11 @@ impl StreamWriter {
         Err(refused)
     }
 
-    fn claim(&mut self) -> Result<Frame, WriteError> {
+    pub(super) fn claim(&mut self) -> Result<Frame, WriteError> {
         self.progress.claim(&self.segment.ring()).ok_or(WriteError::Damaged(self.segment.id))
     }
 
-    fn publish(&mut self, frame: Frame, stamp: Stamp, len: usize) -> u64 {
+    pub(super) fn publish(&mut self, frame: Frame, stamp: Stamp, len: usize) -> u64 {
         let about = About {
             stamp,
             before_ns: 0,

@@ -8,7 +8,7 @@
 //! shared: a successor works it out from the index.
 
 use crate::step::step;
-use crate::stream::ring::{About, Look, Ring, STREAM_READERS_MAX, Seat, Stamp};
+use crate::stream::ring::{About, LEFT_OUT, Look, Ring, STREAM_READERS_MAX, Seat, Stamp};
 use crate::sync::{Ordering, fence, prefetch_to_write, seq_cst_accesses};
 
 /// What the writer knows.
@@ -37,11 +37,17 @@ impl Progress {
     /// Goes on where the writer before ended, whichever step that was. For the one writer, before it writes.
     pub(crate) fn resume(ring: &Ring<'_>) -> Self {
         let mut next = ring.written().max(ring.first());
+        let counted = next;
+        while ring.left_out(next).is_some() && next < counted + ring.keep() {
+            next += 1;
+        }
         if let Look::There(_) = ring.look(next) {
             // Its writer died before it could count it.
             next += 1;
             ring.count(next);
             step!("resume: counted");
+        } else {
+            next = counted;
         }
         let mut used = vec![false; ring.frames()];
         let mut newest = None;
@@ -88,6 +94,23 @@ impl Progress {
     /// Gives a frame back that does not become a record.
     pub(crate) fn give_back(&mut self, frame: Frame) {
         self.free.push(frame.0);
+    }
+
+    /// Leaves out all up to this sequence, which is the next record's: readers are told that they lost them. For a
+    /// replica, where such records never came. A number of steps bounded by what the ring keeps.
+    pub(crate) fn skip_to(&mut self, ring: &Ring<'_>, sequence: u64) {
+        let from = self.next.max(sequence.saturating_sub(ring.keep()));
+        let stamp = self.newest.unwrap_or(Stamp { epoch: 0, ns: 0 });
+        let about = About { stamp, before_ns: stamp.ns, written_ns: 0, len_bytes: 0, incarnation: 0 };
+        for left_out in from..sequence {
+            let (entry, hint) = ring.place(left_out);
+            // Of a record that may be more than a turn of the ring behind.
+            let old = entry.named_frame(ring.frames());
+            hint.store(stamp.ns, Ordering::Relaxed);
+            entry.write(left_out, LEFT_OUT, &about);
+            self.free.extend(old);
+        }
+        self.next = self.next.max(sequence);
     }
 
     /// Makes a filled frame the next record, and calls `wake` for each seat that says that its reader sleeps; `expect`

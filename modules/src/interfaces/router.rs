@@ -293,6 +293,52 @@ pub struct FlowState {
     pub lost: Vec<CarriedLoss>,
 }
 
+/// Streams of other nodes that a node has, and streams of its own that others have. Counts are since its router began,
+/// and only grow.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct ReplicaStates {
+    /// The node.
+    pub node: String,
+    /// What it sends: each stream for each node that has it.
+    pub sent: Vec<ReplicaState>,
+    /// What it has.
+    pub received: Vec<ReplicaState>,
+}
+
+/// What became of the records of a replica, on one of its two ends.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct ReplicaState {
+    /// The stream, as the file names it: `camera.0/image`.
+    pub stream: String,
+    /// The node on the other end.
+    pub node: String,
+    /// Records of which all parts were sent; or that came whole.
+    pub records: u64,
+    /// Bytes of these records.
+    pub bytes: u64,
+    /// Records before the newest that are not in the replica, whatever the cause; none where it is sent.
+    pub gaps: Option<u64>,
+    /// From writing to arrival, by system time, ns: 99 of 100 records were not slower; none where it is sent, or
+    /// without a common time.
+    pub delay_p99_ns: Option<u64>,
+    /// The slowest.
+    pub delay_worst_ns: Option<u64>,
+    /// Records that came later than `delay-alarm` allows.
+    pub delayed: Option<u64>,
+    /// What is not in the replica, and why.
+    pub lost: Vec<ReplicaCause>,
+}
+
+/// Records or parts that are not in a replica, for one cause.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct ReplicaCause {
+    /// In a word. Of records: `sampled`, `passed`, `absent` where they are sent, `incomplete` where they come. Of parts
+    /// that were not taken: `duplicate`, `late`, `foreign`, `undescribed`, `too-large`, `unsound`, `unwritable`.
+    pub cause: String,
+    /// How many.
+    pub times: u64,
+}
+
 /// Carries packages between nodes; it does so also while it is off.
 #[interface(class = "router", crate = crate::macro_support)]
 pub trait Router {
@@ -311,4 +357,8 @@ pub trait Router {
     /// How late packages of declared flows were that left this node.
     #[data(4)]
     fn flows() -> FlowStates;
+
+    /// What it carries of streams between nodes, where there are replicas.
+    #[data(5)]
+    fn replicas() -> ReplicaStates;
 }

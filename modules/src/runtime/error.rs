@@ -193,8 +193,8 @@ pub enum ContextError {
     Read(#[from] StreamReadError),
     /// A stream of another node.
     #[error(
-        "stream `{stream}` of {module} is on node `{node}`, and a stream is read on its own node; subscribe to its \
-         values with `subscribe(PORT.data(), …)`"
+        "stream `{stream}` of {module} is on node `{node}`, and this node has no [[replica]] of it; add one, or \
+         subscribe to its values with `subscribe(PORT.data(), …)`"
     )]
     FarStream {
         /// The stream.

@@ -150,8 +150,8 @@ fn a_stream_is_read_by_its_description_alone() {
         [
             "stream `image` of camera.0 has 1 readers already; end one, or raise its `readers` in \
              [module.stream.image] of camera.0",
-            "stream `image` of camera.1 is on node `far`, and a stream is read on its own node; subscribe to its \
-             values with `subscribe(PORT.data(), …)`",
+            "stream `image` of camera.1 is on node `far`, and this node has no [[replica]] of it; add one, or \
+             subscribe to its values with `subscribe(PORT.data(), …)`",
         ]
     );
     drop(images);

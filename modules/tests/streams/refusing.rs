@@ -109,8 +109,8 @@ fn a_stream_is_read_on_its_own_node_and_while_it_has_seats() {
     assert_eq!(
         said,
         [
-            "stream `image` of camera.1 is on node `far`, and a stream is read on its own node; subscribe to its \
-             values with `subscribe(PORT.data(), …)`",
+            "stream `image` of camera.1 is on node `far`, and this node has no [[replica]] of it; add one, or \
+             subscribe to its values with `subscribe(PORT.data(), …)`",
             "`viewer.0` is of class `viewer`, but this speaks to class `camera`",
             "stream `image` of camera.0 has 1 readers already; end one, or raise its `readers` in \
              [module.stream.image] of camera.0",

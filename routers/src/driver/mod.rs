@@ -7,7 +7,7 @@
 //! ```
 //!
 //! [`SlotDriver`] sends in time slots. Without them [`FreeDriver`] sends what is real time, and [`RestDriver`] the
-//! rest. [`RxDriver`] receives, and [`ClockDriver`] keeps time.
+//! rest. [`ReplicaDriver`] sends parts of replicas. [`RxDriver`] receives, and [`ClockDriver`] keeps time.
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 
@@ -20,6 +20,7 @@ mod held;
 mod log;
 mod outlet;
 mod platform;
+mod replicas;
 mod rest;
 mod rx;
 mod slots;
@@ -35,6 +36,7 @@ pub use held::HELD_NS_MAX;
 pub use log::{Used, WINDOWS, WindowLog};
 pub use outlet::Outlet;
 pub use platform::{NotSent, Platform, SlotEvent};
+pub use replicas::{ReplicaDriver, ReplicaWait};
 pub use rest::{RestDriver, RestInlet, RestStep};
 pub use rx::{RxDriver, RxPlatform};
 pub use slots::{SlotDriver, SlotStep};

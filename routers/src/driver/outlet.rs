@@ -3,8 +3,10 @@
 use super::platform::NotSent;
 use crate::frame::NodeIndex;
 use crate::outbound::{Accepted, DIRECT_HEAD_BYTES, Outbound, OutboundStep, Package};
+use crate::replication::{ReplicaSender, ReplicaStep};
 use crate::report::Report;
 use crate::settings::Settings;
+use rohrpost_mailbox::SystemTime;
 
 /// Clock, queue and sockets of such a thread.
 pub trait Outlet {
@@ -71,12 +73,32 @@ impl Transmitter {
         drop(report);
         match output {
             OutboundStep::Send { to, bytes } => {
-                let sent = on.send(on.monotonic_ns(), to, &mut self.datagram, bytes);
-                settle(on, sent, &self.datagram[..bytes], &[]);
+                self.hand_over(on, to, bytes);
                 None
             }
             OutboundStep::Wait { until_ns } => Some(until_ns.min(on.blocked().1)),
         }
+    }
+
+    /// Sends the next part of a replica, if there is one to send.
+    pub(super) fn step_replicas(
+        &mut self,
+        on: &mut impl Outlet,
+        now_ns: u64,
+        system: impl Fn(u64) -> SystemTime,
+        sender: &mut ReplicaSender,
+    ) -> ReplicaStep {
+        pass_over_blocked(on);
+        let step = sender.poll(now_ns, system, on.queue().0, &mut self.datagram);
+        if let ReplicaStep::Send { to, bytes } = step {
+            self.hand_over(on, to, bytes);
+        }
+        step
+    }
+
+    fn hand_over(&mut self, on: &mut impl Outlet, to: NodeIndex, bytes: usize) {
+        let sent = on.send(on.monotonic_ns(), to, &mut self.datagram, bytes);
+        settle(on, sent, &self.datagram[..bytes], &[]);
     }
 }
 

@@ -8,16 +8,26 @@
 //!  packages: (head 16, body) repeated     fragment: first u64, index u16, count u16, offset u32, package head, bytes
 //!  alive: incarnation u64 and next sequence u64 of the peer as heard here, datagrams of it that were missed u64
 //!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
+//!  record part, description: see `replica`
 //!  byte 7: key of the seal over the content, 0: none, see `security`; hello: always sealed
 //! ```
 //!
 //! Little-endian; a package head has the order of its options. The check is the CRC-32 of zlib over all other bytes.
 
+mod fields;
+mod refusal;
+mod replica;
+
+use fields::long;
+pub use fields::{BadFrame, VERSION};
+pub use refusal::{Refusal, RefusalReason};
+pub use replica::{
+    DESCRIPTION_BYTES_MAX, DESCRIPTION_PART_HEAD_BYTES, DescriptionPart, RECORD_PART_HEAD_BYTES, RecordPart,
+    ReplicaFrame,
+};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
 pub use rohrpost_network::{ALIVE_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES as HEAD_BYTES, REFUSAL_BYTES};
 
-/// Version of this format. The first four bytes, the check and a refusal are the same in all.
-pub const VERSION: u8 = 1;
 /// Fragments of a package, at most: one of 64 KiB in the smallest datagrams has fewer.
 pub const PARTS_MAX: u16 = 256;
 const MAGIC: [u8; 2] = *b"Rp";
@@ -42,6 +52,10 @@ pub enum FrameKind {
     Refusal = 4,
     /// Always sealed: a challenge, or the response to it.
     Hello = 5,
+    /// A part of a record of a stream.
+    RecordPart = 6,
+    /// A part of the description of a stream's module.
+    Description = 7,
     /// Time: the master's present time.
     Sync = 16,
     /// Time: warms the path for the next frame; empty.
@@ -53,12 +67,14 @@ pub enum FrameKind {
 }
 
 impl FrameKind {
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Packages,
         Self::Fragment,
         Self::Alive,
         Self::Refusal,
         Self::Hello,
+        Self::RecordPart,
+        Self::Description,
         Self::Sync,
         Self::WarmUp,
         Self::Request,
@@ -84,23 +100,6 @@ pub struct FrameHead {
     /// Counts the datagrams of this incarnation from this sender to this receiver, from 0. Time frames have a count of
     /// their own.
     pub sequence: u64,
-}
-
-/// Why bytes are no valid frame.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-pub enum BadFrame {
-    /// Something else, or cut short.
-    #[error("no datagram of a Rohrpost router")]
-    Foreign,
-    /// Another version of the format.
-    #[error("wire format {theirs}, ours is {VERSION}; run the same version of Rohrpost on all nodes", theirs = .0)]
-    Version(u8),
-    /// Sealed, but no seal is expected here.
-    #[error("sealed, and this node's configuration says `security = \"none\"`; launch all nodes from the same file")]
-    Sealed,
-    /// This format, but malformed.
-    #[error("damaged: {0}")]
-    Damaged(&'static str),
 }
 
 impl FrameHead {
@@ -219,6 +218,8 @@ pub enum Frame<'a> {
     Alive(Alive),
     /// The sender takes nothing from the receiver.
     Refusal(Refusal),
+    /// Of a replica.
+    Replica(ReplicaFrame<'a>),
     /// A message of the time protocol; `time` parses it.
     Time(&'a [u8]),
 }
@@ -240,6 +241,8 @@ impl<'a> Frame<'a> {
             FrameKind::Fragment => Self::Fragment(Fragment::parse(rest)?),
             FrameKind::Alive => Self::Alive(Alive::parse(rest)?),
             FrameKind::Refusal => Self::Refusal(Refusal::parse(version, rest)?),
+            FrameKind::RecordPart => Self::Replica(ReplicaFrame::Record(RecordPart::parse(rest)?)),
+            FrameKind::Description => Self::Replica(ReplicaFrame::Description(DescriptionPart::parse(rest)?)),
             FrameKind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
             FrameKind::Sync | FrameKind::WarmUp | FrameKind::Request | FrameKind::Reply => Self::Time(rest),
         })
@@ -370,58 +373,6 @@ impl Alive {
         let b: &[u8; ALIVE_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("an alive frame has 24 bytes"))?;
         Ok(Self { heard_incarnation: long(b, 0), heard_next: long(b, 8), heard_lost: long(b, 16) })
     }
-}
-
-/// Why a peer takes nothing from this node.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-#[repr(u8)]
-pub enum RefusalReason {
-    /// Another version of the wire format; the refusal's own version byte is theirs.
-    Version = 1,
-    /// Another configuration.
-    Digest = 2,
-    /// Its configuration has no such node, or that node has another address.
-    Stranger = 3,
-    /// One end seals, and the other does not.
-    Sealed = 4,
-    /// Sealed with another key. No refusal says so: each end finds it out by itself.
-    Key = 5,
-}
-
-/// A refusal: the sender takes nothing from the receiver, and why.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Refusal {
-    /// Wire version of the refusing router: the third byte of all its datagrams.
-    pub version: u8,
-    /// Why.
-    pub reason: RefusalReason,
-    /// Digest of the refusing router.
-    pub digest: u64,
-}
-
-impl Refusal {
-    /// The 16 bytes behind the head.
-    pub fn to_bytes(&self) -> [u8; REFUSAL_BYTES] {
-        let mut bytes = [0; REFUSAL_BYTES];
-        bytes[0] = self.reason as u8;
-        bytes[8..16].copy_from_slice(&self.digest.to_le_bytes());
-        bytes
-    }
-
-    fn parse(version: u8, rest: &[u8]) -> Result<Self, BadFrame> {
-        let b: &[u8; REFUSAL_BYTES] = rest.try_into().map_err(|_| BadFrame::Damaged("a refusal has 16 bytes"))?;
-        let reasons = [RefusalReason::Version, RefusalReason::Digest, RefusalReason::Stranger, RefusalReason::Sealed];
-        let reason = reasons.into_iter().find(|reason| *reason as u8 == b[0]);
-        let reason = reason.filter(|_| b[1..8] == [0; 7]).ok_or(BadFrame::Damaged("unknown reason of a refusal"))?;
-        Ok(Self { version, reason, digest: long(b, 8) })
-    }
-}
-
-/// Eight bytes at an offset that the caller's array has.
-fn long<const N: usize>(bytes: &[u8; N], at: usize) -> u64 {
-    let mut eight = [0; 8];
-    eight.copy_from_slice(&bytes[at..at + 8]);
-    u64::from_le_bytes(eight)
 }
 
 #[cfg(test)]

@@ -141,7 +141,7 @@ impl Inbound {
                     Some(mismatch) => self.refuse(now_ns, came.source, mismatch, deliver),
                 }
             }
-            Ok(Frame::Refusal(_) | Frame::Time(_)) | Err(_) => self.damaged(came.source),
+            Ok(Frame::Refusal(_) | Frame::Replica(_) | Frame::Time(_)) | Err(_) => self.damaged(came.source),
         }
     }
 
@@ -265,6 +265,11 @@ impl Inbound {
                 }
             }
             Frame::Alive(alive) => way.hears_of_us(now_ns, self.settings.incarnation, &alive),
+            Frame::Replica(part) => {
+                if !deliver.replica(head, &part) {
+                    way.peer.received.refused.add(1);
+                }
+            }
             // Handled before.
             Frame::Refusal(_) | Frame::Time(_) => {}
         }

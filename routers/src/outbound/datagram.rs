@@ -112,7 +112,7 @@ impl Outbound {
     }
 
     /// Writes the head before the content: of this kind, with packages of this level first. Returns the length.
-    fn finish(
+    pub(super) fn finish(
         &mut self,
         now_ns: u64,
         (kind, level): (FrameKind, Option<u8>),

@@ -20,6 +20,7 @@ use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 mod accept;
+mod carry;
 mod datagram;
 mod flows;
 mod own;
@@ -106,8 +107,8 @@ pub struct Outbound {
     full: u64,
     /// Peers that hear this incarnation by their word, one bit each; all peers where that does not matter.
     hearing: u64,
-    /// Counters of the real-time half, if this is the other one, and its counted bytes: both share one rate.
-    shares_with: Option<(Arc<Stats>, u64)>,
+    /// Counters of those that go before, and their counted bytes: all share one rate. The real-time half is the first.
+    shares_with: Vec<(Arc<Stats>, u64)>,
     /// It sends in time slots only.
     in_slots: bool,
     /// No keep-alive is due before this, ns.
@@ -145,7 +146,7 @@ impl Outbound {
             reached: u64::MAX,
             full: 0,
             hearing: u64::MAX,
-            shares_with: None,
+            shares_with: Vec::new(),
             in_slots: settings.tdma.is_some(),
             alive_ns: 0,
             sweep_ns: 0,
@@ -165,7 +166,7 @@ impl Outbound {
     /// at the port for what is not real time. Call it before [`Self::sealed`].
     #[must_use]
     pub fn behind(self, real_time: &Arc<Stats>) -> Self {
-        Self { hearing: 0, shares_with: Some((real_time.clone(), real_time.on_wire_bytes.get())), ..self }
+        Self { hearing: 0, ..self.yielding_to(real_time) }
     }
 
     /// The sockets of these peers, one bit each, have no room: packages to them wait, without delay of others.
@@ -309,10 +310,12 @@ impl Outbound {
 
     /// Accounts for the rate that real time uses, and copies which peers hear this node.
     fn look_at_what_is_real_time(&mut self, now_ns: u64) {
-        let Some((real_time, counted)) = &mut self.shares_with else { return };
-        let bytes = real_time.on_wire_bytes.get();
-        self.pace.takes(now_ns, bytes.wrapping_sub(*counted) as usize);
-        *counted = bytes;
+        for (others, counted) in &mut self.shares_with {
+            let bytes = others.on_wire_bytes.get();
+            self.pace.takes(now_ns, bytes.wrapping_sub(*counted) as usize);
+            *counted = bytes;
+        }
+        let Some((real_time, _)) = self.shares_with.first() else { return };
         if self.peer_sessions.is_some() {
             return;
         }

@@ -25,6 +25,7 @@ mod filter;
 mod handover;
 mod hosted;
 mod peer_events;
+mod replicas;
 mod rest;
 mod rx_thread;
 pub(crate) mod sender_cache;
@@ -41,11 +42,13 @@ pub use ages::Ages;
 pub use answers::{Faults, Undelivered};
 pub use failure::{Failure, Failures};
 pub use peer_events::difference;
+pub use replicas::ReplicaParts;
 pub use socket::{SocketError, listen};
 
 use crate::driver::{ANSWERS, Answer, FreeDriver, RxDriver, spin_ns};
 use crate::impair;
 use crate::outbound::Outbound;
+use crate::replication::ReplicaCounts;
 use crate::security::{self, Gate, KeyRing, NoRandom, PeerSessions, Port, Rejections, RouterIdentity, Sealing};
 use crate::settings::Settings;
 use crate::stats::Stats;
@@ -95,6 +98,9 @@ pub enum ShellError {
     /// No unused incarnation number was found.
     #[error(transparent)]
     Random(#[from] NoRandom),
+    /// Replicas with time slots, or sealed.
+    #[error("replicas are carried by networks without time slots and without seals only")]
+    Replicas,
     /// The system has no thread for it.
     #[error("a thread of the router: {0}; is the limit of processes reached (ulimit -u)?")]
     Thread(io::Error),
@@ -132,6 +138,7 @@ pub struct Shell {
     clock: Option<Arc<ClockState>>,
     slots: Option<Arc<slots::SlotStatus>>,
     tunnel: Option<Arc<tunnel::Passed>>,
+    replicas: ReplicaCounts,
     /// Where datagrams are sealed.
     peer_sessions: Option<Arc<PeerSessions>>,
     /// The clock's own thread.
@@ -234,6 +241,7 @@ impl Shell {
             clock: None,
             slots: None,
             tunnel: None,
+            replicas: ReplicaCounts::default(),
             service: None,
             threads: Vec::new(),
             peer_sessions: all,

@@ -26,23 +26,23 @@ const DATAGRAM_BYTES: usize = 1 << 16;
 const RING_EVERY_NS: u64 = 20_000_000;
 
 /// State of the receiving thread.
-pub(super) struct RxThread {
+pub(super) struct RxThread<D = PackageDelivery> {
     pub(super) driver: RxDriver,
-    pub(super) system: RxSystem,
+    pub(super) system: RxSystem<D>,
     pub(super) stats: Arc<Stats>,
 }
 
 /// What the driver has of the system.
-pub(super) struct RxSystem {
+pub(super) struct RxSystem<D = PackageDelivery> {
     pub(super) shared: Arc<Shared>,
     pub(super) socket: Arc<InSocket>,
-    pub(super) delivery: PackageDelivery,
+    pub(super) delivery: D,
     pub(super) settings: Arc<Settings>,
     /// With time slots, refusals and hellos leave through them.
     pub(super) answers: Option<SyncSender<Answer>>,
 }
 
-impl RxPlatform for RxSystem {
+impl<D: Deliver> RxPlatform for RxSystem<D> {
     fn delivery(&mut self) -> impl Deliver {
         &mut self.delivery
     }
@@ -60,7 +60,7 @@ impl RxPlatform for RxSystem {
     }
 }
 
-impl RxThread {
+impl<D: Deliver> RxThread<D> {
     /// Runs until the socket is closed.
     pub(super) fn run(mut self) {
         let mut datagram = vec![0; DATAGRAM_BYTES];

@@ -13,9 +13,9 @@ use rohrpost_mailbox::{Head, monotonic_ns};
 use std::io::IoSlice;
 
 /// Queue and sockets.
-pub(super) struct Sending {
+pub(super) struct Sending<R = ErrorReplier> {
     pub(super) outbound: Outbound,
-    pub(super) answers: ErrorReplier,
+    pub(super) answers: R,
     pub(super) wire: PeerSockets,
     /// To the thread that sends what is not real time; none where there is none.
     pub(super) rest: Option<BatchSender>,
@@ -27,7 +27,7 @@ impl Report for ErrorReplier {
     }
 }
 
-impl Outlet for Sending {
+impl<R: Report> Outlet for Sending<R> {
     fn monotonic_ns(&self) -> u64 {
         monotonic_ns()
     }

@@ -22,6 +22,8 @@ const RECEIVE_BYTES: usize = 8 << 20;
 /// The same for what is not real time: packages that wait longer than this takes at 100 MiB/s are late, and the reader
 /// may have to wait itself.
 pub(super) const REST_BYTES: usize = 2 << 20;
+/// The same for parts of replicas: records are large.
+pub(super) const REPLICA_BYTES: usize = 8 << 20;
 /// Expedited forwarding (RFC 3246), for switches and radios that know it; and the highest priority in this computer's
 /// own queues that needs no rights.
 const TRAFFIC_CLASS: u32 = 46 << 2;
@@ -78,11 +80,13 @@ pub(super) enum Received {
 }
 
 /// Sockets of a node's router for a process that keeps them while routers come and go
-/// ([`Parts::sockets`](super::Parts)): of this port, and of the port for what is not real time. Datagrams that come
+/// ([`Parts::sockets`](super::Parts)): of this port, of the port for what is not real time, and of that for replicas.
+/// Datagrams that come
 /// meanwhile wait in the kernel, with their time of arrival; those that wait too long are dropped. From the first
 /// socket on that cannot be opened now the rest is missing: each router opens these itself, or reports why it cannot.
-pub fn listen(own: IpAddr, (port, rest): (u16, Option<u16>), peers: &[IpAddr]) -> Vec<OwnedFd> {
-    let ports = std::iter::once((port, RECEIVE_BYTES)).chain(rest.map(|port| (port, REST_BYTES)));
+pub fn listen(own: IpAddr, (port, others): (u16, [Option<u16>; 2]), peers: &[IpAddr]) -> Vec<OwnedFd> {
+    let others = others.into_iter().zip([REST_BYTES, REPLICA_BYTES]).filter_map(|(port, bytes)| Some((port?, bytes)));
+    let ports = std::iter::once((port, RECEIVE_BYTES)).chain(others);
     let open = |(port, bytes)| InSocket::open((own, port).into(), peers, bytes).map(|inside| inside.socket.into());
     ports.map_while(|port| open(port).ok()).collect()
 }

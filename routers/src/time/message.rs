@@ -180,9 +180,13 @@ impl TimeMessage {
                 sync_by_kernel: has(SYNC_BY_KERNEL),
                 request_by_kernel: has(REQUEST_BY_KERNEL),
             }),
-            FrameKind::Packages | FrameKind::Fragment | FrameKind::Alive | FrameKind::Refusal | FrameKind::Hello => {
-                return Err(BadFrame::Damaged("no frame of time"));
-            }
+            FrameKind::Packages
+            | FrameKind::Fragment
+            | FrameKind::Alive
+            | FrameKind::Refusal
+            | FrameKind::Hello
+            | FrameKind::RecordPart
+            | FrameKind::Description => return Err(BadFrame::Damaged("no frame of time")),
         };
         // Unused bytes must be 0: another version can use them.
         if message.to_bytes() != *rest {

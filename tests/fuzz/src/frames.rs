@@ -1,7 +1,7 @@
 //! Datagrams of routers: their check covers the whole, so a datagram is written again as it was read, byte for byte.
 
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
-use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, PARTS_MAX, VERSION};
+use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, PARTS_MAX, ReplicaFrame, VERSION};
 use rohrpost_routers::time::message::TimeMessage;
 
 pub(crate) fn run(data: &[u8]) {
@@ -41,6 +41,14 @@ fn validate(datagram: &[u8]) {
         }
         Frame::Alive(alive) => assert_eq!(alive.to_bytes(), rest),
         Frame::Refusal(refusal) => assert_eq!(refusal.to_bytes(), rest),
+        Frame::Replica(replica) => {
+            let (head, bytes, offset, len) = match replica {
+                ReplicaFrame::Record(part) => (part.head_bytes().to_vec(), part.bytes, part.offset, part.len),
+                ReplicaFrame::Description(part) => (part.head_bytes().to_vec(), part.bytes, part.offset, part.len),
+            };
+            assert!(offset as usize + bytes.len() <= len as usize);
+            assert_eq!([&head[..], bytes].concat(), rest);
+        }
         Frame::Time(time) => {
             if let Ok(message) = TimeMessage::parse(head.kind, time) {
                 assert_eq!((message.kind(), &message.to_bytes()[..]), (head.kind, time));

@@ -24,7 +24,8 @@ const ATF_COM: u32 = 0x2;
 pub(in crate::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> Option<LanView> {
     let (network, address) = (installation.network?, node.address?);
     let is_here = UdpSocket::bind((address, 0)).is_ok();
-    let ports = [Some(network.port), Some(network.time_port()), installation.rest_port()].into_iter().flatten();
+    let more = [installation.rest_port(), installation.replica_port()];
+    let ports = [network.port, network.time_port()].into_iter().chain(more.into_iter().flatten());
     let ports = ports
         .map(|number| Port { number, state: if is_here { try_port(address, number) } else { PortState::Unknown } })
         .collect();

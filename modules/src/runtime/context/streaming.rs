@@ -109,8 +109,9 @@ impl Context {
         }
     }
 
-    /// Opens a stream of another module of this node, to look at when the module likes: its newest record, the next
-    /// one, or what was there at a time. It begins with what is written next. The stream need not be there yet.
+    /// Opens a stream of another module of this node, or one of which this node has a replica, to look at when the
+    /// module likes: its newest record, the next one, or what was there at a time. It begins with what is written next.
+    /// The stream need not be there yet.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::{Context, ContextError, Stream};
@@ -241,8 +242,10 @@ impl Context {
         module: impl FnOnce() -> String,
     ) -> Result<CheckedReader, ContextError> {
         let node = beyond.or_else(|| self.installation.node_of(from));
+        let own = self.installation.node_of(self.me);
+        let has_replica = own.is_some_and(|own| self.installation.replica_on(own, from, &known.name).is_some());
         // What the configuration does not have may be here: a module of a test, say.
-        if let Some(node) = node.filter(|node| self.installation.node_of(self.me) != Some(node)) {
+        if let Some(node) = node.filter(|node| own != Some(node) && !has_replica) {
             let (stream, module) = (known.name.into_owned(), module());
             return Err(ContextError::FarStream { stream, module, node: node.into() });
         }

@@ -63,8 +63,8 @@ fn closing_ends_a_thread_that_blocks_in_reading() {
 #[test]
 fn what_comes_while_nobody_reads_a_kept_socket_waits_for_the_next_one() {
     let at = SocketAddr::new(ONE, free_port(ONE));
-    let mut keepers = listen(at.ip(), (at.port(), Some(free_port(ONE))), &[OTHER]);
-    assert_eq!(listen(at.ip(), (at.port(), None), &[OTHER]).len(), 0, "it is open already");
+    let mut keepers = listen(at.ip(), (at.port(), [Some(free_port(ONE)), None]), &[OTHER]);
+    assert_eq!(listen(at.ip(), (at.port(), [None, None]), &[OTHER]).len(), 0, "it is open already");
     let (rest, keeper) = (keepers.pop().unwrap(), keepers.pop().unwrap());
     assert_ne!(UdpSocket::from(rest).local_addr().unwrap(), at, "the other one has the other port");
     let mut sender = OutSocket::new(OTHER, at, 0);

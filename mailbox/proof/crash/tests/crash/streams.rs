@@ -3,7 +3,7 @@
 use crate::aftermath::empty;
 use crate::ground::{Death, Ground, MAILBOX, each_step};
 use crate::victim::die_with;
-use rohrpost_mailbox_crash::{Next, Stamp, StreamId, StreamReader, StreamShape, StreamWriter};
+use rohrpost_mailbox_crash::{Next, OriginRecord, Stamp, StreamId, StreamReader, StreamShape, StreamWriter};
 use std::time::Duration;
 
 const ID: StreamId = StreamId { name: MAILBOX, number: 1 };
@@ -13,6 +13,9 @@ const RACING: StreamShape = StreamShape { record_bytes: 64, keep: 4, readers: 2,
 const PLAIN: StreamShape = StreamShape { record_bytes: 8192, ..RACING };
 /// Records that the scenes write: more than are kept.
 const WRITTEN: u64 = 5;
+
+/// Records that a replica leaves out before the one that it writes.
+const LEFT_OUT: u64 = 2;
 
 /// What the victims do. Those with records of plain memory say so.
 pub(crate) fn act(role: &str, ground: &Ground, arm: impl Fn()) {
@@ -40,6 +43,16 @@ pub(crate) fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             open.body_mut()[..16].copy_from_slice(&bytes(number));
             open.finish(16).unwrap();
             die_with(writer);
+        }
+        "leave out" => {
+            let mut replica = ground.join().replica_writer(ID, shape, WRITTEN).unwrap();
+            arm();
+            let sequence = WRITTEN + LEFT_OUT;
+            let record = OriginRecord { sequence, incarnation: 1, stamp: stamp(sequence), len_bytes: 16 };
+            replica.begin(record).unwrap();
+            assert!(replica.put(0, &bytes(sequence)));
+            assert_eq!(replica.finish(), Some(sequence));
+            die_with(replica);
         }
         "read" => {
             let participant = ground.join();
@@ -161,6 +174,29 @@ fn a_writer_dies_writing() {
             |ground| orphan(ground, shape),
             |ground, reader, death| {
                 a_successor_goes_on(ground, reader, shape, death);
+            },
+        );
+    }
+}
+
+/// What it had left out by then was never written: its successor writes it, or goes on behind the record.
+#[test]
+fn a_writer_of_a_replica_dies_leaving_records_out() {
+    for (role, shape) in [("stream: leave out", RACING), ("stream: plain: leave out", PLAIN)] {
+        each_step(
+            role,
+            6,
+            |ground| orphan(ground, shape),
+            |ground, reader, death| {
+                let writer = writer(ground, shape);
+                // Entries of what is left out are published as well.
+                let may_be = |death: &Death| death.step == "entry: published";
+                let (written, finished) = (writer.written(), WRITTEN + LEFT_OUT + 1);
+                let is_either = written == WRITTEN || written == finished;
+                let is_right =
+                    if death.is_some_and(may_be) { is_either } else { is_finished(death) == (written == finished) };
+                assert!(is_right && is_either, "{written}: {death:?}");
+                all_usable(ground, writer, reader, WRITTEN);
             },
         );
     }

@@ -1,0 +1,64 @@
+//! Replicas: how a router reads descriptions, and what it publishes of them.
+
+use rohrpost::interfaces::{ReplicaCause, ReplicaState, ReplicaStates};
+use rohrpost::schema::Description;
+use rohrpost_config::Installation;
+use rohrpost_routers::frame::NodeIndex;
+use rohrpost_routers::replication::{Describe, ReplicaLoss, ReplicaLosses, ReplicaSettings};
+use rohrpost_routers::shell::Shell;
+use std::time::Duration;
+
+/// Reads descriptions of modules.
+pub(super) struct Descriptions;
+
+impl Describe for Descriptions {
+    fn number(&self, description: &[u8], item: &str) -> Option<u16> {
+        let description = Description::from_bytes(description).ok()?;
+        description.streams().find(|stream| stream.field.name == item).map(|stream| stream.number)
+    }
+}
+
+/// The present state; none on a node that sends and has no replica.
+pub(super) fn of(shell: &Shell, installation: &Installation, all: &[ReplicaSettings]) -> Option<ReplicaStates> {
+    let (settings, counts) = (shell.settings(), shell.replicas());
+    let node = |index: NodeIndex| settings.nodes.get(usize::from(index)).map(|node| node.name.clone());
+    let stream = |place: u16| installation.replicas.get(usize::from(place)).map(|replica| replica.text(installation));
+    let sent = counts.sent.iter().map(|sent| ReplicaState {
+        stream: stream(sent.place).unwrap_or_default(),
+        node: node(sent.to).unwrap_or_default(),
+        records: sent.records.get(),
+        bytes: sent.bytes.get(),
+        gaps: None,
+        delay_p99_ns: None,
+        delay_worst_ns: None,
+        delayed: None,
+        lost: causes(&sent.lost),
+    });
+    let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+    let received = counts.received.iter().map(|received| {
+        let delay = received.delay.get();
+        let p99 = delay.quantile(0.99);
+        ReplicaState {
+            stream: stream(received.place).unwrap_or_default(),
+            node: all.get(usize::from(received.place)).and_then(|replica| node(replica.node)).unwrap_or_default(),
+            records: received.records.get(),
+            bytes: received.bytes.get(),
+            gaps: Some(received.gaps.get()),
+            delay_p99_ns: p99.map(ns),
+            delay_worst_ns: p99.map(|_| ns(delay.max)),
+            delayed: Some(received.delayed.get()),
+            lost: causes(&received.lost),
+        }
+    });
+    let is_any = !counts.sent.is_empty() || !counts.received.is_empty();
+    is_any.then(|| ReplicaStates {
+        node: node(settings.own).unwrap_or_default(),
+        sent: sent.collect(),
+        received: received.collect(),
+    })
+}
+
+fn causes(lost: &ReplicaLosses) -> Vec<ReplicaCause> {
+    let all = ReplicaLoss::ALL.into_iter().map(|cause| (cause.word(), lost.of(cause)));
+    all.filter(|(_, times)| *times > 0).map(|(cause, times)| ReplicaCause { cause: cause.into(), times }).collect()
+}

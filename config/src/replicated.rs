@@ -1,0 +1,44 @@
+//! What an installation knows of its replicas.
+
+use crate::installation::Installation;
+use crate::replica::Replica;
+use crate::stream::StreamSpec;
+use rohrpost_mailbox::Name;
+
+impl Replica {
+    /// As the file names the stream.
+    pub fn text(&self, installation: &Installation) -> String {
+        format!("{}/{}", installation.classes.format(self.from), self.item)
+    }
+
+    /// The shape that the stream has on each node.
+    pub fn spec(&self, installation: &Installation) -> StreamSpec {
+        let module = installation.module(self.from);
+        module.and_then(|module| module.streams.get(&self.item)).copied().unwrap_or_default()
+    }
+}
+
+impl Installation {
+    /// The replica of a stream that a node has, if it has one.
+    pub fn replica_on(&self, node: &str, from: Name, item: &str) -> Option<&Replica> {
+        let is_it = |replica: &&Replica| {
+            replica.from == from.module() && replica.item == item && replica.to.iter().any(|to| to == node)
+        };
+        self.replicas.iter().find(is_it)
+    }
+
+    /// What must be equal on all nodes: the place of a replica is its number on the wire.
+    pub(crate) fn replica_text(&self) -> impl Iterator<Item = String> {
+        self.replicas.iter().enumerate().map(|(place, replica)| {
+            let spec = replica.spec(self);
+            let (StreamSpec { record_bytes, keep, readers, late }, to) = (spec, replica.to.join(" "));
+            format!("replica {place} {} {record_bytes} {keep} {readers} {late:?} to {to}", replica.text(self))
+        })
+    }
+
+    /// Bytes of shared memory that the replicas of a node take.
+    pub(crate) fn replica_memory_on(&self, node: &str) -> impl Iterator<Item = u64> {
+        let here = self.replicas.iter().filter(move |replica| replica.to.iter().any(|to| to == node));
+        here.map(|replica| replica.spec(self).memory())
+    }
+}

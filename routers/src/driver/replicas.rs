@@ -1,0 +1,59 @@
+//! Sends parts of replicas, behind all packages: what leaves next, and for how long to wait.
+
+use super::outlet::{Outlet, Transmitter};
+use crate::replication::{ReplicaSender, ReplicaStep};
+use crate::settings::Settings;
+use rohrpost_mailbox::SystemTime;
+
+/// The end of the router, modules that have begun, and peers that have come are looked at this often, ns.
+const LOOK_NS: u64 = 100_000_000;
+/// Room in a socket is looked at this often at the least, ns.
+const LOOK_AGAIN_NS: u64 = 10_000_000;
+
+/// What to do until it is polled again.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ReplicaWait {
+    /// Poll it at once.
+    Again,
+    /// The wire has no room: sleep.
+    Sleep {
+        /// For so long, ns.
+        for_ns: u64,
+    },
+    /// Wait for records.
+    Wait {
+        /// For so long, ns.
+        for_ns: u64,
+    },
+}
+
+/// Sends the parts of all replicas of a node's streams.
+pub struct ReplicaDriver {
+    transmitter: Transmitter,
+}
+
+impl ReplicaDriver {
+    /// Makes the driver of a starting router.
+    pub fn new(settings: &Settings) -> Self {
+        Self { transmitter: Transmitter::new(settings) }
+    }
+
+    /// Does what is due, one datagram at most. `system` tells system time at a moment of the outlet's clock.
+    pub fn poll(
+        &mut self,
+        on: &mut impl Outlet,
+        system: impl Fn(u64) -> SystemTime,
+        sender: &mut ReplicaSender,
+    ) -> ReplicaWait {
+        let now_ns = on.monotonic_ns();
+        // Keep-alives; packages do not come here.
+        let Some(until_ns) = self.transmitter.step(on, now_ns) else { return ReplicaWait::Again };
+        let until_ns = until_ns.min(on.deliver(now_ns));
+        let left_ns = |other_ns: u64| until_ns.min(other_ns).saturating_sub(now_ns);
+        match self.transmitter.step_replicas(on, now_ns, system, sender) {
+            ReplicaStep::Send { .. } => ReplicaWait::Again,
+            ReplicaStep::Wait { until_ns } => ReplicaWait::Sleep { for_ns: left_ns(until_ns).min(LOOK_AGAIN_NS) },
+            ReplicaStep::Idle { until_ns } => ReplicaWait::Wait { for_ns: left_ns(until_ns).min(LOOK_NS) },
+        }
+    }
+}

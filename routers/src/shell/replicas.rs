@@ -1,0 +1,190 @@
+//! The two threads of replicas: one reads this node's streams and sends their parts, the other writes what comes from
+//! other nodes into rings of this one.
+//!
+//! They have sockets and a port of their own, so a flood of parts takes no room in a socket, and no time of a thread,
+//! from packages. Both are scheduled like modules that are not real time. What is sent, and when, says the
+//! [driver](crate::driver); what becomes a record says [`replication`](crate::replication).
+
+use super::rx_thread::{RxSystem, RxThread};
+use super::sending::Sending;
+use super::socket::{InSocket, REPLICA_BYTES};
+use super::threads::{Awake, Shared, schedule_below};
+use super::wire::PeerSockets;
+use super::{Shell, ShellError};
+use crate::counts::Cause;
+use crate::driver::{ReplicaDriver, ReplicaWait, RxDriver};
+use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
+use crate::impair;
+use crate::outbound::Outbound;
+use crate::replication::{Describe, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
+use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
+use crate::settings::Settings;
+use crate::stats::Stats;
+use rohrpost_mailbox::{Head, Name, Node, Participant, SystemClock, monotonic_ns, wait_any};
+use std::os::fd::OwnedFd;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Modules that have begun are looked for this often, ns.
+const LOOK_EVERY_NS: u64 = 500_000_000;
+
+/// What replicas need.
+pub struct ReplicaParts<'a> {
+    /// All of the installation.
+    pub replicas: &'a [ReplicaSettings],
+    /// Reads descriptions.
+    pub describe: Arc<dyn Describe>,
+    /// The socket, if it is kept for the router; else it makes one.
+    pub socket: Option<OwnedFd>,
+    /// A bad network between it and its sockets.
+    pub impair: Option<impair::ImpairmentSettings>,
+}
+
+/// No package goes here, so none is lost.
+pub(super) struct NoPackages;
+
+impl Report for NoPackages {
+    fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
+}
+
+/// Writes parts that come.
+struct ReplicaDelivery {
+    receiver: ReplicaReceiver,
+    clock: SystemClock,
+}
+
+impl Report for ReplicaDelivery {
+    fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
+}
+
+impl Deliver for ReplicaDelivery {
+    fn deliver(&mut self, _: NodeIndex, _: &Head, _: &[u8]) -> Result<(), NotDelivered> {
+        Err(NotDelivered::NoMailbox)
+    }
+
+    fn replica(&mut self, head: &FrameHead, part: &ReplicaFrame<'_>) -> bool {
+        self.receiver.take(monotonic_ns(), || self.clock.now(), head, part)
+    }
+
+    fn event(&mut self, _: RouterEvent) {}
+}
+
+/// State of the sending thread.
+struct ReplicaTx {
+    shared: Arc<Shared>,
+    participant: Arc<Participant>,
+    describe: Arc<dyn Describe>,
+    driver: ReplicaDriver,
+    sender: ReplicaSender,
+    sending: Sending<NoPackages>,
+    clock: SystemClock,
+}
+
+impl ReplicaTx {
+    /// Runs until the router ends.
+    fn run(mut self) {
+        let (mut awake, mut look_ns) = (Awake::default(), 0);
+        while !self.shared.ends() {
+            let now_ns = monotonic_ns();
+            if now_ns >= look_ns {
+                look_ns = now_ns + LOOK_EVERY_NS;
+                self.sender.look(&self.participant, &*self.describe);
+            }
+            match self.driver.poll(&mut self.sending, |ns| self.clock.at(ns), &mut self.sender) {
+                ReplicaWait::Again => {}
+                ReplicaWait::Sleep { for_ns } => std::thread::sleep(Duration::from_nanos(for_ns)),
+                ReplicaWait::Wait { for_ns } => awake.slept(self.wait(Duration::from_nanos(for_ns))),
+            }
+            awake.pause_if_long(now_ns);
+        }
+    }
+
+    /// Sleeps until there is a record; for how long it slept.
+    fn wait(&mut self, time: Duration) -> Duration {
+        let mut readers = self.sender.readers();
+        if readers.is_empty() {
+            std::thread::sleep(time);
+            return time;
+        }
+        wait_any(&mut readers, Some(Instant::now() + time), || self.shared.ends())
+    }
+}
+
+impl Shell {
+    /// Starts the two threads, if this node writes or has a replica. Datagrams are not sealed, and there are no time
+    /// slots: configuration checks that.
+    ///
+    /// # Errors
+    /// [`ShellError`]
+    pub fn replicate(&mut self, node: &Arc<Node>, parts: ReplicaParts<'_>) -> Result<(), ShellError> {
+        let (settings, shared) = (self.settings.clone(), self.shared.clone());
+        if self.peer_sessions.is_some() || settings.tdma.is_some() {
+            return Err(ShellError::Replicas);
+        }
+        let [sending, receiving] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
+        let sender = ReplicaSender::new(&settings, parts.replicas);
+        let receiver = ReplicaReceiver::new(&settings, parts.replicas, receiving, parts.describe.clone());
+        self.replicas = ReplicaCounts { sent: sender.counts(), received: receiver.counts() };
+        let stats = Stats::of_rest(&settings, &self.stats);
+        if !receiver.is_empty() {
+            self.receive_replicas((receiver, SystemClock::open(node)), &stats, parts.socket)?;
+        }
+        if sender.is_empty() {
+            return Ok(());
+        }
+        // No package waits in it, so it needs no room for those of modules.
+        let alone = Settings { senders: Vec::new(), ..(*settings).clone() };
+        let mut outbound = Outbound::new(&alone, stats).behind(&self.stats).only_to(sender.peers());
+        if let Some(rest) = &self.rest_stats {
+            outbound = outbound.yielding_to(rest);
+        }
+        let port = settings.network.replica_port();
+        let wire = PeerSockets::new(&settings, port, None, parts.impair, &self.failures);
+        let tx_thread = ReplicaTx {
+            participant: sending,
+            describe: parts.describe,
+            driver: ReplicaDriver::new(&settings),
+            sender,
+            sending: Sending { outbound, answers: NoPackages, wire, rest: None },
+            clock: SystemClock::open(node),
+            shared,
+        };
+        self.begin("replicas-out", move || {
+            schedule_below();
+            tx_thread.run();
+        })
+    }
+
+    /// Opens the port, and starts the thread that writes what comes.
+    fn receive_replicas(
+        &mut self,
+        (receiver, clock): (ReplicaReceiver, SystemClock),
+        stats: &Arc<Stats>,
+        kept: Option<OwnedFd>,
+    ) -> Result<(), ShellError> {
+        let settings = self.settings.clone();
+        let own = (settings.nodes[usize::from(settings.own)].address, settings.network.replica_port()).into();
+        let socket = Arc::new(InSocket::kept(kept, own, &settings.peer_addresses(), REPLICA_BYTES)?);
+        self.sockets.push(socket.clone());
+        let rx_thread = RxThread {
+            driver: RxDriver::new(&settings, stats, None).of_rest(),
+            stats: stats.clone(),
+            system: RxSystem {
+                shared: self.shared.clone(),
+                socket,
+                delivery: ReplicaDelivery { receiver, clock },
+                settings,
+                answers: None,
+            },
+        };
+        self.begin("replicas-in", move || {
+            schedule_below();
+            rx_thread.run();
+        })
+    }
+
+    /// Counters of the replicas of this node.
+    pub fn replicas(&self) -> &ReplicaCounts {
+        &self.replicas
+    }
+}

@@ -1,0 +1,218 @@
+//! A stream of one node is read on another as if it were written there: by this test, by the recorder and by tools.
+
+use crate::harness::{NETWORK, OUTPUT, Place, Robot, lacks_namespaces, signal, wait};
+use crate::lan::addresses;
+use crate::process::Running;
+use crate::recorded::{Frame, feed, feeder_entry, noise};
+use crate::recorded_nodes::values;
+use nix::sys::signal::Signal;
+use rohrpost::Name;
+use rohrpost::wire::from_bytes;
+use rohrpost_mailbox::{Next, Participant, RecordInfo, StreamId, StreamReader};
+use rohrpost_recording::info;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+const HEAD: &str = r#"
+installation = "test"
+[system]
+name = "robot"
+id = 1
+[classes]
+router = { id = 250 }
+feeder = { id = 96 }
+output = { id = 32 }
+logd = { id = 24 }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+"#;
+
+const LOGD: &str = r#"
+[[module]]
+name = "logd.0"
+node = "brain"
+builtin = "logd"
+stop-within = "60 s"
+[record]
+directory = "recordings"
+streams = ["feeder.0/frame"]
+leave-free = "0 B"
+flush = "20 ms"
+[[replica]]
+stream = "feeder.0/frame"
+to = ["brain"]
+"#;
+
+/// The number of the feeder's stream in its interface.
+const FRAME: u16 = 2;
+
+fn config(place: &Place, [base, brain]: &[String; 2]) -> PathBuf {
+    let config = place.path("test.toml");
+    let at = |node: &str, entry: &str| entry.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1);
+    let nodes = format!(
+        "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.brain]\naddress = \"{brain}\"\ntools = [16, 31]\n"
+    );
+    let modules = [at("base", OUTPUT), at("base", &feeder_entry(0)), LOGD.to_owned()].concat();
+    std::fs::write(&config, [HEAD, &nodes, NETWORK, &modules].concat()).unwrap();
+    config
+}
+
+/// A reader on a node, and all that it has read.
+struct Follower {
+    reader: StreamReader,
+    records: BTreeMap<u64, (RecordInfo, Vec<u8>)>,
+    lost: u64,
+}
+
+impl Follower {
+    fn new(robot: &Robot) -> Self {
+        let participant = Participant::join(&robot.node, Name::NONE).unwrap();
+        let reader = participant.stream_reader(StreamId { name: robot.name("feeder.0"), number: FRAME }).unwrap();
+        Self { reader, records: BTreeMap::new(), lost: 0 }
+    }
+
+    fn follow(&mut self) {
+        loop {
+            match self.reader.try_next().unwrap() {
+                Next::Record(record) => {
+                    let info = record.info();
+                    let newest = self.records.last_key_value().map(|(sequence, _)| *sequence);
+                    assert!(newest < Some(info.sequence), "{newest:?}, then {}", info.sequence);
+                    self.records.insert(info.sequence, (info, record.body().to_vec()));
+                }
+                Next::Lost(lost) => self.lost += lost,
+                Next::Nothing => return,
+            }
+        }
+    }
+}
+
+/// Two nodes on this computer, at addresses of the loopback device.
+struct Pair {
+    place: Place,
+    config: PathBuf,
+    base: (Running, Robot),
+    brain: (Running, Robot),
+}
+
+impl Pair {
+    fn launched() -> Self {
+        let place = Place::new();
+        let config = config(&place, &addresses());
+        let start = |node: &str| {
+            let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), "--node", node]));
+            let robot = place.robot(&config, node, &mut launch);
+            robot.wait_on(&mut launch);
+            (launch, robot)
+        };
+        let (base, brain) = (start("base"), start("brain"));
+        Self { place, config, base, brain }
+    }
+
+    fn say(&self, node: &str, arguments: &[&str]) -> String {
+        self.place.say_at(&self.config, node, arguments).ok()
+    }
+
+    /// Has the feeder write until its newest record is read on both nodes.
+    fn feed_through(&self, count: u64, [here, there]: [&mut Follower; 2]) {
+        self.say("base", &["call", "feeder.0", "feed", &count.to_string()]);
+        wait("the newest record is read on the other node", || {
+            here.follow();
+            there.follow();
+            let is_fed = self.say("base", &["call", "feeder.0", "--json", "fed"]).trim() != "null";
+            let newest = [&*here, &*there].map(|of| of.records.last_key_value().map(|(sequence, _)| *sequence));
+            if is_fed && newest[0].is_some() && newest[0] == newest[1] {
+                return Some(());
+            }
+            // A busy computer may have dropped a part of the newest: the next one says so.
+            self.say("base", &["call", "feeder.0", "feed", "1"]);
+            None
+        });
+    }
+}
+
+#[test]
+fn a_stream_of_another_node_is_read_as_if_written_here() {
+    let pair = Pair::launched();
+    let (mut here, mut there) = (Follower::new(&pair.base.1), Follower::new(&pair.brain.1));
+    pair.feed_through(60, [&mut here, &mut there]);
+    let feeder = pair.base.1.pid("feeder.0");
+    signal(feeder, Signal::SIGKILL);
+    pair.base.1.wait_restarted("feeder.0", feeder);
+    pair.feed_through(60, [&mut here, &mut there]);
+
+    assert_eq!(here.lost, 0);
+    for (sequence, (info, body)) in &there.records {
+        let (origin, written) = &here.records[sequence];
+        let told = |info: &RecordInfo| (info.stamp, info.incarnation, info.len_bytes);
+        assert_eq!((told(info), body), (told(origin), written), "record {sequence}");
+        let frame: Frame = from_bytes(body).unwrap();
+        assert_eq!(frame.bytes, noise(frame.number));
+    }
+    let (first, _) = there.records.first_key_value().unwrap();
+    let newest = here.records.last_key_value().unwrap().0;
+    assert!(there.records.len() as u64 + there.lost > newest - first, "each is read or told as lost");
+    let incarnations: std::collections::BTreeSet<u32> =
+        there.records.values().map(|(info, _)| info.incarnation).collect();
+    assert_eq!(incarnations.len(), 2, "the writer has begun anew once");
+
+    let at = ["--config", pair.config.to_str().unwrap(), "--node", "brain"];
+    let stream = |words: &[&str]| pair.place.say(&[&["stream"], words, &at].concat()).ok();
+    let list = stream(&["list"]);
+    assert!(list.contains("the router, from node base"), "{list}");
+    let info = stream(&["info", "feeder.0", "frame"]);
+    assert!(info.contains("writer      the router, from node base\n"), "{info}");
+    for (node, way) in [("base", "to brain"), ("brain", "from base")] {
+        let net = pair.say(node, &["net"]);
+        let has_it = net.lines().any(|line| line.contains("feeder.0/frame") && line.contains(way));
+        assert!(has_it, "{net}");
+    }
+
+    let Pair { place, base, brain, .. } = pair;
+    drop((here, there));
+    for (mut launch, robot) in [brain, base] {
+        drop(robot);
+        launch.stop();
+    }
+    let recorded = values(&place.path("recordings/brain-0001.mcap"), "feeder.0/frame");
+    assert!(recorded.len() > 60, "{} of the replica's records are recorded", recorded.len());
+    place.assert_empty();
+}
+
+#[test]
+fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
+    let place = Place::new();
+    let config = config(&place, &["10.77.0.1".into(), "10.77.0.2".into()]);
+    let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=22"];
+    let mut launch =
+        Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], &bad].concat()));
+    // It ends at once where there are none.
+    let begun = wait("both nodes run", || {
+        let runs = ["base", "brain"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
+        if runs { Some(true) } else { launch.err().contains("cannot be made here").then_some(false) }
+    });
+    if !begun {
+        assert!(lacks_namespaces(&launch.err()));
+        return;
+    }
+    let file = place.path("recordings/brain-0001.mcap");
+    let recorded = || values(&file, "feeder.0/frame");
+    wait("the recorder follows the replica", || {
+        feed(&place, "feeder.0", 1);
+        (!recorded().is_empty()).then_some(())
+    });
+    let target = feed(&place, "feeder.0", 300);
+    wait("records behind the last of them", || {
+        feed(&place, "feeder.0", 1);
+        recorded().last().is_some_and(|(_, number)| *number > target).then_some(())
+    });
+    launch.stop();
+    let (recorded, told) = (recorded(), info(&file).unwrap());
+    assert!(recorded.is_sorted_by(|a, b| a.1 < b.1), "{recorded:?}");
+    let channel = told.channels.iter().find(|channel| channel.topic == "feeder.0/frame").unwrap();
+    let (first, last) = (recorded[0].1, recorded[recorded.len() - 1].1);
+    assert!(recorded.len() as u64 + channel.lost > last - first, "{} recorded, {} lost", recorded.len(), channel.lost);
+    assert!(channel.lost > 0 && recorded.len() > 100, "{} recorded, {} lost", recorded.len(), channel.lost);
+    place.assert_empty();
+}
