@@ -1,20 +1,21 @@
 //! Entries as bytes, one behind the other:
 //!
 //! ```text
-//! len u32   bytes of tag and content, little endian
-//! sum u32   of the sum before, tag and content: no entry is missing, and none is changed
-//! tag u8    which kind
-//! content   postcard
+//! len u32     bytes of tag and content, little endian
+//! check u32   of the sum before and the length: a changed length is not taken for the journal's end
+//! sum u32     of the sum before, tag and content: no entry is missing, and none is changed
+//! tag u8      which kind
+//! content     postcard
 //! ```
 
-use super::bytes::digest;
+use super::bytes::{digest, spread};
 use serde::Serialize;
 use std::ops::Range;
 
 /// Version of all that is in a journal. Others are not read.
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 /// Bytes before the tag.
-const HEAD_BYTES: usize = 8;
+const HEAD_BYTES: usize = 12;
 
 /// The kind of an entry.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -164,13 +165,19 @@ fn head(to: &mut Vec<u8>, tag: Tag) -> usize {
     begin
 }
 
+/// What an entry of this length says of it, behind one with this sum. Lengths that differ have checks that differ.
+fn check(before: u32, len: u32) -> u32 {
+    before ^ spread(len)
+}
+
 /// Fills in the head of the entry that begins there.
 fn seal(to: &mut [u8], begin: usize, before: u32) -> Result<u32, postcard::Error> {
     let body = begin + HEAD_BYTES;
     let len = u32::try_from(to.len() - body).map_err(|_| postcard::Error::SerializeBufferFull)?;
     let sum = digest(before.into(), &to[body..]) as u32;
-    to[begin..begin + 4].copy_from_slice(&len.to_le_bytes());
-    to[begin + 4..body].copy_from_slice(&sum.to_le_bytes());
+    for (word, at) in [len, check(before, len), sum].into_iter().zip((begin..).step_by(4)) {
+        to[at..at + 4].copy_from_slice(&word.to_le_bytes());
+    }
     Ok(sum)
 }
 
@@ -219,7 +226,7 @@ pub(super) struct ReadEntry {
 pub(super) enum NoEntry {
     /// The journal ends here.
     End,
-    /// It ends within an entry.
+    /// It ends within an entry, as a process leaves it that was killed.
     Cut,
     /// An entry is changed, or one before it is missing.
     Sum,
@@ -234,7 +241,10 @@ pub(super) fn read(bytes: &[u8], at: usize, before: u32) -> Result<ReadEntry, No
         return Err(NoEntry::End);
     }
     let word = |from: usize| rest.get(from..from + 4)?.try_into().ok().map(u32::from_le_bytes);
-    let (Some(len), Some(sum)) = (word(0), word(4)) else { return Err(NoEntry::Cut) };
+    let (Some(len), Some(checked), Some(sum)) = (word(0), word(4), word(8)) else { return Err(NoEntry::Cut) };
+    if check(before, len) != checked {
+        return Err(NoEntry::Sum);
+    }
     let Some(body) = rest[HEAD_BYTES..].get(..len as usize) else { return Err(NoEntry::Cut) };
     if digest(before.into(), body) as u32 != sum {
         return Err(NoEntry::Sum);
@@ -283,7 +293,7 @@ mod tests {
         for bit in 0..second * 8 {
             let mut flipped = bytes.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
-            assert!(matches!(read(&flipped, 0, 0), Err(NoEntry::Sum | NoEntry::Cut)), "bit {bit}");
+            assert_eq!(read(&flipped, 0, 0), Err(NoEntry::Sum), "bit {bit}");
         }
     }
 }

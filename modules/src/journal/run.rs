@@ -108,7 +108,7 @@ impl ExactRun {
             Ok(frame) if frame.tag == Tag::Begin => frame,
             Ok(_) => return refused("its beginning is missing"),
             Err(NoEntry::End | NoEntry::Cut) => return refused("it is cut off in its beginning"),
-            Err(NoEntry::Sum | NoEntry::Tag(_)) => return refused("its beginning is damaged"),
+            Err(NoEntry::Sum | NoEntry::Tag(_)) => return refused("its beginning is damaged, or of another version"),
         };
         let content = &self.journal[frame.content];
         match postcard::take_from_bytes::<u32>(content) {
