@@ -2,9 +2,11 @@
 
 use crate::harness::{Place, Robot, halt, signal, wait};
 use crate::process::{Running, Said};
-use crate::seer::{OTHER_BUILD, entry};
+use crate::seer::{OTHER_BUILD, OTHER_QUESTIONS, entry};
 use nix::sys::signal::Signal;
 use serde_json::Value;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -230,6 +232,40 @@ fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
 }
 
 #[test]
+fn a_descriptor_is_repeated_without_it_and_what_is_read_past_the_journal_is_found() {
+    let place = Place::new();
+    let listener = UnixListener::bind(place.path("port")).unwrap();
+    let (mut launch, robot) = seers(&place, &["port", "beside"]);
+    let file = recording(&place, 1);
+    let mut ports = [0, 1].map(|_| listener.accept().unwrap().0);
+    for round in 0..20 {
+        for port in &mut ports {
+            let (sent, mut back) = ([round, 7], [0; 2]);
+            port.write_all(&sent).unwrap();
+            port.read_exact(&mut back).unwrap();
+            assert_eq!(back, sent);
+        }
+    }
+    ["seer.0", "seer.1"].iter().for_each(|module| wait_journaled(&file, module, 5));
+    drop(robot);
+    launch.stop();
+    drop((listener, ports));
+    std::fs::remove_file(place.path("port")).unwrap();
+
+    let run = &replayed(&place, &file, &["seer.0"])[0];
+    assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
+    assert!(run["outputs"].as_u64() >= Some(40), "{run:#}");
+    let run = &replayed(&place, &file, &["seer.1"])[0];
+    let why = &run["why"];
+    assert_eq!((&run["result"], &why["event"]), (&"differs".into(), &"finds descriptor 0 ready".into()), "{run:#}");
+    assert!(why["recorded"].as_str().unwrap().starts_with("it publishes data: vision of "), "{run:#}");
+    assert!(why["replayed"].as_str().unwrap().starts_with("it fails: \"Bad file descriptor"), "{run:#}");
+    let listed = place.say(&["replay", "--exact", file.to_str().unwrap(), "seer.0", "--list"]).ok();
+    let told = ["it takes something in (`take_in`): at most 16 bytes", "it gives bytes out (`give_out`): 2 bytes 0007"];
+    assert!(told.iter().all(|line| listed.contains(line)), "{listed}");
+}
+
+#[test]
 fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     let place = Place::new();
     let (mut launch, robot) = seers(&place, &["clock", "clock", "clock"]);
@@ -255,6 +291,15 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     assert_eq!(said.code, Some(1));
     let run: Value = serde_json::from_str(&said.out).unwrap();
     assert_eq!((&run["result"], &run["events"], &run["outputs"]), (&"differs".into(), &3.into(), &0.into()), "{run:#}");
+    let said = replay(&place, &file, &["seer.0"], &[(OTHER_QUESTIONS, "1")]);
+    let run: Value = serde_json::from_str(&said.out).unwrap();
+    assert_eq!(
+        (&run["result"], &run["events"], &run["why"]["event"]),
+        (&"differs".into(), &1.into(), &"is made".into())
+    );
+    let [recorded, replayed] = ["recorded", "replayed"].map(|side| run["why"][side].as_str().unwrap());
+    assert_eq!(recorded, "it wants to tick: once in 5000000 ns");
+    assert_eq!(replayed, "it wants to tick: once in 6000000 ns");
 }
 
 #[test]

@@ -5,10 +5,15 @@
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Interest, Module, ModuleClock, ModuleError, Ready};
 use std::collections::HashMap;
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 /// It is another build if it finds this in its environment.
 pub(crate) const OTHER_BUILD: &str = "ROHRPOST_E2E_SEER_BIAS";
+
+/// It asks for other things if it finds this.
+pub(crate) const OTHER_QUESTIONS: &str = "ROHRPOST_E2E_SEER_ASKS";
 
 /// Its lines in a configuration.
 pub(crate) fn entry(number: usize, source: &str) -> String {
@@ -60,8 +65,12 @@ enum Sight {
     TakenIn,
     /// A file that is part of its settings.
     Map,
-    /// A descriptor.
+    /// A descriptor that no journal knows.
     Descriptor,
+    /// A socket, as the rules have it.
+    Port,
+    /// A socket, read past the journal.
+    Beside,
     /// The clock, in another thread.
     Thread,
     /// Its link.
@@ -80,6 +89,7 @@ struct Seer {
     more: u64,
     fails: bool,
     map: Option<Vec<u8>>,
+    port: Option<UnixStream>,
 }
 
 impl Module for Seer {
@@ -87,7 +97,8 @@ impl Module for Seer {
     type Interfaces = SeeingInterface;
 
     fn new(settings: SeerSettings, context: &mut Context) -> Result<Self, ModuleError> {
-        context.set_period(Duration::from_millis(5));
+        let asks_otherwise = std::env::var_os(OTHER_QUESTIONS).is_some();
+        context.set_period(Duration::from_millis(if asks_otherwise { 6 } else { 5 }));
         let source = settings.source;
         let map = (source == Sight::Map).then(|| std::fs::read(context.path("vision.map"))).transpose()?;
         match source {
@@ -98,8 +109,9 @@ impl Module for Seer {
             }
             _ => {}
         }
+        let port = matches!(source, Sight::Port | Sight::Beside).then(|| open(context)).transpose()?;
         let bias = std::env::var(OTHER_BUILD).ok().and_then(|bias| bias.parse().ok()).unwrap_or(0);
-        Ok(Self { source, clock: context.clock().clone(), more: bias, fails: false, map })
+        Ok(Self { source, clock: context.clock().clone(), more: bias, fails: false, map, port })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -123,10 +135,46 @@ impl Module for Seer {
         Ok(context.publish_now(SeeingInterface::VISION, &seen.wrapping_add(self.more))?)
     }
 
+    /// Says what its port brings, and sends it back there.
     fn ready(&mut self, context: &mut Context, ready: Ready) -> Result<(), ModuleError> {
-        context.unwatch(ready.watch);
-        Ok(())
+        let Some(port) = &mut self.port else {
+            context.unwatch(ready.watch);
+            return Ok(());
+        };
+        let mut room = [0; 16];
+        let came = match self.source {
+            Sight::Beside => port.read(&mut room),
+            _ => context.take_in_to(&mut room, |room| port.read(room)),
+        };
+        let bytes = match came {
+            Ok(0) => {
+                context.unwatch(ready.watch);
+                return Ok(());
+            }
+            Ok(count) => &room[..count],
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(()),
+            Err(error) => return Err(error.into()),
+        };
+        let gone = match self.source {
+            Sight::Beside => port.write(bytes),
+            _ => context.give_out(bytes, |bytes| port.write(bytes)),
+        };
+        assert_eq!(gone?, bytes.len());
+        let seen = bytes.iter().fold(self.more, |sum, byte| sum.wrapping_mul(31).wrapping_add((*byte).into()));
+        Ok(context.publish_now(SeeingInterface::VISION, &seen)?)
     }
+}
+
+/// Opens a seer's port.
+fn open(context: &mut Context) -> Result<UnixStream, ModuleError> {
+    let path = context.path("port");
+    let port = context.open_outside(|| {
+        let port = UnixStream::connect(&path)?;
+        port.set_nonblocking(true)?;
+        Ok(port)
+    })?;
+    context.watch(&port, Interest::Read)?;
+    Ok(port)
 }
 
 impl Seeing for Seer {

@@ -51,8 +51,22 @@ pub(crate) enum Tag {
     Answered,
     /// whether a record was written,
     Wrote,
-    /// what the module took in by itself.
+    /// what the module took in by itself,
     TakenIn,
+    /// whether it could open a descriptor by itself,
+    OpenedOutside,
+    /// watch one,
+    Watched,
+    /// and watch it no longer,
+    Unwatched,
+    /// what came of what it gave out by itself.
+    Accepted,
+    /// Asked without an answer: to go on from another record,
+    Sought,
+    /// to tick,
+    Ticking,
+    /// for data.
+    Subscribed,
     /// A file that it was given.
     File,
     /// Outputs: data,
@@ -63,6 +77,8 @@ pub(crate) enum Tag {
     Called,
     /// a reply,
     Replied,
+    /// bytes past its interfaces,
+    GaveOut,
     /// why it is in error,
     Failed,
     /// why it panicked.
@@ -73,7 +89,7 @@ pub(crate) enum Tag {
     End,
 }
 
-const ALL: [Tag; 25] = [
+const ALL: [Tag; 33] = [
     Tag::Begin,
     Tag::Event,
     Tag::Time,
@@ -90,11 +106,19 @@ const ALL: [Tag; 25] = [
     Tag::Answered,
     Tag::Wrote,
     Tag::TakenIn,
+    Tag::OpenedOutside,
+    Tag::Watched,
+    Tag::Unwatched,
+    Tag::Accepted,
+    Tag::Sought,
+    Tag::Ticking,
+    Tag::Subscribed,
     Tag::File,
     Tag::Published,
     Tag::Written,
     Tag::Called,
     Tag::Replied,
+    Tag::GaveOut,
     Tag::Failed,
     Tag::Panicked,
     Tag::Hole,
@@ -125,11 +149,19 @@ impl Tag {
             Self::Answered => "waits for an answer",
             Self::Wrote => "ends a record of its stream",
             Self::TakenIn => "takes something in (`take_in`)",
+            Self::OpenedOutside => "opens a descriptor (`open_outside`)",
+            Self::Watched => "waits for a descriptor",
+            Self::Unwatched => "waits for a descriptor no longer",
+            Self::Accepted => "asks what came of what it gave out",
+            Self::Sought => "goes on elsewhere in a stream",
+            Self::Ticking => "wants to tick",
+            Self::Subscribed => "subscribes",
             Self::File => "asks for a file",
             Self::Published => "publishes data",
             Self::Written => "writes a record",
             Self::Called => "sends a command",
             Self::Replied => "replies to a command",
+            Self::GaveOut => "gives bytes out (`give_out`)",
             Self::Failed => "fails",
             Self::Panicked => "panics",
             Self::Hole => "does what no journal sees",
@@ -272,7 +304,7 @@ mod tests {
         for (code, tag) in (1..).zip(ALL) {
             assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
         }
-        assert_eq!((Tag::from_code(0), Tag::from_code(26)), (None, None));
+        assert_eq!((Tag::from_code(0), Tag::from_code(34)), (None, None));
     }
 
     #[test]

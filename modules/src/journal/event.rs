@@ -35,8 +35,12 @@ pub(crate) enum JournalEvent<'a> {
         wish: Blob<'a>,
         by: &'a str,
     },
-    /// A descriptor is ready. Not replayed.
-    Ready,
+    /// A descriptor is ready.
+    Ready {
+        watch: u32,
+        readable: bool,
+        writable: bool,
+    },
 }
 
 /// How data came.
@@ -67,7 +71,7 @@ impl JournalEvent<'_> {
             }
             Self::Function { number, .. } => format!("runs its function {number}"),
             Self::Parameters { by, .. } => format!("is given parameters (by {by})"),
-            Self::Ready => "reads a descriptor".into(),
+            Self::Ready { watch, .. } => format!("finds descriptor {watch} ready"),
         }
     }
 }

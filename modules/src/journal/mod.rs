@@ -21,6 +21,7 @@ mod event;
 mod files;
 mod list;
 mod outputs;
+mod question;
 mod replay;
 mod run;
 mod verdict;
@@ -31,6 +32,7 @@ pub(crate) use entry::Tag;
 use event::EventAt;
 pub(crate) use event::{JournalEvent, NotedOrigin};
 pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply, NotedValue};
+pub(crate) use question::{AskedInterest, Question, nanoseconds};
 pub(crate) use replay::{Given, JournalReplay};
 pub use run::{ExactRun, Piece, RunError, VARIABLE};
 pub use verdict::{Difference, ReplayReport, ReplayVerdict};
@@ -131,46 +133,60 @@ impl ModuleJournal {
     }
 
     /// Something that the module is told: asked now, and noted; or, replayed, what was noted then.
-    pub(crate) fn answer<T: Serialize + DeserializeOwned>(&self, tag: Tag, ask: impl FnOnce() -> T) -> T {
+    pub(crate) fn answer<T: Serialize + DeserializeOwned>(
+        &self,
+        tag: Tag,
+        question: Question<'_>,
+        ask: impl FnOnce() -> T,
+    ) -> T {
         if self.0.is_none() {
             return ask();
         }
-        if let Some(given) = self.given(tag) {
+        if let Some(given) = self.given(tag, question) {
             return given.read();
         }
         let answer = ask();
-        self.note(tag, &answer);
+        self.note(tag, question, &answer);
         answer
     }
 
     /// Notes an answer that was given already; nothing, unless it is written.
-    pub(crate) fn note<T: Serialize + ?Sized>(&self, tag: Tag, answer: &T) {
-        self.write(|writer| writer.put(tag, answer));
+    pub(crate) fn note<T: Serialize + ?Sized>(&self, tag: Tag, question: Question<'_>, answer: &T) {
+        self.put(tag, &(question, answer));
     }
 
-    /// The answer that was noted then; none unless it is replayed.
-    pub(crate) fn given(&self, tag: Tag) -> Option<Given> {
-        self.replay(|replay| replay.answer(tag))
+    /// The answer that was noted then; none unless it is replayed. What is asked is what was asked then.
+    pub(crate) fn given(&self, tag: Tag, question: Question<'_>) -> Option<Given> {
+        self.replay(|replay| replay.answer(tag, &question))
+    }
+
+    /// The module wants something that has no answer.
+    pub(crate) fn asked(&self, tag: Tag, question: Question<'_>) {
+        self.answer(tag, question, || ());
+    }
+
+    fn put<T: Serialize + ?Sized>(&self, tag: Tag, content: &T) {
+        self.write(|writer| writer.put(tag, content));
     }
 
     /// How it begins.
     pub(crate) fn begin(&self, begin: &Begin<'_>) {
         if self.replay(|replay| replay.begin(begin)).is_none() {
-            self.note(Tag::Begin, begin);
+            self.put(Tag::Begin, begin);
         }
     }
 
     /// The module is called; `now_ns` is asked for if that is noted.
     pub(crate) fn event(&self, event: &JournalEvent<'_>, now_ns: impl FnOnce() -> u64) {
         if !self.is_none() && self.replay(|replay| replay.event(event)).is_none() {
-            self.note(Tag::Event, &EventAt { at_ns: now_ns(), event: *event });
+            self.put(Tag::Event, &EventAt { at_ns: now_ns(), event: *event });
         }
     }
 
     /// The module sends something, or says something of itself.
     pub(crate) fn output<T: Serialize + ?Sized>(&self, tag: Tag, output: &T) {
         if !self.is_none() && self.replay(|replay| replay.output(tag, output)).is_none() {
-            self.note(tag, output);
+            self.put(tag, output);
         }
     }
 
@@ -196,13 +212,13 @@ impl ModuleJournal {
     }
 
     /// A file that the module's settings name: a replay wants one with the same content.
-    pub(crate) fn file(&self, path: &Path) {
+    pub(crate) fn file(&self, named: &str, path: &Path) {
         if self.is_none() {
             return;
         }
-        let found = files::digest_of(path);
-        if self.replay(|replay| replay.file(path, found)).is_none() {
-            self.note(Tag::File, &found);
+        let (question, found) = (Question::File(named), files::digest_of(path));
+        if self.replay(|replay| replay.file(&question, path, found)).is_none() {
+            self.note(Tag::File, question, &found);
         }
     }
 

@@ -3,6 +3,7 @@
 use super::bytes::{Blob, digest};
 use super::entry::{Tag, VERSION};
 use super::event::JournalEvent;
+use super::question::Question;
 use rohrpost_mailbox::Name;
 use rohrpost_schema::{Description, Type, decode};
 use serde::{Deserialize, Serialize};
@@ -104,10 +105,21 @@ pub(super) fn describe(tag: Tag, content: &[u8], event: Option<&JournalEvent<'_>
         Tag::Published | Tag::Written => postcard::from_bytes(content).ok().map(|its| published(&its, known)),
         Tag::Called => postcard::from_bytes(content).ok().map(|its| called(&its, known)),
         Tag::Replied => postcard::from_bytes(content).ok().map(|its| replied(&its, event, known)),
+        Tag::GaveOut => postcard::from_bytes(content).ok().map(|its: NotedValue<'_>| its.shown(|_| None)),
         Tag::Failed | Tag::Panicked => postcard::from_bytes::<&str>(content).ok().map(|text| format!("\"{text}\"")),
-        _ => return format!("it {}", tag.words()),
+        _ => return asked(tag, content),
     };
     format!("it {}: {}", tag.words(), text.unwrap_or_else(|| in_hex(content)))
+}
+
+/// An entry with a question, in words.
+fn asked(tag: Tag, content: &[u8]) -> String {
+    let is_question = !matches!(tag, Tag::Begin | Tag::Event | Tag::Hole | Tag::End);
+    let question = is_question.then(|| postcard::take_from_bytes::<Question<'_>>(content).ok()).flatten();
+    match question.and_then(|(question, _)| question.words()) {
+        Some(question) => format!("it {}: {question}", tag.words()),
+        None => format!("it {}", tag.words()),
+    }
 }
 
 impl KnownTypes {

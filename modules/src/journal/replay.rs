@@ -6,6 +6,7 @@
 use super::entry::{self, NoEntry, ReadEntry, Tag};
 use super::event::{EventAt, JournalEvent};
 use super::outputs::{Begin, KnownTypes, describe};
+use super::question::Question;
 use super::verdict::{Difference, ReplayReport, ReplayVerdict};
 use rohrpost_schema::Description;
 use serde::{Deserialize, Serialize};
@@ -47,7 +48,8 @@ pub(crate) struct JournalReplay {
     known: KnownTypes,
     /// Why it is cut off at its end, if it is.
     ends: Option<String>,
-    output: Vec<u8>,
+    /// What the module says, as a journal has it.
+    said: Vec<u8>,
     progress: Rc<ReplayProgress>,
 }
 
@@ -72,7 +74,7 @@ impl Given {
 impl JournalReplay {
     pub(super) fn new(bytes: Rc<[u8]>, ends: Option<String>, report: PathBuf) -> Self {
         let progress = Rc::new(ReplayProgress { path: report, report: RefCell::default() });
-        Self { bytes, at: 0, sum: 0, event: 0..0, known: KnownTypes::default(), ends, output: Vec::new(), progress }
+        Self { bytes, at: 0, sum: 0, event: 0..0, known: KnownTypes::default(), ends, said: Vec::new(), progress }
     }
 
     /// The module's interfaces, under each of its names.
@@ -89,7 +91,8 @@ impl JournalReplay {
 
     /// It is of this module and these settings, wherever their files are now.
     pub(super) fn begin(&mut self, begin: &Begin<'_>) {
-        let given = self.answer(Tag::Begin);
+        let frame = self.compare(Tag::Begin, &(), |_, _| true);
+        let given = self.given(frame);
         let noted: Begin<'_> = given.read();
         if noted.texts() != begin.texts() {
             self.refuse("it is of another module, or of other settings");
@@ -159,32 +162,34 @@ impl JournalReplay {
     }
 
     /// What was noted, when the module asks this.
-    pub(super) fn answer(&mut self, tag: Tag) -> Given {
-        let frame = self.look();
-        if frame.tag != tag {
-            self.differ(self.describe(&frame), format!("it {}", tag.words()));
-        }
-        self.pass(&frame);
-        self.given(frame)
+    pub(super) fn answer(&mut self, tag: Tag, question: &Question<'_>) -> Given {
+        let mut answer = self.compare(tag, question, <[u8]>::starts_with);
+        answer.content.start += self.said.len();
+        self.given(answer)
     }
 
     /// Compares what the module sends.
     pub(super) fn output<T: Serialize + ?Sized>(&mut self, tag: Tag, output: &T) {
-        let mut bytes = std::mem::take(&mut self.output);
-        bytes.clear();
-        bytes = postcard::to_extend(output, bytes).unwrap_or_default();
-        let frame = self.look();
-        if frame.tag != tag || self.bytes[frame.content.clone()] != *bytes {
-            self.differ(self.describe(&frame), self.describe_sent(tag, &bytes));
-        }
-        self.pass(&frame);
-        self.output = bytes;
+        self.compare(tag, output, <[u8]>::eq);
         self.progress.report.borrow_mut().outputs += 1;
     }
 
+    /// The entry that comes next, if it is of this kind, and its content fits what the module says.
+    fn compare<T: Serialize + ?Sized>(&mut self, tag: Tag, says: &T, fits: fn(&[u8], &[u8]) -> bool) -> ReadEntry {
+        let mut said = std::mem::take(&mut self.said);
+        said.clear();
+        self.said = postcard::to_extend(says, said).unwrap_or_default();
+        let frame = self.look();
+        if frame.tag != tag || !fits(&self.bytes[frame.content.clone()], &self.said) {
+            self.differ(self.describe(&frame), self.describe_sent(tag, &self.said));
+        }
+        self.pass(&frame);
+        frame
+    }
+
     /// A file has the content that it had.
-    pub(super) fn file(&mut self, path: &Path, found: Option<(u64, u64)>) {
-        let noted: Option<(u64, u64)> = self.answer(Tag::File).read();
+    pub(super) fn file(&mut self, question: &Question<'_>, path: &Path, found: Option<(u64, u64)>) {
+        let noted: Option<(u64, u64)> = self.answer(Tag::File, question).read();
         if noted != found {
             let text = |file: Option<(u64, u64)>| match file {
                 Some((len, _)) => format!("{len} bytes"),

@@ -15,7 +15,8 @@ fn work(journal: &ModuleJournal, clock_ns: &mut u64, event: u64, bias: u64) {
         *clock_ns += 7;
         *clock_ns
     };
-    let (first, second) = (journal.answer(Tag::Time, &mut ask), journal.answer(Tag::Time, &mut ask));
+    let mut ask_time = || journal.answer(Tag::Time, Question::Plain, &mut ask);
+    let (first, second) = (ask_time(), ask_time());
     let value = postcard::to_stdvec(&(first * 31 + second + bias)).unwrap();
     journal
         .output(Tag::Published, &NotedItem { endpoint: 0, number: 1, stamp_ns: first, value: NotedValue::of(&value) });
@@ -160,6 +161,45 @@ fn a_missing_entry_and_a_clock_reading_1_ns_off_are_found_in_their_event_though_
             assert!(matches!(report.verdict, ReplayVerdict::Differs(_)), "entry {at}: {report:?}");
             assert_eq!((report.events, report.outputs), (events, events - 1), "entry {at}");
         }
+    }
+}
+
+/// Asks of a stream what is next, and publishes what came.
+fn look(journal: &ModuleJournal, event: u64, tag: Tag, question: Question<'_>) {
+    journal.event(&JournalEvent::Tick, || event * 1000);
+    let next: Option<u64> = journal.answer(tag, question, || Some(event));
+    let value = postcard::to_stdvec(&next.unwrap_or_default()).unwrap();
+    journal.output(Tag::Published, &NotedItem { endpoint: 0, number: 1, stamp_ns: 0, value: NotedValue::of(&value) });
+}
+
+#[test]
+fn another_question_is_told_in_its_event_with_both_though_the_answer_would_do() {
+    let [hook, lamp] = [1, 2].map(|number| StreamId { name: MODULE, number }.into());
+    let run = |tag: Tag, question: Question<'static>| {
+        move |journal: &ModuleJournal| {
+            (0..3).for_each(|event| look(journal, event, Tag::Record, Question::Sequence(hook, event)));
+            look(journal, 3, tag, question);
+            journal.end();
+        }
+    };
+    let bytes = written(run(Tag::Record, Question::Sequence(hook, 3)));
+    let same = replayed(&bytes, None, run(Tag::Record, Question::Sequence(hook, 3)));
+    assert_eq!(same.to_string(), "identical: 4 events, 4 outputs");
+    for (tag, question, told) in [
+        (Tag::Record, Question::Sequence(hook, 4), "it reads a record of a stream: stream 1 of 1.100.0.0, sequence 4"),
+        (Tag::Record, Question::Sequence(lamp, 3), "it reads a record of a stream: stream 2 of 1.100.0.0, sequence 3"),
+        (Tag::Newest, Question::Of(hook), "it reads the newest record of a stream: stream 1 of 1.100.0.0"),
+        (
+            Tag::Around,
+            Question::Time(hook, 2, 5),
+            "it looks for a time in a stream: stream 1 of 1.100.0.0, 5 ns of epoch 2",
+        ),
+    ] {
+        let report = replayed(&bytes, None, run(tag, question));
+        let ReplayVerdict::Differs(difference) = &report.verdict else { panic!("{report:?}") };
+        assert_eq!((report.events, report.outputs, report.last_ns), (4, 3, 3000), "{report:?}");
+        assert_eq!(difference.recorded, "it reads a record of a stream: stream 1 of 1.100.0.0, sequence 3");
+        assert_eq!(difference.replayed, told);
     }
 }
 

@@ -15,7 +15,9 @@ use crate::interface::Interfaces;
 use crate::journal::{JournalEvent, flush_present};
 use crate::module::Module;
 use crate::output;
-use rohrpost_mailbox::{Kind, ModuleState, OverflowPolicy, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any};
+use rohrpost_mailbox::{
+    Kind, ModuleState, OverflowPolicy, Ready, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -242,8 +244,10 @@ impl<M: Module> Running<M> {
         while self.is_on()
             && let Some(ready) = self.context.watches.as_mut().and_then(Watches::next_ready)
         {
+            let Ready { watch, readable, writable } = ready;
+            let event = JournalEvent::Ready { watch: watch.number(), readable, writable };
             let part = |module: &mut M, context: &mut Context| module.ready(context, ready);
-            let result = self.life.work(JournalEvent::Ready, &mut self.context, part);
+            let result = self.life.work(event, &mut self.context, part);
             self.life.check(result, &mut self.context);
         }
     }

@@ -1,7 +1,7 @@
 //! What the reader of a stream said, as a journal has it.
 
 use super::error::StreamReadError;
-use crate::journal::{Blob, ModuleJournal, Tag};
+use crate::journal::{Blob, ModuleJournal, Question, Tag};
 use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo, Stamp};
 use serde::{Deserialize, Serialize};
 
@@ -72,7 +72,12 @@ impl<'a> From<&'a HeldRecord<'_>> for NotedRecord<'a> {
     }
 }
 
-impl NotedRecord<'_> {
+impl<'a> NotedRecord<'a> {
+    /// What a reader said, and of which stream.
+    pub(super) fn of<S>(record: &'a Option<(HeldRecord<'_>, S)>) -> Option<Self> {
+        record.as_ref().map(|(held, _)| held.into())
+    }
+
     fn given(self) -> GivenRecord {
         (self.info.into(), self.bytes.0.to_vec())
     }
@@ -140,31 +145,42 @@ impl From<NotedReadError> for StreamReadError {
 pub(in crate::runtime) fn note<'r, R, N: Serialize>(
     journal: &ModuleJournal,
     tag: Tag,
+    question: Question<'_>,
     answer: &'r Result<R, StreamReadError>,
     content: impl FnOnce(&'r R) -> N,
 ) {
     if !journal.is_none() {
-        journal.note(tag, &answer.as_ref().map(content).map_err(NotedReadError::from));
+        journal.note(tag, question, &answer.as_ref().map(content).map_err(NotedReadError::from));
     }
 }
 
 /// Whether it was opened then.
-pub(in crate::runtime) fn opened(journal: &ModuleJournal) -> Option<Result<(), StreamReadError>> {
-    let given = journal.given(Tag::Opened)?;
+pub(in crate::runtime) fn opened(
+    journal: &ModuleJournal,
+    question: Question<'_>,
+) -> Option<Result<(), StreamReadError>> {
+    let given = journal.given(Tag::Opened, question)?;
     let opened: Result<(), NotedReadError> = given.read();
     Some(opened.map_err(StreamReadError::from))
 }
 
 /// The record that was read then, if there was one.
-pub(super) fn record(journal: &ModuleJournal, tag: Tag) -> Option<Result<Option<GivenRecord>, StreamReadError>> {
-    let given = journal.given(tag)?;
+pub(super) fn record(
+    journal: &ModuleJournal,
+    tag: Tag,
+    question: Question<'_>,
+) -> Option<Result<Option<GivenRecord>, StreamReadError>> {
+    let given = journal.given(tag, question)?;
     let record: Result<Option<NotedRecord<'_>>, NotedReadError> = given.read();
     Some(record.map(|record| record.map(NotedRecord::given)).map_err(StreamReadError::from))
 }
 
 /// What was next then.
-pub(super) fn next(journal: &ModuleJournal) -> Option<Result<Next<GivenRecord>, StreamReadError>> {
-    let given = journal.given(Tag::Next)?;
+pub(super) fn next(
+    journal: &ModuleJournal,
+    question: Question<'_>,
+) -> Option<Result<Next<GivenRecord>, StreamReadError>> {
+    let given = journal.given(Tag::Next, question)?;
     let next: Result<NotedNext<'_>, NotedReadError> = given.read();
     let next = next.map(|next| match next {
         NotedNext::Record(record) => Next::Record(record.given()),
@@ -175,8 +191,8 @@ pub(super) fn next(journal: &ModuleJournal) -> Option<Result<Next<GivenRecord>, 
 }
 
 /// What was around a time then.
-pub(super) fn around(journal: &ModuleJournal) -> Option<Result<Around, StreamReadError>> {
-    let given = journal.given(Tag::Around)?;
+pub(super) fn around(journal: &ModuleJournal, question: Question<'_>) -> Option<Result<Around, StreamReadError>> {
+    let given = journal.given(Tag::Around, question)?;
     let around: Result<NotedAround, NotedReadError> = given.read();
     Some(around.map(Around::from).map_err(StreamReadError::from))
 }
