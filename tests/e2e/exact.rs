@@ -2,8 +2,9 @@
 
 use crate::harness::{Place, Robot, halt, signal, wait};
 use crate::process::{Running, Said};
-use crate::seer::{OTHER_BUILD, OTHER_QUESTIONS, entry};
+use crate::seer::{NOTHING, OTHER_BUILD, OTHER_QUESTIONS, entry};
 use nix::sys::signal::Signal;
+use rohrpost_modules::journal::Piece;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixListener;
@@ -107,15 +108,24 @@ fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str
     Running::start(command).said()
 }
 
-/// Messages of a journal in a file that is being written.
-fn journaled(file: &Path, module: &str) -> usize {
+/// Messages of a journal in a file that is being written, if they are so.
+fn count(file: &Path, module: &str, is_so: impl Fn(&[u8]) -> bool) -> usize {
     let topic = format!("{module}/journal");
     let Ok(mut reader) = rohrpost_recording::Reader::open(file) else { return 0 };
     let mut count = 0;
-    while let Ok(Some((channel, _))) = reader.next() {
-        count += usize::from(channel.topic == topic);
+    while let Ok(Some((channel, message))) = reader.next() {
+        count += usize::from(channel.topic == topic && is_so(message.data));
     }
     count
+}
+
+fn journaled(file: &Path, module: &str) -> usize {
+    count(file, module, |_| true)
+}
+
+/// Runs of a module of which the beginning is recorded.
+fn begun(file: &Path, module: &str) -> usize {
+    count(file, module, |value| Piece::read(value).is_some_and(|piece| piece.offset == 0))
 }
 
 fn wait_journaled(file: &Path, module: &str, more: usize) {
@@ -300,6 +310,31 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     let [recorded, replayed] = ["recorded", "replayed"].map(|side| run["why"][side].as_str().unwrap());
     assert_eq!(recorded, "it wants to tick: once in 5000000 ns");
     assert_eq!(replayed, "it wants to tick: once in 6000000 ns");
+}
+
+#[test]
+fn a_module_that_fails_or_panics_while_it_is_made_is_told_with_its_reason() {
+    let place = Place::new();
+    let (mut launch, robot) = seers(&place, &["map", "map"]);
+    let file = recording(&place, 1);
+    let modules = ["seer.0", "seer.1"];
+    modules.iter().for_each(|module| wait_journaled(&file, module, 2));
+    std::fs::write(place.path("vision.map"), NOTHING).unwrap();
+    modules.iter().for_each(|module| signal(robot.pid(module), Signal::SIGKILL));
+    modules.iter().for_each(|module| wait("it began again", || (begun(&file, module) > 1).then_some(())));
+    drop(robot);
+    launch.signal(Signal::SIGINT);
+    launch.end();
+
+    for (module, reason) in [("seer.0", "it fails: \"it sees nothing in its map\""), ("seer.1", "it panics: ")] {
+        let runs = replayed(&place, &file, &[module]);
+        assert!(runs[0]["why"].as_str().unwrap().contains("vision.map is not the file that it was"), "{runs:#?}");
+        assert!(runs.len() > 1, "{runs:#?}");
+        for run in &runs[1..] {
+            assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
+            assert!(run["why"].as_str().unwrap().starts_with(reason), "{run:#}");
+        }
+    }
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, 
     let recorded_s = last_ns.saturating_sub(report.first_ns) as f64 / 1e9;
     if is_json {
         let (result, why): (&str, Value) = match &report.verdict {
-            ReplayVerdict::Identical { .. } => ("identical", Value::Null),
+            ReplayVerdict::Identical { .. } => ("identical", json!(report.not_made)),
             ReplayVerdict::Differs(Difference { event, recorded, replayed }) => {
                 ("differs", json!({"event": event, "recorded": recorded, "replayed": replayed}))
             }

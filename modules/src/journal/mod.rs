@@ -67,12 +67,41 @@ thread_local! {
 
 const STRAYED: &str = "the module reads the clock, or a stream, in another thread or within `take_in`";
 
-/// Hands on what a module that has no journal any more, since it panicked in its making, has noted.
-pub(crate) fn flush_present() {
+/// The module was not made: it failed, or panicked. With that its journal ends.
+pub(crate) fn end_unmade(tag: Tag, why: &str) {
     PRESENT.with_borrow_mut(|present| match present {
-        Some(JournalMode::Write(writer)) => writer.flush(),
-        Some(JournalMode::Replay(_)) | None => {}
+        Some(JournalMode::Write(writer)) => {
+            writer.put(tag, why);
+            writer.put(Tag::End, &());
+            writer.flush();
+        }
+        Some(JournalMode::Replay(replay)) => {
+            replay.output(tag, why);
+            replay.end()
+        }
+        None => {}
     });
+}
+
+/// The module could not be started, for a reason that is none of its own.
+pub(crate) fn end_unstarted(why: &str) {
+    PRESENT.with_borrow_mut(|present| match present {
+        Some(JournalMode::Write(writer)) => writer.put(Tag::Hole, &format!("the module could not be started: {why}")),
+        Some(JournalMode::Replay(replay)) => replay.give_up(&format!("the module cannot be started here: {why}")),
+        None => {}
+    });
+}
+
+/// The journal of this thread, put aside; it comes back also if the module panics meanwhile.
+struct Aside(Option<JournalMode>);
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        if let Some(JournalMode::Write(writer)) = self.0.as_mut().filter(|_| std::thread::panicking()) {
+            writer.put(Tag::Hole, "the module panicked within `take_in`, or the like, which a replay does not call");
+        }
+        PRESENT.set(self.0.take());
+    }
 }
 
 impl ModuleJournal {
@@ -200,10 +229,8 @@ impl ModuleJournal {
     /// Does this without the journal. What it asks of the module's runtime meanwhile is a hole, since a replay does not
     /// ask it.
     pub(crate) fn apart<T>(&self, part: impl FnOnce() -> T) -> T {
-        let present = PRESENT.take();
-        let done = part();
-        PRESENT.set(present);
-        done
+        let _aside = Aside(PRESENT.take());
+        part()
     }
 
     /// What comes now is seen by no journal.

@@ -171,7 +171,12 @@ impl JournalReplay {
     /// Compares what the module sends.
     pub(super) fn output<T: Serialize + ?Sized>(&mut self, tag: Tag, output: &T) {
         self.compare(tag, output, <[u8]>::eq);
-        self.progress.report.borrow_mut().outputs += 1;
+        let is_end = matches!(tag, Tag::Failed | Tag::Panicked);
+        let is_made = self.present().is_some_and(|event| event != JournalEvent::New);
+        let not_made = (is_end && !is_made).then(|| self.describe_sent(tag, &self.said));
+        let mut report = self.progress.report.borrow_mut();
+        report.outputs += 1;
+        report.not_made = not_made;
     }
 
     /// The entry that comes next, if it is of this kind, and its content fits what the module says.

@@ -41,7 +41,7 @@ fn written(run: impl FnOnce(&ModuleJournal)) -> Vec<u8> {
     let journal = ModuleJournal::written(JournalWriter::new(stream, SystemClock::open(&node), 7));
     journal.begin(&Begin::new("pilot.0", ("robot.toml", "text"), None));
     run(&journal);
-    flush_present();
+    drop(PRESENT.take());
     let mut bytes = Vec::new();
     while let Next::Record(record) = reader.try_next().unwrap() {
         let piece = Piece::read(record.body()).unwrap();
@@ -96,6 +96,7 @@ fn the_same_run_is_identical_whatever_its_own_clock_says() {
         outputs: EVENTS,
         first_ns: 0,
         last_ns: (EVENTS - 1) * 1000,
+        not_made: None,
     };
     assert_eq!(report, expected);
     let own_clock = |journal: &ModuleJournal| {
@@ -216,6 +217,44 @@ fn a_journal_ends_where_something_is_that_it_does_not_see() {
     assert_eq!(entries(&bytes).last().map(|(tag, _)| *tag), Some(Tag::Hole));
     let report = replayed(&bytes, None, with_hole);
     assert_eq!(report.to_string(), "refused from event 2 on, at 1000 ns: it looks out of the window");
+}
+
+#[test]
+fn a_module_that_is_not_made_is_repeated_with_its_reason() {
+    for (tag, told) in [(Tag::Failed, "it fails: \"no port\""), (Tag::Panicked, "it panics: \"no port\"")] {
+        let run = |why: &'static str| {
+            move |journal: &ModuleJournal| {
+                journal.event(&JournalEvent::New, || 5);
+                end_unmade(tag, why);
+            }
+        };
+        let bytes = written(run("no port"));
+        let report = replayed(&bytes, None, run("no port"));
+        assert_eq!(report.to_string(), format!("identical: 1 events, 1 outputs; the module was not made: {told}"));
+        let report = replayed(&bytes, None, run("no money"));
+        assert!(matches!(report.verdict, ReplayVerdict::Differs(_)), "{report:?}");
+        let report = replayed(&bytes, None, |_| end_unstarted("no node"));
+        assert_eq!(report.verdict, ReplayVerdict::Refused("the module cannot be started here: no node".into()));
+    }
+    let bytes = written(|_| end_unstarted("no node"));
+    let report = replayed(&bytes, None, |journal| journal.event(&JournalEvent::New, || 5));
+    assert_eq!(report.verdict, ReplayVerdict::Refused("the module could not be started: no node".into()));
+}
+
+#[test]
+fn a_panic_while_something_is_taken_in_is_a_hole() {
+    let taking = |journal: &ModuleJournal| {
+        journal.event(&JournalEvent::Tick, || 5);
+        let taken = catch_unwind(AssertUnwindSafe(|| journal.apart(|| panic!("no device"))));
+        assert!(taken.is_err());
+        end_unmade(Tag::Panicked, "no device");
+    };
+    let bytes = written(taking);
+    let report = replayed(&bytes, None, |journal| {
+        journal.event(&JournalEvent::Tick, || 5);
+        journal.asked(Tag::TakenIn, Question::Plain);
+    });
+    assert!(report.to_string().contains("refused from event 1 on, at 5 ns: the module panicked within"), "{report}");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::stream::{self, FollowedStream, Step};
 use super::subscribed::Origin;
 use crate::common::DataHead;
 use crate::interface::Interfaces;
-use crate::journal::{JournalEvent, flush_present};
+use crate::journal::{JournalEvent, Tag, end_unmade, end_unstarted};
 use crate::module::Module;
 use crate::output;
 use rohrpost_mailbox::{
@@ -90,10 +90,14 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 /// See [`StartError`].
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
     let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
-    let mut running = joined.unwrap_or_else(|panic| {
-        flush_present();
+    let joined = joined.unwrap_or_else(|panic| {
+        end_unmade(Tag::Panicked, text_of(&*panic));
         output::flush();
         std::panic::resume_unwind(panic)
+    });
+    let mut running = joined.inspect_err(|error| match error {
+        StartError::Module(_, why) => end_unmade(Tag::Failed, why),
+        error => end_unstarted(&error.to_string()),
     })?;
     let worked = catch_unwind(AssertUnwindSafe(|| {
         if running.is_replayed() {
@@ -108,6 +112,12 @@ pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
     }
     running.end();
     Ok(())
+}
+
+/// What a panic says.
+fn text_of(panic: &(dyn std::any::Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told")
 }
 
 /// A module that runs.
@@ -157,9 +167,7 @@ impl<M: Module> Running<M> {
 
     /// A handler panicked; the process is about to end, and launch to start it again.
     fn panicked(&mut self, panic: &(dyn std::any::Any + Send)) {
-        let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told");
-        self.life.panicked(text, &mut self.context);
+        self.life.panicked(text_of(panic), &mut self.context);
         self.context.journal.end();
         output::flush();
     }

@@ -10,7 +10,7 @@ use super::runner::{Running, served};
 use super::stream::{self, ServedStreams};
 use crate::call::Link;
 use crate::interface::StandIn;
-use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal, SHAPE, Tag};
+use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal, SHAPE};
 use crate::module::{Module, ModuleError};
 use crate::output;
 use nix::sys::prctl::set_pdeathsig;
@@ -186,11 +186,7 @@ impl Start {
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);
         participant.end_work();
-        let mut made = made.map_err(|error| {
-            journal.output(Tag::Failed, &error.to_string());
-            journal.end();
-            StartError::Module(text.clone(), error.to_string())
-        })?;
+        let mut made = made.map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
