@@ -2,12 +2,13 @@
 //! do the same.
 //!
 //! ```text
-//! recording ──▶ journals: pieces of each run put together ──▶ a file ──▶ the module's program, alone ──▶ its report
+//! recording ──▶ journals: pieces of each run put together, a file each ──▶ the module's program, alone ──▶ its report
 //! ```
 
 mod journals;
 mod program;
 
+use crate::demo::Folder;
 use crate::terminal::{Failure, complain, say};
 use journals::RecordedRun;
 use program::ExactPrograms;
@@ -36,9 +37,10 @@ pub(super) struct ExactArguments {
 }
 
 pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
-    let runs = journals::read(&arguments.file, &arguments.modules)?;
+    let folder = Folder::new()?;
+    let runs = journals::read(&arguments.file, &arguments.modules, folder.path())?;
     if arguments.list {
-        runs.iter().for_each(list);
+        runs.iter().try_for_each(list)?;
         return Ok(ExitCode::SUCCESS);
     }
     let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone());
@@ -58,11 +60,14 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
-fn list(run: &RecordedRun) {
+fn list(run: &RecordedRun) -> Result<(), Failure> {
     say(format_args!("{}:", plain::line(&run.module)));
-    let entries = ExactPrograms::exact(run, String::new(), None).entries();
+    if let Some(why) = &run.begins_late {
+        say(format_args!("  ({why})"));
+        return Ok(());
+    }
     // The reader may have seen enough.
-    let _ = entries.iter().all(|entry| say(plain::line(entry)));
+    Ok(ExactPrograms::exact(run, String::new(), None).each_entry(|entry| say(plain::line(entry)))?)
 }
 
 fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, took: Duration) {

@@ -51,7 +51,7 @@ impl ExactPrograms {
 
     /// The run as its program reads it.
     pub(super) fn exact(run: &RecordedRun, report: String, folder: Option<String>) -> ExactRun {
-        ExactRun { folder, report, ends: run.ends.clone(), journal: run.bytes.clone().into() }
+        ExactRun { folder, report, ends: run.ends.clone(), journal: run.journal.display().to_string() }
     }
 
     fn command(&self, exact: &ExactRun) -> Result<Command, String> {

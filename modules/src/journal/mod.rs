@@ -36,7 +36,7 @@ pub(crate) use question::{AskedInterest, Question, nanoseconds};
 pub(crate) use replay::{Given, JournalReplay};
 pub use run::{ExactRun, Piece, RunError, VARIABLE};
 pub use verdict::{Difference, ReplayReport, ReplayVerdict};
-pub(crate) use write::{JournalWriter, SHAPE};
+pub(crate) use write::JournalWriter;
 
 use rohrpost_mailbox::monotonic_ns;
 use serde::Serialize;

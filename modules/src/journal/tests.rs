@@ -1,8 +1,10 @@
 //! Journals as a module writes them, and replays of these and of others with one thing changed.
 
+use super::entry::{Entries, NoEntry};
 use super::*;
 use rohrpost_mailbox::{Name, Next, Node, Participant, StreamId, SystemClock};
 use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
+use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const MODULE: Name = Name::new(1, 100, 0, 0);
@@ -36,7 +38,7 @@ fn written(run: impl FnOnce(&ModuleJournal)) -> Vec<u8> {
     let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
     let participant = Participant::join(&node, MODULE).unwrap();
     let id = StreamId { name: MODULE, number: JOURNAL_NUMBER };
-    let stream = participant.stream_writer(id, SHAPE).unwrap();
+    let stream = participant.stream_writer(id, rohrpost_config::JOURNAL.shape()).unwrap();
     let mut reader = participant.stream_reader(id).unwrap();
     let journal = ModuleJournal::written(JournalWriter::new(stream, SystemClock::open(&node), 7));
     journal.begin(&Begin::new("pilot.0", ("robot.toml", "text"), None));
@@ -56,7 +58,7 @@ fn replayed(bytes: &[u8], ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) 
     let item = DataItem { number: 1, kind: DataKind::Data, field: Field::new("sum", Type::U64) };
     let (name, class, text) = ("Sums".into(), "pilot".into(), String::new());
     let own = Description { name, class, text, functions: Vec::new(), data: vec![item] };
-    let mut replay = JournalReplay::new(bytes.into(), ends.map(Into::into), "".into());
+    let mut replay = JournalReplay::new(Box::new(Cursor::new(bytes.to_vec())), ends.map(Into::into), "".into());
     replay.know_own(vec![Some(own)]);
     let journal = ModuleJournal::replayed(replay);
     let run = || {
@@ -69,12 +71,12 @@ fn replayed(bytes: &[u8], ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) 
 
 /// Entries of a journal: tag and content.
 fn entries(bytes: &[u8]) -> Vec<(Tag, Vec<u8>)> {
-    let (mut at, mut sum, mut entries) = (0, 0, Vec::new());
-    while let Ok(frame) = entry::read(bytes, at, sum) {
-        (at, sum) = (frame.content.end, frame.sum);
-        entries.push((frame.tag, bytes[frame.content].to_vec()));
+    let (mut read, mut entries) = (Entries::new(bytes), Vec::new());
+    while let Ok(tag) = read.look() {
+        entries.push((tag, read.content().to_vec()));
+        read.pass();
     }
-    assert_eq!(at, bytes.len());
+    assert_eq!(read.look(), Err(NoEntry::End));
     entries
 }
 
@@ -125,17 +127,18 @@ fn what_differs_is_told_with_its_event_and_both_values() {
 #[test]
 fn each_flipped_bit_is_found_in_its_event() {
     let bytes = written(|journal| run(journal, None));
-    let (mut at, mut sum, mut events) = (0, 0, 0);
-    while let Ok(frame) = entry::read(&bytes, at, sum) {
-        for bit in at * 8..frame.content.end * 8 {
+    let (mut at, mut events) = (0, 0);
+    for (tag, content) in entries(&bytes) {
+        let end = at + sealed(&[(tag, content)]).len();
+        for bit in at * 8..end * 8 {
             let mut flipped = bytes.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
             let report = replayed(&flipped, None, |journal| run(journal, None));
             let damaged = ReplayVerdict::Refused("an entry of the journal is damaged or missing here".into());
             assert_eq!((&report.verdict, report.events), (&damaged, events), "bit {bit}: {report:?}");
         }
-        events += u64::from(frame.tag == Tag::Event);
-        (at, sum) = (frame.content.end, frame.sum);
+        events += u64::from(tag == Tag::Event);
+        at = end;
     }
     assert_eq!(events, EVENTS);
 }
@@ -273,7 +276,7 @@ fn another_module_or_other_settings_are_refused() {
     let bytes = written(|journal| run(journal, None));
     for (module, text) in [("pilot.1", "text"), ("pilot.0", "texT")] {
         let told = catch_unwind(AssertUnwindSafe(|| {
-            let journal = ModuleJournal::replayed(JournalReplay::new(bytes[..].into(), None, "".into()));
+            let journal = ModuleJournal::replayed(JournalReplay::new(Box::new(Cursor::new(bytes.clone())), None, "".into()));
             journal.begin(&Begin::new(module, ("robot.toml", text), None));
         }));
         let report = told.unwrap_err().downcast::<ReplayReport>().unwrap();
