@@ -85,19 +85,24 @@ fn launched(place: &Place, modules: &str) -> (Running, Robot) {
 
 /// Seers with these sources, all with journals.
 fn seers(place: &Place, sources: &[&str]) -> (Running, Robot) {
+    seers_recorded(place, sources, "")
+}
+
+/// The same, with this in the section `[record]` too.
+pub(crate) fn seers_recorded(place: &Place, sources: &[&str], more: &str) -> (Running, Robot) {
     let entries: String = sources.iter().enumerate().map(|(number, source)| entry(number, source)).collect();
     let names: Vec<String> = (0..sources.len()).map(|number| format!("seer.{number}")).collect();
     let record =
-        format!("[record]\ndirectory = \"recordings\"\nexact = {names:?}\nleave-free = \"0 B\"\nflush = \"20 ms\"\n");
+        format!("[record]\ndirectory = \"recordings\"\nexact = {names:?}\nleave-free = \"0 B\"\nflush = \"20 ms\"\n{more}");
     launched(place, &format!("{entries}{record}"))
 }
 
-fn recording(place: &Place, number: u32) -> PathBuf {
+pub(crate) fn recording(place: &Place, number: u32) -> PathBuf {
     place.path(&format!("recordings/main-{number:04}.mcap"))
 }
 
 /// What each run of each module came to.
-fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Value> {
+pub(crate) fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Value> {
     let said = replay(place, file, modules, &[]);
     said.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
@@ -128,7 +133,7 @@ fn begun(file: &Path, module: &str) -> usize {
     count(file, module, |value| Piece::read(value).is_some_and(|piece| piece.offset == 0))
 }
 
-fn wait_journaled(file: &Path, module: &str, more: usize) {
+pub(crate) fn wait_journaled(file: &Path, module: &str, more: usize) {
     let before = journaled(file, module);
     wait(format!("{module} goes on"), || (journaled(file, module) >= before + more).then_some(()));
 }

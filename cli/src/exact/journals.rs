@@ -2,7 +2,7 @@
 
 use crate::terminal::Failure;
 use rohrpost::output::plain;
-use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, Piece};
+use rohrpost_modules::journal::{ExactRun, JOURNAL_NAME, JOURNAL_NUMBER, Piece};
 use rohrpost_recording::{Reader, RecordedChannel};
 use std::fs::File;
 use std::io::Write;
@@ -15,7 +15,7 @@ pub(super) struct RecordedRun {
     /// Tells it from other runs of the module.
     incarnation: u32,
     /// File with its entries.
-    pub(super) journal: PathBuf,
+    journal: PathBuf,
     /// The same, while more may come.
     file: Option<File>,
     len: u64,
@@ -96,6 +96,12 @@ fn take(runs: &mut Vec<RecordedRun>, folder: &Path, module: &str, value: &[u8]) 
 }
 
 impl RecordedRun {
+    /// As its program reads it; still without the places of other files.
+    pub(super) fn exact(&self) -> ExactRun {
+        let journal = self.journal.display().to_string();
+        ExactRun { folder: None, report: String::new(), ends: self.ends.clone(), journal, records: None }
+    }
+
     fn append(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         let failed = |error: std::io::Error| format!("{}: {error}", self.journal.display());
         let file = match &mut self.file {

@@ -3,10 +3,12 @@
 //!
 //! ```text
 //! recording ──▶ journals: pieces of each run put together, a file each ──▶ the module's program, alone ──▶ its report
+//!          └──▶ records that these name, in another file ───────────────────┘
 //! ```
 
 mod journals;
 mod program;
+mod records;
 
 use crate::demo::Folder;
 use crate::terminal::{Failure, complain, say};
@@ -43,7 +45,8 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
         runs.iter().try_for_each(list)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone());
+    let records = records::collect(&arguments.file, &runs, folder.path())?;
+    let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone(), records);
     let mut code = ExitCode::SUCCESS;
     for run in &runs {
         let began = Instant::now();
@@ -67,7 +70,7 @@ fn list(run: &RecordedRun) -> Result<(), Failure> {
         return Ok(());
     }
     // The reader may have seen enough.
-    Ok(ExactPrograms::exact(run, String::new(), None).each_entry(|entry| say(plain::line(entry)))?)
+    Ok(run.exact().each_entry(|entry| say(plain::line(entry)))?)
 }
 
 fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, took: Duration) {

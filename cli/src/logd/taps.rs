@@ -120,7 +120,8 @@ impl Taps {
             taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
-        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context))
+        let from_oldest = !self.recording.exact.is_empty();
+        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, from_oldest))
     }
 
     /// Records a value that came, if it is to be.
@@ -201,12 +202,11 @@ impl SourceModule {
         let name = &item.field.name;
         let is_stream = item.kind == DataKind::Stream;
         let is_line = description.class == CollectorInterface::CLASS && name == LINE;
-        let ring = recording.stream(self.from, name).filter(|_| is_stream && self.own.is_some());
-        // `*` is not meant for streams, which may have records that fit no package.
+        let ring = recording.in_place(self.from, name).filter(|_| is_stream && self.own.is_some());
+        // As in there.
         let named = |items: &&RecordedItems| !is_stream || items.item.is_some();
         let (sampling, numbering) = match (ring, recording.datum(self.from, name).filter(named)) {
             _ if is_line => recording.output.map(|_| (Sampling::Each, Numbering::Packages))?,
-            (Some(ring), Some(items)) if items.exactness() > ring.exactness() => (items.sampling, Numbering::Packages),
             (Some(items), _) => (items.sampling, Numbering::Records),
             (None, Some(items)) => (items.sampling, Numbering::Packages),
             (None, None) => return None,
@@ -256,8 +256,9 @@ impl Tap {
         self.channel = opened.ok();
     }
 
-    /// Subscribes. A stream that has no seat left is tried again.
-    fn open(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+    /// Subscribes. A stream that has no seat left is tried again. `from_oldest`: journals may name each record of
+    /// streams, also those that were written before the recorder came.
+    fn open(&mut self, context: &mut Context, from_oldest: bool) -> Result<(), ModuleError> {
         let opened = match (self.sampler.numbering(), self.sampling) {
             (Numbering::Records, _) => {
                 context.subscribe_stream_untyped(self.from, &self.item, self.interface).map(Source::Stream)
@@ -273,6 +274,9 @@ impl Tap {
         };
         match opened {
             Ok(source) => {
+                if let (Source::Stream(subscription), Sampling::Each, true) = (&source, self.sampling, from_oldest) {
+                    context.rewind(subscription)?;
+                }
                 self.source = Some(source);
                 self.refusal.clear();
             }

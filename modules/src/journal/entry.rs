@@ -51,6 +51,8 @@ pub(crate) enum Tag {
     Answered,
     /// whether a record was written,
     Wrote,
+    /// which record the next entry has, that is recorded anyhow,
+    Named,
     /// what the module took in by itself,
     TakenIn,
     /// whether it could open a descriptor by itself,
@@ -89,7 +91,7 @@ pub(crate) enum Tag {
     End,
 }
 
-const ALL: [Tag; 33] = [
+const ALL: [Tag; 34] = [
     Tag::Begin,
     Tag::Event,
     Tag::Time,
@@ -105,6 +107,7 @@ const ALL: [Tag; 33] = [
     Tag::Begun,
     Tag::Answered,
     Tag::Wrote,
+    Tag::Named,
     Tag::TakenIn,
     Tag::OpenedOutside,
     Tag::Watched,
@@ -148,6 +151,7 @@ impl Tag {
             Self::Begun => "hands a command over",
             Self::Answered => "waits for an answer",
             Self::Wrote => "ends a record of its stream",
+            Self::Named => "is given what is recorded anyhow",
             Self::TakenIn => "takes something in (`take_in`)",
             Self::OpenedOutside => "opens a descriptor (`open_outside`)",
             Self::Watched => "waits for a descriptor",
@@ -351,7 +355,7 @@ mod tests {
         for (code, tag) in (1..).zip(ALL) {
             assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
         }
-        assert_eq!((Tag::from_code(0), Tag::from_code(34)), (None, None));
+        assert_eq!((Tag::from_code(0), Tag::from_code(35)), (None, None));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What a module is called with.
 
 use super::bytes::Blob;
+use super::value::NotedValue;
 use serde::{Deserialize, Serialize};
 
 /// A call of the module's code by its runtime.
@@ -22,7 +23,7 @@ pub(crate) enum JournalEvent<'a> {
         missed: u32,
         incarnation: u32,
         #[serde(borrow)]
-        value: Blob<'a>,
+        value: NotedValue<'a>,
     },
     /// A function of its own, of the interface under its name of this index.
     Function {

@@ -22,25 +22,31 @@ mod files;
 mod list;
 mod outputs;
 mod question;
+mod records;
 mod replay;
 mod run;
+mod value;
 mod verdict;
 mod write;
 
 pub(crate) use bytes::Blob;
 pub(crate) use entry::Tag;
 use event::EventAt;
+use records::NamedRecord;
 pub(crate) use event::{JournalEvent, NotedOrigin};
-pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply, NotedValue};
+pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply};
 pub(crate) use question::{AskedInterest, Question, nanoseconds};
 pub(crate) use replay::{Given, JournalReplay};
+pub use records::{RecordSum, RecordWriter};
 pub use run::{ExactRun, Piece, RunError, VARIABLE};
+pub(crate) use value::NotedValue;
 pub use verdict::{Difference, ReplayReport, ReplayVerdict};
 pub(crate) use write::JournalWriter;
 
-use rohrpost_mailbox::monotonic_ns;
+use rohrpost_mailbox::{StreamId, monotonic_ns};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
@@ -196,6 +202,27 @@ impl ModuleJournal {
 
     fn put<T: Serialize + ?Sized>(&self, tag: Tag, content: &T) {
         self.write(|writer| writer.put(tag, content));
+    }
+
+    /// A record that the module is given, as what comes next has it. Its bytes, or if it `is_recorded` and long, its
+    /// sum.
+    pub(crate) fn record<'b>(&self, id: StreamId, sequence: u64, is_recorded: bool, bytes: &'b [u8]) -> NotedValue<'b> {
+        if self.is_none() || !is_recorded {
+            return NotedValue::Whole(Blob(bytes));
+        }
+        let value = NotedValue::of(bytes);
+        if let NotedValue::Sum(sum) = value {
+            self.put(Tag::Named, &NamedRecord { stream: id.into(), sequence, sum });
+        }
+        value
+    }
+
+    /// The bytes of a record that was noted so; only if it is replayed.
+    pub(crate) fn bytes<'b>(&self, value: NotedValue<'b>) -> Cow<'b, [u8]> {
+        match value {
+            NotedValue::Whole(bytes) => bytes.0.into(),
+            NotedValue::Sum(sum) => self.replay(|replay| replay.named(sum)).unwrap_or_default().into(),
+        }
     }
 
     /// How it begins.

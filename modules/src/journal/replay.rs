@@ -7,6 +7,7 @@ use super::entry::{Entries, NoEntry, Tag};
 use super::event::{EventAt, JournalEvent};
 use super::outputs::{Begin, KnownTypes, describe};
 use super::question::Question;
+use super::records::{NamedRecord, RecordSum, Records};
 use super::verdict::{Difference, ReplayReport, ReplayVerdict};
 use rohrpost_schema::Description;
 use serde::{Deserialize, Serialize};
@@ -45,6 +46,10 @@ pub(crate) struct JournalReplay {
     known: KnownTypes,
     /// Why it is cut off at its end, if it is.
     ends: Option<String>,
+    /// What the recording has of it.
+    records: Records,
+    /// The record that the module is given next, or now.
+    named: Option<NamedRecord>,
     /// What the module says, as a journal has it.
     said: Vec<u8>,
     progress: Rc<ReplayProgress>,
@@ -67,10 +72,10 @@ impl Given {
 }
 
 impl JournalReplay {
-    pub(super) fn new(from: Box<dyn Read>, ends: Option<String>, report: PathBuf) -> Self {
+    pub(super) fn new(from: Box<dyn Read>, records: Records, ends: Option<String>, report: PathBuf) -> Self {
         let progress = Rc::new(ReplayProgress { path: report, report: RefCell::default() });
         let (entries, known) = (Entries::new(from), KnownTypes::default());
-        Self { entries, event: Vec::new(), known, ends, said: Vec::new(), progress }
+        Self { entries, event: Vec::new(), known, ends, records, named: None, said: Vec::new(), progress }
     }
 
     /// The module's interfaces, under each of its names.
@@ -97,6 +102,10 @@ impl JournalReplay {
 
     /// The kind of the next entry. Where the journal ends, so does the replay.
     fn look(&mut self) -> Tag {
+        while self.entries.look() == Ok(Tag::Named) {
+            self.named = postcard::from_bytes(self.entries.content()).ok();
+            self.entries.pass();
+        }
         match self.entries.look() {
             Ok(Tag::Hole) => {
                 let why: &str = postcard::from_bytes(self.entries.content()).unwrap_or("for no reason told");
@@ -159,6 +168,19 @@ impl JournalReplay {
     pub(super) fn answer(&mut self, tag: Tag, question: &Question<'_>) -> Given {
         self.compare(tag, question, <[u8]>::starts_with);
         self.given(self.said.len())
+    }
+
+    /// A record that the recording has.
+    pub(super) fn named(&mut self, sum: RecordSum) -> Vec<u8> {
+        let what = self.named.filter(|named| named.sum == sum).map_or_else(|| sum.to_string(), |its| its.to_string());
+        match self.records.get(sum) {
+            Ok(Some(bytes)) => bytes,
+            Ok(None) => self.refuse(&format!(
+                "{what}, which the module is given here, is not in the recording: the recorder came too late, was too \
+                 slow, or the file is a part of it"
+            )),
+            Err(error) => self.refuse(&format!("{what}, which the module is given here, cannot be read: {error}")),
+        }
     }
 
     /// Compares what the module sends.

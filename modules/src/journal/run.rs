@@ -4,10 +4,12 @@ use super::bytes::Blob;
 use super::entry::{Entries, NoEntry, Tag, VERSION};
 use super::list;
 use super::outputs::Begin;
+use super::records::{NamedRecord, RecordSum, Records};
 use super::replay::JournalReplay;
 use rohrpost_config::{Installation, Saved};
 use rohrpost_mailbox::Name;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -74,6 +76,8 @@ pub struct ExactRun {
     pub ends: Option<String>,
     /// File with all entries.
     pub journal: String,
+    /// File of a [`RecordWriter`](super::RecordWriter) with the records that the journal names; none if it names none.
+    pub records: Option<String>,
 }
 
 /// Why a run cannot be repeated at all.
@@ -160,7 +164,25 @@ impl ExactRun {
         self.folder.as_ref().map_or_else(|| path.to_owned(), |folder| Path::new(folder).join(name))
     }
 
+    /// Records that the journal names, since the recording has them.
+    ///
+    /// # Errors
+    /// The journal's file cannot be opened.
+    pub fn named_records(&self) -> Result<BTreeSet<RecordSum>, RunError> {
+        let (mut entries, mut named) = (Entries::new(self.open()?), BTreeSet::new());
+        while let Ok(tag) = entries.look() {
+            let record = (tag == Tag::Named).then(|| postcard::from_bytes::<NamedRecord>(entries.content()).ok());
+            named.extend(record.flatten().map(|record| record.sum));
+            entries.pass();
+        }
+        Ok(named)
+    }
+
     pub(crate) fn replay(self) -> Result<JournalReplay, RunError> {
-        Ok(JournalReplay::new(Box::new(self.open()?), self.ends, self.report.into()))
+        let records = self.records.as_ref().map(|path| {
+            Records::open(Path::new(path)).map_err(|error| RunError(format!("{path}: {error}")))
+        });
+        let records = records.transpose()?.unwrap_or_default();
+        Ok(JournalReplay::new(Box::new(self.open()?), records, self.ends, self.report.into()))
     }
 }

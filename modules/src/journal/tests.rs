@@ -1,6 +1,7 @@
 //! Journals as a module writes them, and replays of these and of others with one thing changed.
 
 use super::entry::{Entries, NoEntry};
+use super::records::Records;
 use super::*;
 use rohrpost_mailbox::{Name, Next, Node, Participant, StreamId, SystemClock};
 use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
@@ -55,10 +56,20 @@ fn written(run: impl FnOnce(&ModuleJournal)) -> Vec<u8> {
 
 /// What a replay of these bytes finds.
 fn replayed(bytes: &[u8], ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) -> ReplayReport {
+    replayed_with(bytes, Records::default(), ends, run)
+}
+
+/// The same, with these records.
+fn replayed_with(
+    bytes: &[u8],
+    records: Records,
+    ends: Option<&str>,
+    run: impl FnOnce(&ModuleJournal),
+) -> ReplayReport {
     let item = DataItem { number: 1, kind: DataKind::Data, field: Field::new("sum", Type::U64) };
     let (name, class, text) = ("Sums".into(), "pilot".into(), String::new());
     let own = Description { name, class, text, functions: Vec::new(), data: vec![item] };
-    let mut replay = JournalReplay::new(Box::new(Cursor::new(bytes.to_vec())), ends.map(Into::into), "".into());
+    let mut replay = JournalReplay::new(Box::new(Cursor::new(bytes.to_vec())), records, ends.map(Into::into), "".into());
     replay.know_own(vec![Some(own)]);
     let journal = ModuleJournal::replayed(replay);
     let run = || {
@@ -208,6 +219,49 @@ fn another_question_is_told_in_its_event_with_both_though_the_answer_would_do() 
 }
 
 #[test]
+fn a_long_record_that_is_recorded_anyhow_stands_there_by_its_sum() {
+    let picture: Vec<u8> = (0..70_000_u32).map(|at| (at / 7) as u8).collect();
+    let id = StreamId { name: MODULE, number: 2 };
+    // As a reader of streams does it.
+    let read = |journal: &ModuleJournal, is_recorded: bool| {
+        journal.event(&JournalEvent::Tick, || 5);
+        let bytes = match journal.given(Tag::Newest, Question::Of(id.into())) {
+            Some(given) => journal.bytes(given.read()).into_owned(),
+            None => {
+                let noted = journal.record(id, 7, is_recorded, &picture);
+                journal.note(Tag::Newest, Question::Of(id.into()), &noted);
+                picture.clone()
+            }
+        };
+        journal.output(Tag::Replied, &NotedReply { is_fault: false, result: NotedValue::of(&bytes) });
+        journal.end();
+    };
+    let [whole, short] = [false, true].map(|is_recorded| written(|journal| read(journal, is_recorded)));
+    assert!(whole.len() > 70_000 && short.len() < 300, "{} B, {} B", whole.len(), short.len());
+    let found = replayed(&whole, None, |journal| read(journal, false));
+    assert_eq!(found.to_string(), "identical: 1 events, 1 outputs");
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("records");
+    let records = |bytes: &[u8]| {
+        let mut writer = RecordWriter::create(&path).unwrap();
+        writer.add(RecordSum::of(bytes), bytes).unwrap();
+        writer.finish().unwrap();
+        Records::open(&path).unwrap()
+    };
+    let found = replayed_with(&short, records(&picture), None, |journal| read(journal, true));
+    assert_eq!(found.to_string(), "identical: 1 events, 1 outputs");
+    let mut other = picture.clone();
+    other[40_000] ^= 1;
+    for records in [records(&other), Records::default()] {
+        let found = replayed_with(&short, records, None, |journal| read(journal, true));
+        assert_eq!((found.events, found.outputs), (1, 0));
+        let ReplayVerdict::Refused(why) = &found.verdict else { panic!("{found:?}") };
+        assert!(why.starts_with("record 7 of stream 2 of 1.100.0.0, 70000 bytes of sum "), "{why}");
+    }
+}
+
+#[test]
 fn a_journal_ends_where_something_is_that_it_does_not_see() {
     let with_hole = |journal: &ModuleJournal| {
         let mut clock_ns = 0;
@@ -276,7 +330,7 @@ fn another_module_or_other_settings_are_refused() {
     let bytes = written(|journal| run(journal, None));
     for (module, text) in [("pilot.1", "text"), ("pilot.0", "texT")] {
         let told = catch_unwind(AssertUnwindSafe(|| {
-            let journal = ModuleJournal::replayed(JournalReplay::new(Box::new(Cursor::new(bytes.clone())), None, "".into()));
+            let journal = ModuleJournal::replayed(JournalReplay::new(Box::new(Cursor::new(bytes.clone())), Records::default(), None, "".into()));
             journal.begin(&Begin::new(module, ("robot.toml", text), None));
         }));
         let report = told.unwrap_err().downcast::<ReplayReport>().unwrap();

@@ -43,8 +43,9 @@ impl<M: Module> Running<M> {
                 let result = self.life.work(JournalEvent::Tick, &mut self.context, M::tick);
                 self.life.check(result, &mut self.context);
             }
-            JournalEvent::Received { .. } => {
-                let Some(received) = Received::of(event) else { return };
+            JournalEvent::Received { value, .. } => {
+                let value = self.context.journal.bytes(value);
+                let Some(received) = Received::of(event, &value) else { return };
                 let part = |module: &mut M, context: &mut Context| module.received(context, &received);
                 let result = self.life.work(*event, &mut self.context, part);
                 self.life.check(result, &mut self.context);

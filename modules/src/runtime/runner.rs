@@ -209,7 +209,8 @@ impl<M: Module> Running<M> {
                     Step::Record(record) => {
                         let received = record.received();
                         let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-                        let result = self.life.work(received.event(), &mut self.context, part);
+                        let event = received.event(&self.context.journal);
+                        let result = self.life.work(event, &mut self.context, part);
                         self.life.check(result, &mut self.context);
                         true
                     }
@@ -300,7 +301,7 @@ impl<M: Module> Running<M> {
 
     fn end(mut self) {
         // What modules did that have ended by now waits for nobody else.
-        while self.take_records(FollowedStream::is_journal) {}
+        while self.take_records(FollowedStream::is_whole) {}
         if self.life.state == ModuleState::On {
             self.life.work(JournalEvent::Off, &mut self.context, M::off);
         }
@@ -340,7 +341,7 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &
             let origin = Origin::Package { mailbox: local, id: head.id };
             let received = Received::new(head.from, number, origin, data, value);
             let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-            let result = life.work(received.event(), context, part);
+            let result = life.work(received.event(&context.journal), context, part);
             life.check(result, context);
         }
         true

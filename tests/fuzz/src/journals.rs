@@ -26,7 +26,7 @@ fn begin(journal: &[u8]) {
     let Ok(mut file) = tempfile::NamedTempFile::new_in(folder) else { return };
     file.write_all(journal).expect("the journal's file takes it");
     let path = file.path().display().to_string();
-    let run = ExactRun { folder: None, report: String::new(), ends: None, journal: path };
+    let run = ExactRun { folder: None, report: String::new(), ends: None, journal: path, records: None };
     match run.installation() {
         Ok((installation, name)) => assert!(name.is_mailbox() && !installation.modules.is_empty()),
         Err(why) => assert!(!why.to_string().is_empty()),

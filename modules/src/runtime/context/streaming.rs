@@ -222,6 +222,25 @@ impl Context {
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
     }
 
+    /// Goes back to the oldest record that a followed stream keeps: also those come that were written before it was
+    /// followed. And at the module's end it is given those that are there by then.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError, StreamSubscription};
+    /// # use rohrpost_modules::{interface::StreamPort, types::Pose};
+    /// fn follow_all(context: &mut Context, hook: StreamPort<Pose>) -> Result<StreamSubscription<Pose>, ContextError> {
+    ///     let subscription = context.subscribe_stream(hook, "crane.0")?;
+    ///     context.rewind(&subscription)?;
+    ///     Ok(subscription)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// The stream cannot be looked at.
+    pub fn rewind<T>(&mut self, subscription: &StreamSubscription<T>) -> Result<(), ContextError> {
+        Ok(self.followed_streams.rewind(subscription)?)
+    }
+
     fn open_untyped(&self, from: Name, item: &DataItem, interface: u32) -> Result<CheckedReader, ContextError> {
         let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
         let beyond = (from.system() != self.me.system()).then_some("?");

@@ -3,7 +3,7 @@
 use super::error::{StreamReadError, in_words};
 use crate::interface::StreamPort;
 use crate::journal::JOURNAL_NUMBER;
-use rohrpost_config::Installation;
+use rohrpost_config::{Installation, Sampling};
 use rohrpost_mailbox::{HeldRecord, Name, Next, Participant, RecordInfo, StreamError, StreamId, StreamReader};
 use rohrpost_schema::Description;
 use std::borrow::Cow;
@@ -30,6 +30,8 @@ pub(super) struct Source {
     pub(super) id: StreamId,
     /// The stream's name.
     pub(super) name: Cow<'static, str>,
+    /// Each of its records is recorded.
+    pub(super) is_recorded: bool,
     /// Hash of the interface that this program knows.
     interface: u32,
     installation: Arc<Installation>,
@@ -54,8 +56,10 @@ impl CheckedReader {
         from: Name,
     ) -> Result<Self, StreamReadError> {
         let KnownStream { number, name, interface } = known;
+        let in_place = installation.record.as_ref().and_then(|record| record.in_place(from.module(), &name));
         let source = Source {
             id: StreamId { name: from.module(), number },
+            is_recorded: in_place.is_some_and(|entry| entry.sampling == Sampling::Each),
             name,
             interface,
             installation: installation.clone(),
@@ -65,6 +69,16 @@ impl CheckedReader {
         };
         let reader = participant.stream_reader(source.id).map_err(|error| source.explain(&error))?;
         Ok(Self { reader, source })
+    }
+
+    /// Goes back to the oldest record that is kept.
+    pub(super) fn rewind(&mut self) -> Result<(), StreamReadError> {
+        let Source { participant, id, .. } = &self.source;
+        let info = participant.node().inspect_stream(*id).map_err(|error| self.source.explain(&error))?;
+        if let Some(oldest) = info.and_then(|info| info.oldest) {
+            self.reader.seek(oldest.sequence);
+        }
+        Ok(())
     }
 
     /// Whether it reads a module's journal.

@@ -76,13 +76,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// The stream cannot be read, or is of another interface.
     pub fn newest(&mut self) -> Result<Option<Record<'_, T>>, StreamReadError> {
-        let Self { reader, clock, .. } = self;
+        let (reader, journal) = (&mut self.reader, self.clock.journal());
         let question = Question::Of(reader.source.id.into());
-        if let Some(given) = noted::record(clock.journal(), Tag::Newest, question) {
+        if let Some(given) = noted::record(journal, Tag::Newest, question) {
             return Ok(given?.map(|record| Record::given(record, &reader.source)));
         }
         let newest = reader.newest();
-        note(clock.journal(), Tag::Newest, question, &newest, NotedRecord::of);
+        note(journal, Tag::Newest, question, &newest, |newest| NotedRecord::of_some(journal, newest));
         Ok(newest?.map(Record::new))
     }
 
@@ -106,13 +106,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn try_next(&mut self) -> Result<Next<Record<'_, T>>, StreamReadError> {
-        let Self { reader, clock, .. } = self;
+        let (reader, journal) = (&mut self.reader, self.clock.journal());
         let question = Question::Of(reader.source.id.into());
-        if let Some(given) = noted::next(clock.journal(), question) {
+        if let Some(given) = noted::next(journal, question) {
             return Ok(given?.map(|record| Record::given(record, &reader.source)));
         }
         let next = reader.next();
-        note(clock.journal(), Tag::Next, question, &next, NotedNext::of);
+        note(journal, Tag::Next, question, &next, |next| NotedNext::of(journal, next));
         Ok(next?.map(Record::new))
     }
 
@@ -129,16 +129,16 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn next_within(&mut self, timeout: Duration) -> Result<Next<Record<'_, T>>, StreamReadError> {
-        let Self { reader: CheckedReader { reader, source }, clock, .. } = self;
+        let (CheckedReader { reader, source }, journal) = (&mut self.reader, self.clock.journal());
         let question = Question::Within(source.id.into(), nanoseconds(timeout));
-        if let Some(given) = noted::next(clock.journal(), question) {
+        if let Some(given) = noted::next(journal, question) {
             return Ok(given?.map(|record| Record::given(record, source)));
         }
         let next = match reader.next_timeout(timeout) {
             Ok(next) => source.check_next(next),
             Err(error) => Err(source.explain(&error)),
         };
-        note(clock.journal(), Tag::Next, question, &next, NotedNext::of);
+        note(journal, Tag::Next, question, &next, |next| NotedNext::of(journal, next));
         Ok(next?.map(Record::new))
     }
 
@@ -159,13 +159,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn record(&mut self, sequence: u64) -> Result<Option<Record<'_, T>>, StreamReadError> {
-        let Self { reader, clock, .. } = self;
+        let (reader, journal) = (&mut self.reader, self.clock.journal());
         let question = Question::Sequence(reader.source.id.into(), sequence);
-        if let Some(given) = noted::record(clock.journal(), Tag::Record, question) {
+        if let Some(given) = noted::record(journal, Tag::Record, question) {
             return Ok(given?.map(|record| Record::given(record, &reader.source)));
         }
         let record = reader.record(sequence);
-        note(clock.journal(), Tag::Record, question, &record, NotedRecord::of);
+        note(journal, Tag::Record, question, &record, |record| NotedRecord::of_some(journal, record));
         Ok(record?.map(Record::new))
     }
 
@@ -209,13 +209,13 @@ impl<T: Data> Stream<T> {
     /// As for [`Stream::newest`].
     pub fn around(&mut self, at: impl Into<Moment>) -> Result<Around, StreamReadError> {
         let Stamp { epoch, ns } = self.stamp(at.into());
-        let Self { reader: CheckedReader { reader, source }, clock, .. } = self;
+        let (CheckedReader { reader, source }, journal) = (&mut self.reader, self.clock.journal());
         let question = Question::Time(source.id.into(), epoch, ns);
-        if let Some(given) = noted::around(clock.journal(), question) {
+        if let Some(given) = noted::around(journal, question) {
             return given;
         }
         let around = reader.around(rohrpost_mailbox::Stamp { epoch, ns }).map_err(|error| source.explain(&error));
-        note(clock.journal(), Tag::Around, question, &around, |around| NotedAround::from(*around));
+        note(journal, Tag::Around, question, &around, |around| NotedAround::from(*around));
         around
     }
 
