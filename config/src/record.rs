@@ -157,7 +157,7 @@ impl Recording {
     /// The entry of `streams` by which a stream is read in place; none also if one of `data` names it more exactly.
     pub fn in_place(&self, from: Name, stream: &str) -> Option<&RecordedItems> {
         let entry = self.stream(from, stream)?;
-        // `*` is not meant for streams, which may have records that fit no package.
+        // `*` of `data` is not meant for streams.
         let data = self.datum(from, stream).filter(|data| data.item.is_some());
         data.is_none_or(|data| data.exactness() <= entry.exactness()).then_some(entry)
     }

@@ -92,8 +92,9 @@ fn seers(place: &Place, sources: &[&str]) -> (Running, Robot) {
 pub(crate) fn seers_recorded(place: &Place, sources: &[&str], more: &str) -> (Running, Robot) {
     let entries: String = sources.iter().enumerate().map(|(number, source)| entry(number, source)).collect();
     let names: Vec<String> = (0..sources.len()).map(|number| format!("seer.{number}")).collect();
-    let record =
-        format!("[record]\ndirectory = \"recordings\"\nexact = {names:?}\nleave-free = \"0 B\"\nflush = \"20 ms\"\n{more}");
+    let record = format!(
+        "[record]\ndirectory = \"recordings\"\nexact = {names:?}\nleave-free = \"0 B\"\nflush = \"20 ms\"\n{more}"
+    );
     launched(place, &format!("{entries}{record}"))
 }
 

@@ -2,11 +2,9 @@
 //!
 //! It is this test program itself, as `probe` is.
 
-use rohrpost::serde::Deserialize;
 use rohrpost::schema::Bytes;
-use rohrpost::{
-    Context, Interest, Module, ModuleClock, ModuleError, Ready, Received, Stream, StreamSubscription,
-};
+use rohrpost::serde::Deserialize;
+use rohrpost::{Context, Interest, Module, ModuleClock, ModuleError, Ready, Received, Stream, StreamSubscription};
 use std::collections::HashMap;
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;

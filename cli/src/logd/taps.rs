@@ -203,7 +203,7 @@ impl SourceModule {
         let is_stream = item.kind == DataKind::Stream;
         let is_line = description.class == CollectorInterface::CLASS && name == LINE;
         let ring = recording.in_place(self.from, name).filter(|_| is_stream && self.own.is_some());
-        // As in there.
+        // `*` is not meant for streams, which may have records that fit no package.
         let named = |items: &&RecordedItems| !is_stream || items.item.is_some();
         let (sampling, numbering) = match (ring, recording.datum(self.from, name).filter(named)) {
             _ if is_line => recording.output.map(|_| (Sampling::Each, Numbering::Packages))?,
@@ -275,7 +275,7 @@ impl Tap {
         match opened {
             Ok(source) => {
                 if let (Source::Stream(subscription), Sampling::Each, true) = (&source, self.sampling, from_oldest) {
-                    context.rewind(subscription)?;
+                    context.rewind(subscription);
                 }
                 self.source = Some(source);
                 self.refusal.clear();

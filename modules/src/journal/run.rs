@@ -179,10 +179,10 @@ impl ExactRun {
     }
 
     pub(crate) fn replay(self) -> Result<JournalReplay, RunError> {
-        let records = self.records.as_ref().map(|path| {
-            Records::open(Path::new(path)).map_err(|error| RunError(format!("{path}: {error}")))
-        });
-        let records = records.transpose()?.unwrap_or_default();
+        let records = match &self.records {
+            Some(path) => Records::open(Path::new(path)).map_err(|error| RunError(format!("{path}: {error}")))?,
+            None => Records::default(),
+        };
         Ok(JournalReplay::new(Box::new(self.open()?), records, self.ends, self.report.into()))
     }
 }

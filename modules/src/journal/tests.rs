@@ -54,22 +54,21 @@ fn written(run: impl FnOnce(&ModuleJournal)) -> Vec<u8> {
     bytes
 }
 
+fn replay_of(bytes: &[u8], records: Records, ends: Option<&str>) -> JournalReplay {
+    JournalReplay::new(Box::new(Cursor::new(bytes.to_vec())), records, ends.map(Into::into), "".into())
+}
+
 /// What a replay of these bytes finds.
 fn replayed(bytes: &[u8], ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) -> ReplayReport {
     replayed_with(bytes, Records::default(), ends, run)
 }
 
 /// The same, with these records.
-fn replayed_with(
-    bytes: &[u8],
-    records: Records,
-    ends: Option<&str>,
-    run: impl FnOnce(&ModuleJournal),
-) -> ReplayReport {
+fn replayed_with(bytes: &[u8], records: Records, ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) -> ReplayReport {
     let item = DataItem { number: 1, kind: DataKind::Data, field: Field::new("sum", Type::U64) };
     let (name, class, text) = ("Sums".into(), "pilot".into(), String::new());
     let own = Description { name, class, text, functions: Vec::new(), data: vec![item] };
-    let mut replay = JournalReplay::new(Box::new(Cursor::new(bytes.to_vec())), records, ends.map(Into::into), "".into());
+    let mut replay = replay_of(bytes, records, ends);
     replay.know_own(vec![Some(own)]);
     let journal = ModuleJournal::replayed(replay);
     let run = || {
@@ -330,7 +329,7 @@ fn another_module_or_other_settings_are_refused() {
     let bytes = written(|journal| run(journal, None));
     for (module, text) in [("pilot.1", "text"), ("pilot.0", "texT")] {
         let told = catch_unwind(AssertUnwindSafe(|| {
-            let journal = ModuleJournal::replayed(JournalReplay::new(Box::new(Cursor::new(bytes.clone())), Records::default(), None, "".into()));
+            let journal = ModuleJournal::replayed(replay_of(&bytes, Records::default(), None));
             journal.begin(&Begin::new(module, ("robot.toml", text), None));
         }));
         let report = told.unwrap_err().downcast::<ReplayReport>().unwrap();

@@ -58,7 +58,8 @@ impl<'a> Received<'a> {
 
     /// Of a journal, with this value; none of another event.
     pub(super) fn of(event: &JournalEvent<'_>, value: &'a [u8]) -> Option<Self> {
-        let JournalEvent::Received { from, number, origin, stamp_ns, sequence, missed, incarnation, .. } = *event else {
+        let JournalEvent::Received { from, number, origin, stamp_ns, sequence, missed, incarnation, .. } = *event
+        else {
             return None;
         };
         let origin = match origin {

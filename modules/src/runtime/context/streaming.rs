@@ -230,15 +230,12 @@ impl Context {
     /// # use rohrpost_modules::{interface::StreamPort, types::Pose};
     /// fn follow_all(context: &mut Context, hook: StreamPort<Pose>) -> Result<StreamSubscription<Pose>, ContextError> {
     ///     let subscription = context.subscribe_stream(hook, "crane.0")?;
-    ///     context.rewind(&subscription)?;
+    ///     context.rewind(&subscription);
     ///     Ok(subscription)
     /// }
     /// ```
-    ///
-    /// # Errors
-    /// The stream cannot be looked at.
-    pub fn rewind<T>(&mut self, subscription: &StreamSubscription<T>) -> Result<(), ContextError> {
-        Ok(self.followed_streams.rewind(subscription)?)
+    pub fn rewind<T>(&mut self, subscription: &StreamSubscription<T>) {
+        self.followed_streams.rewind(subscription);
     }
 
     fn open_untyped(&self, from: Name, item: &DataItem, interface: u32) -> Result<CheckedReader, ContextError> {

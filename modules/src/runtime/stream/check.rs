@@ -71,14 +71,13 @@ impl CheckedReader {
         Ok(Self { reader, source })
     }
 
-    /// Goes back to the oldest record that is kept.
-    pub(super) fn rewind(&mut self) -> Result<(), StreamReadError> {
+    /// Goes back to the oldest record that is kept. A stream that cannot be looked at says why when it is read.
+    pub(super) fn rewind(&mut self) {
         let Source { participant, id, .. } = &self.source;
-        let info = participant.node().inspect_stream(*id).map_err(|error| self.source.explain(&error))?;
+        let info = participant.node().inspect_stream(*id).ok().flatten();
         if let Some(oldest) = info.and_then(|info| info.oldest) {
             self.reader.seek(oldest.sequence);
         }
-        Ok(())
     }
 
     /// Whether it reads a module's journal.

@@ -134,11 +134,11 @@ impl FollowedStreams {
     }
 
     /// Goes back to the oldest record that a stream keeps.
-    pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>) -> Result<(), StreamReadError> {
-        self.list.iter_mut().filter(|stream| stream.id == of.id).try_for_each(|stream| {
+    pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>) {
+        for stream in self.list.iter_mut().filter(|stream| stream.id == of.id) {
             stream.is_whole = true;
-            stream.reader.rewind()
-        })
+            stream.reader.rewind();
+        }
     }
 
     /// Passes over what was written until now; of a journal nothing is to be missing.
