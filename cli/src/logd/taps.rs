@@ -120,7 +120,7 @@ impl Taps {
             taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
-        let from_oldest = !self.recording.exact.is_empty();
+        let from_oldest = !self.recording.exact.is_empty() && is_first(&node, context.me());
         self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, from_oldest))
     }
 
@@ -306,6 +306,11 @@ impl Tap {
         let Some(least) = self.least else { return true };
         from_bytes::<OutputLine>(data.value).map_or(true, |line| line.level <= least)
     }
+}
+
+/// Whether no recorder ran before this one since launch began: what that has recorded is not taken again.
+fn is_first(node: &Node, me: Name) -> bool {
+    node.participants().iter().all(|process| process.module != me || process.restarts == 0)
 }
 
 /// Whether the process of a module runs, and is not about to begin or to end: what it noted of itself is true then.

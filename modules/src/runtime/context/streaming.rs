@@ -222,8 +222,8 @@ impl Context {
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
     }
 
-    /// Goes back to the oldest record that a followed stream keeps: also those come that were written before it was
-    /// followed. And at the module's end it is given those that are there by then.
+    /// Goes back to the oldest record that a followed stream keeps of its present writer: also those come that were
+    /// written before it was followed. And at the module's end it is given those that are there by then.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::{Context, ContextError, StreamSubscription};

@@ -4,7 +4,9 @@ use super::error::{StreamReadError, in_words};
 use crate::interface::StreamPort;
 use crate::journal::JOURNAL_NUMBER;
 use rohrpost_config::{Installation, Sampling};
-use rohrpost_mailbox::{HeldRecord, Name, Next, Participant, RecordInfo, StreamError, StreamId, StreamReader};
+use rohrpost_mailbox::{
+    HeldRecord, Name, Next, Participant, RecordInfo, StreamError, StreamId, StreamInfo, StreamReader,
+};
 use rohrpost_schema::Description;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -71,13 +73,23 @@ impl CheckedReader {
         Ok(Self { reader, source })
     }
 
-    /// Goes back to the oldest record that is kept. A stream that cannot be looked at says why when it is read.
+    /// Goes back to the oldest record of its present writer that is kept. A stream that cannot be looked at says why
+    /// when it is read.
     pub(super) fn rewind(&mut self) {
         let Source { participant, id, .. } = &self.source;
         let info = participant.node().inspect_stream(*id).ok().flatten();
-        if let Some(oldest) = info.and_then(|info| info.oldest) {
-            self.reader.seek(oldest.sequence);
+        let Some(StreamInfo { oldest: Some(oldest), newest: Some(newest), .. }) = info else { return };
+        let (mut from, mut to) = (oldest.sequence, newest.sequence);
+        // What is not there any more counts as older.
+        while from < to {
+            let middle = from.midpoint(to);
+            let record = self.reader.record(middle);
+            match record.is_some_and(|record| record.info().incarnation == newest.incarnation) {
+                true => to = middle,
+                false => from = middle + 1,
+            }
         }
+        self.reader.seek(from);
     }
 
     /// Whether it reads a module's journal.

@@ -133,7 +133,7 @@ impl FollowedStreams {
         Some(StreamSubscription { id, data: PhantomData })
     }
 
-    /// Goes back to the oldest record that a stream keeps.
+    /// Goes back to the oldest record that a stream keeps of its present writer.
     pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>) {
         for stream in self.list.iter_mut().filter(|stream| stream.id == of.id) {
             stream.is_whole = true;
