@@ -13,8 +13,8 @@ use rohrpost::{
     Subscription, SystemTime,
 };
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
-use rohrpost_mailbox::local;
-use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER};
+use rohrpost_mailbox::{StreamId, local};
+use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, WHOLE_BYTES_MAX};
 use rohrpost_recording::{ChannelId, ChannelSpec, Message, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -120,8 +120,9 @@ impl Taps {
             taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
-        let from_oldest = !self.recording.exact.is_empty() && is_first(&node, context.me());
-        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, from_oldest))
+        let may_name = !self.recording.exact.is_empty() && is_first(&node, context.me());
+        let node = may_name.then_some(&*node);
+        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, node))
     }
 
     /// Records a value that came, if it is to be.
@@ -256,9 +257,9 @@ impl Tap {
         self.channel = opened.ok();
     }
 
-    /// Subscribes. A stream that has no seat left is tried again. `from_oldest`: journals may name each record of
-    /// streams, also those that were written before the recorder came.
-    fn open(&mut self, context: &mut Context, from_oldest: bool) -> Result<(), ModuleError> {
+    /// Subscribes. A stream that has no seat left is tried again. `journals`: the node, if journals may name long
+    /// records, also those that were written before the recorder came.
+    fn open(&mut self, context: &mut Context, journals: Option<&Node>) -> Result<(), ModuleError> {
         let opened = match (self.sampler.numbering(), self.sampling) {
             (Numbering::Records, _) => {
                 context.subscribe_stream_untyped(self.from, &self.item, self.interface).map(Source::Stream)
@@ -274,7 +275,10 @@ impl Tap {
         };
         match opened {
             Ok(source) => {
-                if let (Source::Stream(subscription), Sampling::Each, true) = (&source, self.sampling, from_oldest) {
+                let may_be_named = self.sampling == Sampling::Each && journals.is_some_and(|node| self.is_long(node));
+                if let Source::Stream(subscription) = &source
+                    && may_be_named
+                {
                     context.rewind(subscription);
                 }
                 self.source = Some(source);
@@ -290,6 +294,13 @@ impl Tap {
             Err(error) => return Err(error.into()),
         }
         Ok(())
+    }
+
+    /// Whether it is a stream of records that a journal may name.
+    fn is_long(&self, node: &Node) -> bool {
+        let id = StreamId { name: self.from, number: self.item.number };
+        let info = node.inspect_stream(id).ok().flatten();
+        info.is_some_and(|info| info.shape.record_bytes as usize > WHOLE_BYTES_MAX)
     }
 
     fn has_brought(&self, data: &Received<'_>) -> bool {

@@ -40,6 +40,7 @@ pub use records::{RecordSum, RecordWriter};
 pub(crate) use replay::{Given, JournalReplay};
 pub use run::{ExactRun, Piece, RunError, VARIABLE};
 pub(crate) use value::NotedValue;
+pub use value::WHOLE_BYTES_MAX;
 pub use verdict::{Difference, ReplayReport, ReplayVerdict};
 pub(crate) use write::JournalWriter;
 

@@ -5,8 +5,8 @@ use super::records::RecordSum;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
-/// A longer value is noted by its length and sum.
-const WHOLE_BYTES_MAX: usize = 4096;
+/// A longer value is noted by its length and sum: what the module sends, and records that are recorded anyhow.
+pub const WHOLE_BYTES_MAX: usize = 4096;
 /// Bytes of a value without description that are shown.
 const SHOWN_BYTES: usize = 64;
 
