@@ -73,7 +73,7 @@ pub struct Context {
     open: Vec<u8>,
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
-    /// Descriptors whose bytes the module's journal has.
+    /// Descriptors of `open_outside`, if there is a journal.
     outside: Vec<RawFd>,
     /// When ticks and periods are due.
     pub(crate) schedule: Schedule,
