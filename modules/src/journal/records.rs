@@ -1,4 +1,4 @@
-//! Records that a module read, and that the same recording holds whole: a journal has their sums in place of their bytes.
+//! Records that a module read, and that the same recording holds whole: a journal has their sums, and not their bytes.
 //!
 //! For a replay they are put into a file, each once:
 //!
