@@ -93,6 +93,7 @@ pub use batch::Message;
 pub use control::{CONTROL_LINE_BYTES_MAX, ControlAnswer, ControlCommand, ControlError, ControlLines};
 pub use cut::{CutError, cut};
 pub use described::DescribedModule;
+pub use disk::is_being_written;
 pub use drawn::{DrawError, DrawOptions, Drawn, DrawnBeside, draw};
 pub use error::{Damage, DiskError, ReadError, Shown};
 pub use info::{ChannelInfo, EpochInfo, Info, info};
