@@ -284,6 +284,12 @@ fn a_replay_is_paused_stepped_and_sought_by_calls() {
         assert!(refused.code != Some(0), "{refused:?}");
         assert!(refused.out.contains(told) || refused.err.contains(told), "{refused:?}");
     }
+    // Stepped to its end it stays there.
+    place.say(&["call", "replay.0", "step_by", "1000"]).ok();
+    let at_end = wait("it is at its end", || Some(position(&place)).filter(|position| position["ended"] == true));
+    assert_eq!(at_end["paused"], true);
+    let sought = seek(&place, drives_s);
+    assert_eq!((&sought["paused"], &sought["ended"]), (&true.into(), &false.into()));
     drop(robot);
     let said = replay.stop();
     assert!(said.contains(" values of ") && said.contains(" s, to "), "{said}");

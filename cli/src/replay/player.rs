@@ -156,6 +156,7 @@ impl RecordingPlayer {
         let began = Instant::now();
         for _ in 0..AT_ONCE_MAX {
             let now_ns = self.clock.now().ns;
+            let is_paused = self.course.is_paused();
             let moved = match self.course.next(now_ns) {
                 Ok(moved) => moved,
                 Err(error) => {
@@ -179,6 +180,9 @@ impl RecordingPlayer {
                 }
                 Move::Advance { time_ns } => drop(self.time.advance_to(time_ns)),
                 Move::Wait { until_ns } => return Ok(Some(self.read_while_waiting(until_ns))),
+                Move::End if is_paused => {
+                    tracing::info!("at the end: `seek`, or `resume` to end the replay")
+                }
                 // Time goes on behind the end: modules that run have work left.
                 Move::Again | Move::End => {}
                 Move::Rest => return Ok(None),
