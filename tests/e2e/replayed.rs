@@ -83,11 +83,11 @@ struct Recorded {
     bytes: Vec<u8>,
 }
 
-fn call(place: &Place, module: &str, function: &[&str]) -> Value {
+pub(crate) fn call(place: &Place, module: &str, function: &[&str]) -> Value {
     place.say(&[&["call", module, "--json"], function].concat()).json()
 }
 
-fn position(place: &Place) -> Value {
+pub(crate) fn position(place: &Place) -> Value {
     call(place, "replay.0", &["position"])
 }
 
@@ -186,7 +186,7 @@ fn seek(place: &Place, at_s: f64) -> Value {
     sought
 }
 
-fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
+pub(crate) fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
     let all = [&["replay", file.to_str().unwrap(), "--quiet", "--no-gui"], words].concat();
     Running::start(place.command(&all))
 }

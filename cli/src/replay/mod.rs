@@ -9,10 +9,12 @@
 mod channels;
 mod configuration;
 mod course;
+mod others;
 mod player;
 mod recorded;
 mod session;
 mod spacing;
+mod tables;
 
 use crate::check;
 use crate::demo::{Folder, drawing, drawn, is_built_in, write_map};
@@ -22,6 +24,7 @@ use crate::record::PartArguments;
 use crate::speech::Speech;
 use crate::terminal::{Failure, say};
 use configuration::{NODE, PlayedModules, ReplayDrawing, ReplayWish, saved_of};
+use others::IntoStream;
 pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::launch::{Launch, events};
@@ -47,6 +50,7 @@ const RATES: std::ops::RangeInclusive<f64> = 0.001..=player::RATE_MAX;
   rohrpost replay main-0001.mcap --run mapper.0 --rate 5  a fresh mapper draws the map anew
   rohrpost replay main-0001.mcap --from +10s --until +20s --loop
   rohrpost replay main-0001.mcap --names laser.0 odometry.0/odometry --paused
+  rohrpost replay rosbag2_0.mcap --into /scan=laser.0/scan /imu=imu.0/raw
   rohrpost replay --exact main-0001.mcap                  all modules that have a journal there
   rohrpost replay --exact main-0001.mcap pilot.0 --program target/debug/pilot
 In another terminal, as with any node:
@@ -68,6 +72,10 @@ pub(crate) struct Arguments {
     /// Names (laser.0) or topics (laser.0/scan) to play; all, if none is named.
     #[arg(long, num_args = 1.., value_name = "NAME")]
     names: Vec<String>,
+    /// Of a recording of another program, such as rosbag2: play the messages of TOPIC as bytes, into a stream of a
+    /// module; can be given several times.
+    #[arg(long, num_args = 1.., value_name = "TOPIC=MODULE/STREAM", conflicts_with = "names")]
+    into: Vec<IntoStream>,
     #[command(flatten)]
     part: PartArguments,
     /// Times the speed at which it was recorded.
@@ -97,7 +105,7 @@ pub(crate) struct Arguments {
 struct RepeatArguments {
     /// Run the programs of modules again with what they were called with and told, and compare all that they do.
     #[arg(long, conflicts_with_all = [
-        "config", "run", "names", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
+        "config", "run", "names", "into", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
     ])]
     exact: bool,
     /// With --exact: another build of the module's program.
@@ -124,6 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return repeat(arguments);
     }
     let recorded = RecordedFiles::read(&arguments.files)?;
+    others::check(&recorded, &arguments.into)?;
     let folder = Folder::new()?;
     let made = installation(arguments, &recorded, folder.path())?;
     for topic in &made.played.left_out {
@@ -195,7 +204,10 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         drawing,
         saved: saved_text.is_some().then_some(&*saved),
     };
-    let played = wish.played()?;
+    let played = match recorded.are_others {
+        true => others::played(&recorded, &arguments.into, &source, &wish.running_names()?)?,
+        false => wish.played()?,
+    };
     if let Some(text) = saved_text {
         let runs = |name: &str| arguments.run.iter().any(|run| run == name);
         std::fs::write(&saved, saved_of(&text, runs)?)?;
@@ -223,6 +235,12 @@ fn source(
         let base = path.canonicalize().map_err(|error| format!("{}: {error}", path.display()))?;
         let text = std::fs::read_to_string(path)?;
         return Ok((Installation::parse(&text, path)?, base.parent().unwrap_or(here).to_owned()));
+    }
+    if recorded.are_others {
+        if let Some(run) = arguments.run.first() {
+            return Err(format!("--run {run}: the files have no configuration; name one: --config FILE").into());
+        }
+        return Ok((others::source(&arguments.into)?, here.to_owned()));
     }
     let recorded = recorded.configuration()?;
     let named =
@@ -261,6 +279,8 @@ fn settings(
     let files = recorded.infos.iter().map(|info| Ok(info.path.canonicalize()?.display().to_string().into()));
     let files = files.collect::<std::io::Result<Vec<Value>>>()?;
     let topics = played.topics.iter().map(|topic| topic.as_str().into()).collect();
+    let pair = |(topic, stream): (&String, &String)| Value::Array(vec![topic.as_str().into(), stream.as_str().into()]);
+    let into = played.into.iter().map(pair).collect();
     let mut whole = recorded.infos[0].clone();
     (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
     let part = arguments.part.of(&whole, &[]);
@@ -283,6 +303,7 @@ fn settings(
         ("end-ns", ns(recorded.end_ns)?),
         ("described", Value::Array(described)),
         ("topics", Value::Array(topics)),
+        ("into", Value::Array(into)),
         ("rate", arguments.rate.into()),
         ("repeats", arguments.repeats.into()),
     ] {

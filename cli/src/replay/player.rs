@@ -54,6 +54,8 @@ struct PlayerSettings {
     described: Vec<(String, String)>,
     /// What it plays.
     topics: BTreeSet<String>,
+    /// Topics of another program, and those in which their messages are played as bytes.
+    into: Vec<(String, String)>,
     /// Times the recorded speed.
     rate: f64,
     from_ns: Option<u64>,
@@ -95,9 +97,10 @@ impl Module for RecordingPlayer {
 
     fn new(settings: PlayerSettings, context: &mut Context) -> Result<Self, ModuleError> {
         let stand_ins = Self::stand_ins(&settings, context.installation())?;
-        let channels = PlayedChannels::new(&stand_ins, &settings.topics, context.installation());
-        let PlayerSettings { files, topics, begin_ns, end_ns, rate, from_ns, until_ns, repeats, .. } = settings;
+        let channels = PlayedChannels::new(&stand_ins, &settings.topics, &settings.into, context.installation());
+        let PlayerSettings { files, begin_ns, end_ns, rate, from_ns, until_ns, repeats, .. } = settings;
         let files = files.iter().map(|file| context.installation().resolve(file)).collect();
+        let topics = channels.topics();
         let plays = move |channel: &RecordedChannel| !channel.is_drawn() && topics.contains(&channel.topic);
         let course = Course::new(Player::new(files, plays), Part { from_ns, until_ns, repeats })?;
         let timer = TimerFd::new(ClockId::CLOCK_MONOTONIC, TimerFlags::TFD_NONBLOCK | TimerFlags::TFD_CLOEXEC)?;
