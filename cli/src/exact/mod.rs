@@ -5,10 +5,12 @@
 //! recording ──▶ journals: pieces of each run put together ──▶ a file ──▶ the module's program, alone ──▶ its report
 //! ```
 
+mod answers;
 mod journals;
 mod program;
 
 use crate::terminal::{Failure, complain, say};
+pub(super) use answers::JournalAnswers;
 use journals::RecordedRun;
 use program::ExactPrograms;
 pub(super) use program::SHARED_MEMORY;

@@ -6,6 +6,7 @@
 //!                                                                              └─ modules that run: --run
 //! ```
 
+mod answers;
 mod channels;
 mod configuration;
 mod course;
@@ -18,7 +19,7 @@ mod tables;
 
 use crate::check;
 use crate::demo::{Folder, drawing, drawn, is_built_in, write_map};
-use crate::exact::{self, ExactArguments};
+use crate::exact::{self, ExactArguments, JournalAnswers};
 use crate::launch::end;
 use crate::record::PartArguments;
 use crate::speech::Speech;
@@ -29,6 +30,7 @@ pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::launch::{Launch, events};
 use rohrpost::output::plain;
+use rohrpost::wire::append;
 use rohrpost_config::Installation;
 use session::ReplaySession;
 use std::path::{Path, PathBuf};
@@ -39,6 +41,8 @@ use toml::{Table, Value};
 
 /// The name of the configuration that is made.
 const CONFIG: &str = "replay.toml";
+/// The file with answers.
+const ANSWERS: &str = "answers";
 /// The file that the GUI writes.
 const DRAWING: &str = "rohrpost-replay.rrd";
 /// The largest rate: that of a node's time.
@@ -57,7 +61,8 @@ In another terminal, as with any node:
   rohrpost call replay.0 pause          also resume, step, step_by 0.5, seek 12.5
   rohrpost echo replay.0 state
   rohrpost stream read laser.0 scan --next 10
-It is a node of its own, called `replay`; no command reaches a module that is played. With --exact no node runs.")]
+It is a node of its own, called `replay`; a command to a module that is played gets the answer that its journal has,
+or a fault. With --exact no node runs.")]
 pub(crate) struct Arguments {
     /// Recordings, played one after the other. Those of several recorders are to be merged first. With --exact one
     /// recording, and modules; all that have a journal, if none is named.
@@ -263,7 +268,19 @@ fn told(errors: &rohrpost_config::Errors) -> String {
     errors.problems().iter().map(problem).collect::<Vec<_>>().join("\n")
 }
 
-/// The player's settings, and files with the descriptions.
+/// What modules have answered to commands, as bytes; none if the files have no journal.
+fn answers(recorded: &RecordedFiles) -> Result<Option<Vec<u8>>, Failure> {
+    let modules = recorded.with_journal();
+    if modules.is_empty() {
+        return Ok(None);
+    }
+    let files: Vec<&Path> = recorded.infos.iter().map(|info| info.path.as_path()).collect();
+    let mut bytes = Vec::new();
+    append(&mut bytes, &JournalAnswers::read(&files, &modules)?)?;
+    Ok(Some(bytes))
+}
+
+/// The player's settings, files with the descriptions, and one with answers.
 fn settings(
     arguments: &Arguments,
     recorded: &RecordedFiles,
@@ -308,6 +325,10 @@ fn settings(
         ("repeats", arguments.repeats.into()),
     ] {
         settings.insert(key.into(), value);
+    }
+    if let Some(answers) = answers(recorded)? {
+        std::fs::write(folder.join(ANSWERS), answers)?;
+        settings.insert("answers".into(), ANSWERS.into());
     }
     for (key, time) in [("from-ns", part.from_ns), ("until-ns", part.until_ns)] {
         if let Some(time) = time {

@@ -3,6 +3,7 @@
 use crate::terminal::Failure;
 use rohrpost::output::plain::line;
 use rohrpost::schema::Description;
+use rohrpost_modules::journal::JOURNAL_NAME;
 use rohrpost_recording::format::{MESSAGE_ENCODING, PROFILE, session_key};
 use rohrpost_recording::{DescribedModule, Info, info, recovered_path};
 use std::collections::{BTreeMap, BTreeSet};
@@ -98,6 +99,14 @@ impl RecordedFiles {
     pub(super) fn all_topics(&self) -> BTreeSet<&str> {
         let channels = self.infos.iter().flat_map(|info| &info.channels);
         channels.filter(|channel| channel.messages > 0).map(|channel| channel.topic.as_str()).collect()
+    }
+
+    /// Modules with a journal.
+    pub(super) fn with_journal(&self) -> Vec<String> {
+        let channels = self.infos.iter().flat_map(|info| &info.channels);
+        let journals = channels.filter(|channel| !self.are_others && channel.item == JOURNAL_NAME);
+        let names: BTreeSet<String> = journals.map(|channel| channel.name.clone()).collect();
+        names.into_iter().collect()
     }
 
     /// The configuration that was recorded.
