@@ -56,6 +56,8 @@ mod recorded_control;
 mod recorded_killed;
 mod recorded_nodes;
 mod replayed;
+mod replayed_answers;
+mod replayed_others;
 mod restart;
 mod screen;
 mod seer;

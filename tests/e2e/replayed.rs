@@ -83,11 +83,11 @@ struct Recorded {
     bytes: Vec<u8>,
 }
 
-fn call(place: &Place, module: &str, function: &[&str]) -> Value {
+pub(crate) fn call(place: &Place, module: &str, function: &[&str]) -> Value {
     place.say(&[&["call", module, "--json"], function].concat()).json()
 }
 
-fn position(place: &Place) -> Value {
+pub(crate) fn position(place: &Place) -> Value {
     call(place, "replay.0", &["position"])
 }
 
@@ -186,7 +186,7 @@ fn seek(place: &Place, at_s: f64) -> Value {
     sought
 }
 
-fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
+pub(crate) fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
     let all = [&["replay", file.to_str().unwrap(), "--quiet", "--no-gui"], words].concat();
     Running::start(place.command(&all))
 }
@@ -284,6 +284,12 @@ fn a_replay_is_paused_stepped_and_sought_by_calls() {
         assert!(refused.code != Some(0), "{refused:?}");
         assert!(refused.out.contains(told) || refused.err.contains(told), "{refused:?}");
     }
+    // Stepped to its end it stays there.
+    place.say(&["call", "replay.0", "step_by", "1000"]).ok();
+    let at_end = wait("it is at its end", || Some(position(&place)).filter(|position| position["ended"] == true));
+    assert_eq!(at_end["paused"], true);
+    let sought = seek(&place, drives_s);
+    assert_eq!((&sought["paused"], &sought["ended"]), (&true.into(), &false.into()));
     drop(robot);
     let said = replay.stop();
     assert!(said.contains(" values of ") && said.contains(" s, to "), "{said}");

@@ -1,5 +1,6 @@
 //! Journals in a recording, put together of their pieces: each in a file, however long it is.
 
+use crate::record::ProgressLine;
 use crate::terminal::Failure;
 use rohrpost::output::plain;
 use rohrpost_modules::journal::{ExactRun, JOURNAL_NAME, JOURNAL_NUMBER, Piece};
@@ -56,6 +57,27 @@ pub(super) fn read(file: &Path, modules: &[String], folder: &Path) -> Result<Vec
         (None, None) if runs.is_empty() => Err(no_journal(file, None)),
         (None, _) => Ok(runs),
     }
+}
+
+/// Those of these modules in files that follow one another, as far as they are whole.
+pub(super) fn of_files(files: &[&Path], modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
+    let (mut runs, mut progress) = (Vec::new(), ProgressLine::new());
+    for file in files {
+        let mut reader = Reader::open(file)?;
+        loop {
+            match reader.next() {
+                Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
+                    take(&mut runs, folder, &channel.name, message.data)?;
+                }
+                Ok(Some(_)) => {}
+                // Behind a damage a piece is missing.
+                Ok(None) | Err(_) => break,
+            }
+            let (read, all) = reader.progress();
+            progress.tell(read, all);
+        }
+    }
+    Ok(runs)
 }
 
 fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {

@@ -6,12 +6,14 @@
 //!          └──▶ records that these name, in another file ───────────────────┘
 //! ```
 
+mod answers;
 mod journals;
 mod program;
 mod records;
 
 use crate::demo::Folder;
 use crate::terminal::{Failure, complain, say};
+pub(super) use answers::JournalAnswers;
 use journals::RecordedRun;
 use program::ExactPrograms;
 pub(super) use program::SHARED_MEMORY;

@@ -15,7 +15,7 @@ use rohrpost::{
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
 use rohrpost_mailbox::{StreamId, local};
 use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, WHOLE_BYTES_MAX};
-use rohrpost_recording::{ChannelId, ChannelSpec, Message, WriteError, Writer};
+use rohrpost_recording::{ChannelId, ChannelSpec, Earlier, Message, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -136,12 +136,7 @@ impl Taps {
         if !is_chosen || !tap.is_important(data) {
             return;
         }
-        let (epoch, stamp_ns) = match data.moment() {
-            Moment::Stamp(stamp) => (stamp.epoch, stamp.ns),
-            Moment::Ns(ns) => (now.epoch, ns),
-        };
-        let sequence = data.head.sequence;
-        let message = Message { arrival_ns: now.ns, stamp_ns, epoch, sequence, data: data.value };
+        let message = message(now, data);
         // What is refused is counted; that the queue is full, tells `Health` with the reason.
         if let Err(error @ WriteError::Long(_)) = writer.write(channel, &message)
             && tap.refusal.is_empty()
@@ -153,10 +148,12 @@ impl Taps {
 }
 
 impl Taps {
-    /// Notes a value that comes while nothing is recorded: it is no loss.
-    pub(super) fn pass_over(&mut self, data: &Received<'_>) {
-        if let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) {
-            let _ = tap.sampler.note(&data.head, Instant::now());
+    /// Notes a value that comes while nothing is recorded: it is no loss. The next recording may begin with it.
+    pub(super) fn pass_over(&mut self, earlier: Option<&mut Earlier>, now: &SystemTime, data: &Received<'_>) {
+        let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
+        let (_, is_chosen) = tap.sampler.note(&data.head, Instant::now());
+        if let (true, Some(channel), Some(earlier)) = (is_chosen, tap.channel, earlier) {
+            earlier.note(channel, &message(now, data));
         }
     }
 }
@@ -322,6 +319,15 @@ impl Tap {
 /// Whether no recorder ran before this one since launch began: what that has recorded is not taken again.
 fn is_first(node: &Node, me: Name) -> bool {
     node.participants().iter().all(|process| process.module != me || process.restarts == 0)
+}
+
+/// A value that came, as it is recorded.
+fn message<'a>(now: &SystemTime, data: &Received<'a>) -> Message<'a> {
+    let (epoch, stamp_ns) = match data.moment() {
+        Moment::Stamp(stamp) => (stamp.epoch, stamp.ns),
+        Moment::Ns(ns) => (now.epoch, ns),
+    };
+    Message { arrival_ns: now.ns, stamp_ns, epoch, sequence: data.head.sequence, data: data.value }
 }
 
 /// Whether the process of a module runs, and is not about to begin or to end: what it noted of itself is true then.

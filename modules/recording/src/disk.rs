@@ -1,7 +1,7 @@
 //! The few things that recording asks of a disk. Tests put one in its place that fails.
 
 use nix::sys::statvfs::statvfs;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
@@ -31,6 +31,13 @@ pub(crate) trait DiskFile: Send {
 
     /// Whether it still has a name: a removed file takes what is written, and nobody ever sees it.
     fn has_name(&mut self) -> io::Result<bool>;
+}
+
+/// Whether a recorder writes this file just now. It holds a lock, which ends with its process; on a disk without locks
+/// nobody can tell.
+pub fn is_being_written(path: &Path) -> bool {
+    // A shared one: network file systems give no other for a file that is read.
+    File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
 /// That of the operating system.

@@ -16,6 +16,7 @@
 //! pays for a branch. Whatever no journal sees is noted as a hole, and a replay ends there, with the reason.
 
 mod bytes;
+mod commands;
 mod entry;
 mod event;
 mod files;
@@ -30,6 +31,7 @@ mod verdict;
 mod write;
 
 pub(crate) use bytes::Blob;
+pub use commands::{NotedAnswer, NotedOutcome};
 pub(crate) use entry::Tag;
 use event::EventAt;
 pub(crate) use event::{JournalEvent, NotedOrigin};

@@ -108,7 +108,7 @@ impl ExactRun {
     }
 
     /// All entries.
-    fn open(&self) -> Result<BufReader<File>, RunError> {
+    pub(super) fn open(&self) -> Result<BufReader<File>, RunError> {
         let file = File::open(&self.journal).map_err(|error| RunError(format!("{}: {error}", self.journal)))?;
         Ok(BufReader::new(file))
     }
