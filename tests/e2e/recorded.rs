@@ -1,7 +1,7 @@
 //! The built-in module `logd` on a running node: all that was sent is in its files, or counted; they are whole, also
 //! after it was killed; and a disk that is not there is told, and disturbs nobody.
 
-use crate::harness::{OUTPUT, Place, Robot, signal, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rand_chacha::ChaCha8Rng;
@@ -104,21 +104,6 @@ impl Feeding for Feeder {
     }
 }
 
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-feeder = { id = 96 }
-output = { id = 32 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
-"#;
-
 const LOGD: &str = r#"
 [[module]]
 name = "logd.0"
@@ -154,9 +139,7 @@ pub(crate) fn launched(place: &Place, record: &str) -> (Running, Robot) {
 
 /// The same, with another entry of the recorder.
 pub(crate) fn launched_with(place: &Place, logd: &str, record: &str) -> (Running, Robot) {
-    let config = place.path("test.toml");
-    let text = [HEAD, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record].concat();
-    std::fs::write(&config, text).unwrap();
+    let config = place.config(&[RECORDED_CLASSES, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
     robot.wait_on(&mut launch);
