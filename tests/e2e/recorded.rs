@@ -306,6 +306,7 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
     let errors = || place.say(&["log", "--timeout", "60", "--level", "error"]).out;
     let told = wait("an error", || Some(errors()).filter(|lines| lines.contains("records nothing: ")));
     assert!(told.contains("/disk/recordings") && told.contains(": is gone; make the folder again"), "{told}");
+    assert!(told.contains("tries again every second (errno 2: No such file or directory)"), "{told}");
     let frames = StreamId { name: robot.name("feeder.0"), number: FeedingInterface::FRAME.number };
     wait("the recorder has subscribed", || {
         let status = place.say(&["status", "feeder.0", "--json"]).json();

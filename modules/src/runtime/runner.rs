@@ -66,7 +66,7 @@ pub fn run<M: Module>() -> ExitCode {
 /// Tells what went wrong, and turns it into an exit code.
 pub fn exit(result: Result<(), StartError>) -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
-    tracing::error!("{error}");
+    tracing::error!(errno = error.errno(), "{error}");
     output::flush();
     if !output::is_installed() {
         output::print(&error);

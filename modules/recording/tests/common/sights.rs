@@ -66,7 +66,7 @@ pub(crate) fn long_cloud() -> (PointCloud, Vec<u8>) {
 pub(crate) fn line(text: &str) -> OutputLine {
     let module = u32::from_be_bytes([1, 140, 3, 0]);
     let (lost, suppressed) = (0, 0);
-    OutputLine { time_ns: STAMP_NS, module, level: OutputLevel::Warn, lost, suppressed, text: text.into() }
+    OutputLine { time_ns: STAMP_NS, module, level: OutputLevel::Warn, lost, suppressed, errno: None, text: text.into() }
 }
 
 /// One of each, and one that is not drawn.
