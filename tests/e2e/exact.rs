@@ -1,6 +1,6 @@
 //! Exact replay: the demo's modules repeat what they did on a loaded and disturbed node, and whatever differs is found.
 
-use crate::harness::{Place, Robot, halt, signal, wait};
+use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, signal, wait};
 use crate::process::{Running, Said};
 use crate::seer::{NOTHING, OTHER_BUILD, OTHER_QUESTIONS, entry};
 use nix::sys::signal::Signal;
@@ -15,23 +15,7 @@ use std::time::Duration;
 
 /// Set where the replays of a run are to be more than two: 20 in the long proof.
 const REPLAYS: &str = "ROHRPOST_EXACT_REPLAYS";
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-pilot = { id = 140 }
-seer = { id = 110 }
-mapper = { id = 96 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
+const LOGD: &str = r#"
 [[module]]
 name = "logd.0"
 builtin = "logd"
@@ -73,8 +57,7 @@ flush = "20 ms"
 const BUILDING: &str = include_str!("../../config/building.map");
 
 fn launched(place: &Place, modules: &str) -> (Running, Robot) {
-    let config = place.path("test.toml");
-    std::fs::write(&config, format!("{HEAD}{modules}")).unwrap();
+    let config = place.config(&[RECORDED_CLASSES, LOGD, modules]);
     std::fs::write(place.path("building.map"), BUILDING).unwrap();
     std::fs::write(place.path("vision.map"), "far").unwrap();
     let mut launch = place.launch(&config);

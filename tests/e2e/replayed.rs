@@ -1,7 +1,7 @@
 //! `rohrpost replay` of a robot that was recorded: played and recorded again it is the same; a fresh mapper draws the
 //! same map; and the replay is paused, stepped and sought by calls.
 
-use crate::harness::{OUTPUT, Place, Robot, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, wait};
 use crate::process::Running;
 use rohrpost::interfaces::{LaserInterface, WheelsInterface};
 use rohrpost::schema::Type;
@@ -14,23 +14,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-pilot = { id = 140 }
-mapper = { id = 96 }
-output = { id = 32 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
+const TIME: &str = r#"
 [time]
 source = "simulation"
 speed = 2.0
@@ -112,8 +96,7 @@ fn recorded_so_far(place: &Place) -> (u64, u64, u64) {
 fn record(place: &Place) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
-    let config = place.path("test.toml");
-    std::fs::write(&config, [HEAD, OUTPUT, MODULES].concat()).unwrap();
+    let config = place.config(&[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
     wait("the modules are there", || {
@@ -193,8 +176,7 @@ pub(crate) fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
 
 /// The node of a replay.
 fn replaying(place: &Place, replay: &mut Running) -> Robot {
-    let config = place.path("as-played.toml");
-    std::fs::write(&config, [HEAD, OUTPUT, MODULES].concat().replace("\"test\"", "\"test-replay\"")).unwrap();
+    let config = place.config_of("test-replay", "[nodes.main]", &[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     Installation::load(&config).unwrap();
     let robot = place.robot(&config, "replay", replay);
     wait("the player is there", || {

@@ -2,6 +2,7 @@
 //! are.
 
 use nix::sys::statvfs::statvfs;
+use rohrpost::output::errno_of;
 use rohrpost_recording::{is_being_written, is_closed, recover as recovered, recovered_path};
 use std::ffi::OsStr;
 use std::io;
@@ -74,7 +75,7 @@ fn make_whole(file: &Path, leave_bytes: u64) {
             made.messages,
             made.path.file_name().unwrap_or_default().to_string_lossy()
         ),
-        Err(error) => tracing::error!("{name} was not closed, and is not recovered: {error}"),
+        Err(error) => tracing::error!(errno = errno_of(&error), "{name} was not closed, and is not recovered: {error}"),
     }
 }
 

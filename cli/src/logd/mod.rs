@@ -24,6 +24,7 @@ use crate::version;
 use control::{ControlServer, Orders, Told};
 use health::Health;
 use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
+use rohrpost::output::errno_of;
 use rohrpost::{Context, Module, ModuleClock, ModuleError, Ready, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
 use rohrpost_mailbox::TimeSource;
@@ -173,7 +174,7 @@ impl Logd {
         self.ended = match told {
             Ok(()) => ControlAnswer::ok().with("written", written).with("lost", lost).with("files", files),
             Err(error) => {
-                tracing::error!("the recording could not be ended: {error}");
+                tracing::error!(errno = errno_of(&error), "the recording could not be ended: {error}");
                 ControlAnswer::err(&format!("the recording is off, but could not be ended: {error}"))
             }
         };

@@ -77,6 +77,8 @@ pub struct ChannelInfo {
     pub message_encoding: String,
     /// The topic that it was drawn of for other programs, if it was.
     pub drawn_of: Option<String>,
+    /// Pictures or points were reduced as they were drawn: some of them, or all.
+    pub is_reduced: bool,
     /// Messages, without those that are repeated.
     pub messages: u64,
     /// Repeated from an earlier file, as the beginning of this one.
@@ -283,4 +285,5 @@ fn describe(info: &mut ChannelInfo, channel: &Definition) {
     info.schema_encoding.clone_from(&channel.schema.encoding);
     info.message_encoding.clone_from(&channel.message_encoding);
     info.drawn_of = channel.texts.get(key::DRAWN).cloned();
+    info.is_reduced |= channel.texts.contains_key(key::REDUCED);
 }

@@ -2,6 +2,7 @@
 
 use super::stream::{RecordError, StreamReadError};
 use crate::journal::RunError;
+use crate::output::errno_of;
 use rohrpost_config::{Errors, NameTextError, SettingsError};
 use rohrpost_mailbox::NodeError;
 use std::path::PathBuf;
@@ -88,17 +89,32 @@ pub enum StartError {
     #[error("launch, process {0}, ended before this module began")]
     Orphan(u32),
     /// The module said no.
-    #[error("{0}: {1}")]
-    Module(String, String),
+    #[error("{module}: {text}")]
+    Module {
+        /// The module.
+        module: String,
+        /// What it said.
+        text: String,
+        /// The number of the kernel's error, if one is behind it.
+        errno: Option<u16>,
+    },
     /// The system said no.
     #[error("{0}: {1}")]
-    System(&'static str, std::io::Error),
+    System(&'static str, #[source] std::io::Error),
 }
 
 impl StartError {
     /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the
     /// same way.
     pub const CONFIGURATION: u8 = 78;
+
+    /// The number of the kernel's error, if one is behind it.
+    pub fn errno(&self) -> Option<u16> {
+        match self {
+            Self::Module { errno, .. } => *errno,
+            other => errno_of(other),
+        }
+    }
 
     /// The exit code that tells launch whether starting again may help.
     pub fn exit_code(&self) -> u8 {
@@ -118,7 +134,7 @@ impl StartError {
             | Self::Stream(_)
             | Self::Exact(_)
             | Self::Orphan(_)
-            | Self::Module(..)
+            | Self::Module { .. }
             | Self::System(..) => 1,
         }
     }

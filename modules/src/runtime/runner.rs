@@ -68,7 +68,7 @@ pub fn run<M: Module>() -> ExitCode {
 /// Tells what went wrong, and turns it into an exit code.
 pub fn exit(result: Result<(), StartError>) -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
-    tracing::error!("{error}");
+    tracing::error!(errno = error.errno(), "{error}");
     output::flush();
     if !output::is_installed() {
         output::print(&error);
@@ -96,7 +96,7 @@ pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
         std::panic::resume_unwind(panic)
     });
     let mut running = joined.inspect_err(|error| match error {
-        StartError::Module(_, why) => end_unmade(Tag::Failed, why),
+        StartError::Module { text: why, .. } => end_unmade(Tag::Failed, why),
         error => end_unstarted(&error.to_string()),
     })?;
     let worked = catch_unwind(AssertUnwindSafe(|| {

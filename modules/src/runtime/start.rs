@@ -186,7 +186,11 @@ impl Start {
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);
         participant.end_work();
-        let mut made = made.map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
+        let mut made = made.map_err(|error| StartError::Module {
+            module: text.clone(),
+            text: error.to_string(),
+            errno: error.errno(),
+        })?;
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
@@ -229,7 +233,11 @@ fn stand_ins<M: Module>(
     module: &rohrpost_config::Module,
 ) -> Result<Vec<StandIn>, StartError> {
     let text = |name| installation.classes.format(name);
-    let failed = |error: ModuleError| StartError::Module(text(module.name), error.to_string());
+    let failed = |error: ModuleError| StartError::Module {
+        module: text(module.name),
+        text: error.to_string(),
+        errno: error.errno(),
+    };
     let stand_ins = M::stand_ins(settings, installation).map_err(failed)?;
     for (at, StandIn { name, description }) in stand_ins.iter().enumerate() {
         let why = if !module.names().any(|own| own == *name) {
@@ -305,13 +313,14 @@ fn schedule(wanted: Scheduling) {
             let _ = sys::schedule(sys::Scheduling::Normal(0));
         }
         tracing::warn!(
+            errno = error.raw_os_error(),
             "runs without {wanted}: {error}; allow it with a limit `rtprio` for this user (limits.conf) or CAP_SYS_NICE"
         );
     } else if let sys::Scheduling::Fifo(_) = how {
         match sys::lock_memory() {
             Ok(true) => {}
             Ok(false) => tracing::debug!("memory is not locked: the memlock limit is finite (`ulimit -l`)"),
-            Err(error) => tracing::warn!("memory is not locked: {error}"),
+            Err(error) => tracing::warn!(errno = error.raw_os_error(), "memory is not locked: {error}"),
         }
     }
 }
