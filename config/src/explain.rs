@@ -193,7 +193,8 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let (number, memory) = (count_text(modules.len(), "module"), memory::of_node(&modules));
+        let memory = memory::of_node(&modules, self.installation.journals_on(&node.name));
+        let number = count_text(modules.len(), "module");
         self.line("");
         self.line(format!("Node `{}`: {number}, {memory}", node.name));
         self.line("");

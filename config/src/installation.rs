@@ -2,6 +2,7 @@
 
 use crate::access::Access;
 use crate::classes::ClassTable;
+use crate::exact::JOURNAL;
 use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::module::Module;
@@ -81,9 +82,15 @@ impl Installation {
         self.modules.iter().filter(move |module| module.node == node)
     }
 
-    /// Bytes of shared memory that the mailboxes and streams of a node take, as far as the file names them.
+    /// Bytes of shared memory that the mailboxes, streams and journals of a node take, as far as the file names them.
     pub fn memory_on(&self, node: &str) -> u64 {
-        saturating_sum(self.modules_on(node).map(Module::memory))
+        saturating_sum(self.modules_on(node).map(Module::memory).chain([self.journals_on(node)]))
+    }
+
+    /// Bytes of these that its journals take.
+    pub fn journals_on(&self, node: &str) -> u64 {
+        let is_exact = |module: &&Module| self.record.as_ref().is_some_and(|record| record.is_exact(module.name));
+        saturating_sum(self.modules_on(node).filter(is_exact).map(|_| JOURNAL.memory()))
     }
 
     /// The nodes that are on the LAN, or the only one; they come first in [`nodes`](Self::nodes).

@@ -20,6 +20,7 @@ mod demo;
 mod demo_recorded;
 mod doctor;
 mod exact;
+mod exact_records;
 mod far;
 mod faults;
 mod graph;

@@ -1,10 +1,12 @@
-//! Journals in a recording, put together of their pieces.
+//! Journals in a recording, put together of their pieces: each in a file, however long it is.
 
 use crate::terminal::Failure;
 use rohrpost::output::plain;
-use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, Piece};
+use rohrpost_modules::journal::{ExactRun, JOURNAL_NAME, JOURNAL_NUMBER, Piece};
 use rohrpost_recording::{Reader, RecordedChannel};
-use std::path::Path;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 /// The journal of one run of a module: from its start to its end, or as far as it was recorded.
 #[derive(Debug)]
@@ -12,22 +14,26 @@ pub(super) struct RecordedRun {
     pub(super) module: String,
     /// Tells it from other runs of the module.
     incarnation: u32,
-    pub(super) bytes: Vec<u8>,
+    /// File with its entries.
+    journal: PathBuf,
+    /// The same, while more may come.
+    file: Option<File>,
+    len: u64,
     /// Why it goes on no further, if it should.
     pub(super) ends: Option<String>,
     /// Why it cannot be replayed at all: its beginning is missing.
     pub(super) begins_late: Option<String>,
 }
 
-/// Journals of these modules, or of all, in the order in which they begin.
-pub(super) fn read(file: &Path, modules: &[String]) -> Result<Vec<RecordedRun>, Failure> {
+/// Journals of these modules, or of all, in the order in which they begin; put together in that folder.
+pub(super) fn read(file: &Path, modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
     let mut runs: Vec<RecordedRun> = Vec::new();
     let mut reader = Reader::open(file)?;
     let mut damage = None;
     loop {
         match reader.next() {
             Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
-                take(&mut runs, &channel.name, message.data)
+                take(&mut runs, folder, &channel.name, message.data)?;
             }
             Ok(Some(_)) => {}
             Ok(None) => break,
@@ -58,11 +64,11 @@ fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {
     is_journal && (modules.is_empty() || modules.contains(&channel.name))
 }
 
-fn take(runs: &mut Vec<RecordedRun>, module: &str, value: &[u8]) {
-    let Some(Piece { incarnation, offset, bytes }) = Piece::read(value) else { return };
+fn take(runs: &mut Vec<RecordedRun>, folder: &Path, module: &str, value: &[u8]) -> Result<(), Failure> {
+    let Some(Piece { incarnation, offset, bytes }) = Piece::read(value) else { return Ok(()) };
     let is_it = |run: &RecordedRun| (run.module.as_str(), run.incarnation) == (module, incarnation);
     // After the node's memory was made anew, incarnations are counted from the beginning.
-    let known = runs.iter().rposition(is_it).filter(|at| offset > 0 || runs[*at].bytes.is_empty());
+    let known = runs.iter().rposition(is_it).filter(|at| offset > 0 || runs[*at].len == 0);
     let at = known.unwrap_or_else(|| {
         let begins_late = (offset > 0).then(|| {
             format!(
@@ -70,18 +76,41 @@ fn take(runs: &mut Vec<RecordedRun>, module: &str, value: &[u8]) {
                  `rohrpost record merge` this file with the one before it"
             )
         });
-        let module = module.to_owned();
-        runs.push(RecordedRun { module, incarnation, bytes: Vec::new(), ends: None, begins_late });
+        // Of one module one run goes on at a time: the others need no open file.
+        runs.iter_mut().filter(|run| run.module == module).for_each(|run| run.file = None);
+        let (module, journal) = (module.to_owned(), folder.join(format!("journal-{}", runs.len())));
+        runs.push(RecordedRun { module, incarnation, journal, file: None, len: 0, ends: None, begins_late });
         runs.len() - 1
     });
     let run = &mut runs[at];
-    let have = run.bytes.len() as u64;
-    if run.ends.is_some() || run.begins_late.is_some() || offset < have {
-        return;
+    if run.ends.is_some() || run.begins_late.is_some() || offset < run.len {
+        return Ok(());
     }
-    match offset - have {
-        0 => run.bytes.extend_from_slice(bytes),
-        lost => run.ends = Some(format!("{lost} bytes of the journal were not recorded: the recorder was too slow")),
+    match offset - run.len {
+        0 => run.append(bytes),
+        lost => {
+            run.ends = Some(format!("{lost} bytes of the journal were not recorded: the recorder was too slow"));
+            Ok(())
+        }
+    }
+}
+
+impl RecordedRun {
+    /// As its program reads it; still without the places of other files.
+    pub(super) fn exact(&self) -> ExactRun {
+        let journal = self.journal.display().to_string();
+        ExactRun { folder: None, report: String::new(), ends: self.ends.clone(), journal, records: None }
+    }
+
+    fn append(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        let failed = |error: std::io::Error| format!("{}: {error}", self.journal.display());
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(File::options().create(true).append(true).open(&self.journal).map_err(failed)?),
+        };
+        file.write_all(bytes).map_err(failed)?;
+        self.len += bytes.len() as u64;
+        Ok(())
     }
 }
 
@@ -109,7 +138,7 @@ mod tests {
 
     #[test]
     fn pieces_are_put_together_until_one_is_missing() {
-        let mut runs = Vec::new();
+        let (mut runs, folder) = (Vec::new(), tempfile::tempdir().unwrap());
         for (module, incarnation, offset, bytes) in [
             ("pilot.0", 5, 0, &b"ab"[..]),
             ("mapper.0", 6, 9, b"x"),
@@ -122,20 +151,23 @@ mod tests {
             ("pilot.0", 7, 0, b"new"),
             ("pilot.0", 7, 3, b"er"),
         ] {
-            take(&mut runs, module, &record(incarnation, offset, bytes));
+            take(&mut runs, folder.path(), module, &record(incarnation, offset, bytes)).unwrap();
         }
-        take(&mut runs, "pilot.0", b"no piece");
-        let told: Vec<(&str, &[u8], bool, bool)> = runs
+        take(&mut runs, folder.path(), "pilot.0", b"no piece").unwrap();
+        let told: Vec<(&str, Option<String>, bool, bool)> = runs
             .iter()
-            .map(|run| (run.module.as_str(), &run.bytes[..], run.ends.is_some(), run.begins_late.is_some()))
+            .map(|run| {
+                let journal = std::fs::read_to_string(&run.journal).ok();
+                (run.module.as_str(), journal, run.ends.is_some(), run.begins_late.is_some())
+            })
             .collect();
         let expected = [
-            ("pilot.0", &b"abcd"[..], true, false),
-            ("mapper.0", b"", false, true),
-            ("pilot.0", b"z", false, false),
-            ("pilot.0", b"newer", false, false),
+            ("pilot.0", Some("abcd"), true, false),
+            ("mapper.0", None, false, true),
+            ("pilot.0", Some("z"), false, false),
+            ("pilot.0", Some("newer"), false, false),
         ];
-        assert_eq!(told, expected);
+        assert_eq!(told, expected.map(|(module, text, ends, late)| (module, text.map(str::to_owned), ends, late)));
         assert!(runs[0].ends.as_ref().is_some_and(|why| why.starts_with("3 bytes ")), "{:?}", runs[0].ends);
     }
 }

@@ -9,14 +9,16 @@ use rohrpost_mailbox::saturating_sum;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What all modules of a node keep there.
-pub(super) fn of_node(modules: &[&Module]) -> String {
+/// What all modules of a node keep there; `journals` of it are those of modules that can be replayed exactly.
+pub(super) fn of_node(modules: &[&Module], journals: u64) -> String {
     let sum = |memory: fn(&Module) -> u64| saturating_sum(modules.iter().map(|module| memory(module)));
-    let mailboxes = format!("{} of mailboxes", about(sum(Module::mailbox_memory)));
-    match sum(Module::stream_memory) {
-        0 => mailboxes,
-        streams => format!("{mailboxes}, {} of streams", about(streams)),
+    let mut words = format!("{} of mailboxes", about(sum(Module::mailbox_memory)));
+    for (bytes, what) in [(sum(Module::stream_memory), "streams"), (journals, "journals")] {
+        if bytes > 0 {
+            let _ = write!(words, ", {} of {what}", about(bytes));
+        }
     }
+    words
 }
 
 pub(super) fn mailbox(spec: &MailboxSpec) -> String {

@@ -144,6 +144,6 @@ fn work_of(event: &JournalEvent<'_>) -> Work {
         JournalEvent::Received { number, .. } => Work::Received(number),
         JournalEvent::Function { number, .. } => Work::Function(number),
         JournalEvent::Parameters { .. } => Work::Parameters,
-        JournalEvent::Ready => Work::Ready,
+        JournalEvent::Ready { .. } => Work::Ready,
     }
 }

@@ -10,12 +10,12 @@ use super::runner::{Running, served};
 use super::stream::{self, ServedStreams};
 use crate::call::Link;
 use crate::interface::StandIn;
-use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal, SHAPE, Tag};
+use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal};
 use crate::module::{Module, ModuleError};
 use crate::output;
 use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
-use rohrpost_config::{Installation, MailboxSpec, Scheduling, Start as StartState};
+use rohrpost_config::{Installation, JOURNAL, MailboxSpec, Scheduling, Start as StartState};
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, StreamError, StreamId, SystemClock, Work,
     base_directory, local, node_directory, sys,
@@ -186,11 +186,7 @@ impl Start {
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);
         participant.end_work();
-        let mut made = made.map_err(|error| {
-            journal.output(Tag::Failed, &error.to_string());
-            journal.end();
-            StartError::Module(text.clone(), error.to_string())
-        })?;
+        let mut made = made.map_err(|error| StartError::Module(text.clone(), error.to_string()))?;
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
         let by_hand = self.launcher.is_none();
@@ -206,12 +202,12 @@ impl Start {
         let installation = &*self.installation;
         let wanted = installation.record.as_ref().is_some_and(|record| record.is_exact(self.name));
         let journal = match ExactRun::from_environment()? {
-            Some(run) => ModuleJournal::replayed(run.replay()),
+            Some(run) => ModuleJournal::replayed(run.replay()?),
             None if wanted => {
                 let id = StreamId { name: self.name, number: JOURNAL_NUMBER };
                 let text = installation.classes.format(self.name);
                 let failed = |error: StreamError| StartError::Stream(format!("the journal of `{text}`: {error}"));
-                let stream = participant.stream_writer(id, SHAPE).map_err(failed)?;
+                let stream = participant.stream_writer(id, JOURNAL.shape()).map_err(failed)?;
                 ModuleJournal::written(JournalWriter::new(stream, clock.clone(), participant.node().next_incarnation()))
             }
             None => return Ok(ModuleJournal::default()),

@@ -127,3 +127,28 @@ fn a_restarted_writer_is_followed() {
     wait("it sees the last", || (widths(&seen).last() == Some(&5)).then_some(()));
     assert_eq!(*seen.lock().unwrap(), (0..6).map(|n| (n, n, 0)).collect::<Vec<_>>());
 }
+
+#[test]
+fn a_stream_can_be_followed_from_the_oldest_record_of_its_present_writer() {
+    let place = Place::with("");
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 0..3);
+    camera.crashes();
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 3..6);
+    let viewer = place.start::<Watcher>(VIEWER);
+    let seen = Seen::default();
+    let noted = seen.clone();
+    viewer.does(move |part, context| {
+        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
+        context.rewind(&images);
+        part.handler = Some(Box::new(move |data| {
+            let image = data.read(&images)?.unwrap();
+            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
+            Ok(())
+        }));
+    });
+    shoots(&camera, 6..7);
+    wait("it sees the last", || (widths(&seen).last() == Some(&6)).then_some(()));
+    assert_eq!(*seen.lock().unwrap(), (3..7).map(|n| (n, n, 0)).collect::<Vec<_>>());
+}

@@ -2,12 +2,12 @@
 
 use super::Context;
 use crate::interface::StreamPort;
-use crate::journal::Tag;
+use crate::journal::{Question, Tag};
 use crate::runtime::error::ContextError;
 use crate::runtime::stream::{
     CheckedReader, KnownStream, OpenValue, OwnStream, RecordError, Stream, StreamSubscription, note, opened,
 };
-use rohrpost_mailbox::{Name, Stamp};
+use rohrpost_mailbox::{Name, Stamp, StreamId};
 use rohrpost_schema::{Data, DataItem};
 
 impl Context {
@@ -93,17 +93,18 @@ impl Context {
         let (_, streams, outlet) = self.split();
         let OwnStream { about, writer } = &mut streams[at];
         let journal = outlet.journal;
-        let noted = journal.given(Tag::Wrote).map(|given| given.read::<Result<(u64, u64), RecordError>>());
+        let question = Question::Own { endpoint: about.endpoint as u16, number: about.item.number, stamp_ns };
+        let noted = journal.given(Tag::Wrote, question).map(|given| given.read::<Result<(u64, u64), RecordError>>());
         let (epoch, sequence) = noted.unwrap_or_else(|| Ok((epoch, writer.written())))?;
         match writer.begin(Stamp { epoch, ns: stamp_ns }) {
             Ok(record) => {
-                journal.note(Tag::Wrote, &Ok::<_, RecordError>((epoch, sequence)));
+                journal.note(Tag::Wrote, question, &Ok::<_, RecordError>((epoch, sequence)));
                 Ok(OpenValue::new(record, (sequence, stamp_ns), about, outlet))
             }
             Err(error) => {
                 let error = about.explain(error);
                 journal.replay(|replay| replay.give_up(&format!("a record that was written is refused now: {error}")));
-                journal.note(Tag::Wrote, &Err::<(u64, u64), _>(&error));
+                journal.note(Tag::Wrote, question, &Err::<(u64, u64), _>(&error));
                 Err(error.into())
             }
         }
@@ -221,6 +222,22 @@ impl Context {
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
     }
 
+    /// Goes back to the oldest record that a followed stream keeps of its present writer: also those come that were
+    /// written before it was followed. And at the module's end it is given those that are there by then.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError, StreamSubscription};
+    /// # use rohrpost_modules::{interface::StreamPort, types::Pose};
+    /// fn follow_all(context: &mut Context, hook: StreamPort<Pose>) -> Result<StreamSubscription<Pose>, ContextError> {
+    ///     let subscription = context.subscribe_stream(hook, "crane.0")?;
+    ///     context.rewind(&subscription);
+    ///     Ok(subscription)
+    /// }
+    /// ```
+    pub fn rewind<T>(&mut self, subscription: &StreamSubscription<T>) {
+        self.followed_streams.rewind(subscription);
+    }
+
     fn open_untyped(&self, from: Name, item: &DataItem, interface: u32) -> Result<CheckedReader, ContextError> {
         let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
         let beyond = (from.system() != self.me.system()).then_some("?");
@@ -247,10 +264,12 @@ impl Context {
             return Err(ContextError::FarStream { stream, module, node: node.into() });
         }
         let participant = self.link.unseen().borrow().participant().clone();
-        let then = opened(&self.journal).transpose()?;
+        let id = StreamId { name: from.module(), number: known.number };
+        let question = Question::Interface(id.into(), known.interface);
+        let then = opened(&self.journal, question).transpose()?;
         let reader = CheckedReader::open(&participant, &self.installation, known, from);
         if then.is_none() {
-            note(&self.journal, Tag::Opened, &reader, |_| ());
+            note(&self.journal, Tag::Opened, question, &reader, |_| ());
         }
         Ok(reader?)
     }

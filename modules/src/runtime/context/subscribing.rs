@@ -3,6 +3,7 @@
 use super::Context;
 use crate::common::DataHead;
 use crate::interface::DataPort;
+use crate::journal::{Question, Tag, nanoseconds};
 use crate::runtime::error::ContextError;
 use crate::runtime::follow::{Rate, Subscription};
 use rohrpost_mailbox::{CreateError, Head, Name, OverflowPolicy, Shape, local};
@@ -100,6 +101,11 @@ impl Context {
     ) -> Result<Subscription<T>, ContextError> {
         let known = self.taking.iter().copied().find(|(local, _)| *local == mailbox);
         let (mailbox, latest) = known.ok_or(ContextError::NoMailbox(mailbox))?;
+        let period_ns = match rate {
+            Rate::Each => None,
+            Rate::Every(period) => Some(nanoseconds(period)),
+        };
+        self.journal.asked(Tag::Subscribed, Question::Data { from: from.raw(), number, interface, mailbox, period_ns });
         let followed = self.followings.follow((mailbox, latest), from, number, interface, rate);
         Ok(Subscription::new(followed.ok_or(ContextError::TooMany)?, mailbox))
     }

@@ -54,6 +54,8 @@ impl<T> seal::Kind for StreamSubscription<T> {
 pub(crate) struct FollowedStream {
     reader: CheckedReader,
     id: u16,
+    /// Nothing of it is to be missing at its ends.
+    is_whole: bool,
     notices: Notices,
 }
 
@@ -110,7 +112,8 @@ impl FollowedRecord<'_> {
             incarnation: 0,
         };
         let (from, number) = (self.source.id.name, self.source.id.number);
-        Received::new(from, number, Origin::Stream { id: self.id, stamp: info.stamp }, head, self.held.body())
+        let origin = Origin::Stream { id: self.id, stamp: info.stamp, is_recorded: self.source.is_recorded };
+        Received::new(from, number, origin, head, self.held.body())
     }
 }
 
@@ -120,13 +123,22 @@ impl FollowedStreams {
         let id = self.made;
         self.made = id.checked_add(1)?;
         let (stream, module) = (reader.source.name.clone().into_owned(), reader.source.module());
-        if reader.is_journal() {
+        let is_whole = reader.is_journal();
+        if is_whole {
             // From its beginning on, as far as it is there.
             reader.reader.seek(0);
         }
         let notices = Notices { stream, module, throttle: Throttle::default(), refusal: None, retry: None };
-        self.list.push(FollowedStream { reader, id, notices });
+        self.list.push(FollowedStream { reader, id, is_whole, notices });
         Some(StreamSubscription { id, data: PhantomData })
+    }
+
+    /// Goes back to the oldest record that a stream keeps of its present writer.
+    pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>) {
+        for stream in self.list.iter_mut().filter(|stream| stream.id == of.id) {
+            stream.is_whole = true;
+            stream.reader.rewind();
+        }
     }
 
     /// Passes over what was written until now; of a journal nothing is to be missing.
@@ -166,13 +178,18 @@ impl FollowedStreams {
 
 impl FollowedStream {
     /// Whether it is the journal of a module.
-    pub(in crate::runtime) fn is_journal(&self) -> bool {
+    fn is_journal(&self) -> bool {
         self.reader.is_journal()
+    }
+
+    /// Whether what is there at the module's end is read before.
+    pub(in crate::runtime) fn is_whole(&self) -> bool {
+        self.is_whole
     }
 
     /// The next record, or what there is instead.
     pub(in crate::runtime) fn step(&mut self) -> Step<'_> {
-        let Self { reader, id, notices } = self;
+        let Self { reader, id, notices, .. } = self;
         if notices.retry.is_some_and(|retry| Instant::now() < retry) {
             return Step::Nothing;
         }
