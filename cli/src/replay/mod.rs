@@ -210,7 +210,7 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         saved: saved_text.is_some().then_some(&*saved),
     };
     let played = match recorded.are_others {
-        true => others::played(&recorded, &arguments.into, &source, &wish.running_names()?)?,
+        true => others::played(recorded, &arguments.into, &source, &wish.running_names()?)?,
         false => wish.played()?,
     };
     if let Some(text) = saved_text {
@@ -269,7 +269,7 @@ fn told(errors: &rohrpost_config::Errors) -> String {
 }
 
 /// What modules have answered to commands, as bytes; none if the files have no journal.
-fn answers(recorded: &RecordedFiles) -> Result<Option<Vec<u8>>, Failure> {
+fn noted_answers(recorded: &RecordedFiles) -> Result<Option<Vec<u8>>, Failure> {
     let modules = recorded.with_journal();
     if modules.is_empty() {
         return Ok(None);
@@ -326,7 +326,7 @@ fn settings(
     ] {
         settings.insert(key.into(), value);
     }
-    if let Some(answers) = answers(recorded)? {
+    if let Some(answers) = noted_answers(recorded)? {
         std::fs::write(folder.join(ANSWERS), answers)?;
         settings.insert("answers".into(), ANSWERS.into());
     }
