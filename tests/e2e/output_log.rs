@@ -214,7 +214,7 @@ required = false
 settings = { map = "missing.map" }
 "#;
     let pilot = "[[module]]\nname = \"pilot.0\"\nprogram = \"./script\"\nrequired = false\n";
-    let script = File::options().write(true).create(true).mode(0o755).open(place.path("script"));
+    let script = File::options().write(true).create_new(true).mode(0o755).open(place.path("script"));
     script.unwrap().write_all(b"#!/no/such/interpreter\n").unwrap();
     let config = place.config(&[RECORDED_CLASSES, motor, OUTPUT, pilot]);
     let _launch = place.launch(&config);

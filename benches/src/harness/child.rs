@@ -93,7 +93,7 @@ impl Child {
         self.report.read().unwrap_or_else(|| Err(Failure::Failed("its process was killed".into())))
     }
 
-    /// The same of a child that becomes another program, whose exit code is to be 0.
+    /// The same of a child that becomes another program: its exit code is to be 0.
     ///
     /// # Errors
     /// What the child failed with before, its other end, or that it was killed.

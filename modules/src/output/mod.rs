@@ -105,7 +105,7 @@ impl OutputLevel {
 
     /// The level of this number, as it is cast; the last one if none has it.
     pub(crate) fn of_number(number: u8) -> Self {
-        Self::ALL.into_iter().find(|level| *level as u8 == number).unwrap_or(Self::Trace)
+        Self::ALL.into_iter().find(|its| *its as u8 == number).unwrap_or(Self::Trace)
     }
 
     /// One word.

@@ -1,4 +1,4 @@
-//! How long a command to a module takes whose run is noted in a journal, and to one whose is not.
+//! How long a command takes to a module that writes a journal, and to one that writes none.
 
 use super::super::Case;
 use super::super::case::{Done, as_failure};
@@ -48,7 +48,7 @@ name = "motor.0"
 program = "motor"
 optional = true
 "#;
-/// Nobody records: it says whose runs are noted.
+/// Nobody records: it says which module writes a journal.
 const RECORDING: &str = r#"
 [[module]]
 name = "logd.0"

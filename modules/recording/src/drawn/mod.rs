@@ -60,7 +60,8 @@ pub struct Drawn {
     pub drawn: BTreeMap<String, u64>,
     /// Values that could not be drawn, by topic: they contradict themselves, or have a place that is no number.
     pub not_drawn: BTreeMap<String, u64>,
-    /// Values that are in the file as they were recorded, too long to be in it twice, and no pixels or points, by topic.
+    /// Values that are in the file as they were recorded, too long to be in it twice, and no pixels or points: by
+    /// topic.
     pub too_long: BTreeMap<String, u64>,
     /// Topics of which nothing is drawn.
     pub without: Vec<String>,

@@ -14,8 +14,8 @@ pub(crate) enum Picture {
     File(CompressedImage),
 }
 
-/// None if its sizes do not fit together. If its pixels have more than `bytes_max`, every k-th of every k-th row is left,
-/// with the smallest k by which they have not.
+/// None if its sizes do not fit together. If its pixels have more than `bytes_max`, every k-th of every k-th row is
+/// left, with the smallest k by which they have not.
 pub(crate) fn of_picture(value: Value, bytes_max: usize) -> Option<Picture> {
     let mut image = ValueFields::of(value)?;
     let (width, height) = (image.count("width_px")?, image.count("height_px")?);

@@ -74,7 +74,7 @@ fn of_a_long_cloud_every_kth_point_that_is_seen_is_drawn() {
     // Every other place is empty. 15000 points of 16 bytes are left, 4096 fit.
     let count = 30_000;
     let point = |number: u32| {
-        let x = if number % 2 == 0 { number as f32 } else { f32::NAN };
+        let x = if number.is_multiple_of(2) { number as f32 } else { f32::NAN };
         [x, -(number as f32), 0.5, 7.0].map(f32::to_le_bytes).concat()
     };
     let points = Bytes((0..count).flat_map(point).collect());

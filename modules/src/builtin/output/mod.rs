@@ -26,8 +26,8 @@ use std::time::Instant;
 const SLOTS: u16 = 512;
 /// Bytes of lines in a page, so that it fits in any reply mailbox.
 const PAGE_BYTES: usize = 2500;
-/// Most bytes that a line has besides its text: time, module, level, two counts, a number of an error, the length of the
-/// text.
+/// Most bytes that a line has besides its text: time, module, level, two counts, a number of an error, the length of
+/// the text.
 const NUMBERS_BYTES: usize = 10 + 5 + 1 + 5 + 5 + 4 + 2;
 
 #[derive(Deserialize, Default)]
