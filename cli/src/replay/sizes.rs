@@ -39,7 +39,7 @@ impl ItemSizes {
         all.late = all.late.max(spec.late);
     }
 
-    /// One whose messages are measured: more of the longest ones are not kept than of those.
+    /// One with messages that are measured. All have room for the longest ones, and keep as many as fit of those.
     pub(super) fn add_derived(&mut self, spec: StreamSpec) {
         let record_bytes = self.derived.map_or(0, |all| all.record_bytes).max(spec.record_bytes);
         self.derived = Some(of_records(record_bytes));
