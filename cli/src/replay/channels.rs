@@ -75,8 +75,9 @@ impl PlayedChannels {
         recorded: &RecordedChannel,
         message: &Message<'_>,
     ) -> Result<(), ContextError> {
-        let stamp = Stamp { epoch: self.epoch_of(message.epoch), ns: message.stamp_ns };
+        let epoch = self.epoch_of(message.epoch);
         let Some(channel) = self.by_topic.get_mut(&recorded.topic) else { return Ok(()) };
+        let stamp = Stamp { epoch, ns: stamp_of(message, channel.is_opaque) };
         let mut value = message.data;
         if channel.is_opaque {
             opaque_of(&mut self.opaque, value);
@@ -111,6 +112,11 @@ impl PlayedChannels {
     }
 }
 
+/// When a message was made. Other programs may not say, and write 0: then it is when it arrived.
+fn stamp_of(message: &Message<'_>, is_opaque: bool) -> u64 {
+    if is_opaque && message.stamp_ns == 0 { message.arrival_ns } else { message.stamp_ns }
+}
+
 /// Postcard of bytes: their count, seven bits a byte, and they themselves.
 fn opaque_of(to: &mut Vec<u8>, bytes: &[u8]) {
     to.clear();
@@ -137,6 +143,13 @@ mod tests {
             opaque_of(&mut opaque, &bytes);
             assert_eq!(from_bytes::<Bytes>(&opaque).unwrap().0, bytes);
         }
+    }
+
+    #[test]
+    fn messages_of_others_without_a_publish_time_are_of_the_time_of_their_arrival() {
+        let message = |stamp_ns| Message { arrival_ns: 7, stamp_ns, epoch: 1, sequence: 0, data: &[] };
+        assert_eq!([0, 5].map(|stamp_ns| stamp_of(&message(stamp_ns), true)), [7, 5]);
+        assert_eq!(stamp_of(&message(0), false), 0, "ours are as they are");
     }
 
     #[test]

@@ -7,6 +7,7 @@
 //! ```
 
 use super::recorded::RecordedFiles;
+use super::sizes::ItemSizes;
 use super::tables::{entries, stream, table, table_of, text_of};
 use crate::terminal::Failure;
 use rohrpost::Name;
@@ -200,7 +201,7 @@ impl ReplayWish<'_> {
         let is_collector =
             |module: &&&Module| self.installation.classes.name(module.name.class()) == Some(rohrpost::output::CLASS);
         let collectors = running.iter().take_while(is_collector).count();
-        modules.insert(collectors, Value::Table(self.player(&player, played, settings)));
+        modules.insert(collectors, Value::Table(self.player(&player, played, settings)?));
         new.insert("module".into(), Value::Array(modules));
         Ok((toml::to_string(&new)?, player))
     }
@@ -318,10 +319,10 @@ impl ReplayWish<'_> {
     }
 
     /// The player, with the streams and mailboxes of all that it plays.
-    fn player(&self, name: &str, played: &PlayedModules, settings: Table) -> Table {
+    fn player(&self, name: &str, played: &PlayedModules, settings: Table) -> Result<Table, Failure> {
         let classes = &self.installation.classes;
         let (mut slots, mut size) = COMMANDS_MIN;
-        let mut streams: BTreeMap<&str, StreamSpec> = BTreeMap::new();
+        let mut sizes: BTreeMap<&str, ItemSizes> = BTreeMap::new();
         for (name, description) in &played.described {
             let module = classes.parse_module(name).ok().and_then(|name| self.installation.module(name));
             let commands = module.map(|module| module.mailboxes.commands);
@@ -329,13 +330,12 @@ impl ReplayWish<'_> {
             size = size.max(commands.map_or(0, |commands| commands.size));
             for item in description.streams() {
                 let item = item.field.name.as_str();
-                let own = || played.streams.get(&format!("{name}/{item}"));
-                let spec = module.and_then(|module| module.streams.get(item)).or_else(own).copied().unwrap_or_default();
-                let all = streams.entry(item).or_insert(spec);
-                all.record_bytes = all.record_bytes.max(spec.record_bytes);
-                all.keep = all.keep.max(spec.keep);
-                all.readers = all.readers.max(spec.readers);
-                all.late = all.late.max(spec.late);
+                let all = sizes.entry(item).or_default();
+                let configured = module.and_then(|module| module.streams.get(item));
+                match (configured, played.streams.get(&format!("{name}/{item}"))) {
+                    (None, Some(derived)) => all.add_derived(*derived),
+                    (configured, _) => all.add_configured(configured.copied().unwrap_or_default()),
+                }
             }
         }
         let commands = table([("slots", Value::Integer(slots.into())), ("size", format!("{size} B").into())]);
@@ -348,9 +348,12 @@ impl ReplayWish<'_> {
             ("settings", Value::Table(settings)),
             ("mailbox", Value::Table(table([("commands", Value::Table(commands))]))),
         ]);
-        let streams = streams.into_iter().map(|(item, spec)| (item.to_owned(), Value::Table(stream(&spec))));
-        entry.insert("stream".into(), Value::Table(streams.collect()));
-        entry
+        let mut streams = Table::new();
+        for (item, sizes) in sizes {
+            streams.insert(item.to_owned(), Value::Table(stream(&sizes.spec(item)?)));
+        }
+        entry.insert("stream".into(), Value::Table(streams));
+        Ok(entry)
     }
 
     fn format(&self, name: Name) -> String {

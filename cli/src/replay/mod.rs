@@ -14,6 +14,7 @@ mod others;
 mod player;
 mod recorded;
 mod session;
+mod sizes;
 mod spacing;
 mod tables;
 

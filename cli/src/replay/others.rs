@@ -7,12 +7,13 @@
 
 use super::configuration::PlayedModules;
 use super::recorded::RecordedFiles;
+use super::sizes::of_records;
 use crate::record::ProgressLine;
 use crate::terminal::Failure;
 use rohrpost::output::plain::line;
 use rohrpost::schema::{DataItem, DataKind, Description, Field, Type};
-use rohrpost_config::{Installation, StreamSpec};
-use rohrpost_recording::{ChannelInfo, Reader};
+use rohrpost_config::Installation;
+use rohrpost_recording::{ChannelInfo, ReadError, Reader};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::str::FromStr;
@@ -23,11 +24,6 @@ const CONFIG: &str = "others.toml";
 const CLASS_ID_MIN: usize = 20;
 /// What a stream takes besides a message: the length of it.
 const LENGTH_BYTES_MAX: usize = 5;
-/// Memory for the records of a stream. Fewer of long ones are kept, but so many at least.
-const KEPT_BYTES: usize = 32 << 20;
-const KEEP_MIN: usize = 4;
-/// Several programs may publish on one topic, each with its own stamps.
-const LATE: std::time::Duration = std::time::Duration::from_secs(10);
 /// Names of types are as long as others like; so much of them is told.
 const TYPE_CHARS_MAX: usize = 200;
 
@@ -185,8 +181,9 @@ pub(super) fn played(
         // There are no more topics than channels of MCAP, which have numbers of this size.
         let number = description.data.len() as u16 + 1;
         description.data.push(DataItem { number, kind: DataKind::Stream, field });
-        let spec = spec(longest.get(topic.as_str()).copied().unwrap_or_default());
-        played.streams.insert(one.name(), spec);
+        let longest = longest.get(topic.as_str()).copied().unwrap_or_default();
+        // A recording has no longer messages than a stream may have.
+        played.streams.insert(one.name(), of_records((longest + LENGTH_BYTES_MAX) as u32));
         played.topics.insert(one.name());
         played.into.insert(topic.clone(), one.name());
     }
@@ -199,37 +196,23 @@ fn longest<'a>(recorded: &RecordedFiles, into: &'a [IntoStream]) -> Result<BTree
     let mut progress = ProgressLine::new();
     for info in &recorded.infos {
         let mut reader = Reader::open(&info.path)?;
-        let mut failed_at = None;
         loop {
-            let is_damaged = match reader.next() {
+            match reader.next() {
                 Ok(Some((channel, message))) => {
                     if let Some(longest) = longest.get_mut(channel.topic.as_str()) {
                         *longest = message.data.len().max(*longest);
                     }
-                    false
                 }
-                Ok(None) => break,
-                // It is told when it is to be played.
-                Err(_) => true,
-            };
+                // The disk fails, and would again. It is told when it is to be played.
+                Ok(None) | Err(ReadError::Io { .. }) => break,
+                // Reading goes on behind a damage, with the next record, or ends there.
+                Err(_) => {}
+            }
             let (read, all) = reader.progress();
             progress.tell(read, all);
-            // Behind a damage reading goes on, unless the disk fails.
-            if is_damaged && failed_at.replace(read) == Some(read) {
-                break;
-            }
         }
     }
     Ok(longest)
-}
-
-/// Sizes of a stream with messages of so many bytes.
-fn spec(longest: usize) -> StreamSpec {
-    let record = longest + LENGTH_BYTES_MAX;
-    let default = StreamSpec::default();
-    let keep = (KEPT_BYTES / record).clamp(KEEP_MIN, default.keep as usize);
-    // A recording has no longer messages than a stream may have.
-    StreamSpec { record_bytes: record as u32, keep: keep as u32, late: LATE, ..default }
 }
 
 #[cfg(test)]
@@ -296,15 +279,5 @@ mod tests {
         let runs = BTreeSet::from(["wheel-left.0".to_owned()]);
         let told = super::played(&recorded, &into, &source(&into).unwrap(), &runs).err().unwrap().to_string();
         assert!(told.contains("wheel-left.0 runs; play into a stream of another module"), "{told}");
-    }
-
-    #[test]
-    fn a_stream_has_room_for_the_longest_message_and_keeps_fewer_long_ones() {
-        for (longest, record_bytes, keep) in
-            [(0, 5, 64), (1_000, 1_005, 64), (1 << 20, (1 << 20) + 5, 31), (16 << 20, (16 << 20) + 5, 4)]
-        {
-            let spec = spec(longest);
-            assert_eq!((spec.record_bytes, spec.keep), (record_bytes, keep), "{longest}");
-        }
     }
 }

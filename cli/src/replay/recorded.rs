@@ -9,6 +9,9 @@ use rohrpost_recording::{DescribedModule, Info, info, recovered_path};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
+/// Longer than this nothing is waited for between two files of another program.
+const GAP_MAX_NS: u64 = 60_000_000_000;
+
 /// A text of the files, and the file's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct RecordedText {
@@ -157,15 +160,17 @@ fn are_others(infos: &[Info]) -> Result<bool, Failure> {
 fn in_order(infos: &[Info]) -> Result<(), Failure> {
     for (at, later) in infos.iter().enumerate() {
         let recording = later.session.get(session_key::RECORDING);
-        let is_other = later.profile != PROFILE;
+        if later.profile != PROFILE {
+            others_in_order(&infos[..at], later)?;
+            continue;
+        }
         let mut earlier = infos[..at].iter().filter(|info| info.session.get(session_key::RECORDING) == recording);
         let is_overlapped = |info: &&Info| {
             let last = info.epochs.iter().filter_map(|its| Some((its.epoch, its.last_ns?))).max();
             let first = later.epochs.iter().filter_map(|its| Some((its.epoch, its.first_ns?))).min();
-            let is_before = is_other && info.last_ns.zip(later.first_ns).is_some_and(|(last, first)| first < last);
-            info.path == later.path || is_before || last.zip(first).is_some_and(|(last, first)| first < last)
+            info.path == later.path || last.zip(first).is_some_and(|(last, first)| first < last)
         };
-        if let Some(before) = earlier.find(is_overlapped).filter(|_| is_other || recording.is_some()) {
+        if let Some(before) = earlier.find(is_overlapped).filter(|_| recording.is_some()) {
             return Err(format!(
                 "{} begins before {} ends, and files are played one after the other; name each file once, in order",
                 later.path.display(),
@@ -173,6 +178,30 @@ fn in_order(infos: &[Info]) -> Result<(), Failure> {
             )
             .into());
         }
+    }
+    Ok(())
+}
+
+/// Files of others that were split overlap a little; those of two recordings may be days apart.
+fn others_in_order(earlier: &[Info], later: &Info) -> Result<(), Failure> {
+    let is_later = |info: &&Info| info.path == later.path || info.first_ns > later.first_ns.or(info.first_ns);
+    if let Some(before) = earlier.iter().find(is_later) {
+        return Err(format!(
+            "{} begins before {}, and files are played one after the other; name each file once, in order",
+            later.path.display(),
+            before.path.display()
+        )
+        .into());
+    }
+    let end_ns = earlier.iter().filter_map(|info| info.last_ns).max();
+    let gap_ns = later.first_ns.zip(end_ns).map_or(0, |(first, end)| first.saturating_sub(end));
+    if gap_ns > GAP_MAX_NS {
+        return Err(format!(
+            "{} begins {} s after the files before it end, and the replay would wait so long; replay them one by one",
+            later.path.display(),
+            gap_ns / 1_000_000_000
+        )
+        .into());
     }
     Ok(())
 }
@@ -212,5 +241,25 @@ mod file_tests {
         }
         let torn = [first.clone(), recovered_path(&first), second.clone()];
         assert_eq!(without_torn(&torn), [&recovered_path(&first), &second]);
+    }
+
+    #[test]
+    fn files_of_others_may_overlap_and_are_not_far_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, second] = two_files(folder.path()).map(|path| info(&path).unwrap());
+        let file = |like: &Info, first_s: u64, last_s: u64| {
+            let [first_ns, last_ns] = [first_s, last_s].map(|s| Some(s * 1_000_000_000));
+            Info { profile: "ros2".into(), first_ns, last_ns, path: like.path.clone(), ..info(&like.path).unwrap() }
+        };
+        let told = |files: [Info; 2]| in_order(&files).map_err(|error| error.to_string());
+        assert_eq!(told([file(&first, 1, 10), file(&second, 9, 20)]), Ok(()));
+        assert_eq!(told([file(&first, 1, 10), file(&second, 70, 80)]), Ok(()));
+        for (files, wanted) in [
+            ([file(&second, 9, 20), file(&first, 1, 10)], "name each file once, in order"),
+            ([file(&first, 1, 10), file(&first, 1, 10)], "name each file once, in order"),
+            ([file(&first, 1, 10), file(&second, 86_410, 86_420)], "begins 86400 s after the files before it end"),
+        ] {
+            assert!(told(files).is_err_and(|told| told.contains(wanted)), "{wanted}");
+        }
     }
 }

@@ -388,5 +388,7 @@ impl Recorder {
     fn lose(&mut self, batch: &Batch) {
         self.learn_channels();
         batch.messages().for_each(|(at, _)| self.channels[at].count_lost(1));
+        // It is newer than what was written: the next recording does not begin with an older value.
+        self.newest.note(batch, &self.channels);
     }
 }

@@ -5,7 +5,9 @@ use std::error::Error;
 use std::io;
 use std::sync::Arc;
 
-/// The number of the kernel's error behind an error: of the first that has one, of itself and its sources.
+/// The number of the kernel's error behind an error: of the first that has one, of itself and its sources. If none
+/// has, a text of theirs may end as those of the kernel's errors do, `(os error 2)`: errors that others stand for
+/// (`#[error(transparent)]`) are no sources.
 ///
 /// ```
 /// use rohrpost_modules::output::errno_of;
@@ -15,18 +17,26 @@ use std::sync::Arc;
 /// assert_eq!(errno_of(&"x".parse::<u8>().unwrap_err()), None);
 /// ```
 pub fn errno_of(error: &(dyn Error + 'static)) -> Option<u16> {
-    let mut rest = Some(error);
-    while let Some(error) = rest {
-        if let Some(number) = own_number(error) {
-            return u16::try_from(number).ok();
-        }
-        // What an `io::Error` was made of is not its source: it stands for it.
-        rest = match io_error(error).and_then(io::Error::get_ref) {
-            Some(inner) => Some(inner),
-            None => error.source(),
-        };
+    let all = || std::iter::successors(Some(error), |error| behind(*error));
+    match all().find_map(own_number) {
+        Some(number) => u16::try_from(number).ok(),
+        None => all().find_map(told_number),
     }
-    None
+}
+
+fn behind<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a (dyn Error + 'static)> {
+    // What an `io::Error` was made of is not its source: it stands for it.
+    match io_error(error).and_then(io::Error::get_ref) {
+        Some(inner) => Some(inner),
+        None => error.source(),
+    }
+}
+
+/// At the end of its text.
+fn told_number(error: &(dyn Error + 'static)) -> Option<u16> {
+    let text = error.to_string();
+    let (_, number) = text.strip_suffix(')')?.rsplit_once("(os error ")?;
+    number.parse().ok()
 }
 
 fn own_number(error: &(dyn Error + 'static)) -> Option<i32> {
@@ -59,6 +69,10 @@ mod tests {
         Nothing,
         #[error("deeper")]
         Deeper(#[source] Box<Failed>),
+        #[error(transparent)]
+        Same(io::Error),
+        #[error("mailbox: {0}")]
+        Told(String),
     }
 
     #[test]
@@ -68,6 +82,10 @@ mod tests {
             (full(), Some(28)),
             (Failed::from(Errno::EACCES), Some(13)),
             (Failed::Nothing, None),
+            (Failed::Same(io::Error::from_raw_os_error(2)), Some(2)),
+            (Failed::Deeper(Box::new(Failed::Same(io::Error::from_raw_os_error(2)))), Some(2)),
+            (Failed::Told(io::Error::from_raw_os_error(12).to_string()), Some(12)),
+            (Failed::Told("(os error x)".into()), None),
             (Failed::Deeper(Box::new(Failed::Deeper(Box::new(full())))), Some(28)),
             (Failed::Full(Arc::new(io::Error::other(full()))), Some(28)),
             (Failed::Full(Arc::new(io::Error::other("words"))), None),

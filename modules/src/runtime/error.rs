@@ -4,7 +4,7 @@ use super::stream::{RecordError, StreamReadError};
 use crate::journal::RunError;
 use crate::output::errno_of;
 use rohrpost_config::{Errors, NameTextError, SettingsError};
-use rohrpost_mailbox::NodeError;
+use rohrpost_mailbox::{CreateError, NodeError};
 use std::path::PathBuf;
 
 /// Why a module did not start.
@@ -30,7 +30,7 @@ pub enum StartError {
     Node(#[from] NodeError),
     /// A mailbox, which the text names as the configuration does.
     #[error("{0}")]
-    Mailbox(String),
+    Mailbox(String, #[source] CreateError),
     /// An alias without an interface.
     #[error("`{0}` is an alias of `{1}`, but that program has no interface of class `{2}`")]
     Endpoint(String, String, String),
@@ -130,7 +130,7 @@ impl StartError {
             | Self::NoStream { .. }
             | Self::Interface { .. } => Self::CONFIGURATION,
             Self::Node(_)
-            | Self::Mailbox(_)
+            | Self::Mailbox(..)
             | Self::Stream(_)
             | Self::Exact(_)
             | Self::Orphan(_)

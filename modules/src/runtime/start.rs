@@ -139,7 +139,7 @@ impl Start {
         let receiver = |name: Name, spec: &MailboxSpec| {
             participant.clone().receiver(name, shape(spec)).map_err(|error: CreateError| {
                 let text = error.to_string().replace(&name.to_string(), &installation.classes.format(name));
-                StartError::Mailbox(text)
+                StartError::Mailbox(text, error)
             })
         };
         let settings = installation.settings_as(module)?;

@@ -59,7 +59,8 @@ impl DrawingBeside {
             return Vec::new();
         }
         let drawn = self.drawer.draw(id, &sampled.channel, stamp_ns, data).unwrap_or_default();
-        if !drawn.is_empty() {
+        // A long one of which nothing comes is not decoded again and again.
+        if !drawn.is_empty() || data.len() > TWICE_BYTES_MAX {
             sampled.period = period;
         }
         drawn

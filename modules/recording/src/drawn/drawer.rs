@@ -11,6 +11,9 @@ use rohrpost_schema::{Type, decode};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// A longer scan is none that a scanner makes, and is not drawn in part: half a million beams take it.
+const SCAN_BYTES_MAX: usize = 1 << 20;
+
 /// Draws messages of one file, one after the other.
 pub(crate) struct Drawer {
     /// By the numbers of what they are drawn of.
@@ -93,7 +96,8 @@ impl Drawer {
     ) -> Option<Vec<DrawnMessage>> {
         let source = self.sources.get_mut(&id)?;
         let bytes_max = self.bytes_max.filter(|max| data.len() > *max);
-        if bytes_max.is_some() && !source.shape.can_be_reduced() {
+        let is_too_long = source.shape == Shape::Scan && data.len() > SCAN_BYTES_MAX;
+        if bytes_max.is_some() && (is_too_long || !source.shape.can_be_reduced()) {
             return Some(Vec::new());
         }
         let origin = Origin {

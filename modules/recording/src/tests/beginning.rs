@@ -11,7 +11,7 @@ use std::time::Duration;
 
 const SECOND_NS: u64 = 1_000_000_000;
 /// What is true now, but for the arrival: topic, stamp, epoch, sequence.
-type Kept = (String, u64, u64, u32);
+pub(super) type Kept = (String, u64, u64, u32);
 
 /// A line of output, as far as this crate looks at it.
 fn line() -> Type {
@@ -109,7 +109,7 @@ fn numbers(files: &[PathBuf]) -> Vec<u32> {
 }
 
 /// What a file repeats, with its log time and bytes; and the first message behind that.
-fn beginning(path: &Path) -> (Vec<(Kept, u64, Vec<u8>)>, u64) {
+pub(super) fn beginning(path: &Path) -> (Vec<(Kept, u64, Vec<u8>)>, u64) {
     let mut reader = Reader::open(path).unwrap();
     let mut repeated = Vec::new();
     while let Some((channel, message)) = reader.next().unwrap() {
