@@ -34,7 +34,7 @@ pub(super) fn read(file: &Path, modules: &[String], folder: &Path) -> Result<Vec
     loop {
         match reader.next() {
             Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
-                take(&mut runs, folder, &channel.name, message.data)?;
+                take(&mut runs, folder, &channel, message.data)?;
             }
             Ok(Some(_)) => {}
             Ok(None) => break,
@@ -67,7 +67,7 @@ pub(super) fn of_files(files: &[&Path], modules: &[String], folder: &Path) -> Re
         loop {
             match reader.next() {
                 Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
-                    take(&mut runs, folder, &channel.name, message.data)?;
+                    take(&mut runs, folder, &channel, message.data)?;
                 }
                 Ok(Some(_)) => {}
                 // Behind a damage a piece is missing.
@@ -86,11 +86,14 @@ fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {
     is_journal && (modules.is_empty() || modules.contains(&channel.name))
 }
 
-fn take(runs: &mut Vec<RecordedRun>, folder: &Path, module: &str, value: &[u8]) -> Result<(), Failure> {
+fn take(runs: &mut Vec<RecordedRun>, folder: &Path, channel: &RecordedChannel, value: &[u8]) -> Result<(), Failure> {
+    let (module, is_repeated) = (channel.name.as_str(), channel.is_repeated());
     let Some(Piece { incarnation, offset, bytes }) = Piece::read(value) else { return Ok(()) };
     let is_it = |run: &RecordedRun| (run.module.as_str(), run.incarnation) == (module, incarnation);
-    // After the node's memory was made anew, incarnations are counted from the beginning.
-    let known = runs.iter().rposition(is_it).filter(|at| offset > 0 || runs[*at].len == 0);
+    // After the node's memory was made anew, incarnations are counted from the beginning: then a run begins that has
+    // the incarnation of another one. What a file repeats of the one before it begins none.
+    let goes_on = |run: &RecordedRun| offset > 0 || is_repeated || (run.len == 0 && run.begins_late.is_none());
+    let known = runs.iter().rposition(is_it).filter(|at| goes_on(&runs[*at]));
     let at = known.unwrap_or_else(|| {
         let begins_late = (offset > 0).then(|| {
             format!(
@@ -158,6 +161,38 @@ mod tests {
         record
     }
 
+    fn channel(module: &str, is_repeated: bool) -> RecordedChannel {
+        let texts = is_repeated.then(|| ("repeated".to_owned(), String::new()));
+        RecordedChannel {
+            topic: format!("{module}/{JOURNAL_NAME}"),
+            name: module.to_owned(),
+            item: JOURNAL_NAME.to_owned(),
+            ty: None,
+            message_encoding: String::new(),
+            schema_encoding: String::new(),
+            texts: texts.into_iter().collect(),
+        }
+    }
+
+    #[test]
+    fn a_run_begins_at_nothing_unless_the_file_repeats_it() {
+        let (mut runs, folder) = (Vec::new(), tempfile::tempdir().unwrap());
+        for (is_repeated, offset, bytes) in [
+            (false, 7, &b"late"[..]),
+            (false, 0, b"a"),
+            (true, 0, b"a"),
+            (false, 1, b"b"),
+            (true, 1, b"b"),
+            (false, 2, b"c"),
+            (false, 0, b"x"),
+        ] {
+            take(&mut runs, folder.path(), &channel("pilot.0", is_repeated), &record(5, offset, bytes)).unwrap();
+        }
+        assert!(runs[0].begins_late.is_some());
+        let journals = runs[1..].iter().map(|run| std::fs::read_to_string(&run.journal).unwrap());
+        assert_eq!(journals.collect::<Vec<_>>(), ["abc", "x"]);
+    }
+
     #[test]
     fn pieces_are_put_together_until_one_is_missing() {
         let (mut runs, folder) = (Vec::new(), tempfile::tempdir().unwrap());
@@ -173,9 +208,9 @@ mod tests {
             ("pilot.0", 7, 0, b"new"),
             ("pilot.0", 7, 3, b"er"),
         ] {
-            take(&mut runs, folder.path(), module, &record(incarnation, offset, bytes)).unwrap();
+            take(&mut runs, folder.path(), &channel(module, false), &record(incarnation, offset, bytes)).unwrap();
         }
-        take(&mut runs, folder.path(), "pilot.0", b"no piece").unwrap();
+        take(&mut runs, folder.path(), &channel("pilot.0", false), b"no piece").unwrap();
         let told: Vec<(&str, Option<String>, bool, bool)> = runs
             .iter()
             .map(|run| {
