@@ -68,10 +68,14 @@ impl Module for Wheels {
         loop {
             match context.take_in_to(&mut room, |room| self.port.read(room)) {
                 Ok(count) => {
+                    assert!(room[count..].iter().all(|byte| *byte == 0));
                     assert_eq!(context.give_out(&room[..count], |bytes| self.null.write(bytes))?, count);
                     READ.fetch_add(count as u64, Ordering::Relaxed);
                 }
-                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    assert_eq!(room, [0; 16]);
+                    return Ok(());
+                }
                 Err(error) => return Err(error.into()),
             }
         }

@@ -103,3 +103,12 @@ fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, 
         ReplayVerdict::Differs(_) | ReplayVerdict::Refused(_) => complain(text),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    /// Records that a journal may name are those that a recording takes.
+    #[test]
+    fn what_a_journal_names_is_recorded() {
+        assert_eq!(rohrpost_config::RECORDED_BYTES_MAX, rohrpost_recording::format::MESSAGE_BYTES_MAX);
+    }
+}

@@ -39,7 +39,7 @@ impl ExactPrograms {
             write_map(directory.path())?;
             exact.folder = Some(directory.path().display().to_string());
         }
-        let mut command = match self.command(&exact) {
+        let mut command = match self.command(run, &exact) {
             Ok(command) => command,
             Err(why) => return Ok(ReplayReport::refused(why)),
         };
@@ -55,8 +55,8 @@ impl ExactPrograms {
         Ok(report.unwrap_or_else(|| ReplayReport::refused(format!("its program ended ({status}) and told no result"))))
     }
 
-    fn command(&self, exact: &ExactRun) -> Result<Command, String> {
-        let (installation, name) = exact.installation().map_err(|error| error.to_string())?;
+    fn command(&self, run: &RecordedRun, exact: &ExactRun) -> Result<Command, String> {
+        let (installation, name) = run.installation(exact)?;
         let own = std::env::current_exe().map_err(|error| error.to_string())?;
         let module = installation.module(name).ok_or("the configuration does not have the module")?;
         let command = match (&self.program, &module.program) {

@@ -24,7 +24,7 @@ use crate::exact::{self, ExactArguments, JournalAnswers};
 use crate::launch::end;
 use crate::record::PartArguments;
 use crate::speech::Speech;
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, complain, say};
 use configuration::{NODE, PlayedModules, ReplayDrawing, ReplayWish, saved_of};
 use others::IntoStream;
 pub(crate) use player::run as play;
@@ -218,7 +218,15 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         let runs = |name: &str| arguments.run.iter().any(|run| run == name);
         std::fs::write(&saved, saved_of(&text, runs)?)?;
     }
-    let settings = settings(arguments, recorded, &played, folder)?;
+    let mut settings = settings(arguments, recorded, &played, folder)?;
+    match noted_answers(recorded, &source, &played, folder) {
+        Ok(None) => {}
+        Ok(Some(answers)) => {
+            std::fs::write(folder.join(ANSWERS), answers)?;
+            settings.insert("answers".into(), ANSWERS.into());
+        }
+        Err(error) => complain(format_args!("commands are not answered, as the journals cannot be read: {error}")),
+    }
     let (text, player) = wish.text(&played, settings)?;
     let path = folder.join(CONFIG);
     std::fs::write(&path, text)?;
@@ -269,19 +277,30 @@ fn told(errors: &rohrpost_config::Errors) -> String {
     errors.problems().iter().map(problem).collect::<Vec<_>>().join("\n")
 }
 
-/// What modules have answered to commands, as bytes; none if the files have no journal.
-fn noted_answers(recorded: &RecordedFiles) -> Result<Option<Vec<u8>>, Failure> {
-    let modules = recorded.with_journal();
+/// What modules that are played have answered to commands, as bytes; none if the files have no journal of them.
+fn noted_answers(
+    recorded: &RecordedFiles,
+    source: &Installation,
+    played: &PlayedModules,
+    folder: &Path,
+) -> Result<Option<Vec<u8>>, Failure> {
+    let is_played = |host: &String| {
+        let module = source.classes.parse_module(host).ok().and_then(|name| source.module(name));
+        let mut names = module.into_iter().flat_map(|module| module.names());
+        played.described.contains_key(host)
+            || names.any(|name| played.described.contains_key(&source.classes.format(name)))
+    };
+    let modules: Vec<String> = recorded.with_journal().into_iter().filter(is_played).collect();
     if modules.is_empty() {
         return Ok(None);
     }
     let files: Vec<&Path> = recorded.infos.iter().map(|info| info.path.as_path()).collect();
     let mut bytes = Vec::new();
-    append(&mut bytes, &JournalAnswers::read(&files, &modules)?)?;
+    append(&mut bytes, &JournalAnswers::read(&files, &modules, folder)?)?;
     Ok(Some(bytes))
 }
 
-/// The player's settings, files with the descriptions, and one with answers.
+/// The player's settings, and files with the descriptions.
 fn settings(
     arguments: &Arguments,
     recorded: &RecordedFiles,
@@ -326,10 +345,6 @@ fn settings(
         ("repeats", arguments.repeats.into()),
     ] {
         settings.insert(key.into(), value);
-    }
-    if let Some(answers) = noted_answers(recorded)? {
-        std::fs::write(folder.join(ANSWERS), answers)?;
-        settings.insert("answers".into(), ANSWERS.into());
     }
     for (key, time) in [("from-ns", part.from_ns), ("until-ns", part.until_ns)] {
         if let Some(time) = time {

@@ -36,26 +36,44 @@ pub enum NotedOutcome {
 }
 
 impl ExactRun {
-    /// The commands that the module has answered, as far as the journal can be read, in their order.
+    /// Gives the commands that the module has answered, as far as the journal can be read, in their order, and until
+    /// `take` says false.
     ///
     /// # Errors
     /// The journal's file cannot be opened.
-    pub fn answers(&self) -> Result<Vec<NotedAnswer>, RunError> {
-        Ok(read(Entries::new(self.open()?)))
+    pub fn each_answer(&self, take: impl FnMut(NotedAnswer) -> bool) -> Result<(), RunError> {
+        each(Entries::new(self.open()?), take);
+        Ok(())
     }
 }
 
-fn read<R: Read>(mut entries: Entries<R>) -> Vec<NotedAnswer> {
-    let (mut command, mut answers) = (None, Vec::new());
+impl NotedAnswer {
+    /// Bytes that it takes, about.
+    pub fn bytes(&self) -> usize {
+        let outcome = match &self.outcome {
+            NotedOutcome::Result(bytes) => bytes.0.len(),
+            NotedOutcome::Fault(text) => text.len(),
+            NotedOutcome::Long(_) => 0,
+        };
+        size_of::<Self>() + self.arguments.0.len() + outcome
+    }
+}
+
+fn each<R: Read>(mut entries: Entries<R>, mut take: impl FnMut(NotedAnswer) -> bool) {
+    let mut command = None;
     while let Ok(tag) = entries.look() {
         match tag {
             Tag::Event => command = command_of(entries.content()),
-            Tag::Replied => answers.extend(command.take().and_then(|command| answered(command, entries.content()))),
+            Tag::Replied => {
+                let answer = command.take().and_then(|command| answered(command, entries.content()));
+                if answer.is_some_and(|answer| !take(answer)) {
+                    return;
+                }
+            }
             _ => {}
         }
         entries.pass();
     }
-    answers
 }
 
 /// A command without its answer, if the event is one.
@@ -115,7 +133,14 @@ mod tests {
         journal.add(Tag::Event, &EventAt { at_ns: 8, event: JournalEvent::Tick });
         journal.reply(false, b"no command");
         journal.call(9, b"d");
-        let run = |journal: &[u8]| read(Entries::new(journal));
+        let run = |journal: &[u8]| {
+            let mut answers = Vec::new();
+            each(Entries::new(journal), |answer| {
+                answers.push(answer);
+                true
+            });
+            answers
+        };
         let answer = |at_ns, arguments: &[u8], outcome| NotedAnswer {
             endpoint: 1,
             function: 16,

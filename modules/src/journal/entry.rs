@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::io::{self, Read};
 
 /// Version of all that is in a journal. Others are not read.
-pub(super) const VERSION: u32 = 2;
+pub(super) const VERSION: u32 = 3;
 /// Bytes before the tag.
 const HEAD_BYTES: usize = 12;
 
@@ -67,8 +67,12 @@ pub(crate) enum Tag {
     Sought,
     /// to tick,
     Ticking,
-    /// for data.
+    /// for data,
     Subscribed,
+    /// for older records of a followed stream,
+    Rewound,
+    /// for a mailbox.
+    MadeMailbox,
     /// A file that it was given.
     File,
     /// Outputs: data,
@@ -91,7 +95,7 @@ pub(crate) enum Tag {
     End,
 }
 
-const ALL: [Tag; 34] = [
+const ALL: [Tag; 36] = [
     Tag::Begin,
     Tag::Event,
     Tag::Time,
@@ -116,6 +120,8 @@ const ALL: [Tag; 34] = [
     Tag::Sought,
     Tag::Ticking,
     Tag::Subscribed,
+    Tag::Rewound,
+    Tag::MadeMailbox,
     Tag::File,
     Tag::Published,
     Tag::Written,
@@ -160,6 +166,8 @@ impl Tag {
             Self::Sought => "goes on elsewhere in a stream",
             Self::Ticking => "wants to tick",
             Self::Subscribed => "subscribes",
+            Self::Rewound => "goes back in a followed stream",
+            Self::MadeMailbox => "makes a mailbox",
             Self::File => "asks for a file",
             Self::Published => "publishes data",
             Self::Written => "writes a record",
@@ -355,7 +363,7 @@ mod tests {
         for (code, tag) in (1..).zip(ALL) {
             assert_eq!((tag as u8, Tag::from_code(code)), (code, Some(tag)));
         }
-        assert_eq!((Tag::from_code(0), Tag::from_code(35)), (None, None));
+        assert_eq!((Tag::from_code(0), Tag::from_code(37)), (None, None));
     }
 
     #[test]

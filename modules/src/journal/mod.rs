@@ -36,7 +36,7 @@ pub(crate) use entry::Tag;
 use event::EventAt;
 pub(crate) use event::{JournalEvent, NotedOrigin};
 pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply};
-pub(crate) use question::{AskedInterest, Question, nanoseconds};
+pub(crate) use question::{AskedInterest, AskedStream, Question, nanoseconds};
 use records::NamedRecord;
 pub use records::{RecordSum, RecordWriter};
 pub(crate) use replay::{Given, JournalReplay};
@@ -46,6 +46,7 @@ pub use value::WHOLE_BYTES_MAX;
 pub use verdict::{Difference, ReplayReport, ReplayVerdict};
 pub(crate) use write::JournalWriter;
 
+use rohrpost_config::RECORDED_BYTES_MAX;
 use rohrpost_mailbox::{StreamId, monotonic_ns};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -214,7 +215,9 @@ impl ModuleJournal {
             return NotedValue::Whole(Blob(bytes));
         }
         let value = NotedValue::of(bytes);
-        if let NotedValue::Sum(sum) = value {
+        if bytes.len() > RECORDED_BYTES_MAX {
+            self.hole(&format!("it is given a record of {} bytes, which is more than a recording takes", bytes.len()));
+        } else if let NotedValue::Sum(sum) = value {
             self.put(Tag::Named, &NamedRecord { stream: id.into(), sequence, sum });
         }
         value

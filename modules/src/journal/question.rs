@@ -35,6 +35,12 @@ pub(crate) enum Question<'a> {
     Watch(AskedInterest),
     /// A watched descriptor.
     Watched(u32),
+    /// Each record of a stream of the interface with this hash.
+    Followed(AskedStream, u32),
+    /// The followed stream with this number.
+    Rewound(u16),
+    /// A mailbox of its own: slots, bytes of the largest body, and whether it takes data from all.
+    Mailbox { local: u8, slots: u16, bytes: u16, is_to_all: bool },
 }
 
 /// What a descriptor is watched for.
@@ -95,6 +101,12 @@ impl Question<'_> {
             Self::Watch(AskedInterest::Write) => "to write".into(),
             Self::Watch(AskedInterest::Both) => "to read or write".into(),
             Self::Watched(number) => format!("descriptor {number}"),
+            Self::Followed(stream, hash) => format!("each record of {stream}, interface {hash:08x}"),
+            Self::Rewound(number) => format!("followed stream {number}"),
+            Self::Mailbox { local, slots, bytes, is_to_all } => {
+                let of = if is_to_all { " of all" } else { "" };
+                format!("mailbox {local}, {slots} slots of {bytes} bytes, for data{of}")
+            }
         })
     }
 }

@@ -24,10 +24,10 @@ use crate::journal::{ModuleJournal, Question, Tag, nanoseconds};
 use crate::publish::Subscriptions;
 use rohrpost_config::{Installation, Principal, TimeSource};
 use rohrpost_mailbox::{Name, OverflowPolicy, Publications, Receiver, Shape, SystemTime, Watches, local};
-use std::os::fd::RawFd;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
+use watching::OpenedFile;
 
 /// A module's connection to its node: proxies, subscriptions, publishing, time, settings.
 ///
@@ -74,7 +74,7 @@ pub struct Context {
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
     /// Descriptors of `open_outside`, if there is a journal.
-    outside: Vec<RawFd>,
+    outside: Vec<OpenedFile>,
     /// When ticks and periods are due.
     pub(crate) schedule: Schedule,
     scratch: Vec<u8>,

@@ -202,7 +202,7 @@ impl<M: Module> Running<M> {
         let mut followed = std::mem::take(&mut self.context.followed_streams.list);
         for stream in followed.iter_mut().filter(|stream| of(stream)) {
             any |= burst(|| {
-                if self.life.state != ModuleState::On {
+                if self.life.state != ModuleState::On || self.context.followed_streams.is_rewound() {
                     return false;
                 }
                 match stream.step() {
@@ -219,8 +219,7 @@ impl<M: Module> Running<M> {
                 }
             });
         }
-        followed.append(&mut self.context.followed_streams.list);
-        self.context.followed_streams.list = followed;
+        self.context.followed_streams.put_back(followed);
         any
     }
 

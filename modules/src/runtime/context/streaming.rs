@@ -2,13 +2,16 @@
 
 use super::Context;
 use crate::interface::StreamPort;
-use crate::journal::{Question, Tag};
+use crate::journal::{AskedStream, Question, Tag};
 use crate::runtime::error::ContextError;
 use crate::runtime::stream::{
     CheckedReader, KnownStream, OpenValue, OwnStream, RecordError, Stream, StreamSubscription, note, opened,
 };
 use rohrpost_mailbox::{Name, Stamp, StreamId};
 use rohrpost_schema::{Data, DataItem};
+
+/// How it is asked for a stream of an interface.
+type OpenQuestion = fn(AskedStream, u32) -> Question<'static>;
 
 impl Context {
     /// Writes a value that was true at `stamp_ns` (system time) into the module's stream: straight into shared memory,
@@ -125,7 +128,7 @@ impl Context {
     /// When the text names no module, one of another class, or one of another node ([`ContextError::FarStream`]), and
     /// [`ContextError::Read`] when all seats of the stream are taken.
     pub fn stream<T: Data>(&mut self, port: StreamPort<T>, module: &str) -> Result<Stream<T>, ContextError> {
-        Ok(Stream::new(self.open_stream(&port, module)?, self.clock.clone()))
+        Ok(Stream::new(self.open_stream(&port, module, Question::Interface)?, self.clock.clone()))
     }
 
     /// Opens a stream of which the type is known by its description alone, such as one that a view draws. Each record's
@@ -160,7 +163,7 @@ impl Context {
     /// [`ContextError::FarStream`] for a module of another node, and [`ContextError::Read`] when all seats of the
     /// stream are taken.
     pub fn stream_untyped(&mut self, from: Name, item: &DataItem, interface: u32) -> Result<Stream<()>, ContextError> {
-        Ok(Stream::new(self.open_untyped(from, item, interface)?, self.clock.clone()))
+        Ok(Stream::new(self.open_untyped(from, item, interface, Question::Interface)?, self.clock.clone()))
     }
 
     /// Follows a stream of another module of this node: each record comes to [`crate::Module::received`], while this
@@ -189,7 +192,7 @@ impl Context {
         port: StreamPort<T>,
         module: &str,
     ) -> Result<StreamSubscription<T>, ContextError> {
-        let reader = self.open_stream(&port, module)?;
+        let reader = self.open_stream(&port, module, Question::Followed)?;
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
     }
 
@@ -218,7 +221,7 @@ impl Context {
         item: &DataItem,
         interface: u32,
     ) -> Result<StreamSubscription<()>, ContextError> {
-        let reader = self.open_untyped(from, item, interface)?;
+        let reader = self.open_untyped(from, item, interface, Question::Followed)?;
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
     }
 
@@ -235,26 +238,38 @@ impl Context {
     /// }
     /// ```
     pub fn rewind<T>(&mut self, subscription: &StreamSubscription<T>) {
+        self.journal.asked(Tag::Rewound, Question::Rewound(subscription.id()));
         self.followed_streams.rewind(subscription);
     }
 
-    fn open_untyped(&self, from: Name, item: &DataItem, interface: u32) -> Result<CheckedReader, ContextError> {
+    fn open_untyped(
+        &self,
+        from: Name,
+        item: &DataItem,
+        interface: u32,
+        question: OpenQuestion,
+    ) -> Result<CheckedReader, ContextError> {
         let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
         let beyond = (from.system() != self.me.system()).then_some("?");
-        self.open_known(known, from, beyond, || self.installation.classes.format(from))
+        self.open_known(known, (from, beyond), question, || self.installation.classes.format(from))
     }
 
-    fn open_stream<T>(&self, port: &StreamPort<T>, module: &str) -> Result<CheckedReader, ContextError> {
+    fn open_stream<T>(
+        &self,
+        port: &StreamPort<T>,
+        module: &str,
+        question: OpenQuestion,
+    ) -> Result<CheckedReader, ContextError> {
         let (from, is_beyond) = self.of_class(module, port.class)?;
-        self.open_known((*port).into(), from, is_beyond.then_some("?"), || module.into())
+        self.open_known((*port).into(), (from, is_beyond.then_some("?")), question, || module.into())
     }
 
     /// Opens a stream, which is `beyond` if the node is not of this configuration.
     fn open_known(
         &self,
         known: KnownStream,
-        from: Name,
-        beyond: Option<&str>,
+        (from, beyond): (Name, Option<&str>),
+        question: OpenQuestion,
         module: impl FnOnce() -> String,
     ) -> Result<CheckedReader, ContextError> {
         let node = beyond.or_else(|| self.installation.node_of(from));
@@ -265,7 +280,7 @@ impl Context {
         }
         let participant = self.link.unseen().borrow().participant().clone();
         let id = StreamId { name: from.module(), number: known.number };
-        let question = Question::Interface(id.into(), known.interface);
+        let question = question(id.into(), known.interface);
         let then = opened(&self.journal, question).transpose()?;
         let reader = CheckedReader::open(&participant, &self.installation, known, from);
         if then.is_none() {

@@ -124,7 +124,7 @@ impl Context {
     /// # Errors
     /// When it cannot be made.
     pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
-        self.make_mailbox(local, shape)?;
+        self.make_mailbox(local, shape, false)?;
         self.taking.push((local, shape.full == OverflowPolicy::Latest));
         Ok(())
     }
@@ -150,12 +150,14 @@ impl Context {
     /// # Errors
     /// When it cannot be made.
     pub fn open_mailbox_to_all(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
-        self.make_mailbox(local, shape)?;
+        self.make_mailbox(local, shape, true)?;
         self.open.push(local);
         Ok(())
     }
 
-    fn make_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
+    fn make_mailbox(&mut self, local: u8, shape: Shape, is_to_all: bool) -> Result<(), CreateError> {
+        let Shape { slots, body_bytes_max: bytes, .. } = shape;
+        self.journal.asked(Tag::MadeMailbox, Question::Mailbox { local, slots, bytes, is_to_all });
         let participant = self.link.unseen().borrow().participant().clone();
         let made = participant.receiver(self.me.with_local(local), shape);
         if made.is_err() {

@@ -62,7 +62,8 @@ impl Context {
     }
 
     /// The same into memory that the module has, as `read` of a descriptor has it: how many bytes came. Takes nothing
-    /// from the heap.
+    /// from the heap. With a journal, the room behind these bytes is zeroed, now and in the replay; all of it when it
+    /// fails.
     ///
     /// ```
     /// # use rohrpost_modules::runtime::Context;
@@ -81,14 +82,16 @@ impl Context {
         let question = Question::Room(room.len() as u64);
         if let Some(given) = self.journal.given(Tag::TakenIn, question) {
             let taken: Result<Blob<'_>, NotedError> = given.read();
-            let bytes = taken?.0;
+            let bytes = taken.as_ref().map_or(&[][..], |blob| blob.0);
             let count = bytes.len().min(room.len());
             room[..count].copy_from_slice(&bytes[..count]);
-            return Ok(count);
+            room[count..].fill(0);
+            return Ok(taken.map(|_| count)?);
         }
         let taken = self.journal.apart(|| read(&mut *room)).map_err(|error| NotedError::of(&error));
         // More than there is room for has come into no memory of the module.
         let taken = taken.map(|count| count.min(room.len()));
+        room[*taken.as_ref().unwrap_or(&0)..].fill(0);
         self.journal.note(Tag::TakenIn, question, &taken.as_ref().map(|count| Blob(&room[..*count])));
         Ok(taken?)
     }

@@ -3,7 +3,7 @@
 use super::error::{StreamReadError, in_words};
 use crate::interface::StreamPort;
 use crate::journal::JOURNAL_NUMBER;
-use rohrpost_config::{Installation, Sampling};
+use rohrpost_config::Installation;
 use rohrpost_mailbox::{
     HeldRecord, Name, Next, Participant, RecordInfo, StreamError, StreamId, StreamInfo, StreamReader,
 };
@@ -58,10 +58,9 @@ impl CheckedReader {
         from: Name,
     ) -> Result<Self, StreamReadError> {
         let KnownStream { number, name, interface } = known;
-        let in_place = installation.record.as_ref().and_then(|record| record.in_place(from.module(), &name));
         let source = Source {
             id: StreamId { name: from.module(), number },
-            is_recorded: in_place.is_some_and(|entry| entry.sampling == Sampling::Each),
+            is_recorded: installation.records_each(from.module(), &name),
             name,
             interface,
             installation: installation.clone(),

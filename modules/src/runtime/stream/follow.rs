@@ -32,6 +32,13 @@ pub struct StreamSubscription<T> {
     data: PhantomData<fn() -> T>,
 }
 
+impl<T> StreamSubscription<T> {
+    /// Tells it from others of the module.
+    pub(in crate::runtime) fn id(&self) -> u16 {
+        self.id
+    }
+}
+
 impl<T> Clone for StreamSubscription<T> {
     fn clone(&self) -> Self {
         *self
@@ -78,6 +85,8 @@ struct Notices {
 pub(crate) struct FollowedStreams {
     /// Those that are not being worked off.
     pub(in crate::runtime) list: Vec<FollowedStream>,
+    /// To be rewound once they are not being worked off.
+    rewound: Vec<u16>,
     /// Ever made.
     made: u16,
 }
@@ -135,15 +144,29 @@ impl FollowedStreams {
 
     /// Goes back to the oldest record that a stream keeps of its present writer.
     pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>) {
-        for stream in self.list.iter_mut().filter(|stream| stream.id == of.id) {
-            stream.is_whole = true;
-            stream.reader.rewind();
+        match self.list.iter_mut().find(|stream| stream.id == of.id) {
+            Some(stream) => stream.rewind(),
+            None => self.rewound.push(of.id),
         }
     }
 
-    /// Passes over what was written until now; of a journal nothing is to be missing.
+    /// Whether one that is being worked off is to be rewound first.
+    pub(in crate::runtime) fn is_rewound(&self) -> bool {
+        !self.rewound.is_empty()
+    }
+
+    /// Those that were worked off come back.
+    pub(in crate::runtime) fn put_back(&mut self, mut worked: Vec<FollowedStream>) {
+        worked.append(&mut self.list);
+        self.list = worked;
+        for id in std::mem::take(&mut self.rewound) {
+            self.list.iter_mut().filter(|stream| stream.id == id).for_each(FollowedStream::rewind);
+        }
+    }
+
+    /// Passes over what was written until now, but of those of which nothing is to be missing.
     pub(in crate::runtime) fn pass_over(&mut self) {
-        for stream in self.list.iter_mut().filter(|stream| !stream.is_journal()) {
+        for stream in self.list.iter_mut().filter(|stream| !stream.is_whole) {
             if let Err(error) = stream.reader.reader.pass_over() {
                 stream.notices.refused(&stream.reader.source.explain(&error));
             }
@@ -185,6 +208,11 @@ impl FollowedStream {
     /// Whether what is there at the module's end is read before.
     pub(in crate::runtime) fn is_whole(&self) -> bool {
         self.is_whole
+    }
+
+    fn rewind(&mut self) {
+        self.is_whole = true;
+        self.reader.rewind();
     }
 
     /// The next record, or what there is instead.
