@@ -209,6 +209,7 @@ mod tests {
             message_encoding: String::new(),
             schema_encoding: String::new(),
             texts: texts.into_iter().collect(),
+            is_ours: true,
         }
     }
 
