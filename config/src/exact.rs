@@ -2,10 +2,8 @@
 
 use crate::classes::{ClassTable, ROUTER};
 use crate::directory::Directory;
-use crate::installation::Installation;
 use crate::module::{Module, Program, RECORDER, REPLAY, TCP_CLIENT, TCP_ROUTER};
 use crate::reader::Section;
-use crate::record::Sampling;
 use crate::stream::StreamSpec;
 use rohrpost_mailbox::Name;
 use std::time::Duration;
@@ -32,17 +30,6 @@ pub struct ExactModule {
 /// Whether the journal of a module with this program would say all that it takes in. Own programs are believed.
 pub fn may_have_journal(program: &Program) -> bool {
     !matches!(program, Program::Builtin(builtin) if WITHOUT.contains(&builtin.as_str()))
-}
-
-impl Installation {
-    /// Whether each record of a stream is recorded out of shared memory, so that a journal may name it. The recorder
-    /// takes those of modules on its node but its own; `*` are those of the file.
-    pub fn records_each(&self, from: Name, stream: &str) -> bool {
-        let (Some(record), Some(module)) = (&self.record, self.module(from)) else { return false };
-        let has_recorder = |own: &Module| own.is_recorder() && own.node == module.node && own.name != module.name;
-        let entry = record.in_place(from, stream).filter(|entry| entry.sampling == Sampling::Each);
-        entry.is_some_and(|entry| entry.from.is_some() || module.is_in_file()) && self.modules.iter().any(has_recorder)
-    }
 }
 
 pub(crate) fn read(section: &Section<'_>, directory: &Directory<'_>) -> Vec<ExactModule> {

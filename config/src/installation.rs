@@ -8,7 +8,7 @@ use crate::gui::Gui;
 use crate::module::Module;
 use crate::node::{self, Node, System};
 use crate::output::{Level, Output};
-use crate::record::Recording;
+use crate::record::{Recording, Sampling};
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
 use crate::tcp::Tcp;
@@ -67,6 +67,15 @@ pub struct Installation {
 }
 
 impl Installation {
+    /// Whether each record of a stream is recorded out of shared memory, so that a journal may name it. The recorder
+    /// takes those of modules on its node but its own; `*` are those of the file.
+    pub fn records_each(&self, from: Name, stream: &str) -> bool {
+        let (Some(record), Some(module)) = (&self.record, self.module(from)) else { return false };
+        let has_recorder = |own: &Module| own.is_recorder() && own.node == module.node && own.name != module.name;
+        let entry = record.in_place(from, stream).filter(|entry| entry.sampling == Sampling::Each);
+        entry.is_some_and(|entry| entry.from.is_some() || module.is_in_file()) && self.modules.iter().any(has_recorder)
+    }
+
     /// The module with a name, as its own or as an alias. The name may be that of any of the module's mailboxes.
     pub fn module(&self, name: Name) -> Option<&Module> {
         self.modules.iter().find(|module| module.names().any(|own| own == name.module()))

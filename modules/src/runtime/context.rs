@@ -1,5 +1,6 @@
 //! What a module can ask of its runtime.
 
+mod opened;
 mod publishing;
 mod standing_in;
 mod streaming;
@@ -22,12 +23,12 @@ use crate::call::{Caller, Link};
 use crate::interface::Proxy;
 use crate::journal::{ModuleJournal, Question, Tag, nanoseconds};
 use crate::publish::Subscriptions;
+use opened::OpenedFile;
 use rohrpost_config::{Installation, Principal, TimeSource};
 use rohrpost_mailbox::{Name, OverflowPolicy, Publications, Receiver, Shape, SystemTime, Watches, local};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
-use watching::OpenedFile;
 
 /// A module's connection to its node: proxies, subscriptions, publishing, time, settings.
 ///

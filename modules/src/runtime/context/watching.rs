@@ -1,44 +1,18 @@
 //! Descriptors that a module waits for, and how it opens them so that an exact replay needs none.
 
 use super::Context;
+use super::opened::OpenedFile;
 use super::taking_in::NotedError;
 use crate::journal::{AskedInterest, Question, Tag};
 use nix::libc;
-use nix::sys::stat::{FileStat, fstat, stat};
 use rohrpost_mailbox::{Interest, Watch, Watches};
 use std::fs::OpenOptions;
 use std::io;
-use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::fs::OpenOptionsExt;
 
 /// Exists everywhere.
 const STAND_IN: &str = "/";
-/// What is open.
-const OPEN: &str = "/proc/self/fd";
-
-/// A descriptor, and which file it is of.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct OpenedFile {
-    number: RawFd,
-    device: libc::dev_t,
-    inode: libc::ino_t,
-}
-
-impl OpenedFile {
-    fn of(descriptor: &impl AsFd) -> Option<Self> {
-        let descriptor = descriptor.as_fd();
-        let FileStat { st_dev: device, st_ino: inode, .. } = fstat(descriptor).ok()?;
-        Some(Self { number: descriptor.as_raw_fd(), device, inode })
-    }
-
-    /// Whether the number is still that of the same file, as far as it can be told.
-    fn may_be_open(&self) -> bool {
-        match stat(format!("{OPEN}/{}", self.number).as_str()) {
-            Ok(found) => (found.st_dev, found.st_ino) == (self.device, self.inode),
-            Err(_) => stat(OPEN).is_err(),
-        }
-    }
-}
 
 impl Context {
     /// Waits for a file descriptor too: a serial port, a socket, a pipe, anything that `poll` knows. When there is
@@ -112,7 +86,8 @@ impl Context {
 
     /// Opens what the module reads or writes past its interfaces: a serial port, a socket, the next connection of one.
     /// In an exact replay `open` is not called, and the descriptor that comes is of nothing: to read, to write
-    /// and calls of sockets fail with `EBADF` or the like; `fstat` and `fcntl` work, and tell of a folder. So set it up in `open`; read and write by [`Context::take_in_to`] and [`Context::give_out`].
+    /// and calls of sockets fail with `EBADF` or the like; `fstat` and `fcntl` work, and tell of a folder. So set it
+    /// up in `open`; read and write by [`Context::take_in_to`] and [`Context::give_out`].
     ///
     /// ```
     /// # use rohrpost_mailbox::Interest;
@@ -150,21 +125,5 @@ impl Context {
             self.outside.push(opened);
         }
         Ok(descriptor)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs::File;
-
-    #[test]
-    fn a_number_that_is_given_anew_is_of_another_file() {
-        let first = File::open("/dev/null").unwrap();
-        let opened = OpenedFile::of(&first).unwrap();
-        assert!(opened.may_be_open() && OpenedFile::of(&first.try_clone().unwrap()) != Some(opened));
-        let file = tempfile::tempfile().unwrap();
-        let reused = OpenedFile { number: opened.number, ..OpenedFile::of(&file).unwrap() };
-        assert!(reused != opened && !reused.may_be_open());
     }
 }
