@@ -79,3 +79,6 @@ pub mod tracing {
 #[cfg(doctest)]
 #[doc = include_str!("../docs/src/guide.md")]
 mod guide {}
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/exact.md")]
+mod exact {}

@@ -5,7 +5,9 @@
 
 use rohrpost_bench::Failure;
 use rohrpost_bench::harness::{Child, Shared, Zeroable};
+use std::os::unix::process::CommandExt;
 use std::path::Path;
+use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -16,7 +18,8 @@ fn main() {
     a_child_that_hangs_is_killed_when_its_time_is_over();
     what_a_child_fails_with_is_told();
     a_child_dies_with_its_parent();
-    println!("test result: ok. 3 passed");
+    the_exit_code_of_a_program_that_a_child_becomes_is_told();
+    println!("test result: ok. 4 passed");
 }
 
 fn soon() -> Instant {
@@ -96,4 +99,17 @@ fn a_child_dies_with_its_parent() {
     });
     assert!(parent.unwrap().finish(soon()).is_err());
     wait_for("the end of the child", || is_dead(pid.wait()));
+}
+
+fn the_exit_code_of_a_program_that_a_child_becomes_is_told() {
+    let run = |program: &str, script: &str| {
+        let child = Child::start(|| Err(Failure::of("exec", Command::new(program).args(["-c", script]).exec())));
+        child.unwrap().finish_program(soon())
+    };
+    assert_eq!(run("sh", "exit 0"), Ok(()));
+    assert_eq!(run("sh", "exit 3"), Err(Failure::Failed("it ended with 3".into())));
+    for (program, words) in [("sh", "SIGKILL"), ("/no/such/program", "exec: No such file")] {
+        let failure = run(program, "kill -KILL $$").unwrap_err();
+        assert!(failure.to_string().contains(words), "{failure}");
+    }
 }

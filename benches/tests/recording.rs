@@ -24,7 +24,18 @@ fn every_contender_records_all_and_every_line_is_complete() {
     let beside: Vec<_> = all.iter().filter(|row| row["case"] == "pair beside 50 MB/s recorded").collect();
     assert_eq!(beside.len(), 2, "{beside:?}");
     assert!(beside[0]["contender"] == "rohrpost" && beside[0]["vs"] == "without recorder", "{beside:?}");
-    assert_eq!(all.len(), 4 * SIZES.len() + 2, "a case is not in the table above");
+    for (case, beside, is_median) in [
+        ("event with journal", "without journal", true),
+        ("exact replay of the demo", "real time", true),
+        ("replay, error of spacing", "1 ms", false),
+    ] {
+        let of: Vec<_> = all.iter().filter(|row| row["case"] == case).collect();
+        assert_eq!(of.len(), 2, "{case}: {of:?}");
+        assert!(of[0]["contender"] == "rohrpost" && of[0]["vs"] == beside && of[1]["contender"] == beside, "{of:?}");
+        let targets = [&of[0]["target_p50"], &of[0]["target_p99"]].map(serde_json::Value::is_number);
+        assert_eq!(targets, [is_median, !is_median], "{of:?}");
+    }
+    assert_eq!(all.len(), 4 * SIZES.len() + 8, "a case is not in the table above");
     assert_eq!(left_behind(&prefix), [""; 0]);
 }
 

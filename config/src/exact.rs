@@ -4,10 +4,19 @@ use crate::classes::{ClassTable, ROUTER};
 use crate::directory::Directory;
 use crate::module::{Module, Program, RECORDER, REPLAY, TCP_CLIENT, TCP_ROUTER};
 use crate::reader::Section;
+use crate::stream::StreamSpec;
 use rohrpost_mailbox::Name;
+use std::time::Duration;
 
 /// Built-in modules that take in what no journal sees: descriptors, files, threads, packages past their proxies.
 const WITHOUT: [&str; 7] = [RECORDER, REPLAY, ROUTER, TCP_CLIENT, TCP_ROUTER, "output", "carmen"];
+
+/// The stream that a journal is written into: with little to do it holds the last 20 s. Journals are in order by
+/// themselves, so no record is late.
+pub const JOURNAL: StreamSpec = StreamSpec { record_bytes: 4096, keep: 1024, readers: 4, late: Duration::MAX };
+
+/// Bytes of a longest record that a recording takes.
+pub const RECORDED_BYTES_MAX: usize = 16 << 20;
 
 /// A module of `exact`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

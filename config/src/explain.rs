@@ -200,8 +200,12 @@ impl Page<'_> {
 
     fn node(&mut self, node: &Node) {
         let modules: Vec<&Module> = self.installation.modules_on(&node.name).collect();
-        let replicas = saturating_sum(self.installation.replica_memory_on(&node.name));
-        let (number, memory) = (count_text(modules.len(), "module"), memory::of_node(&modules, replicas));
+        let others = [
+            (saturating_sum(self.installation.replica_memory_on(&node.name)), "replicas"),
+            (self.installation.journals_on(&node.name), "journals"),
+        ];
+        let memory = memory::of_node(&modules, others);
+        let number = count_text(modules.len(), "module");
         self.line("");
         self.line(format!("Node `{}`: {number}, {memory}", node.name));
         self.line("");

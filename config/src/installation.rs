@@ -2,12 +2,13 @@
 
 use crate::access::Access;
 use crate::classes::ClassTable;
+use crate::exact::JOURNAL;
 use crate::flow::Flow;
 use crate::gui::Gui;
 use crate::module::Module;
 use crate::node::{self, Node, System};
 use crate::output::{Level, Output};
-use crate::record::Recording;
+use crate::record::{Recording, Sampling};
 use crate::replica::Replica;
 use crate::saved::Saved;
 use crate::scheduling::{Scheduling, SchedulingRule};
@@ -69,6 +70,15 @@ pub struct Installation {
 }
 
 impl Installation {
+    /// Whether each record of a stream is recorded out of shared memory, so that a journal may name it. The recorder
+    /// takes those of modules on its node but its own; `*` are those of the file.
+    pub fn records_each(&self, from: Name, stream: &str) -> bool {
+        let (Some(record), Some(module)) = (&self.record, self.module(from)) else { return false };
+        let has_recorder = |own: &Module| own.is_recorder() && own.node == module.node && own.name != module.name;
+        let entry = record.in_place(from, stream).filter(|entry| entry.sampling == Sampling::Each);
+        entry.is_some_and(|entry| entry.from.is_some() || module.is_in_file()) && self.modules.iter().any(has_recorder)
+    }
+
     /// The module with a name, as its own or as an alias. The name may be that of any of the module's mailboxes.
     pub fn module(&self, name: Name) -> Option<&Module> {
         self.modules.iter().find(|module| module.names().any(|own| own == name.module()))
@@ -84,9 +94,16 @@ impl Installation {
         self.modules.iter().filter(move |module| module.node == node)
     }
 
-    /// Bytes of shared memory that the mailboxes and streams of a node take, as far as the file names them.
+    /// Bytes of shared memory that the mailboxes, streams and journals of a node take, as far as the file names them.
     pub fn memory_on(&self, node: &str) -> u64 {
-        saturating_sum(self.modules_on(node).map(Module::memory).chain(self.replica_memory_on(node)))
+        let others = self.replica_memory_on(node).chain([self.journals_on(node)]);
+        saturating_sum(self.modules_on(node).map(Module::memory).chain(others))
+    }
+
+    /// Bytes of these that its journals take.
+    pub fn journals_on(&self, node: &str) -> u64 {
+        let is_exact = |module: &&Module| self.record.as_ref().is_some_and(|record| record.is_exact(module.name));
+        saturating_sum(self.modules_on(node).filter(is_exact).map(|_| JOURNAL.memory()))
     }
 
     /// The nodes that are on the LAN, or the only one; they come first in [`nodes`](Self::nodes).

@@ -79,7 +79,7 @@ pub use classes::{ClassEntry, ClassTable, NameTextError, ROUTER, TCP, TOOL};
 pub use contents::{Contents, ContentsError};
 pub use digest::Digest;
 pub use errors::{Errors, Problem, SettingsError};
-pub use exact::{ExactModule, may_have_journal};
+pub use exact::{ExactModule, JOURNAL, RECORDED_BYTES_MAX, may_have_journal};
 pub use explain::explain;
 pub use flow::Flow;
 pub use gui::{Gui, Show};

@@ -154,6 +154,14 @@ impl Recording {
         nearest_entry(&self.streams, from, item)
     }
 
+    /// The entry of `streams` by which a stream is read in place; none also if one of `data` names it more exactly.
+    pub fn in_place(&self, from: Name, stream: &str) -> Option<&RecordedItems> {
+        let entry = self.stream(from, stream)?;
+        // `*` of `data` is not meant for streams.
+        let data = self.datum(from, stream).filter(|data| data.item.is_some());
+        data.is_none_or(|data| data.exactness() <= entry.exactness()).then_some(entry)
+    }
+
     /// The entry of `data` that counts for data; none: they are not recorded.
     pub fn datum(&self, from: Name, item: &str) -> Option<&RecordedItems> {
         nearest_entry(&self.data, from, item)

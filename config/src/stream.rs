@@ -29,7 +29,7 @@ impl Default for StreamSpec {
 
 impl StreamSpec {
     /// The shape that such a stream has in shared memory.
-    pub fn shape(&self) -> StreamShape {
+    pub const fn shape(&self) -> StreamShape {
         StreamShape { record_bytes: self.record_bytes, keep: self.keep, readers: self.readers, late: self.late }
     }
 

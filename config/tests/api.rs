@@ -1,8 +1,8 @@
 //! What other crates rely on when they use an installation.
 
 use rohrpost_config::{
-    Installation, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RecordedItems, RestartPolicy, Sampling,
-    Scheduling, Start, StreamSpec, TimeSource, explain,
+    Installation, JOURNAL, Level, LineFormat, Node, OverflowPolicy, Program, Reach, RecordedItems, RestartPolicy,
+    Sampling, Scheduling, Start, StreamSpec, TimeSource, explain,
 };
 use rohrpost_mailbox::{Class, Name};
 use serde::Deserialize;
@@ -80,7 +80,12 @@ fn what_is_recorded_is_found_by_module_and_item_and_is_called() {
     ] {
         let found = (sampling(record.stream(name(module), item)), sampling(record.datum(name(module), item)));
         assert_eq!(found, (stream, datum), "{module}/{item}");
+        assert_eq!(sampling(record.in_place(name(module), item)), stream, "`*` of `data` is not meant for {item}");
     }
+    let named = parse(&RECORD.replace("data = [", "data = [\"motor.0/image\", "));
+    let record = named.record.as_ref().unwrap();
+    assert_eq!(sampling(record.in_place(name("motor.0"), "image")), None, "`data` names it more exactly");
+    assert_eq!(sampling(record.in_place(name("laser.0"), "scan")), Some(Sampling::Each));
     let recorder = full.module(name("logd.0")).unwrap();
     let mut calls: Vec<String> = recorder.calls.iter().map(|name| full.classes.format(*name)).collect();
     calls.sort();
@@ -89,13 +94,15 @@ fn what_is_recorded_is_found_by_module_and_item_and_is_called() {
 }
 
 #[test]
-fn memory_of_a_node_is_that_of_its_mailboxes_and_streams() {
+fn memory_of_a_node_is_that_of_its_mailboxes_streams_and_journals() {
     let full = parse(FULL);
     let without = FULL.replace("stream.scan", "settings.scan").replace("stream.image", "settings.image");
     let streams: u64 = full.modules.iter().flat_map(|module| module.streams.values()).map(StreamSpec::memory).sum();
     assert!(streams > 17 * (8 << 20), "8 records, 8 readers, and one that is being written: {streams}");
     assert_eq!(full.memory_on("base"), parse(&without).memory_on("base") + streams);
     assert_eq!(full.memory_on("desk"), parse(&without).memory_on("desk"));
+    let without = RECORD.replace("exact = [\"motor.0\"]", "");
+    assert_eq!(parse(RECORD).memory_on("base"), parse(&without).memory_on("base") + JOURNAL.memory());
 }
 
 #[test]

@@ -142,7 +142,7 @@ impl View for Output {
 pub(crate) fn draw_line(scene: &mut Scene, installation: &rohrpost_config::Installation, line: &OutputLine) {
     scene.set_time(line.time_ns);
     let module = installation.classes.format(line.module());
-    scene.output_line(&module, Level::from(line.level), &line.text);
+    scene.output_line(&module, Level::from(line.level), &line.full_text());
 }
 
 /// Everything else: numbers as curves, the rest as text.

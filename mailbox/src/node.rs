@@ -69,7 +69,7 @@ const _: () = assert!(size_of::<Entry>() == 64 && size_of::<NodePage>() == 64 + 
 pub enum NodeError {
     /// The system said no.
     #[error("node directory {0}: {1}")]
-    Io(PathBuf, io::Error),
+    Io(PathBuf, #[source] io::Error),
     /// Somebody else could have put it there.
     #[error("node directory {0} belongs to user {1}, not to us; remove it, or set ROHRPOST_DIR to another place")]
     Foreign(PathBuf, u32),

@@ -62,7 +62,7 @@ pub enum CreateError {
     Descriptors(Name),
     /// Its file cannot be used.
     #[error("mailbox {0}: its file {1}: {2}")]
-    File(Name, PathBuf, io::Error),
+    File(Name, PathBuf, #[source] io::Error),
 }
 
 impl CreateError {

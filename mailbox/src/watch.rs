@@ -21,6 +21,23 @@ const PIPE_TRUSTED: Duration = Duration::from_millis(100);
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Watch(u32);
 
+impl Watch {
+    /// Its number: which of those that the participant has watched since it began.
+    pub const fn number(self) -> u32 {
+        self.0
+    }
+
+    /// The one of this number.
+    ///
+    /// ```
+    /// # use rohrpost_mailbox::Watch;
+    /// assert_eq!(Watch::from_number(7).number(), 7);
+    /// ```
+    pub const fn from_number(number: u32) -> Self {
+        Self(number)
+    }
+}
+
 /// What a descriptor is watched for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Interest {

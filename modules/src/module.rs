@@ -3,6 +3,7 @@
 
 use crate::call::Fault;
 use crate::interface::{Interfaces, StandIn, StandInCommand};
+use crate::output::errno_of;
 use crate::parameter::ParameterSet;
 use crate::runtime::{Context, Received};
 use rohrpost_config::Installation;
@@ -149,30 +150,54 @@ pub trait Module: Sized {
 /// }
 /// assert_eq!(parse("x").unwrap_err().to_string(), "invalid digit found in string");
 /// ```
-pub struct ModuleError(String);
+pub struct ModuleError {
+    text: String,
+    errno: Option<u16>,
+}
 
 impl ModuleError {
     /// From words.
     pub fn new(text: impl Into<String>) -> Self {
-        Self(text.into())
+        Self { text: text.into(), errno: None }
+    }
+
+    /// From an error, behind words that say where it happened.
+    ///
+    /// ```
+    /// use rohrpost_modules::ModuleError;
+    ///
+    /// let error = std::fs::read_to_string("/no/such.map").unwrap_err();
+    /// let error = ModuleError::at("/no/such.map", error);
+    /// assert_eq!(error.to_string(), "/no/such.map: No such file or directory (os error 2)");
+    /// assert_eq!(error.errno(), Some(2));
+    /// ```
+    pub fn at(place: impl fmt::Display, error: impl Into<Self>) -> Self {
+        let Self { text, errno } = error.into();
+        Self { text: format!("{place}: {text}"), errno }
+    }
+
+    /// The number of the kernel's error, if one is behind it.
+    pub fn errno(&self) -> Option<u16> {
+        self.errno
     }
 }
 
 impl fmt::Display for ModuleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&self.text)
     }
 }
 
 impl fmt::Debug for ModuleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&self.text)
     }
 }
 
 // Like anyhow's: it is made from every error, so it cannot be one itself.
-impl<E: std::error::Error> From<E> for ModuleError {
+impl<E: std::error::Error + 'static> From<E> for ModuleError {
     fn from(error: E) -> Self {
+        let errno = errno_of(&error);
         let mut text = error.to_string();
         let mut source = error.source();
         while let Some(cause) = source {
@@ -182,6 +207,6 @@ impl<E: std::error::Error> From<E> for ModuleError {
             }
             source = cause.source();
         }
-        Self(text)
+        Self { text, errno }
     }
 }

@@ -103,6 +103,7 @@ fn a_line_of_output_has_the_documented_bytes() {
         level: OutputLevel::Info,
         lost: 0,
         suppressed: 0,
+        errno: None,
         text: "is on".into(),
     };
     let data = DataHead { stamp_ns: line.time_ns, sequence: 2, missed: line.lost, incarnation: 0 };

@@ -7,48 +7,24 @@
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
-#[path = "../../benches/src/counting.rs"]
-pub mod counting;
+pub mod warm;
 
-use counting::{CountingHeap, heap_uses};
-use rohrpost_config::Installation;
-use rohrpost_mailbox::{Interest, Name, Next, Node, Ready, node_directory};
+use rohrpost_mailbox::{Interest, Next, Ready};
 use rohrpost_modules::call::CallError;
 use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
-use rohrpost_modules::runtime::{
-    Context, Rate, Received, Start, Stream, StreamSubscription, Subscription, ToolLink, run_started,
-};
+use rohrpost_modules::runtime::{Context, Rate, Received, Stream, StreamSubscription, Subscription};
 use rohrpost_modules::types::{Pose, Twist};
-use rohrpost_modules::{Module, ModuleError, interface};
-use std::io::{Read, Write};
+use rohrpost_modules::{Module, ModuleError};
+use std::io::Read;
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use warm::{Crane, CraneInterface, READ, RECEIVED, host, port, ticks, work};
 
-/// Uses of the heap by the module's thread, as it knew at its last tick.
-static USES: AtomicU64 = AtomicU64::new(0);
-static RECEIVED: AtomicU64 = AtomicU64::new(0);
-static TICKS: AtomicU64 = AtomicU64::new(0);
 /// Records of the stream that came one by one, those that the module was given, and values looked up by time.
 static RECORDS: AtomicU64 = AtomicU64::new(0);
 static FOLLOWED: AtomicU64 = AtomicU64::new(0);
 static LOOKED_UP: AtomicU64 = AtomicU64::new(0);
-/// Bytes written to the module's descriptor, and those that it read.
-static WRITTEN: AtomicU64 = AtomicU64::new(0);
-static READ: AtomicU64 = AtomicU64::new(0);
-static FAR: Mutex<Option<UnixStream>> = Mutex::new(None);
-
-#[global_allocator]
-static HEAP: CountingHeap = CountingHeap;
-
-/// Knows where it hangs.
-#[interface(class = "crane", crate = rohrpost_modules::macro_support)]
-trait Crane {
-    /// Where its hook hangs.
-    #[stream(1)]
-    fn hook() -> Pose;
-}
 
 /// Publishes what it is told, and follows itself: so it is publisher, subscriber and server at once, of data and of a
 /// stream.
@@ -73,15 +49,13 @@ impl Module for Wheels {
         let _ = context.subscribe(MotorInterface::MOTION, "motor.0", Rate::Every(Duration::from_millis(2)))?;
         let each = context.subscribe_stream(CraneInterface::HOOK, "crane.0")?;
         let hook = context.stream(CraneInterface::HOOK, "crane.0")?;
-        let (far, port) = UnixStream::pair()?;
+        let port = port()?;
         context.watch(&port, Interest::Read)?;
-        *FAR.lock().unwrap() = Some(far);
         Ok(Self { own, each, hook, before_ns: 0, told: Twist::default(), port })
     }
 
     fn tick(&mut self, context: &mut Context) -> Result<(), ModuleError> {
-        USES.store(heap_uses(), Ordering::Relaxed);
-        TICKS.fetch_add(1, Ordering::Relaxed);
+        ticks();
         context.publish_now(MotorInterface::MOTION, &self.told)?;
         let now_ns = context.now().ns;
         context.write(CraneInterface::HOOK, now_ns, &Pose { x_m: self.told.speed_m_s, ..Pose::default() })?;
@@ -124,73 +98,24 @@ impl Motor for Wheels {
     }
 }
 
-const CONFIG: &str = r#"
-installation = "hot-PID"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 100, text = "Drives" }
-crane = { id = 101, text = "Lifts" }
-tool = { id = 16, text = "By hand" }
-[nodes.main]
-[[module]]
-name = "motor.0"
-aliases = ["crane.0"]
-program = "motor"
-optional = true
-spin = "10 us"
-"#;
-const MOTOR: Name = Name::new(1, 100, 0, 0);
-
-/// Calls, until there were so many ticks and so many data received.
-fn work(motor: &MotorProxy, ticks: u64, received: u64) {
-    let (began, mut moves) = (Instant::now(), None);
-    let (ticks_then, received_then) = (TICKS.load(Ordering::Relaxed), RECEIVED.load(Ordering::Relaxed));
-    while TICKS.load(Ordering::Relaxed) < ticks_then + ticks
-        || RECEIVED.load(Ordering::Relaxed) < received_then + received
-        || READ.load(Ordering::Relaxed) + 50 < WRITTEN.load(Ordering::Relaxed)
-    {
-        motor.drive(0.5, 0.25).unwrap();
-        let written = FAR.lock().unwrap().as_mut().unwrap().write(b"x").unwrap();
-        WRITTEN.fetch_add(written as u64, Ordering::Relaxed);
-        assert!(matches!(motor.halt(), Err(CallError::Module(_, DriveError::NotFinite))));
-        // There is none before the first tick.
-        moves = motor.motion().ok();
-        assert!(began.elapsed() < Duration::from_secs(60), "it does not tick, or receives nothing");
+/// Calls that fail, and data that are asked for.
+fn call(motor: &MotorProxy) {
+    assert!(matches!(motor.halt(), Err(CallError::Module(_, DriveError::NotFinite))));
+    // There is none before the first tick.
+    if let Ok((_, twist)) = motor.motion() {
+        assert!([Twist::default(), Twist { speed_m_s: 0.5, turn_rate_rad_s: 0.25 }].contains(&twist));
     }
-    assert_eq!(moves.map(|(_, twist)| twist), Some(Twist { speed_m_s: 0.5, turn_rate_rad_s: 0.25 }));
 }
 
 #[test]
 fn a_modules_thread_does_not_touch_the_heap() {
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("hot.toml");
-    std::fs::write(&file, CONFIG.replace("PID", &std::process::id().to_string())).unwrap();
-    let installation = Arc::new(Installation::load(&file).unwrap());
-    let start = Start { installation: installation.clone(), name: MOTOR, launcher: None, restarts: 0, off: false };
-    let module = std::thread::spawn(move || run_started::<Wheels>(start));
-
-    let path = node_directory(&installation.name, "main");
-    let node = Node::create(&path, 0o700).unwrap();
-    let mut tool = ToolLink::join(&installation, &node, "main", Duration::from_secs(5)).unwrap();
-    let began = Instant::now();
-    while tool.status(MOTOR).is_err() {
-        assert!(began.elapsed() < Duration::from_secs(60) && !module.is_finished(), "it does not start");
-        std::thread::yield_now();
-    }
-    let link = rohrpost_modules::call::Caller::from(tool.link);
-    let motor =
-        <MotorProxy as rohrpost_modules::interface::Proxy>::new(&link, MOTOR).with_timeout(Duration::from_secs(5));
+    let hosted = host::<Wheels>("hot", "spin = \"10 us\"\n");
     // Longer than a renewal of the subscriptions takes to come.
-    work(&motor, 1500, 1000);
-    let before = USES.load(Ordering::Relaxed);
-    assert!(before > 0, "it counts");
-    work(&motor, 3000, 2000);
-    assert_eq!(USES.load(Ordering::Relaxed) - before, 0, "uses of the heap after warming up");
+    let before = work(&hosted.motor, 1500, 1000, call);
+    assert_eq!(work(&hosted.motor, 3000, 2000, call) - before, 0, "uses of the heap after warming up");
+    let (_, twist) = hosted.motor.motion().unwrap();
+    assert_eq!(twist, Twist { speed_m_s: 0.5, turn_rate_rad_s: 0.25 });
     for (count, what) in [(&RECORDS, "one by one"), (&FOLLOWED, "followed"), (&LOOKED_UP, "looked up by time")] {
         assert!(count.load(Ordering::Relaxed) > 3000, "records {what}: {count:?}");
     }
-    // The module's thread ends with the process; its node is nobody's then.
-    let _ = std::fs::remove_dir_all(path);
 }

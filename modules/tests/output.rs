@@ -112,6 +112,24 @@ fn lines_arrive_whole_or_are_counted() {
     tracing::info!(number = 7, "with fields");
     assert_eq!(next(&mut collector).text, "with fields number=7");
 
+    // The number of an error has a place of its own.
+    let full = std::io::Error::from_raw_os_error(28);
+    tracing::warn!(errno = full.raw_os_error(), "is full");
+    let line = next(&mut collector);
+    assert_eq!((line.errno, line.text.as_str()), (Some(28), "is full"));
+    assert_eq!(line.full_text(), "is full (errno 28: No space left on device)");
+    tracing::warn!(error = &full as &(dyn std::error::Error + 'static), "cannot write");
+    let line = next(&mut collector);
+    let text = "cannot write error=No space left on device (os error 28)";
+    assert_eq!((line.errno, line.text.as_str(), &*line.full_text()), (Some(28), text, text));
+    tracing::warn!(errno = None::<i32>, "is well");
+    tracing::warn!(errno = 70_000, "is odd");
+    let lines = [0, 1].map(|_| next(&mut collector));
+    assert_eq!(
+        lines.each_ref().map(|line| (line.errno, line.text.as_str())),
+        [(None, "is well"), (None, "is odd errno=70000")]
+    );
+
     // A panic is reported with its reason, in any thread.
     assert!(std::thread::spawn(|| panic!("the wheels came off")).join().is_err());
     let line = next(&mut collector);

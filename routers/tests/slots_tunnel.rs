@@ -91,6 +91,15 @@ fn bounds_ns(segment: &Segment) -> Vec<u64> {
     bounds(&installation).iter().map(|bound| bound.latency.unwrap().latency.as_nanos() as u64).collect()
 }
 
+/// Tells threads to end when it is dropped: also by an assertion that fails meanwhile, for a scope waits for them.
+struct Ends<'a>(&'a AtomicBool);
+
+impl Drop for Ends<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Publishes the packages of a flow, and says when each was published.
 fn publish(mut sender: Sender, flow: usize, ends: &AtomicBool) -> Vec<u64> {
     let (from, _, bytes) = FLOWS[flow];
@@ -154,11 +163,12 @@ fn flows_keep_their_bounds(segment: &Segment, stalls: &Stalls, mut is_done: impl
             scope.spawn(move || publish(sender, flow, ends))
         };
         let threads: Vec<_> = senders.into_iter().enumerate().map(publish).collect();
+        let ending = Ends(&ends);
         while !is_done() {
             come.look();
             std::thread::sleep(Duration::from_millis(1));
         }
-        ends.store(true, Ordering::Relaxed);
+        drop(ending);
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
     });
     come.all(&published);

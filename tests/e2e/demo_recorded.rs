@@ -3,7 +3,7 @@
 use crate::harness::{Place, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
-use rohrpost_recording::info;
+use rohrpost_recording::{ChannelInfo, info};
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../modules/tests/data/small.log");
 
@@ -50,11 +50,22 @@ fn all_of_a_demo_is_in_one_file() {
         let channel = told.channels.iter().find(|channel| channel.topic == topic);
         assert!(channel.is_some_and(|channel| channel.messages > 0), "{topic}: {told:?}");
     }
-    for drawn in ["laser.0/scan/", "mapper.0/pose/", "output.0/line/"] {
-        let is_it = |topic: &str| topic.starts_with(drawn);
-        let channel = told.channels.iter().find(|channel| is_it(&channel.topic) && channel.drawn_of.is_some());
-        assert!(channel.is_some_and(|channel| channel.messages > 0), "{drawn}: {told:?}");
+    // Of the camera's pictures, which are longer than 64 KiB, each fourth pixel.
+    let drawn = [
+        ("camera.0/image", "foxglove.RawImage", true),
+        ("depth.0/points", "foxglove.PointCloud", true),
+        ("laser.0/scan", "foxglove.PointCloud", false),
+        ("mapper.0/pose", "foxglove.PoseInFrame", false),
+        ("output.0/line", "foxglove.Log", false),
+    ];
+    for (topic, type_name, is_reduced) in drawn {
+        let is_it =
+            |channel: &&ChannelInfo| channel.type_name == type_name && channel.drawn_of.as_deref() == Some(topic);
+        let channel = told.channels.iter().find(is_it);
+        assert!(channel.is_some_and(|its| its.messages > 0 && its.is_reduced == is_reduced), "{topic}: {told:?}");
     }
+    let said = place.say(&["record", "info", "out.mcap"]).ok();
+    assert!(said.contains("foxglove.RawImage protobuf, drawn of camera.0/image, reduced to 64 KiB"), "{said}");
     assert!(told.configuration["demo.toml"].contains("[record]"));
     assert!(!place.path("out.mcap.part").exists());
     let before = std::fs::read(&file).unwrap();

@@ -1,10 +1,13 @@
 //! Exact replay: the demo's modules repeat what they did on a loaded and disturbed node, and whatever differs is found.
 
-use crate::harness::{Place, Robot, halt, signal, wait};
+use crate::harness::{Place, RECORDED_CLASSES, Robot, halt, signal, wait};
 use crate::process::{Running, Said};
-use crate::seer::{OTHER_BUILD, entry};
+use crate::seer::{NOTHING, OTHER_BUILD, OTHER_QUESTIONS, entry};
 use nix::sys::signal::Signal;
+use rohrpost_modules::journal::Piece;
 use serde_json::Value;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,23 +15,7 @@ use std::time::Duration;
 
 /// Set where the replays of a run are to be more than two: 20 in the long proof.
 const REPLAYS: &str = "ROHRPOST_EXACT_REPLAYS";
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-pilot = { id = 140 }
-seer = { id = 110 }
-mapper = { id = 96 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
+const LOGD: &str = r#"
 [[module]]
 name = "logd.0"
 builtin = "logd"
@@ -70,8 +57,7 @@ flush = "20 ms"
 const BUILDING: &str = include_str!("../../config/building.map");
 
 fn launched(place: &Place, modules: &str) -> (Running, Robot) {
-    let config = place.path("test.toml");
-    std::fs::write(&config, format!("{HEAD}{modules}")).unwrap();
+    let config = place.config(&[RECORDED_CLASSES, LOGD, modules]);
     std::fs::write(place.path("building.map"), BUILDING).unwrap();
     std::fs::write(place.path("vision.map"), "far").unwrap();
     let mut launch = place.launch(&config);
@@ -82,19 +68,25 @@ fn launched(place: &Place, modules: &str) -> (Running, Robot) {
 
 /// Seers with these sources, all with journals.
 fn seers(place: &Place, sources: &[&str]) -> (Running, Robot) {
+    seers_recorded(place, sources, "")
+}
+
+/// The same, with this in the section `[record]` too.
+pub(crate) fn seers_recorded(place: &Place, sources: &[&str], more: &str) -> (Running, Robot) {
     let entries: String = sources.iter().enumerate().map(|(number, source)| entry(number, source)).collect();
     let names: Vec<String> = (0..sources.len()).map(|number| format!("seer.{number}")).collect();
-    let record =
-        format!("[record]\ndirectory = \"recordings\"\nexact = {names:?}\nleave-free = \"0 B\"\nflush = \"20 ms\"\n");
+    let record = format!(
+        "[record]\ndirectory = \"recordings\"\nexact = {names:?}\nleave-free = \"0 B\"\nflush = \"20 ms\"\n{more}"
+    );
     launched(place, &format!("{entries}{record}"))
 }
 
-fn recording(place: &Place, number: u32) -> PathBuf {
+pub(crate) fn recording(place: &Place, number: u32) -> PathBuf {
     place.path(&format!("recordings/main-{number:04}.mcap"))
 }
 
 /// What each run of each module came to.
-fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Value> {
+pub(crate) fn replayed(place: &Place, file: &Path, modules: &[&str]) -> Vec<Value> {
     let said = replay(place, file, modules, &[]);
     said.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
@@ -105,18 +97,27 @@ fn replay(place: &Place, file: &Path, modules: &[&str], variables: &[(&str, &str
     Running::start(command).said()
 }
 
-/// Messages of a journal in a file that is being written.
-fn journaled(file: &Path, module: &str) -> usize {
+/// Messages of a journal in a file that is being written, if they are so.
+fn count(file: &Path, module: &str, is_so: impl Fn(&[u8]) -> bool) -> usize {
     let topic = format!("{module}/journal");
     let Ok(mut reader) = rohrpost_recording::Reader::open(file) else { return 0 };
     let mut count = 0;
-    while let Ok(Some((channel, _))) = reader.next() {
-        count += usize::from(channel.topic == topic);
+    while let Ok(Some((channel, message))) = reader.next() {
+        count += usize::from(channel.topic == topic && is_so(message.data));
     }
     count
 }
 
-fn wait_journaled(file: &Path, module: &str, more: usize) {
+fn journaled(file: &Path, module: &str) -> usize {
+    count(file, module, |_| true)
+}
+
+/// Runs of a module of which the beginning is recorded.
+fn begun(file: &Path, module: &str) -> usize {
+    count(file, module, |value| Piece::read(value).is_some_and(|piece| piece.offset == 0))
+}
+
+pub(crate) fn wait_journaled(file: &Path, module: &str, more: usize) {
     let before = journaled(file, module);
     wait(format!("{module} goes on"), || (journaled(file, module) >= before + more).then_some(()));
 }
@@ -230,6 +231,41 @@ fn rules_that_are_kept_repeat_and_those_that_are_broken_are_found_or_refused() {
 }
 
 #[test]
+fn a_descriptor_is_repeated_without_it_and_what_is_read_past_the_journal_is_found() {
+    let place = Place::new();
+    let listener = UnixListener::bind(place.path("port")).unwrap();
+    let (mut launch, robot) = seers(&place, &["port", "beside"]);
+    let file = recording(&place, 1);
+    let mut ports = [0, 1].map(|_| listener.accept().unwrap().0);
+    for round in 0..20 {
+        for port in &mut ports {
+            let (sent, mut back) = ([round, 7], [0; 2]);
+            port.write_all(&sent).unwrap();
+            port.read_exact(&mut back).unwrap();
+            assert_eq!(back, sent);
+        }
+    }
+    ["seer.0", "seer.1"].iter().for_each(|module| wait_journaled(&file, module, 5));
+    drop(robot);
+    launch.stop();
+    drop((listener, ports));
+    std::fs::remove_file(place.path("port")).unwrap();
+
+    let run = &replayed(&place, &file, &["seer.0"])[0];
+    assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
+    assert!(run["outputs"].as_u64() >= Some(40), "{run:#}");
+    let run = &replayed(&place, &file, &["seer.1"])[0];
+    let why = &run["why"];
+    assert_eq!((&run["result"], &why["event"]), (&"differs".into(), &"finds descriptor 0 ready".into()), "{run:#}");
+    // For the stamp of what it publishes.
+    assert_eq!(why["recorded"], "it reads the clock", "{run:#}");
+    assert!(why["replayed"].as_str().unwrap().starts_with("it fails: \"Bad file descriptor"), "{run:#}");
+    let listed = place.say(&["replay", "--exact", file.to_str().unwrap(), "seer.0", "--list"]).ok();
+    let told = ["it takes something in (`take_in`): at most 16 bytes", "it gives bytes out (`give_out`): 2 bytes 0007"];
+    assert!(told.iter().all(|line| listed.contains(line)), "{listed}");
+}
+
+#[test]
 fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     let place = Place::new();
     let (mut launch, robot) = seers(&place, &["clock", "clock", "clock"]);
@@ -255,6 +291,40 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     assert_eq!(said.code, Some(1));
     let run: Value = serde_json::from_str(&said.out).unwrap();
     assert_eq!((&run["result"], &run["events"], &run["outputs"]), (&"differs".into(), &3.into(), &0.into()), "{run:#}");
+    let said = replay(&place, &file, &["seer.0"], &[(OTHER_QUESTIONS, "1")]);
+    let run: Value = serde_json::from_str(&said.out).unwrap();
+    assert_eq!(
+        (&run["result"], &run["events"], &run["why"]["event"]),
+        (&"differs".into(), &1.into(), &"is made".into())
+    );
+    let [recorded, replayed] = ["recorded", "replayed"].map(|side| run["why"][side].as_str().unwrap());
+    assert_eq!(recorded, "it wants to tick: once in 5000000 ns");
+    assert_eq!(replayed, "it wants to tick: once in 6000000 ns");
+}
+
+#[test]
+fn a_module_that_fails_or_panics_while_it_is_made_is_told_with_its_reason() {
+    let place = Place::new();
+    let (mut launch, robot) = seers(&place, &["map", "map"]);
+    let file = recording(&place, 1);
+    let modules = ["seer.0", "seer.1"];
+    modules.iter().for_each(|module| wait_journaled(&file, module, 2));
+    std::fs::write(place.path("vision.map"), NOTHING).unwrap();
+    modules.iter().for_each(|module| signal(robot.pid(module), Signal::SIGKILL));
+    modules.iter().for_each(|module| wait("it began again", || (begun(&file, module) > 1).then_some(())));
+    drop(robot);
+    launch.signal(Signal::SIGINT);
+    launch.end();
+
+    for (module, reason) in [("seer.0", "it fails: \"it sees nothing in its map\""), ("seer.1", "it panics: ")] {
+        let runs = replayed(&place, &file, &[module]);
+        assert!(runs[0]["why"].as_str().unwrap().contains("vision.map is not the file that it was"), "{runs:#?}");
+        assert!(runs.len() > 1, "{runs:#?}");
+        for run in &runs[1..] {
+            assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
+            assert!(run["why"].as_str().unwrap().starts_with(reason), "{run:#}");
+        }
+    }
 }
 
 #[test]

@@ -79,6 +79,26 @@ pub(crate) fn probe(name: &str, settings: &str, keys: &str) -> String {
     )
 }
 
+/// Classes of modules that are recorded and replayed, for configurations that have such.
+pub(crate) const RECORDED_CLASSES: &str = "
+[classes.motor]
+id = 200
+[classes.odometry]
+id = 160
+[classes.laser]
+id = 150
+[classes.pilot]
+id = 140
+[classes.seer]
+id = 110
+[classes.feeder]
+id = 100
+[classes.mapper]
+id = 95
+[classes.logd]
+id = 24
+";
+
 /// Sections of a configuration with several nodes.
 pub(crate) const NETWORK: &str = "[network]\nsecurity = \"none\"\n[time]\nsource = \"master\"\n";
 

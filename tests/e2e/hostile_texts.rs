@@ -3,6 +3,7 @@
 
 use crate::harness::{OUTPUT, PATIENCE, Place, wait};
 use crate::record::recording_that_says;
+use crate::replayed_others::bag_that_says;
 use rohrpost::interface::{Interface, Serve};
 use rohrpost::output::plain::is_obeyed;
 use rohrpost::parameter::{Parameter, ParameterSet, Refusal};
@@ -195,7 +196,16 @@ fn no_tool_lets_a_module_drive_the_terminal() {
     let saved = saved.to_str().unwrap();
     let recording = recording_that_says(&place, HOSTILE, &structure(String::schema()));
     let recording = recording.to_str().unwrap();
+    let bag = bag_that_says(&place, HOSTILE);
+    let bag = bag.to_str().unwrap();
+    let into = format!("{HOSTILE}=laser.0/scan");
     let tried: &[&[&str]] = &[
+        &["record", "info", bag],
+        &["replay", bag],
+        &["replay", bag, recording],
+        &["replay", bag, "--into", "x=laser.0/scan"],
+        &["replay", bag, "--into", &into, &into],
+        &["replay", recording, "--into", &into],
         &["record", "info", recording],
         &["record", "cut", recording, &place.path("cut.mcap").display().to_string(), HOSTILE],
         &["record", "export", recording, &place.path("drawn.mcap").display().to_string(), "--format", "drawn"],

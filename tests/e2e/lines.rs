@@ -45,7 +45,7 @@ fn a_line_in_anothers_name_is_not_taken_and_what_cannot_be_is_marked() {
     let time_ns = tool.clock.now().ns;
     let line = |module: Name, text: &str| {
         let (level, text) = (OutputLevel::Info, text.into());
-        OutputLine { time_ns, module: module.raw(), level, lost: 0, suppressed: 0, text }
+        OutputLine { time_ns, module: module.raw(), level, lost: 0, suppressed: 0, errno: None, text }
     };
     let stranger = Name::new(2, me.class().0, me.instance(), 0);
     for (from, line) in [
@@ -83,7 +83,8 @@ fn a_module_with_endless_lines_has_its_share_and_lines_of_others_stay() {
     let me = tool.link.me();
     let time_ns = tool.clock.now().ns;
     let text = "noise".into();
-    let line = OutputLine { time_ns, module: me.raw(), level: OutputLevel::Info, lost: 0, suppressed: 0, text };
+    let line =
+        OutputLine { time_ns, module: me.raw(), level: OutputLevel::Info, lost: 0, suppressed: 0, errno: None, text };
     wait("its share is used up", || {
         (0..5000).for_each(|_| _ = send(&robot, &mut tool, me, &line));
         (refused(&robot, &mut tool).beyond_share > 0).then_some(())

@@ -4,7 +4,7 @@ use crate::harness::Place;
 use rohrpost::Name;
 use rohrpost::common::OutputLevel;
 use rohrpost::output::OutputLine;
-use rohrpost::schema::{Schema, Type};
+use rohrpost::schema::{Members, Schema, Type};
 use rohrpost::wire::append;
 use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use std::collections::BTreeMap;
@@ -44,18 +44,20 @@ fn recorded(place: &Place, stem: &str, config: &str, lines: &[Said<'_>]) -> Stri
     let session = Session { node: "main".into(), configuration, ..Session::default() };
     let options = Options { leave_bytes: 0, ..Options::new(place.path(""), stem) };
     let mut writer = Writer::start(options, session).unwrap();
-    let line = ChannelSpec { name: "output.0", item: "line", ty: &OutputLine::schema(), texts: BTreeMap::new() };
-    let line = writer.channel(&line).unwrap();
+    let lines_channel =
+        ChannelSpec { name: "output.0", item: "line", ty: &OutputLine::schema(), texts: BTreeMap::new() };
+    let lines_channel = writer.channel(&lines_channel).unwrap();
     let speed = ChannelSpec { name: "motor.0", item: "speed", ty: &Type::U8, texts: BTreeMap::new() };
     let speed = writer.channel(&speed).unwrap();
     for (number, (second, class, level, text)) in (0..).zip(lines) {
         let time_ns = BEGIN_NS + second * 1_000_000_000;
         let module = Name::new(1, *class, 0, 0).raw();
         let mut data = Vec::new();
-        append(&mut data, &OutputLine { time_ns, module, level: *level, lost: 0, suppressed: 0, text: (*text).into() })
-            .unwrap();
+        let errno = (*level == OutputLevel::Error).then_some(5);
+        let line = OutputLine { time_ns, module, level: *level, lost: 0, suppressed: 0, errno, text: (*text).into() };
+        append(&mut data, &line).unwrap();
         let message = Message { arrival_ns: time_ns, stamp_ns: time_ns, epoch: 1, sequence: number, data: &data };
-        writer.write(line, &message).unwrap();
+        writer.write(lines_channel, &message).unwrap();
         writer.write(speed, &Message { data: &[7], ..message }).unwrap();
     }
     writer.finish().1.unwrap();
@@ -79,7 +81,7 @@ fn lines_of_recordings_are_shown_as_those_of_a_robot() {
         "22:13:20.000 info  main/output.0: is on",
         "22:13:21.000 info  main/motor.0: is on",
         "22:13:22.000 warn  main/pilot.0: a wall",
-        "22:14:50.000 error main/motor.0: stalls\n\tsince long",
+        "22:14:50.000 error main/motor.0: stalls\n\tsince long (errno 5: Input/output error)",
         "22:15:00.000 debug main/pilot.0: turns",
     ];
     for (arguments, shown, why) in [
@@ -88,6 +90,7 @@ fn lines_of_recordings_are_shown_as_those_of_a_robot() {
         (&["--module", "pilot.0"], &[2, 4], "a module"),
         (&["--module", "pilot.1"], &[1, 3], "an alias of another"),
         (&["--class", "motor", "--text", "STALLS"], &[3], "a class, and words"),
+        (&["--text", "errno 5"], &[3], "a number of an error"),
         (&["--since", "15 s"], &[3, 4], "before the end of the recordings"),
         (&["--last", "2"], &[3, 4], "the last ones"),
         (&["--level", "info", "--last", "1"], &[3], "the last one of those"),
@@ -98,6 +101,10 @@ fn lines_of_recordings_are_shown_as_those_of_a_robot() {
     let json: serde_json::Value = serde_json::from_str(&log(&["--json", "--last", "1"])).unwrap();
     let keys = ["node", "module", "class", "level", "text"].map(|key| json[key].as_str().unwrap());
     assert_eq!(keys, ["main", "pilot.0", "pilot", "debug", "turns"]);
+    assert!(json.get("errno").is_none() && json.get("errno_text").is_none(), "{json}");
+    let json: serde_json::Value = serde_json::from_str(&log(&["--json", "--level", "error"])).unwrap();
+    assert_eq!((&json["errno"], &json["errno_text"]), (&5.into(), &"Input/output error".into()));
+    assert_eq!(json["text"], "stalls\nsince long");
 }
 
 #[test]
@@ -110,7 +117,7 @@ fn what_a_recording_lacks_is_told() {
     let said = place.say(&["log", "--file", open.to_str().unwrap(), "--level", "error"]).ok();
     let lines: Vec<&str> = said.lines().collect();
     assert!(lines[0].starts_with("… ") && lines[0].contains("open.mcap was not closed: "), "{said}");
-    assert_eq!(lines[1..], ["22:14:50.000 error main/motor.0: stalls", "\tsince long"]);
+    assert_eq!(lines[1..], ["22:14:50.000 error main/motor.0: stalls", "\tsince long (errno 5: Input/output error)"]);
     let other = CONFIG.replace("pilot", "driver").replace("\"test\"", "\"other\"");
     std::fs::write(&strange, &other).unwrap();
     let strange = strange.to_str().unwrap();
@@ -148,4 +155,24 @@ fn a_recording_without_lines_says_so() {
     writer.finish().1.unwrap();
     let said = place.say(&["log", "--file", place.path("a-0001.mcap").to_str().unwrap()]).ok();
     assert!(said.starts_with("… ") && said.contains("has no lines of output; `output = true`"), "{said}");
+}
+
+/// As those before lines had numbers of errors.
+#[test]
+fn lines_of_another_version_are_refused_in_words() {
+    let place = Place::new();
+    let configuration = BTreeMap::from([("test.toml".into(), CONFIG.into())]);
+    let session = Session { configuration, ..Session::default() };
+    let mut writer = Writer::start(Options { leave_bytes: 0, ..Options::new(place.path(""), "a") }, session).unwrap();
+    let Type::Struct(mut older) = OutputLine::schema() else { panic!("a line is a struct") };
+    let Members::Fields(fields) = &mut older.members else { panic!("with fields") };
+    fields.retain(|field| field.name != "errno");
+    let line = ChannelSpec { name: "output.0", item: "line", ty: &Type::Struct(older), texts: BTreeMap::new() };
+    let line = writer.channel(&line).unwrap();
+    let message = Message { arrival_ns: BEGIN_NS, stamp_ns: BEGIN_NS, epoch: 1, sequence: 0, data: &[0; 6] };
+    writer.write(line, &message).unwrap();
+    writer.finish().1.unwrap();
+    let said = place.say(&["log", "--file", place.path("a-0001.mcap").to_str().unwrap()]).ok();
+    let words = "output.0/line has lines of another version; `rohrpost record export --format json` shows them";
+    assert!(said.contains(words) && said.lines().count() == 1, "{said}");
 }

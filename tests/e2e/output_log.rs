@@ -1,9 +1,12 @@
 //! `rohrpost log` as a person uses it: levels, filters, following.
 
-use crate::harness::{OUTPUT, Place, halt, probe, signal, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, halt, probe, signal, wait};
 use crate::output::{call, is_own};
 use crate::process::Running;
 use nix::sys::signal::Signal;
+use std::fs::File;
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
 
 const PATIENT: [&str; 3] = ["log", "--timeout", "60"];
 
@@ -196,4 +199,33 @@ fn a_collector_that_does_not_answer_is_told_with_what_to_do() {
     let told = place.say(&["log", "--timeout", "0.2"]).fails();
     assert!(told.contains("no answer from output.0 within 200ms") && told.contains("`rohrpost list`"), "{told}");
     signal(pid, Signal::SIGCONT);
+}
+
+/// Of a module that does not start, and of one that is not there.
+#[test]
+fn a_line_has_the_number_of_the_error_that_ended_a_module() {
+    let place = Place::new();
+    let motor = r#"
+[[module]]
+name = "motor.0"
+aliases = ["odometry.0", "laser.0"]
+builtin = "sim"
+required = false
+settings = { map = "missing.map" }
+"#;
+    let pilot = "[[module]]\nname = \"pilot.0\"\nprogram = \"./script\"\nrequired = false\n";
+    let script = File::options().write(true).create_new(true).mode(0o755).open(place.path("script"));
+    script.unwrap().write_all(b"#!/no/such/interpreter\n").unwrap();
+    let config = place.config(&[RECORDED_CLASSES, motor, OUTPUT, pilot]);
+    let _launch = place.launch(&config);
+    let told = |module: &str| {
+        let said = place.say(&["log", "--timeout", "60", "--json", "--level", "error", "--module", module]);
+        let lines = said.out.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+        lines.into_iter().find(|line| line.get("errno").is_some())
+    };
+    for (module, words) in [("motor.0", "missing.map: No such file"), ("pilot.0", "could not be started: ")] {
+        let line = wait(format!("a line of {module}"), || told(module));
+        assert_eq!((&line["errno"], &line["errno_text"]), (&2.into(), &"No such file or directory".into()), "{line}");
+        assert!(line["text"].as_str().unwrap().contains(words), "{line}");
+    }
 }

@@ -77,8 +77,13 @@ fn a_recording_is_described_cut_merged_and_recovered() {
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
     assert!(place.say(&["record", "info", file]).ok().contains("not closed: if nothing writes it any more"));
-    let text = place.say(&["record", "recover", file]).ok();
     let recovered = place.path("base-0001.recovered.mcap");
+    let writer = std::fs::File::open(&path).unwrap();
+    writer.lock().unwrap();
+    let told = place.say(&["record", "recover", file]).fails();
+    assert!(told.contains("a recorder writes it just now") && !recovered.exists(), "{told}");
+    drop(writer);
+    let text = place.say(&["record", "recover", file]).ok();
     assert!(text.starts_with(&format!("{}: 1000 messages of {file}, ", recovered.display())), "{text}");
     assert_eq!(place.say(&["record", "info", recovered.to_str().unwrap(), "--json"]).json()["messages"], 1000);
 }

@@ -1,7 +1,7 @@
 //! The built-in module `logd` on a running node: all that was sent is in its files, or counted; they are whole, also
 //! after it was killed; and a disk that is not there is told, and disturbs nobody.
 
-use crate::harness::{OUTPUT, Place, Robot, signal, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, signal, wait};
 use crate::process::Running;
 use nix::sys::signal::Signal;
 use rand_chacha::ChaCha8Rng;
@@ -104,21 +104,6 @@ impl Feeding for Feeder {
     }
 }
 
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-feeder = { id = 96 }
-output = { id = 32 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
-"#;
-
 const LOGD: &str = r#"
 [[module]]
 name = "logd.0"
@@ -154,9 +139,7 @@ pub(crate) fn launched(place: &Place, record: &str) -> (Running, Robot) {
 
 /// The same, with another entry of the recorder.
 pub(crate) fn launched_with(place: &Place, logd: &str, record: &str) -> (Running, Robot) {
-    let config = place.path("test.toml");
-    let text = [HEAD, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record].concat();
-    std::fs::write(&config, text).unwrap();
+    let config = place.config(&[RECORDED_CLASSES, OUTPUT, logd, &feeder_entry(0), &feeder_entry(1), record]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
     robot.wait_on(&mut launch);
@@ -323,6 +306,7 @@ fn a_folder_that_is_not_there_is_told_and_recording_begins_as_soon_as_it_is() {
     let errors = || place.say(&["log", "--timeout", "60", "--level", "error"]).out;
     let told = wait("an error", || Some(errors()).filter(|lines| lines.contains("records nothing: ")));
     assert!(told.contains("/disk/recordings") && told.contains(": is gone; make the folder again"), "{told}");
+    assert!(told.contains("tries again every second (errno 2: No such file or directory)"), "{told}");
     let frames = StreamId { name: robot.name("feeder.0"), number: FeedingInterface::FRAME.number };
     wait("the recorder has subscribed", || {
         let status = place.say(&["status", "feeder.0", "--json"]).json();

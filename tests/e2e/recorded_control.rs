@@ -1,8 +1,9 @@
 //! Log control on a running node: by `rohrpost record`, and by TCP, also with connections that misbehave.
 
 use crate::harness::{PATIENCE, Place, wait};
-use crate::recorded::{RECORD, feed, feed_until_recorded, launched, numbers, wait_for_all};
-use rohrpost_recording::info;
+use crate::recorded::{Frame, RECORD, feed, feed_until_recorded, launched, numbers, wait_for_all};
+use rohrpost::wire::from_bytes;
+use rohrpost_recording::{Reader, info};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::path::Path;
@@ -66,6 +67,17 @@ fn frames(files: &[&Path]) -> Vec<u64> {
     files.iter().flat_map(|file| numbers(file, "feeder.0/frame")).collect()
 }
 
+/// The number of the frame that a file repeats of the time before it.
+fn repeated_frame(file: &Path) -> Option<u64> {
+    let mut reader = Reader::open(file).unwrap();
+    while let Some((channel, message)) = reader.next().unwrap() {
+        if channel.topic == "feeder.0/frame" && channel.is_repeated() {
+            return Some(from_bytes::<Frame>(message.data).unwrap().number);
+        }
+    }
+    None
+}
+
 #[test]
 fn the_recorder_obeys_the_command_line() {
     let place = Place::new();
@@ -102,6 +114,7 @@ fn the_recorder_obeys_the_command_line() {
     let begun = record(&["on"]).ok();
     assert!(begun.contains("run 7/main-0002.mcap"), "{begun}");
     assert_eq!(record(&["on"]).ok(), begun, "it is on");
+    wait("a line is recorded", || told(&record(&["status"]).ok(), "written").filter(|written| written != "0"));
     feed_until_recorded(&place, "feeder.0");
     drop(robot);
     launch.stop();
@@ -115,6 +128,7 @@ fn the_recorder_obeys_the_command_line() {
     assert!(said.lines().any(|line| line.starts_with("mark at ") && line.ends_with(": door open")), "{said}");
     let all = frames(&[&path("main-0001.mcap"), &path("main-0002.mcap"), &folder.join("main-0001.mcap")]);
     assert_eq!(all, (all[0]..=last).collect::<Vec<u64>>(), "each is in one file");
+    assert_eq!(repeated_frame(&folder.join("main-0002.mcap")), Some(last + 50), "it begins with the newest");
     let later = frames(&[&folder.join("main-0002.mcap")]);
     assert!(later[0] > last + 50, "what came while it was off is in no file: {later:?}");
     assert_eq!(info(&folder.join("main-0002.mcap")).unwrap().lost, 0, "nor is it lost");

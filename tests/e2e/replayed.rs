@@ -1,7 +1,7 @@
 //! `rohrpost replay` of a robot that was recorded: played and recorded again it is the same; a fresh mapper draws the
 //! same map; and the replay is paused, stepped and sought by calls.
 
-use crate::harness::{OUTPUT, Place, Robot, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, wait};
 use crate::process::Running;
 use rohrpost::interfaces::{LaserInterface, WheelsInterface};
 use rohrpost::schema::Type;
@@ -14,23 +14,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-const HEAD: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-pilot = { id = 140 }
-mapper = { id = 96 }
-output = { id = 32 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
+const TIME: &str = r#"
 [time]
 source = "simulation"
 speed = 2.0
@@ -83,11 +67,11 @@ struct Recorded {
     bytes: Vec<u8>,
 }
 
-fn call(place: &Place, module: &str, function: &[&str]) -> Value {
+pub(crate) fn call(place: &Place, module: &str, function: &[&str]) -> Value {
     place.say(&[&["call", module, "--json"], function].concat()).json()
 }
 
-fn position(place: &Place) -> Value {
+pub(crate) fn position(place: &Place) -> Value {
     call(place, "replay.0", &["position"])
 }
 
@@ -112,8 +96,7 @@ fn recorded_so_far(place: &Place) -> (u64, u64, u64) {
 fn record(place: &Place) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
-    let config = place.path("test.toml");
-    std::fs::write(&config, [HEAD, OUTPUT, MODULES].concat()).unwrap();
+    let config = place.config(&[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     let mut launch = place.launch(&config);
     let robot = place.robot(&config, "main", &mut launch);
     wait("the modules are there", || {
@@ -186,15 +169,14 @@ fn seek(place: &Place, at_s: f64) -> Value {
     sought
 }
 
-fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
+pub(crate) fn replay(place: &Place, file: &Path, words: &[&str]) -> Running {
     let all = [&["replay", file.to_str().unwrap(), "--quiet", "--no-gui"], words].concat();
     Running::start(place.command(&all))
 }
 
 /// The node of a replay.
 fn replaying(place: &Place, replay: &mut Running) -> Robot {
-    let config = place.path("as-played.toml");
-    std::fs::write(&config, [HEAD, OUTPUT, MODULES].concat().replace("\"test\"", "\"test-replay\"")).unwrap();
+    let config = place.config_of("test-replay", "[nodes.main]", &[RECORDED_CLASSES, TIME, OUTPUT, MODULES]);
     Installation::load(&config).unwrap();
     let robot = place.robot(&config, "replay", replay);
     wait("the player is there", || {
@@ -284,6 +266,12 @@ fn a_replay_is_paused_stepped_and_sought_by_calls() {
         assert!(refused.code != Some(0), "{refused:?}");
         assert!(refused.out.contains(told) || refused.err.contains(told), "{refused:?}");
     }
+    // Stepped to its end it stays there.
+    place.say(&["call", "replay.0", "step_by", "1000"]).ok();
+    let at_end = wait("it is at its end", || Some(position(&place)).filter(|position| position["ended"] == true));
+    assert_eq!(at_end["paused"], true);
+    let sought = seek(&place, drives_s);
+    assert_eq!((&sought["paused"], &sought["ended"]), (&true.into(), &false.into()));
     drop(robot);
     let said = replay.stop();
     assert!(said.contains(" values of ") && said.contains(" s, to "), "{said}");

@@ -274,11 +274,9 @@ fn receive(queue: &MqdT) -> Done<u64> {
     if &message[..bytes] == BODY { Ok(now_ns) } else { Err("the first message is another".into()) }
 }
 
-/// If this process was started as one of the hidden programs: does what it has to. Call it first thing in `main`.
-///
-/// # Errors
-/// When anything fails, or the first package is not the one that was sent.
-pub fn run_hidden_program() -> Option<Result<(), Failure>> {
+/// If this process was started as one of the programs here: does what it has to. Fails when anything does, or the first
+/// package is not the one that was sent.
+pub(super) fn run_hidden_program() -> Option<Result<(), Failure>> {
     let main_ns = monotonic_ns();
     let role = std::env::var(ROLE).ok()?;
     let first_ns = match role.split(' ').collect::<Vec<_>>()[..] {

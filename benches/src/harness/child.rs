@@ -54,7 +54,8 @@ impl ChildReport {
 pub struct Child {
     pid: Pid,
     report: Shared<ChildReport>,
-    ended: bool,
+    /// How it has ended.
+    ended: Option<WaitStatus>,
 }
 
 impl Child {
@@ -69,7 +70,7 @@ impl Child {
         let parent = nix::unistd::getpid();
         // SAFETY: the parent has no other thread (see above), so the child may do what any process may.
         match unsafe { fork() }.map_err(|error| Failure::of("fork", error))? {
-            ForkResult::Parent { child } => Ok(Self { pid: child, report, ended: false }),
+            ForkResult::Parent { child } => Ok(Self { pid: child, report, ended: None }),
             ForkResult::Child => {
                 // The parent may have gone between the fork and the wish to go with it.
                 let bound = nix::sys::prctl::set_pdeathsig(Signal::SIGKILL).is_ok() && getppid() == parent;
@@ -88,6 +89,25 @@ impl Child {
     /// # Errors
     /// What the child failed with, or that it was killed.
     pub fn finish(mut self, deadline: Instant) -> Result<(), Failure> {
+        self.await_end(deadline)?;
+        self.report.read().unwrap_or_else(|| Err(Failure::Failed("its process was killed".into())))
+    }
+
+    /// The same of a child that becomes another program: its exit code is to be 0.
+    ///
+    /// # Errors
+    /// What the child failed with before, its other end, or that it was killed.
+    pub fn finish_program(mut self, deadline: Instant) -> Result<(), Failure> {
+        let status = self.await_end(deadline)?;
+        match (self.report.read(), status) {
+            (Some(Err(failure)), _) => Err(failure),
+            (_, WaitStatus::Exited(_, 0)) => Ok(()),
+            (_, WaitStatus::Exited(_, code)) => Err(Failure::Failed(format!("it ended with {code}"))),
+            (_, status) => Err(Failure::Failed(format!("it ended: {status:?}"))),
+        }
+    }
+
+    fn await_end(&mut self, deadline: Instant) -> Result<WaitStatus, Failure> {
         while !self.has_ended()? {
             if interrupted() {
                 return Err(Failure::Failed("interrupted".into()));
@@ -97,7 +117,7 @@ impl Child {
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-        self.report.read().unwrap_or_else(|| Err(Failure::Failed("its process was killed".into())))
+        Ok(self.ended.unwrap_or(WaitStatus::StillAlive))
     }
 
     /// Its process; after it has ended, perhaps somebody else's.
@@ -118,18 +138,18 @@ impl Child {
     /// # Errors
     /// When the kernel does not know it, which cannot be.
     pub fn has_ended(&mut self) -> Result<bool, Failure> {
-        if self.ended {
-            return Ok(true);
+        if self.ended.is_none() {
+            let status = waitpid(self.pid, Some(WaitPidFlag::WNOHANG));
+            let status = status.map_err(|error| Failure::of("waitpid", error))?;
+            self.ended = Some(status).filter(|status| *status != WaitStatus::StillAlive);
         }
-        let status = waitpid(self.pid, Some(WaitPidFlag::WNOHANG)).map_err(|error| Failure::of("waitpid", error))?;
-        self.ended = status != WaitStatus::StillAlive;
-        Ok(self.ended)
+        Ok(self.ended.is_some())
     }
 }
 
 impl Drop for Child {
     fn drop(&mut self) {
-        if !self.ended {
+        if self.ended.is_none() {
             let _ = kill(self.pid, Signal::SIGKILL);
             let _ = waitpid(self.pid, None);
         }

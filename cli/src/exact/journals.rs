@@ -1,10 +1,18 @@
-//! Journals in a recording, put together of their pieces.
+//! Journals in a recording, put together of their pieces: each in a file, however long it is.
 
+use crate::record::ProgressLine;
 use crate::terminal::Failure;
 use rohrpost::output::plain;
-use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, Piece};
+use rohrpost_config::Installation;
+use rohrpost_mailbox::Name;
+use rohrpost_modules::journal::{ExactRun, JOURNAL_NAME, JOURNAL_NUMBER, Piece};
 use rohrpost_recording::{Reader, RecordedChannel};
-use std::path::Path;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Runs in one recording.
+const RUNS_MAX: usize = 10_000;
 
 /// The journal of one run of a module: from its start to its end, or as far as it was recorded.
 #[derive(Debug)]
@@ -12,29 +20,39 @@ pub(super) struct RecordedRun {
     pub(super) module: String,
     /// Tells it from other runs of the module.
     incarnation: u32,
-    pub(super) bytes: Vec<u8>,
+    /// File with its entries.
+    journal: PathBuf,
+    len: u64,
     /// Why it goes on no further, if it should.
     pub(super) ends: Option<String>,
     /// Why it cannot be replayed at all: its beginning is missing.
     pub(super) begins_late: Option<String>,
 }
 
-/// Journals of these modules, or of all, in the order in which they begin.
-pub(super) fn read(file: &Path, modules: &[String]) -> Result<Vec<RecordedRun>, Failure> {
-    let mut runs: Vec<RecordedRun> = Vec::new();
+/// Runs that are being put together.
+struct PiecedRuns<'a> {
+    runs: Vec<RecordedRun>,
+    folder: &'a Path,
+    /// The file of the run to which a piece was added last.
+    open: Option<(usize, File)>,
+}
+
+/// Journals of these modules, or of all, in the order in which they begin; put together in that folder.
+pub(super) fn read(file: &Path, modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
+    let mut pieced = PiecedRuns::new(folder);
     let mut reader = Reader::open(file)?;
     let mut damage = None;
     loop {
         match reader.next() {
             Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
-                take(&mut runs, &channel.name, message.data)
+                pieced.take(&channel, message.data)?;
             }
             Ok(Some(_)) => {}
             Ok(None) => break,
             Err(error) => {
                 // What comes behind it may be whole; but no journal is.
                 let why = format!("the recording is damaged or cut off here: {error}");
-                for run in &mut runs {
+                for run in &mut pieced.runs {
                     run.ends.get_or_insert_with(|| why.clone());
                 }
                 damage = Some(error);
@@ -42,6 +60,7 @@ pub(super) fn read(file: &Path, modules: &[String]) -> Result<Vec<RecordedRun>, 
             }
         }
     }
+    let runs = pieced.runs;
     let missing = modules.iter().find(|module| !runs.iter().any(|run| run.module == **module));
     match (missing, damage) {
         (Some(_), Some(error)) => Err(error.into()),
@@ -52,36 +71,109 @@ pub(super) fn read(file: &Path, modules: &[String]) -> Result<Vec<RecordedRun>, 
     }
 }
 
+/// Those of these modules in files that follow one another, as far as they are whole.
+pub(super) fn of_files(files: &[&Path], modules: &[String], folder: &Path) -> Result<Vec<RecordedRun>, Failure> {
+    let (mut pieced, mut progress) = (PiecedRuns::new(folder), ProgressLine::new());
+    for file in files {
+        let mut reader = Reader::open(file)?;
+        loop {
+            match reader.next() {
+                Ok(Some((channel, message))) if is_wanted(&channel, modules) => {
+                    pieced.take(&channel, message.data)?;
+                }
+                Ok(Some(_)) => {}
+                // Behind a damage a piece is missing.
+                Ok(None) | Err(_) => break,
+            }
+            let (read, all) = reader.progress();
+            progress.tell(read, all);
+        }
+    }
+    Ok(pieced.runs)
+}
+
 fn is_wanted(channel: &RecordedChannel, modules: &[String]) -> bool {
     let is_journal = channel.item == JOURNAL_NAME
         && channel.texts.get("number").is_some_and(|number| *number == JOURNAL_NUMBER.to_string());
     is_journal && (modules.is_empty() || modules.contains(&channel.name))
 }
 
-fn take(runs: &mut Vec<RecordedRun>, module: &str, value: &[u8]) {
-    let Some(Piece { incarnation, offset, bytes }) = Piece::read(value) else { return };
-    let is_it = |run: &RecordedRun| (run.module.as_str(), run.incarnation) == (module, incarnation);
-    // After the node's memory was made anew, incarnations are counted from the beginning.
-    let known = runs.iter().rposition(is_it).filter(|at| offset > 0 || runs[*at].bytes.is_empty());
-    let at = known.unwrap_or_else(|| {
+impl<'a> PiecedRuns<'a> {
+    fn new(folder: &'a Path) -> Self {
+        Self { runs: Vec::new(), folder, open: None }
+    }
+
+    fn take(&mut self, channel: &RecordedChannel, value: &[u8]) -> Result<(), Failure> {
+        let (module, is_repeated) = (channel.name.as_str(), channel.is_repeated());
+        let Some(Piece { incarnation, offset, bytes }) = Piece::read(value) else { return Ok(()) };
+        let is_it = |run: &RecordedRun| (run.module.as_str(), run.incarnation) == (module, incarnation);
+        // After the node's memory was made anew, incarnations are counted from the beginning: then a run begins that
+        // has the incarnation of another one. What a file repeats of the one before it begins none.
+        let goes_on = |run: &RecordedRun| offset > 0 || is_repeated || (run.len == 0 && run.begins_late.is_none());
+        let at = match self.runs.iter().rposition(is_it).filter(|at| goes_on(&self.runs[*at])) {
+            Some(at) => at,
+            None => self.begin(module, incarnation, offset)?,
+        };
+        let run = &mut self.runs[at];
+        if run.ends.is_some() || run.begins_late.is_some() || offset < run.len {
+            return Ok(());
+        }
+        match offset - run.len {
+            0 => self.append(at, bytes),
+            lost => {
+                run.ends = Some(format!("{lost} bytes of the journal were not recorded: the recorder was too slow"));
+                Ok(())
+            }
+        }
+    }
+
+    /// Its place.
+    fn begin(&mut self, module: &str, incarnation: u32, offset: u64) -> Result<usize, Failure> {
+        let at = self.runs.len();
+        if at == RUNS_MAX {
+            return Err(
+                format!("more than {RUNS_MAX} runs of modules; cut the recording: `rohrpost record cut`").into()
+            );
+        }
         let begins_late = (offset > 0).then(|| {
             format!(
                 "its journal began {offset} bytes before the recording did; record from the module's start on, or \
                  `rohrpost record merge` this file with the one before it"
             )
         });
-        let module = module.to_owned();
-        runs.push(RecordedRun { module, incarnation, bytes: Vec::new(), ends: None, begins_late });
-        runs.len() - 1
-    });
-    let run = &mut runs[at];
-    let have = run.bytes.len() as u64;
-    if run.ends.is_some() || run.begins_late.is_some() || offset < have {
-        return;
+        let (module, journal) = (module.to_owned(), self.folder.join(format!("journal-{at}")));
+        self.runs.push(RecordedRun { module, incarnation, journal, len: 0, ends: None, begins_late });
+        Ok(at)
     }
-    match offset - have {
-        0 => run.bytes.extend_from_slice(bytes),
-        lost => run.ends = Some(format!("{lost} bytes of the journal were not recorded: the recorder was too slow")),
+
+    fn append(&mut self, at: usize, bytes: &[u8]) -> Result<(), Failure> {
+        let run = &mut self.runs[at];
+        let failed = |error: std::io::Error| format!("{}: {error}", run.journal.display());
+        let open = self.open.take().filter(|(of, _)| *of == at).map(|(_, file)| Ok(file));
+        let mut file =
+            open.unwrap_or_else(|| File::options().create(true).append(true).open(&run.journal)).map_err(failed)?;
+        file.write_all(bytes).map_err(failed)?;
+        run.len += bytes.len() as u64;
+        self.open = Some((at, file));
+        Ok(())
+    }
+}
+
+impl RecordedRun {
+    /// As its program reads it; still without the places of other files.
+    pub(super) fn exact(&self) -> ExactRun {
+        let journal = self.journal.display().to_string();
+        ExactRun { folder: None, report: String::new(), ends: self.ends.clone(), journal, records: None }
+    }
+
+    /// The configuration as it was then, and the module: that of the channel.
+    pub(super) fn installation(&self, exact: &ExactRun) -> Result<(Installation, Name), String> {
+        let (installation, name) = exact.installation().map_err(|error| error.to_string())?;
+        let named = installation.classes.format(name);
+        if named != self.module {
+            return Err(format!("the journal that was recorded of {} is of another module: {named}", self.module));
+        }
+        Ok((installation, name))
     }
 }
 
@@ -107,9 +199,55 @@ mod tests {
         record
     }
 
+    fn channel(module: &str, is_repeated: bool) -> RecordedChannel {
+        let texts = is_repeated.then(|| ("repeated".to_owned(), String::new()));
+        RecordedChannel {
+            topic: format!("{module}/{JOURNAL_NAME}"),
+            name: module.to_owned(),
+            item: JOURNAL_NAME.to_owned(),
+            ty: None,
+            message_encoding: String::new(),
+            schema_encoding: String::new(),
+            texts: texts.into_iter().collect(),
+            is_ours: true,
+        }
+    }
+
+    #[test]
+    fn a_run_begins_at_nothing_unless_the_file_repeats_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut pieced = PiecedRuns::new(folder.path());
+        for (is_repeated, offset, bytes) in [
+            (false, 7, &b"late"[..]),
+            (false, 0, b"a"),
+            (true, 0, b"a"),
+            (false, 1, b"b"),
+            (true, 1, b"b"),
+            (false, 2, b"c"),
+            (false, 0, b"x"),
+        ] {
+            pieced.take(&channel("pilot.0", is_repeated), &record(5, offset, bytes)).unwrap();
+        }
+        let runs = pieced.runs;
+        assert!(runs[0].begins_late.is_some());
+        let journals = runs[1..].iter().map(|run| std::fs::read_to_string(&run.journal).unwrap());
+        assert_eq!(journals.collect::<Vec<_>>(), ["abc", "x"]);
+    }
+
+    #[test]
+    fn too_many_runs_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut pieced = PiecedRuns::new(folder.path());
+        let channel = channel("pilot.0", false);
+        let mut begin = |incarnation| pieced.take(&channel, &record(incarnation, 9, b"late"));
+        (0..RUNS_MAX as u32).for_each(|incarnation| begin(incarnation).unwrap());
+        assert!(begin(u32::MAX).unwrap_err().to_string().starts_with("more than 10000 runs "));
+    }
+
     #[test]
     fn pieces_are_put_together_until_one_is_missing() {
-        let mut runs = Vec::new();
+        let folder = tempfile::tempdir().unwrap();
+        let mut pieced = PiecedRuns::new(folder.path());
         for (module, incarnation, offset, bytes) in [
             ("pilot.0", 5, 0, &b"ab"[..]),
             ("mapper.0", 6, 9, b"x"),
@@ -122,20 +260,24 @@ mod tests {
             ("pilot.0", 7, 0, b"new"),
             ("pilot.0", 7, 3, b"er"),
         ] {
-            take(&mut runs, module, &record(incarnation, offset, bytes));
+            pieced.take(&channel(module, false), &record(incarnation, offset, bytes)).unwrap();
         }
-        take(&mut runs, "pilot.0", b"no piece");
-        let told: Vec<(&str, &[u8], bool, bool)> = runs
+        pieced.take(&channel("pilot.0", false), b"no piece").unwrap();
+        let runs = pieced.runs;
+        let told: Vec<(&str, Option<String>, bool, bool)> = runs
             .iter()
-            .map(|run| (run.module.as_str(), &run.bytes[..], run.ends.is_some(), run.begins_late.is_some()))
+            .map(|run| {
+                let journal = std::fs::read_to_string(&run.journal).ok();
+                (run.module.as_str(), journal, run.ends.is_some(), run.begins_late.is_some())
+            })
             .collect();
         let expected = [
-            ("pilot.0", &b"abcd"[..], true, false),
-            ("mapper.0", b"", false, true),
-            ("pilot.0", b"z", false, false),
-            ("pilot.0", b"newer", false, false),
+            ("pilot.0", Some("abcd"), true, false),
+            ("mapper.0", None, false, true),
+            ("pilot.0", Some("z"), false, false),
+            ("pilot.0", Some("newer"), false, false),
         ];
-        assert_eq!(told, expected);
+        assert_eq!(told, expected.map(|(module, text, ends, late)| (module, text.map(str::to_owned), ends, late)));
         assert!(runs[0].ends.as_ref().is_some_and(|why| why.starts_with("3 bytes ")), "{:?}", runs[0].ends);
     }
 }

@@ -2,13 +2,18 @@
 //! do the same.
 //!
 //! ```text
-//! recording ──▶ journals: pieces of each run put together ──▶ a file ──▶ the module's program, alone ──▶ its report
+//! recording ──▶ journals: pieces of each run put together, a file each ──▶ the module's program, alone ──▶ its report
+//!          └──▶ records that these name, in another file ───────────────────┘
 //! ```
 
+mod answers;
 mod journals;
 mod program;
+mod records;
 
+use crate::demo::Folder;
 use crate::terminal::{Failure, complain, say};
+pub(super) use answers::JournalAnswers;
 use journals::RecordedRun;
 use program::ExactPrograms;
 pub(super) use program::SHARED_MEMORY;
@@ -36,12 +41,14 @@ pub(super) struct ExactArguments {
 }
 
 pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
-    let runs = journals::read(&arguments.file, &arguments.modules)?;
+    let folder = Folder::new()?;
+    let runs = journals::read(&arguments.file, &arguments.modules, folder.path())?;
     if arguments.list {
-        runs.iter().for_each(list);
+        runs.iter().try_for_each(list)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone());
+    let records = records::collect(&arguments.file, &runs, folder.path())?;
+    let programs = ExactPrograms::new(arguments.program.clone(), arguments.folder.clone(), records);
     let mut code = ExitCode::SUCCESS;
     for run in &runs {
         let began = Instant::now();
@@ -58,11 +65,14 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
     Ok(code)
 }
 
-fn list(run: &RecordedRun) {
+fn list(run: &RecordedRun) -> Result<(), Failure> {
     say(format_args!("{}:", plain::line(&run.module)));
-    let entries = ExactPrograms::exact(run, String::new(), None).entries();
+    if let Some(why) = &run.begins_late {
+        say(format_args!("  ({why})"));
+        return Ok(());
+    }
     // The reader may have seen enough.
-    let _ = entries.iter().all(|entry| say(plain::line(entry)));
+    Ok(run.exact().each_entry(|entry| say(plain::line(entry)))?)
 }
 
 fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, took: Duration) {
@@ -70,7 +80,7 @@ fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, 
     let recorded_s = last_ns.saturating_sub(report.first_ns) as f64 / 1e9;
     if is_json {
         let (result, why): (&str, Value) = match &report.verdict {
-            ReplayVerdict::Identical { .. } => ("identical", Value::Null),
+            ReplayVerdict::Identical { .. } => ("identical", json!(report.not_made)),
             ReplayVerdict::Differs(Difference { event, recorded, replayed }) => {
                 ("differs", json!({"event": event, "recorded": recorded, "replayed": replayed}))
             }
@@ -91,5 +101,14 @@ fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, 
     match report.verdict {
         ReplayVerdict::Identical { .. } => drop(say(format_args!("{text}; {times}"))),
         ReplayVerdict::Differs(_) | ReplayVerdict::Refused(_) => complain(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    /// Records that a journal may name are those that a recording takes.
+    #[test]
+    fn what_a_journal_names_is_recorded() {
+        assert_eq!(rohrpost_config::RECORDED_BYTES_MAX, rohrpost_recording::format::MESSAGE_BYTES_MAX);
     }
 }

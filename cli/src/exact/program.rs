@@ -15,11 +15,13 @@ pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 pub(super) struct ExactPrograms {
     program: Option<PathBuf>,
     folder: Option<PathBuf>,
+    /// File with the records that journals name.
+    records: Option<String>,
 }
 
 impl ExactPrograms {
-    pub(super) fn new(program: Option<PathBuf>, folder: Option<PathBuf>) -> Self {
-        Self { program, folder }
+    pub(super) fn new(program: Option<PathBuf>, folder: Option<PathBuf>, records: Option<PathBuf>) -> Self {
+        Self { program, folder, records: records.map(|path| path.display().to_string()) }
     }
 
     /// Repeats a run, and reads what the program found.
@@ -27,13 +29,17 @@ impl ExactPrograms {
         let directory = Folder::within(Path::new(SHARED_MEMORY))?;
         let (file, report) = (directory.path().join("run"), directory.path().join("report"));
         let folder = self.folder.as_ref().map(|folder| canonical(folder)).transpose()?;
-        let mut exact =
-            Self::exact(run, report.display().to_string(), folder.map(|folder| folder.display().to_string()));
+        let mut exact = ExactRun {
+            folder: folder.map(|folder| folder.display().to_string()),
+            report: report.display().to_string(),
+            records: self.records.clone(),
+            ..run.exact()
+        };
         if self.folder.is_none() && is_of_demo(&exact) {
             write_map(directory.path())?;
             exact.folder = Some(directory.path().display().to_string());
         }
-        let mut command = match self.command(&exact) {
+        let mut command = match self.command(run, &exact) {
             Ok(command) => command,
             Err(why) => return Ok(ReplayReport::refused(why)),
         };
@@ -49,13 +55,8 @@ impl ExactPrograms {
         Ok(report.unwrap_or_else(|| ReplayReport::refused(format!("its program ended ({status}) and told no result"))))
     }
 
-    /// The run as its program reads it.
-    pub(super) fn exact(run: &RecordedRun, report: String, folder: Option<String>) -> ExactRun {
-        ExactRun { folder, report, ends: run.ends.clone(), journal: run.bytes.clone().into() }
-    }
-
-    fn command(&self, exact: &ExactRun) -> Result<Command, String> {
-        let (installation, name) = exact.installation().map_err(|error| error.to_string())?;
+    fn command(&self, run: &RecordedRun, exact: &ExactRun) -> Result<Command, String> {
+        let (installation, name) = run.installation(exact)?;
         let own = std::env::current_exe().map_err(|error| error.to_string())?;
         let module = installation.module(name).ok_or("the configuration does not have the module")?;
         let command = match (&self.program, &module.program) {

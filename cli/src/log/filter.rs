@@ -49,7 +49,7 @@ impl Filter {
         line.level <= self.level
             && (named || self.modules.is_empty() && self.classes.is_empty())
             && self.since_ns.is_none_or(|since_ns| line.time_ns >= since_ns)
-            && self.text.as_ref().is_none_or(|text| line.text.to_lowercase().contains(text))
+            && self.text.as_ref().is_none_or(|text| line.full_text().to_lowercase().contains(text))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Tells what goes wrong with a recording: once when it begins, and when it is over.
 
+use rohrpost::output::errno_of;
 use rohrpost_recording::{DiskError, Status};
 use std::mem::{Discriminant, discriminant};
 use std::time::{Duration, Instant};
@@ -26,7 +27,7 @@ impl Health {
         let problem = status.problem.as_ref().map(|problem| &problem.error);
         match problem {
             Some(error) if self.problem != Some(discriminant(error)) => {
-                tracing::error!("records nothing: {error}; tries again every second");
+                tracing::error!(errno = errno_of(error), "records nothing: {error}; tries again every second");
                 if self.problem.is_none() {
                     self.lost_before = status.lost;
                 }

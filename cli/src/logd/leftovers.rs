@@ -2,9 +2,9 @@
 //! are.
 
 use nix::sys::statvfs::statvfs;
-use rohrpost_recording::{is_closed, recover as recovered, recovered_path};
+use rohrpost::output::errno_of;
+use rohrpost_recording::{is_being_written, is_closed, recover as recovered, recovered_path};
 use std::ffi::OsStr;
-use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -55,16 +55,10 @@ fn is_file(name: &str, stem: &str) -> bool {
 }
 
 /// Whether its writer did not close it, and nothing was made of it yet. A file without a beginning has nothing in it.
+/// Another recorder may make its files in a folder below.
 fn is_leftover(file: &Path) -> bool {
     // In this order: a writer that ends meanwhile closes it.
     !recovered_path(file).exists() && !is_being_written(file) && matches!(is_closed(file), Ok(false))
-}
-
-/// Another recorder may make its files in a folder below. A writer holds a lock, which ends with its process; on a disk
-/// without locks nobody can tell.
-fn is_being_written(file: &Path) -> bool {
-    // A shared one: network file systems give no other for a file that is read.
-    File::open(file).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
 fn make_whole(file: &Path, leave_bytes: u64) {
@@ -81,7 +75,7 @@ fn make_whole(file: &Path, leave_bytes: u64) {
             made.messages,
             made.path.file_name().unwrap_or_default().to_string_lossy()
         ),
-        Err(error) => tracing::error!("{name} was not closed, and is not recovered: {error}"),
+        Err(error) => tracing::error!(errno = errno_of(&error), "{name} was not closed, and is not recovered: {error}"),
     }
 }
 
@@ -156,6 +150,8 @@ mod tests {
         // The same, without a writer.
         std::fs::copy(&file, &killed).unwrap();
         assert_eq!((is_leftover(&file), is_leftover(&killed)), (false, true));
+        let told = recovered(&file, &recovered_path(&file), &mut |_, _| {}).unwrap_err().to_string();
+        assert!(told.contains("a recorder writes it just now") && !recovered_path(&file).exists(), "{told}");
         drop(writer);
     }
 

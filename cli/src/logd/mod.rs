@@ -24,10 +24,13 @@ use crate::version;
 use control::{ControlServer, Orders, Told};
 use health::Health;
 use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
+use rohrpost::output::errno_of;
 use rohrpost::{Context, Module, ModuleClock, ModuleError, Ready, Received, Start, StartError};
 use rohrpost_config::{Installation, Recording};
 use rohrpost_mailbox::TimeSource;
-use rohrpost_recording::{ControlAnswer, ControlCommand, DrawnBeside, Options, Rotation, Session, Status, Writer};
+use rohrpost_recording::{
+    ControlAnswer, ControlCommand, DrawnBeside, Earlier, Options, Rotation, Session, Status, Writer,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -54,6 +57,8 @@ struct Logd {
     ending: Option<Writer>,
     /// How the one before ended.
     ended: ControlAnswer,
+    /// What came last before the next recording, while nothing is recorded.
+    earlier: Option<Earlier>,
     health: Health,
     /// Log control leads to folders below it.
     root: PathBuf,
@@ -92,6 +97,7 @@ impl Module for Logd {
             writer: None,
             ending: None,
             ended: ControlAnswer::ok(),
+            earlier: None,
             health: Health::default(),
             root,
             clock: context.clock().clone(),
@@ -111,7 +117,7 @@ impl Module for Logd {
     fn off(&mut self, context: &mut Context) {
         self.control.close(context);
         for writer in self.ending.take().into_iter().chain(self.writer.take()) {
-            self.ended = finish(writer);
+            self.finish(writer);
         }
     }
 
@@ -133,7 +139,7 @@ impl Module for Logd {
     fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
         match self.writer.as_mut() {
             Some(writer) if has_begun(context.clock()) => self.taps.take(writer, &context.now(), data),
-            _ => self.taps.pass_over(data),
+            _ => self.taps.pass_over(self.earlier.as_mut(), &context.now(), data),
         }
         Ok(())
     }
@@ -148,11 +154,30 @@ impl Module for Logd {
 impl Logd {
     /// A recording begins.
     fn begin(&mut self) -> Result<(), rohrpost_recording::StartError> {
-        let mut writer = Writer::start(self.options.clone(), self.session.clone())?;
+        let mut writer = Writer::start_behind(self.earlier.take(), self.options.clone(), self.session.clone())?;
         self.health = Health::default();
         self.taps.begin(&mut writer);
         self.writer = Some(writer);
         Ok(())
+    }
+
+    /// Waits until all is written. How it ended is for log control, the newest messages are for the next recording.
+    fn finish(&mut self, mut writer: Writer) {
+        let mut earlier = self.earlier.take().unwrap_or_else(|| writer.passed_over());
+        if let Some(newest) = writer.take_newest() {
+            earlier.fill(newest);
+        }
+        self.earlier = Some(earlier);
+        let (Status { written, lost, files_closed, files_torn, .. }, told) = writer.finish();
+        let files = files_closed + files_torn;
+        tracing::info!("recorded {written} messages, {lost} lost, in {files} files");
+        self.ended = match told {
+            Ok(()) => ControlAnswer::ok().with("written", written).with("lost", lost).with("files", files),
+            Err(error) => {
+                tracing::error!(errno = errno_of(&error), "the recording could not be ended: {error}");
+                ControlAnswer::err(&format!("the recording is off, but could not be ended: {error}"))
+            }
+        };
     }
 
     fn find(&mut self, context: &mut Context) -> Result<(), ModuleError> {
@@ -206,18 +231,6 @@ impl Recorder for Logd {
     fn answer(&mut self, order: u32) -> Option<String> {
         self.orders.answer(order).map(|answer| answer.line().to_owned())
     }
-}
-
-/// Waits until all is written; how it ended, for log control.
-fn finish(writer: Writer) -> ControlAnswer {
-    let (Status { written, lost, files_closed, files_torn, .. }, told) = writer.finish();
-    let files = files_closed + files_torn;
-    tracing::info!("recorded {written} messages, {lost} lost, in {files} files");
-    if let Err(error) = told {
-        tracing::error!("the recording could not be ended: {error}");
-        return ControlAnswer::err(&format!("the recording is off, but could not be ended: {error}"));
-    }
-    ControlAnswer::ok().with("written", written).with("lost", lost).with("files", files)
 }
 
 /// Whether there is a time at which something can arrive: that of a log begins with its player.

@@ -2,7 +2,7 @@
 
 use super::control::{OpenOrder, Told};
 use super::folder::below;
-use super::{Logd, finish, has_begun};
+use super::{Logd, has_begun};
 use rohrpost_recording::{ControlAnswer, ControlCommand, FileChange, Mark, OrderError, PendingOrder, Status, Writer};
 use std::path::Path;
 
@@ -35,7 +35,7 @@ impl Logd {
     /// Tells what became of orders that are open.
     pub(super) fn look_at_orders(&mut self) {
         if let Some(ended) = self.ending.take_if(|writer| !writer.status().is_running) {
-            self.ended = finish(ended);
+            self.finish(ended);
         }
         let Self { orders, options, writer, ending, ended, .. } = self;
         orders.poll(|order| match order {
@@ -67,6 +67,7 @@ impl Logd {
     fn switch_off(&mut self) -> Result<OpenOrder, ControlAnswer> {
         if let Some(mut writer) = self.writer.take() {
             writer.begin_end();
+            self.earlier = Some(writer.passed_over());
             self.ending = Some(writer);
             tracing::info!("records no more, as log control says");
         }

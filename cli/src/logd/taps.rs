@@ -13,9 +13,9 @@ use rohrpost::{
     Subscription, SystemTime,
 };
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
-use rohrpost_mailbox::local;
-use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER};
-use rohrpost_recording::{ChannelId, ChannelSpec, Message, WriteError, Writer};
+use rohrpost_mailbox::{StreamId, local};
+use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, WHOLE_BYTES_MAX};
+use rohrpost_recording::{ChannelId, ChannelSpec, Earlier, Message, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -129,7 +129,9 @@ impl Taps {
             taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
-        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context))
+        let may_name = !self.recording.exact.is_empty() && is_first(&node, context.me());
+        let node = may_name.then_some(&*node);
+        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, node))
     }
 
     /// Records a value that came, if it is to be.
@@ -143,12 +145,7 @@ impl Taps {
         if !is_chosen || !tap.is_important(data) {
             return;
         }
-        let (epoch, stamp_ns) = match data.moment() {
-            Moment::Stamp(stamp) => (stamp.epoch, stamp.ns),
-            Moment::Ns(ns) => (now.epoch, ns),
-        };
-        let sequence = data.head.sequence;
-        let message = Message { arrival_ns: now.ns, stamp_ns, epoch, sequence, data: data.value };
+        let message = message(now, data);
         // What is refused is counted; that the queue is full, tells `Health` with the reason.
         if let Err(error @ WriteError::Long(_)) = writer.write(channel, &message)
             && tap.refusal.is_empty()
@@ -160,10 +157,12 @@ impl Taps {
 }
 
 impl Taps {
-    /// Notes a value that comes while nothing is recorded: it is no loss.
-    pub(super) fn pass_over(&mut self, data: &Received<'_>) {
-        if let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) {
-            let _ = tap.sampler.note(&data.head, Instant::now());
+    /// Notes a value that comes while nothing is recorded: it is no loss. The next recording may begin with it.
+    pub(super) fn pass_over(&mut self, earlier: Option<&mut Earlier>, now: &SystemTime, data: &Received<'_>) {
+        let Some(tap) = self.taps.iter_mut().find(|tap| tap.has_brought(data)) else { return };
+        let (_, is_chosen) = tap.sampler.note(&data.head, Instant::now());
+        if let (true, Some(channel), Some(earlier)) = (is_chosen, tap.channel, earlier) {
+            earlier.note(channel, &message(now, data));
         }
     }
 }
@@ -215,12 +214,11 @@ impl SourceModule {
         let name = &item.field.name;
         let is_stream = item.kind == DataKind::Stream;
         let is_line = description.class == CollectorInterface::CLASS && name == LINE;
-        let ring = recording.stream(self.from, name).filter(|_| is_stream && self.is_here(name));
+        let ring = recording.in_place(self.from, name).filter(|_| is_stream && self.is_here(name));
         // `*` is not meant for streams, which may have records that fit no package.
         let named = |items: &&RecordedItems| !is_stream || items.item.is_some();
         let (sampling, numbering) = match (ring, recording.datum(self.from, name).filter(named)) {
             _ if is_line => recording.output.map(|_| (Sampling::Each, Numbering::Packages))?,
-            (Some(ring), Some(items)) if items.exactness() > ring.exactness() => (items.sampling, Numbering::Packages),
             (Some(items), _) => (items.sampling, Numbering::Records),
             (None, Some(items)) => (items.sampling, Numbering::Packages),
             (None, None) => return None,
@@ -270,8 +268,9 @@ impl Tap {
         self.channel = opened.ok();
     }
 
-    /// Subscribes. A stream that has no seat left is tried again.
-    fn open(&mut self, context: &mut Context) -> Result<(), ModuleError> {
+    /// Subscribes. A stream that has no seat left is tried again. `journals`: the node, if journals may name long
+    /// records, also those that were written before the recorder came.
+    fn open(&mut self, context: &mut Context, journals: Option<&Node>) -> Result<(), ModuleError> {
         let opened = match (self.sampler.numbering(), self.sampling) {
             (Numbering::Records, _) => {
                 context.subscribe_stream_untyped(self.from, &self.item, self.interface).map(Source::Stream)
@@ -287,6 +286,12 @@ impl Tap {
         };
         match opened {
             Ok(source) => {
+                let may_be_named = self.sampling == Sampling::Each && journals.is_some_and(|node| self.is_long(node));
+                if let Source::Stream(subscription) = &source
+                    && may_be_named
+                {
+                    context.rewind(subscription);
+                }
                 self.source = Some(source);
                 self.refusal.clear();
             }
@@ -300,6 +305,13 @@ impl Tap {
             Err(error) => return Err(error.into()),
         }
         Ok(())
+    }
+
+    /// Whether it is a stream of records that a journal may name.
+    fn is_long(&self, node: &Node) -> bool {
+        let id = StreamId { name: self.from, number: self.item.number };
+        let info = node.inspect_stream(id).ok().flatten();
+        info.is_some_and(|info| info.shape.record_bytes as usize > WHOLE_BYTES_MAX)
     }
 
     fn has_brought(&self, data: &Received<'_>) -> bool {
@@ -316,6 +328,20 @@ impl Tap {
         let Some(least) = self.least else { return true };
         from_bytes::<OutputLine>(data.value).map_or(true, |line| line.level <= least)
     }
+}
+
+/// Whether no recorder ran before this one since launch began: what that has recorded is not taken again.
+fn is_first(node: &Node, me: Name) -> bool {
+    node.participants().iter().all(|process| process.module != me || process.restarts == 0)
+}
+
+/// A value that came, as it is recorded.
+fn message<'a>(now: &SystemTime, data: &Received<'a>) -> Message<'a> {
+    let (epoch, stamp_ns) = match data.moment() {
+        Moment::Stamp(stamp) => (stamp.epoch, stamp.ns),
+        Moment::Ns(ns) => (now.epoch, ns),
+    };
+    Message { arrival_ns: now.ns, stamp_ns, epoch, sequence: data.head.sequence, data: data.value }
 }
 
 /// Whether the process of a module runs, and is not about to begin or to end: what it noted of itself is true then.

@@ -28,7 +28,7 @@ pub(super) struct ExportArguments {
     /// At most so many messages a second of each channel, by their stamps; output lines are all taken.
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<u64>,
-    /// Also copy what is drawn as it was recorded; then messages above 64 KiB are not drawn.
+    /// Also copy what is drawn as it was recorded; then fewer pixels and points are drawn of messages above 64 KiB.
     #[arg(long)]
     with_original: bool,
 }
@@ -99,7 +99,7 @@ fn drawn_text(to: &Path, told: &Drawn) -> String {
         lines.extend(counts.iter().map(|(topic, count)| format!("{topic}: {count} not drawn: {why}")));
     };
     left_out(&told.not_drawn, "the value contradicts itself, or is nowhere");
-    left_out(&told.too_long, "above 64 KiB it would be in the file twice; leave out --with-original");
+    left_out(&told.too_long, "above 64 KiB a file or a path would be there twice; leave out --with-original");
     if !told.without.is_empty() {
         lines.push(format!("not drawn, as there is no picture of them: {}", told.without.join(", ")));
     }

@@ -114,7 +114,7 @@ fn rate(channel: &ChannelInfo) -> Option<f64> {
 
 /// Of others the name, and how values and types are written.
 fn type_text(channel: &ChannelInfo) -> String {
-    let ChannelInfo { ty, type_name, message_encoding, schema_encoding, drawn_of, .. } = channel;
+    let ChannelInfo { ty, type_name, message_encoding, schema_encoding, drawn_of, is_reduced, .. } = channel;
     match ty {
         Some(ty) => describe_type(ty),
         None => {
@@ -122,7 +122,8 @@ fn type_text(channel: &ChannelInfo) -> String {
             let mut words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).collect();
             words.dedup();
             let drawn = drawn_of.as_ref().map_or(String::new(), |topic| format!(", drawn of {topic}"));
-            format!("{}{drawn}", words.join(" "))
+            let reduced = if *is_reduced { ", reduced to 64 KiB" } else { "" };
+            format!("{}{drawn}{reduced}", words.join(" "))
         }
     }
 }
@@ -132,7 +133,7 @@ fn as_json(info: &Info) -> Value {
         json!({
             "topic": channel.topic, "name": channel.name, "item": channel.item, "type_name": channel.type_name,
             "type": channel.ty.as_ref().map(describe_type), "message_encoding": channel.message_encoding,
-            "schema_encoding": channel.schema_encoding, "drawn_of": channel.drawn_of,
+            "schema_encoding": channel.schema_encoding, "drawn_of": channel.drawn_of, "reduced": channel.is_reduced,
             "messages": channel.messages, "repeated": channel.repeated, "lost": channel.lost,
             "first_ns": channel.first_ns, "last_ns": channel.last_ns,
         })

@@ -160,6 +160,7 @@ mod tests {
             message_encoding: encoding.into(),
             schema_encoding: String::new(),
             texts: BTreeMap::new(),
+            is_ours: true,
         }
     }
 

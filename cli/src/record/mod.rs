@@ -12,6 +12,7 @@ mod time;
 
 use crate::terminal::Failure;
 pub(crate) use part::PartArguments;
+pub(crate) use progress::ProgressLine;
 use rohrpost_recording::ControlCommand;
 use std::process::ExitCode;
 

@@ -8,19 +8,19 @@ use std::time::{Duration, Instant};
 const PERIOD: Duration = Duration::from_millis(500);
 
 /// A line on the standard error that is written over and over, if that is a terminal.
-pub(super) struct ProgressLine {
+pub(crate) struct ProgressLine {
     is_shown: bool,
     has_shown: bool,
     said: Instant,
 }
 
 impl ProgressLine {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { is_shown: io::stderr().is_terminal(), has_shown: false, said: Instant::now() }
     }
 
     /// So many bytes are read, of so many.
-    pub(super) fn tell(&mut self, read: u64, all: u64) {
+    pub(crate) fn tell(&mut self, read: u64, all: u64) {
         if !self.is_shown || self.said.elapsed() < PERIOD {
             return;
         }

@@ -10,6 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 struct PlayedChannel {
     from: Name,
     number: u16,
+    /// Its messages are of another program, and bytes here.
+    is_opaque: bool,
     has_played: bool,
     has_refused: bool,
 }
@@ -18,6 +20,8 @@ struct PlayedChannel {
 #[derive(Default)]
 pub(super) struct PlayedChannels {
     by_topic: BTreeMap<String, PlayedChannel>,
+    /// A message of another program, with its length.
+    opaque: Vec<u8>,
     /// Recorded epochs, and those of the node in their place.
     epochs: Vec<(u64, u64)>,
     /// Values that were published.
@@ -27,8 +31,14 @@ pub(super) struct PlayedChannels {
 }
 
 impl PlayedChannels {
-    /// Items of these modules that are among the topics.
-    pub(super) fn new(stand_ins: &[StandIn], topics: &BTreeSet<String>, installation: &Installation) -> Self {
+    /// Items of these modules that are among the topics. `into` are topics of another program, and those here in which
+    /// their messages are played.
+    pub(super) fn new(
+        stand_ins: &[StandIn],
+        topics: &BTreeSet<String>,
+        into: &[(String, String)],
+        installation: &Installation,
+    ) -> Self {
         let mut channels = Self::default();
         for StandIn { name, description } in stand_ins {
             let module = installation.classes.format(*name);
@@ -36,12 +46,19 @@ impl PlayedChannels {
                 let topic = format!("{module}/{}", item.field.name);
                 if topics.contains(&topic) {
                     let (from, number) = (*name, item.number);
-                    let channel = PlayedChannel { from, number, has_played: false, has_refused: false };
-                    channels.by_topic.insert(topic, channel);
+                    let other = into.iter().find(|(_, stream)| *stream == topic).map(|(other, _)| other.clone());
+                    let is_opaque = other.is_some();
+                    let channel = PlayedChannel { from, number, is_opaque, has_played: false, has_refused: false };
+                    channels.by_topic.insert(other.unwrap_or(topic), channel);
                 }
             }
         }
         channels
+    }
+
+    /// Topics in the files.
+    pub(super) fn topics(&self) -> BTreeSet<String> {
+        self.by_topic.keys().cloned().collect()
     }
 
     /// A recorded epoch begins, which is this one of the node.
@@ -58,9 +75,15 @@ impl PlayedChannels {
         recorded: &RecordedChannel,
         message: &Message<'_>,
     ) -> Result<(), ContextError> {
-        let stamp = Stamp { epoch: self.epoch_of(message.epoch), ns: message.stamp_ns };
+        let epoch = self.epoch_of(message.epoch);
         let Some(channel) = self.by_topic.get_mut(&recorded.topic) else { return Ok(()) };
-        match context.publish_as(channel.from, channel.number, stamp, message.data) {
+        let stamp = Stamp { epoch, ns: stamp_of(message, channel.is_opaque) };
+        let mut value = message.data;
+        if channel.is_opaque {
+            opaque_of(&mut self.opaque, value);
+            value = &self.opaque;
+        }
+        match context.publish_as(channel.from, channel.number, stamp, value) {
             Ok(()) => {
                 channel.has_played = true;
                 self.played += 1;
@@ -89,9 +112,45 @@ impl PlayedChannels {
     }
 }
 
+/// When a message was made. Other programs may not say, and write 0: then it is when it arrived.
+fn stamp_of(message: &Message<'_>, is_opaque: bool) -> u64 {
+    if is_opaque && message.stamp_ns == 0 { message.arrival_ns } else { message.stamp_ns }
+}
+
+/// Postcard of bytes: their count, seven bits a byte, and they themselves.
+fn opaque_of(to: &mut Vec<u8>, bytes: &[u8]) {
+    to.clear();
+    let mut count = bytes.len();
+    while count >= 0x80 {
+        to.push(count as u8 | 0x80);
+        count >>= 7;
+    }
+    to.push(count as u8);
+    to.extend_from_slice(bytes);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rohrpost::schema::Bytes;
+    use rohrpost::wire::from_bytes;
+
+    #[test]
+    fn messages_of_others_are_bytes() {
+        let mut opaque = vec![7; 3];
+        for len in [0, 1, 127, 128, 16_383, 16_384, 3_000_000] {
+            let bytes: Vec<u8> = (0..len).map(|at: usize| at as u8).collect();
+            opaque_of(&mut opaque, &bytes);
+            assert_eq!(from_bytes::<Bytes>(&opaque).unwrap().0, bytes);
+        }
+    }
+
+    #[test]
+    fn messages_of_others_without_a_publish_time_are_of_the_time_of_their_arrival() {
+        let message = |stamp_ns| Message { arrival_ns: 7, stamp_ns, epoch: 1, sequence: 0, data: &[] };
+        assert_eq!([0, 5].map(|stamp_ns| stamp_of(&message(stamp_ns), true)), [7, 5]);
+        assert_eq!(stamp_of(&message(0), false), 0, "ours are as they are");
+    }
 
     #[test]
     fn a_value_of_the_epoch_before_a_step_stays_of_that() {

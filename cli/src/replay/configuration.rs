@@ -7,6 +7,8 @@
 //! ```
 
 use super::recorded::RecordedFiles;
+use super::sizes::ItemSizes;
+use super::tables::{entries, stream, table, table_of, text_of};
 use crate::terminal::Failure;
 use rohrpost::Name;
 use rohrpost::output::plain::line;
@@ -55,12 +57,17 @@ pub(super) struct ReplayWish<'a> {
 }
 
 /// What is played.
+#[derive(Default)]
 pub(super) struct PlayedModules {
     /// Names that the player stands in for.
     pub(super) described: BTreeMap<String, Description>,
     pub(super) topics: BTreeSet<String>,
     /// Topics that were recorded and cannot be played.
     pub(super) left_out: BTreeSet<String>,
+    /// Topics of another program, and those in which their messages are played as bytes.
+    pub(super) into: BTreeMap<String, String>,
+    /// By topic: streams that have another size than usual, unless the configuration says theirs.
+    pub(super) streams: BTreeMap<String, StreamSpec>,
 }
 
 impl ReplayWish<'_> {
@@ -93,13 +100,16 @@ impl ReplayWish<'_> {
         Ok(installation.modules.iter().filter(is_running).collect())
     }
 
+    /// Names of modules that run, with their aliases.
+    pub(super) fn running_names(&self) -> Result<BTreeSet<String>, Failure> {
+        let names = self.running()?.into_iter().flat_map(Module::names);
+        Ok(names.map(|name| self.format(name)).collect())
+    }
+
     /// What is played: all that is recorded, but for what runs and what is not wanted.
     pub(super) fn played(&self) -> Result<PlayedModules, Failure> {
-        let running = self.running()?;
-        let runs = |name: &str| {
-            let name = self.installation.classes.parse_module(name).ok();
-            name.is_some_and(|name| running.iter().any(|module| module.names().any(|own| own == name)))
-        };
+        let running = self.running_names()?;
+        let runs = |name: &str| running.contains(name);
         let (names, topics) = (self.recorded.names(), self.recorded.all_topics());
         if let Some(unknown) = self.names.iter().find(|name| !names.contains(&***name) && !topics.contains(&***name)) {
             let topics: Vec<&str> = topics.iter().copied().collect();
@@ -139,7 +149,7 @@ impl ReplayWish<'_> {
         if all.is_empty() {
             return Err("nothing is left to be played; name other modules, or let fewer run".into());
         }
-        Ok(PlayedModules { described, topics: all, left_out })
+        Ok(PlayedModules { described, topics: all, left_out, ..PlayedModules::default() })
     }
 
     /// The text of the configuration. `settings` are the player's; the player's name comes with it.
@@ -191,7 +201,7 @@ impl ReplayWish<'_> {
         let is_collector =
             |module: &&&Module| self.installation.classes.name(module.name.class()) == Some(rohrpost::output::CLASS);
         let collectors = running.iter().take_while(is_collector).count();
-        modules.insert(collectors, Value::Table(self.player(&player, played, settings)));
+        modules.insert(collectors, Value::Table(self.player(&player, played, settings)?));
         new.insert("module".into(), Value::Array(modules));
         Ok((toml::to_string(&new)?, player))
     }
@@ -309,23 +319,23 @@ impl ReplayWish<'_> {
     }
 
     /// The player, with the streams and mailboxes of all that it plays.
-    fn player(&self, name: &str, played: &PlayedModules, settings: Table) -> Table {
+    fn player(&self, name: &str, played: &PlayedModules, settings: Table) -> Result<Table, Failure> {
         let classes = &self.installation.classes;
         let (mut slots, mut size) = COMMANDS_MIN;
-        let mut streams: BTreeMap<&str, StreamSpec> = BTreeMap::new();
-        for (module, description) in &played.described {
-            let module = classes.parse_module(module).ok().and_then(|name| self.installation.module(name));
+        let mut sizes: BTreeMap<&str, ItemSizes> = BTreeMap::new();
+        for (name, description) in &played.described {
+            let module = classes.parse_module(name).ok().and_then(|name| self.installation.module(name));
             let commands = module.map(|module| module.mailboxes.commands);
             slots = slots.max(commands.map_or(0, |commands| commands.slots));
             size = size.max(commands.map_or(0, |commands| commands.size));
             for item in description.streams() {
                 let item = item.field.name.as_str();
-                let spec = module.and_then(|module| module.streams.get(item)).copied().unwrap_or_default();
-                let all = streams.entry(item).or_insert(spec);
-                all.record_bytes = all.record_bytes.max(spec.record_bytes);
-                all.keep = all.keep.max(spec.keep);
-                all.readers = all.readers.max(spec.readers);
-                all.late = all.late.max(spec.late);
+                let all = sizes.entry(item).or_default();
+                let configured = module.and_then(|module| module.streams.get(item));
+                match (configured, played.streams.get(&format!("{name}/{item}"))) {
+                    (None, Some(derived)) => all.add_derived(*derived),
+                    (configured, _) => all.add_configured(configured.copied().unwrap_or_default()),
+                }
             }
         }
         let commands = table([("slots", Value::Integer(slots.into())), ("size", format!("{size} B").into())]);
@@ -338,45 +348,17 @@ impl ReplayWish<'_> {
             ("settings", Value::Table(settings)),
             ("mailbox", Value::Table(table([("commands", Value::Table(commands))]))),
         ]);
-        let streams = streams.into_iter().map(|(item, spec)| (item.to_owned(), Value::Table(stream(&spec))));
-        entry.insert("stream".into(), Value::Table(streams.collect()));
-        entry
+        let mut streams = Table::new();
+        for (item, sizes) in sizes {
+            streams.insert(item.to_owned(), Value::Table(stream(&sizes.spec(item)?)));
+        }
+        entry.insert("stream".into(), Value::Table(streams));
+        Ok(entry)
     }
 
     fn format(&self, name: Name) -> String {
         self.installation.classes.format(name)
     }
-}
-
-fn stream(spec: &StreamSpec) -> Table {
-    let late = if spec.late.is_zero() { "refuse".into() } else { format!("{} ns", spec.late.as_nanos()) };
-    table([
-        ("record", format!("{} B", spec.record_bytes).into()),
-        ("keep", Value::Integer(spec.keep.into())),
-        ("readers", Value::Integer(spec.readers.into())),
-        ("late", late.into()),
-    ])
-}
-
-/// A section of which one list has only the entries that are kept.
-fn entries(section: &Table, key: &str, is_kept: impl Fn(&Value) -> bool) -> Table {
-    let mut section = section.clone();
-    if let Some(list) = section.get_mut(key).and_then(Value::as_array_mut) {
-        list.retain(is_kept);
-    }
-    section
-}
-
-fn table_of(source: &Table, key: &str) -> Table {
-    source.get(key).and_then(Value::as_table).cloned().unwrap_or_default()
-}
-
-fn table<const N: usize>(entries: [(&str, Value); N]) -> Table {
-    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
-}
-
-fn text_of(path: &Path) -> Value {
-    path.display().to_string().into()
 }
 
 /// Saved parameters of those modules that run.

@@ -6,26 +6,32 @@
 //!                                                                              └─ modules that run: --run
 //! ```
 
+mod answers;
 mod channels;
 mod configuration;
 mod course;
+mod others;
 mod player;
 mod recorded;
 mod session;
+mod sizes;
 mod spacing;
+mod tables;
 
 use crate::check;
 use crate::demo::{Folder, drawing, drawn, is_built_in, write_map};
-use crate::exact::{self, ExactArguments};
+use crate::exact::{self, ExactArguments, JournalAnswers};
 use crate::launch::end;
 use crate::record::PartArguments;
 use crate::speech::Speech;
-use crate::terminal::{Failure, say};
+use crate::terminal::{Failure, complain, say};
 use configuration::{NODE, PlayedModules, ReplayDrawing, ReplayWish, saved_of};
+use others::IntoStream;
 pub(crate) use player::run as play;
 use recorded::RecordedFiles;
 use rohrpost::launch::{Launch, events};
 use rohrpost::output::plain;
+use rohrpost::wire::append;
 use rohrpost_config::Installation;
 use session::ReplaySession;
 use std::path::{Path, PathBuf};
@@ -36,6 +42,8 @@ use toml::{Table, Value};
 
 /// The name of the configuration that is made.
 const CONFIG: &str = "replay.toml";
+/// The file with answers.
+const ANSWERS: &str = "answers";
 /// The file that the GUI writes.
 const DRAWING: &str = "rohrpost-replay.rrd";
 /// The largest rate: that of a node's time.
@@ -47,13 +55,15 @@ const RATES: std::ops::RangeInclusive<f64> = 0.001..=player::RATE_MAX;
   rohrpost replay main-0001.mcap --run mapper.0 --rate 5  a fresh mapper draws the map anew
   rohrpost replay main-0001.mcap --from +10s --until +20s --loop
   rohrpost replay main-0001.mcap --names laser.0 odometry.0/odometry --paused
+  rohrpost replay rosbag2_0.mcap --into /scan=laser.0/scan /imu=imu.0/raw
   rohrpost replay --exact main-0001.mcap                  all modules that have a journal there
   rohrpost replay --exact main-0001.mcap pilot.0 --program target/debug/pilot
 In another terminal, as with any node:
   rohrpost call replay.0 pause          also resume, step, step_by 0.5, seek 12.5
   rohrpost echo replay.0 state
   rohrpost stream read laser.0 scan --next 10
-It is a node of its own, called `replay`; no command reaches a module that is played. With --exact no node runs.")]
+It is a node of its own, called `replay`; a command to a module that is played gets the answer that its journal has,
+or a fault. With --exact no node runs.")]
 pub(crate) struct Arguments {
     /// Recordings, played one after the other. Those of several recorders are to be merged first. With --exact one
     /// recording, and modules; all that have a journal, if none is named.
@@ -68,6 +78,10 @@ pub(crate) struct Arguments {
     /// Names (laser.0) or topics (laser.0/scan) to play; all, if none is named.
     #[arg(long, num_args = 1.., value_name = "NAME")]
     names: Vec<String>,
+    /// Of a recording of another program, such as rosbag2: play the messages of TOPIC as bytes, into a stream of a
+    /// module; can be given several times.
+    #[arg(long, num_args = 1.., value_name = "TOPIC=MODULE/STREAM", conflicts_with = "names")]
+    into: Vec<IntoStream>,
     #[command(flatten)]
     part: PartArguments,
     /// Times the speed at which it was recorded.
@@ -97,7 +111,7 @@ pub(crate) struct Arguments {
 struct RepeatArguments {
     /// Run the programs of modules again with what they were called with and told, and compare all that they do.
     #[arg(long, conflicts_with_all = [
-        "config", "run", "names", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
+        "config", "run", "names", "into", "from", "until", "rate", "repeats", "paused", "viewer", "no_gui", "quiet",
     ])]
     exact: bool,
     /// With --exact: another build of the module's program.
@@ -124,6 +138,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         return repeat(arguments);
     }
     let recorded = RecordedFiles::read(&arguments.files)?;
+    others::check(&recorded, &arguments.into)?;
     let folder = Folder::new()?;
     let made = installation(arguments, &recorded, folder.path())?;
     for topic in &made.played.left_out {
@@ -195,12 +210,23 @@ fn installation(arguments: &Arguments, recorded: &RecordedFiles, folder: &Path) 
         drawing,
         saved: saved_text.is_some().then_some(&*saved),
     };
-    let played = wish.played()?;
+    let played = match recorded.are_others {
+        true => others::played(recorded, &arguments.into, &source, &wish.running_names()?)?,
+        false => wish.played()?,
+    };
     if let Some(text) = saved_text {
         let runs = |name: &str| arguments.run.iter().any(|run| run == name);
         std::fs::write(&saved, saved_of(&text, runs)?)?;
     }
-    let settings = settings(arguments, recorded, &played, folder)?;
+    let mut settings = settings(arguments, recorded, &played, folder)?;
+    match noted_answers(recorded, &source, &played, folder) {
+        Ok(None) => {}
+        Ok(Some(answers)) => {
+            std::fs::write(folder.join(ANSWERS), answers)?;
+            settings.insert("answers".into(), ANSWERS.into());
+        }
+        Err(error) => complain(format_args!("commands are not answered, as the journals cannot be read: {error}")),
+    }
     let (text, player) = wish.text(&played, settings)?;
     let path = folder.join(CONFIG);
     std::fs::write(&path, text)?;
@@ -224,6 +250,12 @@ fn source(
         let text = std::fs::read_to_string(path)?;
         return Ok((Installation::parse(&text, path)?, base.parent().unwrap_or(here).to_owned()));
     }
+    if recorded.are_others {
+        if let Some(run) = arguments.run.first() {
+            return Err(format!("--run {run}: the files have no configuration; name one: --config FILE").into());
+        }
+        return Ok((others::source(&arguments.into)?, here.to_owned()));
+    }
     let recorded = recorded.configuration()?;
     let named =
         |errors| format!("{}\nthis is the configuration in the recording; name another: --config FILE", told(&errors));
@@ -245,6 +277,29 @@ fn told(errors: &rohrpost_config::Errors) -> String {
     errors.problems().iter().map(problem).collect::<Vec<_>>().join("\n")
 }
 
+/// What modules that are played have answered to commands, as bytes; none if the files have no journal of them.
+fn noted_answers(
+    recorded: &RecordedFiles,
+    source: &Installation,
+    played: &PlayedModules,
+    folder: &Path,
+) -> Result<Option<Vec<u8>>, Failure> {
+    let is_played = |host: &String| {
+        let module = source.classes.parse_module(host).ok().and_then(|name| source.module(name));
+        let mut names = module.into_iter().flat_map(|module| module.names());
+        played.described.contains_key(host)
+            || names.any(|name| played.described.contains_key(&source.classes.format(name)))
+    };
+    let modules: Vec<String> = recorded.with_journal().into_iter().filter(is_played).collect();
+    if modules.is_empty() {
+        return Ok(None);
+    }
+    let files: Vec<&Path> = recorded.infos.iter().map(|info| info.path.as_path()).collect();
+    let mut bytes = Vec::new();
+    append(&mut bytes, &JournalAnswers::read(&files, &modules, folder)?)?;
+    Ok(Some(bytes))
+}
+
 /// The player's settings, and files with the descriptions.
 fn settings(
     arguments: &Arguments,
@@ -261,6 +316,8 @@ fn settings(
     let files = recorded.infos.iter().map(|info| Ok(info.path.canonicalize()?.display().to_string().into()));
     let files = files.collect::<std::io::Result<Vec<Value>>>()?;
     let topics = played.topics.iter().map(|topic| topic.as_str().into()).collect();
+    let pair = |(topic, stream): (&String, &String)| Value::Array(vec![topic.as_str().into(), stream.as_str().into()]);
+    let into = played.into.iter().map(pair).collect();
     let mut whole = recorded.infos[0].clone();
     (whole.first_ns, whole.last_ns) = (Some(recorded.begin_ns), Some(recorded.end_ns));
     let part = arguments.part.of(&whole, &[]);
@@ -283,6 +340,7 @@ fn settings(
         ("end-ns", ns(recorded.end_ns)?),
         ("described", Value::Array(described)),
         ("topics", Value::Array(topics)),
+        ("into", Value::Array(into)),
         ("rate", arguments.rate.into()),
         ("repeats", arguments.repeats.into()),
     ] {

@@ -10,6 +10,7 @@
 //!
 //! The timer goes by the computer's clock, since a module has no ticks while the node's time stands still.
 
+use super::answers::PlayedAnswers;
 use super::channels::PlayedChannels;
 use super::course::{Course, Move, Part};
 use super::spacing::Spacing;
@@ -19,6 +20,7 @@ use nix::sys::timerfd::{ClockId, TimerFd, TimerFlags};
 use rohrpost::interface::{StandIn, StandInCommand};
 use rohrpost::interfaces::{Replay, ReplayInterface, ReplayPosition, ReplayRefusal};
 use rohrpost::schema::Description;
+use rohrpost::wire::from_bytes;
 use rohrpost::{
     Context, Fault, Installation, Interest, Module, ModuleClock, ModuleError, Ready, Start, StartError, TimeTeller,
 };
@@ -54,6 +56,10 @@ struct PlayerSettings {
     described: Vec<(String, String)>,
     /// What it plays.
     topics: BTreeSet<String>,
+    /// Topics of another program, and those in which their messages are played as bytes.
+    into: Vec<(String, String)>,
+    /// The file with the answers of modules.
+    answers: Option<String>,
     /// Times the recorded speed.
     rate: f64,
     from_ns: Option<u64>,
@@ -72,6 +78,7 @@ struct RecordingPlayer {
     clock: ModuleClock,
     timer: TimerFd,
     channels: PlayedChannels,
+    answers: PlayedAnswers,
     begin_ns: u64,
     end_ns: u64,
     rate: f64,
@@ -95,9 +102,13 @@ impl Module for RecordingPlayer {
 
     fn new(settings: PlayerSettings, context: &mut Context) -> Result<Self, ModuleError> {
         let stand_ins = Self::stand_ins(&settings, context.installation())?;
-        let channels = PlayedChannels::new(&stand_ins, &settings.topics, context.installation());
-        let PlayerSettings { files, topics, begin_ns, end_ns, rate, from_ns, until_ns, repeats, .. } = settings;
+        let channels = PlayedChannels::new(&stand_ins, &settings.topics, &settings.into, context.installation());
+        let answers = settings.answers.as_ref().map(|file| std::fs::read(context.installation().resolve(file)));
+        let answers = answers.transpose()?.map(|bytes| from_bytes(&bytes)).transpose()?;
+        let answers = answers.map(PlayedAnswers::new).unwrap_or_default();
+        let PlayerSettings { files, begin_ns, end_ns, rate, from_ns, until_ns, repeats, .. } = settings;
         let files = files.iter().map(|file| context.installation().resolve(file)).collect();
+        let topics = channels.topics();
         let plays = move |channel: &RecordedChannel| !channel.is_drawn() && topics.contains(&channel.topic);
         let course = Course::new(Player::new(files, plays), Part { from_ns, until_ns, repeats })?;
         let timer = TimerFd::new(ClockId::CLOCK_MONOTONIC, TimerFlags::TFD_NONBLOCK | TimerFlags::TFD_CLOEXEC)?;
@@ -108,6 +119,7 @@ impl Module for RecordingPlayer {
             clock: context.clock().clone(),
             timer,
             channels,
+            answers,
             begin_ns,
             end_ns,
             rate,
@@ -141,12 +153,11 @@ impl Module for RecordingPlayer {
         &mut self,
         context: &mut Context,
         command: &StandInCommand<'_>,
-        _: &mut Vec<u8>,
+        reply: &mut Vec<u8>,
     ) -> Result<(), Fault> {
         let name = context.installation().classes.format(command.to);
-        Err(Fault::ModuleError(format!(
-            "{name} is played from a recording and takes no commands; `rohrpost replay --run {name}` runs it instead"
-        )))
+        reply.extend_from_slice(self.answers.find(&name, command, self.clock.now().ns)?);
+        Ok(())
     }
 }
 
@@ -156,6 +167,7 @@ impl RecordingPlayer {
         let began = Instant::now();
         for _ in 0..AT_ONCE_MAX {
             let now_ns = self.clock.now().ns;
+            let is_paused = self.course.is_paused();
             let moved = match self.course.next(now_ns) {
                 Ok(moved) => moved,
                 Err(error) => {
@@ -179,6 +191,9 @@ impl RecordingPlayer {
                 }
                 Move::Advance { time_ns } => drop(self.time.advance_to(time_ns)),
                 Move::Wait { until_ns } => return Ok(Some(self.read_while_waiting(until_ns))),
+                Move::End if is_paused => {
+                    tracing::info!("at the end: `seek`, or `resume` to end the replay")
+                }
                 // Time goes on behind the end: modules that run have work left.
                 Move::Again | Move::End => {}
                 Move::Rest => return Ok(None),

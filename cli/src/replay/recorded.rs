@@ -3,10 +3,14 @@
 use crate::terminal::Failure;
 use rohrpost::output::plain::line;
 use rohrpost::schema::Description;
+use rohrpost_modules::journal::JOURNAL_NAME;
 use rohrpost_recording::format::{MESSAGE_ENCODING, PROFILE, session_key};
 use rohrpost_recording::{DescribedModule, Info, info, recovered_path};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+
+/// Longer than this nothing is waited for between two files of another program.
+const GAP_MAX_NS: u64 = 60_000_000_000;
 
 /// A text of the files, and the file's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,6 +22,8 @@ pub(super) struct RecordedText {
 /// Files that are played one after the other.
 pub(super) struct RecordedFiles {
     pub(super) infos: Vec<Info>,
+    /// They were recorded by another program, such as rosbag2.
+    pub(super) are_others: bool,
     /// When the first message arrived, and the last.
     pub(super) begin_ns: u64,
     pub(super) end_ns: u64,
@@ -29,15 +35,9 @@ impl RecordedFiles {
         let files = without_torn(files);
         let infos = files.into_iter().map(|file| info(file)).collect::<Result<Vec<Info>, _>>()?;
         in_order(&infos)?;
-        if let Some(foreign) = infos.iter().find(|info| info.profile != PROFILE) {
-            let (file, profile) = (foreign.path.display(), line(&foreign.profile));
-            return Err(format!(
-                "{file}: was not recorded by Rohrpost (profile `{profile}`): its messages are of no module that could \
-                 publish them; name recordings of logd"
-            )
-            .into());
-        }
-        if let Some(old) = infos.iter().find(|info| info.messages > 0 && info.described.is_empty()) {
+        let are_others = are_others(&infos)?;
+        let is_old = |info: &&Info| !are_others && info.messages > 0 && info.described.is_empty();
+        if let Some(old) = infos.iter().find(is_old) {
             return Err(format!(
                 "{}: does not describe its modules, as it was recorded by an older version; nobody can stand in for \
                  them: record again, or draw it with `rohrpost record export`",
@@ -50,7 +50,7 @@ impl RecordedFiles {
         let (Some(begin_ns), Some(end_ns)) = (begin_ns, end_ns) else {
             return Err("there is no message in these files; name others (`rohrpost record info FILE`)".into());
         };
-        Ok(Self { infos, begin_ns, end_ns })
+        Ok(Self { infos, are_others, begin_ns, end_ns })
     }
 
     /// What modules said of themselves, by name.
@@ -104,6 +104,14 @@ impl RecordedFiles {
         channels.filter(|channel| channel.messages > 0).map(|channel| channel.topic.as_str()).collect()
     }
 
+    /// Modules with a journal.
+    pub(super) fn with_journal(&self) -> Vec<String> {
+        let channels = self.infos.iter().flat_map(|info| &info.channels);
+        let journals = channels.filter(|channel| !self.are_others && channel.item == JOURNAL_NAME);
+        let names: BTreeSet<String> = journals.map(|channel| channel.name.clone()).collect();
+        names.into_iter().collect()
+    }
+
     /// The configuration that was recorded.
     pub(super) fn configuration(&self) -> Result<RecordedText, Failure> {
         let is_one = |text: &str| text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("installation"));
@@ -134,24 +142,66 @@ fn without_torn(files: &[PathBuf]) -> Vec<&PathBuf> {
     files.iter().filter(|file| !is_torn(file)).collect()
 }
 
-/// Files of one recording come one after the other, each once.
+/// Whether the files are of another program. Those of two kinds have not much in common.
+fn are_others(infos: &[Info]) -> Result<bool, Failure> {
+    let is_other = |info: &&Info| info.profile != PROFILE;
+    let Some(other) = infos.iter().find(is_other) else { return Ok(false) };
+    if let Some(ours) = infos.iter().find(|info| !is_other(info)) {
+        let (other, profile, ours) = (other.path.display(), line(&other.profile), ours.path.display());
+        return Err(format!(
+            "{other} was not recorded by Rohrpost (profile `{profile}`), and {ours} was; replay them one by one"
+        )
+        .into());
+    }
+    Ok(true)
+}
+
+/// Files of one recording come one after the other, each once. Those of others do not say of which one they are.
 fn in_order(infos: &[Info]) -> Result<(), Failure> {
     for (at, later) in infos.iter().enumerate() {
         let recording = later.session.get(session_key::RECORDING);
+        if later.profile != PROFILE {
+            others_in_order(&infos[..at], later)?;
+            continue;
+        }
         let mut earlier = infos[..at].iter().filter(|info| info.session.get(session_key::RECORDING) == recording);
         let is_overlapped = |info: &&Info| {
             let last = info.epochs.iter().filter_map(|its| Some((its.epoch, its.last_ns?))).max();
             let first = later.epochs.iter().filter_map(|its| Some((its.epoch, its.first_ns?))).min();
             info.path == later.path || last.zip(first).is_some_and(|(last, first)| first < last)
         };
-        if let (Some(_), Some(before)) = (recording, earlier.find(is_overlapped)) {
+        if let Some(before) = earlier.find(is_overlapped).filter(|_| recording.is_some()) {
             return Err(format!(
-                "{} begins before {} ends, and both are of one recording; name each file once, in order",
+                "{} begins before {} ends, and files are played one after the other; name each file once, in order",
                 later.path.display(),
                 before.path.display()
             )
             .into());
         }
+    }
+    Ok(())
+}
+
+/// Files of others that were split overlap a little; those of two recordings may be days apart.
+fn others_in_order(earlier: &[Info], later: &Info) -> Result<(), Failure> {
+    let is_later = |info: &&Info| info.path == later.path || info.first_ns > later.first_ns.or(info.first_ns);
+    if let Some(before) = earlier.iter().find(is_later) {
+        return Err(format!(
+            "{} begins before {}, and files are played one after the other; name each file once, in order",
+            later.path.display(),
+            before.path.display()
+        )
+        .into());
+    }
+    let end_ns = earlier.iter().filter_map(|info| info.last_ns).max();
+    let gap_ns = later.first_ns.zip(end_ns).map_or(0, |(first, end)| first.saturating_sub(end));
+    if gap_ns > GAP_MAX_NS {
+        return Err(format!(
+            "{} begins {} s after the files before it end, and the replay would wait so long; replay them one by one",
+            later.path.display(),
+            gap_ns / 1_000_000_000
+        )
+        .into());
     }
     Ok(())
 }
@@ -191,5 +241,25 @@ mod file_tests {
         }
         let torn = [first.clone(), recovered_path(&first), second.clone()];
         assert_eq!(without_torn(&torn), [&recovered_path(&first), &second]);
+    }
+
+    #[test]
+    fn files_of_others_may_overlap_and_are_not_far_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, second] = two_files(folder.path()).map(|path| info(&path).unwrap());
+        let file = |like: &Info, first_s: u64, last_s: u64| {
+            let [first_ns, last_ns] = [first_s, last_s].map(|s| Some(s * 1_000_000_000));
+            Info { profile: "ros2".into(), first_ns, last_ns, path: like.path.clone(), ..info(&like.path).unwrap() }
+        };
+        let told = |files: [Info; 2]| in_order(&files).map_err(|error| error.to_string());
+        assert_eq!(told([file(&first, 1, 10), file(&second, 9, 20)]), Ok(()));
+        assert_eq!(told([file(&first, 1, 10), file(&second, 70, 80)]), Ok(()));
+        for (files, wanted) in [
+            ([file(&second, 9, 20), file(&first, 1, 10)], "name each file once, in order"),
+            ([file(&first, 1, 10), file(&first, 1, 10)], "name each file once, in order"),
+            ([file(&first, 1, 10), file(&second, 86_410, 86_420)], "begins 86400 s after the files before it end"),
+        ] {
+            assert!(told(files).is_err_and(|told| told.contains(wanted)), "{wanted}");
+        }
     }
 }

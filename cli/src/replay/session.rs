@@ -102,7 +102,8 @@ impl ReplaySession {
         if !position.paused {
             self.resumed.get_or_insert_with(Instant::now);
         }
-        if position.ended {
+        // In a pause it stays at its end: it can be sought.
+        if position.ended && !position.paused {
             self.took = Some(self.resumed.map_or(Duration::ZERO, |resumed| resumed.elapsed()));
         }
         self.last = Some(position);

@@ -9,16 +9,16 @@ use rohrpost_mailbox::saturating_sum;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What all modules of a node, and its replicas, keep there.
-pub(super) fn of_node(modules: &[&Module], replicas: u64) -> String {
+/// What all modules of a node keep there, and `others` besides, each with its name.
+pub(super) fn of_node(modules: &[&Module], others: [(u64, &str); 2]) -> String {
     let sum = |memory: fn(&Module) -> u64| saturating_sum(modules.iter().map(|module| memory(module)));
-    let mailboxes = format!("{} of mailboxes", about(sum(Module::mailbox_memory)));
-    let streams = match sum(Module::stream_memory) {
-        0 => String::new(),
-        streams => format!(", {} of streams", about(streams)),
-    };
-    let replicas = if replicas == 0 { String::new() } else { format!(", {} of replicas", about(replicas)) };
-    format!("{mailboxes}{streams}{replicas}")
+    let mut words = format!("{} of mailboxes", about(sum(Module::mailbox_memory)));
+    for (bytes, what) in [(sum(Module::stream_memory), "streams")].into_iter().chain(others) {
+        if bytes > 0 {
+            let _ = write!(words, ", {} of {what}", about(bytes));
+        }
+    }
+    words
 }
 
 pub(super) fn mailbox(spec: &MailboxSpec) -> String {

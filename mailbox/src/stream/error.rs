@@ -61,7 +61,7 @@ pub enum StreamError {
     Descriptors(StreamId),
     /// Its file cannot be used.
     #[error("stream {0}: its file {1}: {2}")]
-    File(StreamId, PathBuf, io::Error),
+    File(StreamId, PathBuf, #[source] io::Error),
     /// Its file is something else.
     #[error("stream {0}: {1}")]
     Bad(StreamId, BadFile),

@@ -1,10 +1,15 @@
 //! The few things that recording asks of a disk. Tests put one in its place that fails.
 
 use nix::sys::statvfs::statvfs;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::time::Duration;
+
+/// So often a lock is tried, and so far apart.
+const LOCK_TRIES: usize = 20;
+const LOCK_RETRY: Duration = Duration::from_millis(1);
 
 /// Where files are made.
 pub(crate) trait Disk: Send {
@@ -33,6 +38,13 @@ pub(crate) trait DiskFile: Send {
     fn has_name(&mut self) -> io::Result<bool>;
 }
 
+/// Whether a recorder writes this file just now. It holds a lock, which ends with its process; on a disk without locks
+/// nobody can tell.
+pub fn is_being_written(path: &Path) -> bool {
+    // A shared one: network file systems give no other for a file that is read.
+    File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
 /// That of the operating system.
 pub(crate) struct RealDisk;
 
@@ -41,7 +53,13 @@ impl Disk for RealDisk {
         let file = OpenOptions::new().write(true).create_new(true).open(path)?;
         // As long as it is open, others see that it is being written. Where there are no locks, it is written all the
         // same.
-        let _ = file.try_lock();
+        for _ in 0..LOCK_TRIES {
+            // A reader that looks whether it is being written has it for a moment.
+            if !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+                break;
+            }
+            std::thread::sleep(LOCK_RETRY);
+        }
         Ok(Box::new(file))
     }
 

@@ -14,6 +14,9 @@ pub enum DiskError {
     Full {
         /// The file that was written.
         path: Shown,
+        /// What the kernel said.
+        #[source]
+        error: Arc<io::Error>,
     },
     /// Less is free than recordings leave to others.
     #[error(
@@ -33,18 +36,27 @@ pub enum DiskError {
     ReadOnly {
         /// What was to be written.
         path: Shown,
+        /// What the kernel said.
+        #[source]
+        error: Arc<io::Error>,
     },
     /// By the modes of the folder or its file system.
     #[error("{path}: permission denied; let the user of the recorder write in this folder")]
     Denied {
         /// What was to be written.
         path: Shown,
+        /// What the kernel said.
+        #[source]
+        error: Arc<io::Error>,
     },
     /// The folder or the open file was removed, or its disk unmounted.
     #[error("{path}: is gone; make the folder again, or mount its disk")]
     Gone {
         /// What is not there.
         path: Shown,
+        /// What the kernel said, if it was asked for that.
+        #[source]
+        error: Option<Arc<io::Error>>,
     },
     /// A link leads to where no files are to be made.
     #[error("{folder}: leads out of {root}, where files are to be made; remove the link")]
@@ -60,6 +72,7 @@ pub enum DiskError {
         /// The file.
         path: Shown,
         /// What the kernel said.
+        #[source]
         error: Arc<io::Error>,
     },
     /// Anything else.
@@ -70,6 +83,7 @@ pub enum DiskError {
         /// With which file.
         path: Shown,
         /// What the kernel said.
+        #[source]
         error: Arc<io::Error>,
     },
 }
@@ -77,13 +91,13 @@ pub enum DiskError {
 impl DiskError {
     /// Sorts an error of the kernel.
     pub(crate) fn new(doing: &'static str, path: &Path, error: io::Error) -> Self {
-        let shown = Shown(path.to_owned());
+        let (path, error) = (Shown(path.to_owned()), Arc::new(error));
         match error.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full { path: shown },
-            io::ErrorKind::ReadOnlyFilesystem => Self::ReadOnly { path: shown },
-            io::ErrorKind::PermissionDenied => Self::Denied { path: shown },
-            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Self::Gone { path: shown },
-            _ => Self::Other { doing, path: shown, error: Arc::new(error) },
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full { path, error },
+            io::ErrorKind::ReadOnlyFilesystem => Self::ReadOnly { path, error },
+            io::ErrorKind::PermissionDenied => Self::Denied { path, error },
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Self::Gone { path, error: Some(error) },
+            _ => Self::Other { doing, path, error },
         }
     }
 }
@@ -107,6 +121,7 @@ pub enum ReadError {
         /// The file.
         path: Shown,
         /// What the kernel said.
+        #[source]
         error: io::Error,
     },
     /// It does not begin with MCAP's magic bytes.

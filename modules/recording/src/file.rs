@@ -107,7 +107,7 @@ impl OpenFile {
         let failed = |error: io::Error| DiskError::Sync { path: Shown(self.path.clone()), error: error.into() };
         sink.file().sync().map_err(failed)?;
         if !sink.file().has_name().map_err(failed)? {
-            return Err(DiskError::Gone { path: Shown(self.path.clone()) });
+            return Err(DiskError::Gone { path: Shown(self.path.clone()), error: None });
         }
         if !self.has_synced_name {
             disk.sync_folder(folder_of(&self.path)).map_err(failed)?;

@@ -65,6 +65,9 @@ pub mod key {
     pub const REPEATED: &str = "repeated";
     /// Of a channel that was drawn of another one, for other programs: the topic of that.
     pub const DRAWN: &str = "drawn";
+    /// Of a drawn channel with fewer pixels or points than what was recorded, so that nothing long is in a file twice:
+    /// `true`.
+    pub const REDUCED: &str = "reduced";
 }
 
 /// Operation codes of records.

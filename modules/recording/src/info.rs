@@ -77,6 +77,8 @@ pub struct ChannelInfo {
     pub message_encoding: String,
     /// The topic that it was drawn of for other programs, if it was.
     pub drawn_of: Option<String>,
+    /// Pictures or points were reduced as they were drawn: some of them, or all.
+    pub is_reduced: bool,
     /// Messages, without those that are repeated.
     pub messages: u64,
     /// Repeated from an earlier file, as the beginning of this one.
@@ -232,19 +234,21 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
     let mut channels: BTreeMap<&str, ChannelInfo> = BTreeMap::new();
     let mut epochs: BTreeMap<u64, Tally> = BTreeMap::new();
     let mut times = None;
+    // Other programs may have the same words for other things.
+    let is_ours = info.profile == format::PROFILE;
     for (id, channel) in definitions.channels() {
         let tally = tallies.get(&id);
         let (messages, its_times) = tally.map_or((0, None), |tally| (tally.messages, tally.times));
         let told = channels.entry(&channel.topic).or_default();
-        describe(told, channel);
-        if channel.is_repeated() {
+        describe(told, channel, is_ours);
+        if is_ours && channel.is_repeated() {
             told.repeated = told.repeated.saturating_add(messages);
             continue;
         }
         told.messages = told.messages.saturating_add(messages);
         (told.first_ns, told.last_ns) = wider(told.first_ns.zip(told.last_ns), its_times).unzip();
         times = wider(times, its_times);
-        if let Some(epoch) = channel.epoch().filter(|_| messages > 0) {
+        if let Some(epoch) = channel.epoch().filter(|_| is_ours && messages > 0) {
             let tally = epochs.entry(epoch).or_default();
             tally.messages = tally.messages.saturating_add(messages);
             tally.widen(its_times);
@@ -274,7 +278,7 @@ fn sum(counts: impl Iterator<Item = u64>) -> u64 {
 }
 
 /// A topic has a channel for each epoch, all with the same description.
-fn describe(info: &mut ChannelInfo, channel: &Definition) {
+fn describe(info: &mut ChannelInfo, channel: &Definition, is_ours: bool) {
     let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
     info.topic.clone_from(&channel.topic);
     (info.name, info.item) = (text(key::NAME), text(key::ITEM));
@@ -282,5 +286,6 @@ fn describe(info: &mut ChannelInfo, channel: &Definition) {
     info.ty = channel.schema.ty();
     info.schema_encoding.clone_from(&channel.schema.encoding);
     info.message_encoding.clone_from(&channel.message_encoding);
-    info.drawn_of = channel.texts.get(key::DRAWN).cloned();
+    info.drawn_of = channel.texts.get(key::DRAWN).filter(|_| is_ours).cloned();
+    info.is_reduced |= is_ours && channel.texts.contains_key(key::REDUCED);
 }

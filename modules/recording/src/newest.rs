@@ -2,7 +2,7 @@
 
 use crate::batch::{Batch, Message};
 use crate::shape::Shape;
-use crate::status::ChannelState;
+use crate::status::{ChannelId, ChannelState};
 use rohrpost_schema::Type;
 use std::sync::Arc;
 
@@ -18,6 +18,8 @@ pub(crate) struct Newest {
     channels: Vec<NewestOf>,
     bytes: usize,
     bytes_max: usize,
+    /// Those of before the recording, of channels that it does not know yet.
+    earlier: Option<Box<Earlier>>,
 }
 
 /// The newest message of a channel.
@@ -47,16 +49,38 @@ impl Newest {
     /// Of none; files have this length, and begin with no more than a quarter of it.
     pub(crate) fn new(file_bytes: u64) -> Self {
         let quarter = usize::try_from(file_bytes / 4).unwrap_or(usize::MAX);
-        Self { channels: Vec::new(), bytes: 0, bytes_max: quarter.min(KEPT_BYTES_MAX) }
+        Self { channels: Vec::new(), bytes: 0, bytes_max: quarter.min(KEPT_BYTES_MAX), earlier: None }
     }
 
-    /// Notes what is in a file now.
-    pub(crate) fn note(&mut self, batch: &Batch, channels: &[Arc<ChannelState>]) {
+    /// The same, behind those of another recording.
+    pub(crate) fn behind(earlier: Option<Earlier>, file_bytes: u64) -> Self {
+        Self { earlier: earlier.map(Box::new), ..Self::new(file_bytes) }
+    }
+
+    /// Takes notice of channels that are new.
+    pub(crate) fn learn(&mut self, channels: &[Arc<ChannelState>]) {
         for channel in &channels[self.channels.len()..] {
             let ty = Type::from_bytes(&channel.schema).ok();
             let is_words = ty.as_ref().and_then(Shape::of) == Some(Shape::Line);
             self.channels.push(NewestOf { is_words, kept: None });
+            if let Some(kept) = self.earlier.as_mut().and_then(|earlier| earlier.take(channel)) {
+                self.put(self.channels.len() - 1, kept);
+            }
         }
+    }
+
+    /// Puts in what another one has kept, if there is room.
+    fn put(&mut self, at: usize, kept: KeptMessage) {
+        let bytes = kept.data.as_ref().map_or(0, Vec::capacity);
+        if self.bytes + bytes <= self.bytes_max {
+            self.bytes += bytes;
+            self.channels[at].kept = Some(kept);
+        }
+    }
+
+    /// Notes what is in a file now.
+    pub(crate) fn note(&mut self, batch: &Batch, channels: &[Arc<ChannelState>]) {
+        self.learn(channels);
         let mut last = vec![None; channels.len()];
         batch.messages().enumerate().for_each(|(place, (at, _))| last[at] = Some(place));
         for (place, (at, message)) in batch.messages().enumerate() {
@@ -106,6 +130,46 @@ impl Newest {
         let mut missing: Vec<_> = missing.collect();
         missing.sort_by_key(|(_, message)| (message.epoch, message.arrival_ns));
         missing
+    }
+}
+
+/// The newest message of each channel of a recording that has ended, and of what came since then: another recording
+/// begins with them ([`crate::Writer::start_behind`]).
+pub struct Earlier {
+    channels: Vec<Arc<ChannelState>>,
+    newest: Newest,
+}
+
+impl Earlier {
+    pub(crate) fn new(channels: Vec<Arc<ChannelState>>, mut newest: Newest) -> Self {
+        newest.learn(&channels);
+        newest.earlier = None;
+        Self { channels, newest }
+    }
+
+    /// Notes a message that is not recorded, of a channel of the recording that has ended. Takes as long as copying it.
+    pub fn note(&mut self, channel: ChannelId, message: &Message<'_>) {
+        if self.newest.channels.get(channel.0).is_some_and(|its| !its.is_words) {
+            self.newest.keep(channel.0, message);
+        }
+    }
+
+    /// Fills in what is older, of channels of which nothing came since then.
+    pub fn fill(&mut self, mut older: Self) {
+        for (at, channel) in self.channels.iter().enumerate() {
+            if self.newest.channels[at].kept.is_none()
+                && let Some(kept) = older.take(channel)
+            {
+                self.newest.put(at, kept);
+            }
+        }
+    }
+
+    /// That of a channel, which may have another number here.
+    fn take(&mut self, channel: &ChannelState) -> Option<KeptMessage> {
+        let is_it = |its: &Arc<ChannelState>| its.topic == channel.topic && its.type_hash == channel.type_hash;
+        let at = self.channels.iter().position(is_it)?;
+        self.newest.channels[at].kept.take()
     }
 }
 

@@ -21,7 +21,7 @@ use crate::error::{DiskError, Shown};
 use crate::file::OpenFile;
 use crate::format::metadata;
 use crate::inbox::Taken;
-use crate::newest::Newest;
+use crate::newest::{Earlier, Newest};
 use crate::options::{Options, Session};
 use crate::rotate;
 use crate::shared::Shared;
@@ -62,8 +62,13 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    pub(crate) fn new(disk: Box<dyn Disk>, options: Options, session: Session, shared: Arc<Shared>) -> Self {
-        let newest = Newest::new(options.rotation.bytes_max);
+    pub(crate) fn new(
+        disk: Box<dyn Disk>,
+        newest: Newest,
+        options: Options,
+        session: Session,
+        shared: Arc<Shared>,
+    ) -> Self {
         Self {
             disk,
             options,
@@ -180,6 +185,7 @@ impl Recorder {
     fn learn_channels(&mut self) {
         let known = self.channels.len();
         self.channels.extend(self.shared.channels_from(known));
+        self.newest.learn(&self.channels);
         let known = self.described.len();
         self.described.extend(self.shared.described_from(known));
     }
@@ -369,6 +375,7 @@ impl Recorder {
         if let Err(error) = told {
             self.fail(error, Instant::now());
         }
+        self.shared.put_newest(Earlier::new(self.channels, self.newest));
     }
 
     /// Losses that no file tells, as the last one was closed before, have one more.
@@ -381,5 +388,7 @@ impl Recorder {
     fn lose(&mut self, batch: &Batch) {
         self.learn_channels();
         batch.messages().for_each(|(at, _)| self.channels[at].count_lost(1));
+        // It is newer than what was written: the next recording does not begin with an older value.
+        self.newest.note(batch, &self.channels);
     }
 }

@@ -1,5 +1,6 @@
 //! A whole file from one that was not closed, or is damaged.
 
+use crate::disk::is_being_written;
 use crate::error::{Damage, ReadError, Shown};
 use crate::format::metadata;
 use crate::read::contents::{Contents, Ending, Item};
@@ -38,6 +39,9 @@ pub struct Recovered {
 /// Why nothing was recovered.
 #[derive(Debug, Error)]
 pub enum RecoverError {
+    /// What is made of it now would lack what still comes.
+    #[error("{0}: a recorder writes it just now; end the recording, or begin its next file: `rohrpost record rotate`")]
+    BeingWritten(Shown),
     /// The old file.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -57,8 +61,11 @@ pub fn recovered_path(path: &Path) -> PathBuf {
 /// reading goes on behind it; where no record can be found any more, it ends.
 ///
 /// # Errors
-/// When the old file is no MCAP file, or the new one cannot be written.
+/// When the old file is no MCAP file, or is being written, or the new one cannot be written.
 pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Recovered, RecoverError> {
+    if is_being_written(path) {
+        return Err(RecoverError::BeingWritten(Shown(path.to_owned())));
+    }
     let mut contents = Contents::open(path)?;
     let mut new = Rewriter::create(to)?;
     let mut damages = Vec::new();

@@ -102,6 +102,11 @@ const KNOWN: [KnownType; 6] = [
 ];
 
 impl Shape {
+    /// Whether a part of such a value is one, too.
+    pub(crate) const fn can_be_reduced(self) -> bool {
+        matches!(self, Self::Scan | Self::Points | Self::Picture)
+    }
+
     /// Of values of a type; none if they are not drawn.
     pub(crate) fn of(ty: &Type) -> Option<Self> {
         match ty {

@@ -2,6 +2,7 @@
 
 use crate::described::DescribedModule;
 use crate::inbox::Inbox;
+use crate::newest::Earlier;
 use crate::status::{ChannelState, Counts, Status};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -11,11 +12,14 @@ pub(crate) struct Shared {
     channels: Mutex<Vec<Arc<ChannelState>>>,
     described: Mutex<Vec<Arc<DescribedModule>>>,
     counts: Mutex<Counts>,
+    /// Of a recording that has ended.
+    newest: Mutex<Option<Earlier>>,
 }
 
 impl Shared {
     pub(crate) fn new(inbox: Inbox) -> Self {
-        Self { inbox, channels: Mutex::default(), described: Mutex::default(), counts: Mutex::default() }
+        let (channels, described) = (Mutex::default(), Mutex::default());
+        Self { inbox, channels, described, counts: Mutex::default(), newest: Mutex::default() }
     }
 
     pub(crate) fn add(&self, channel: Arc<ChannelState>) {
@@ -34,6 +38,14 @@ impl Shared {
     /// Those behind the first `known`.
     pub(crate) fn described_from(&self, known: usize) -> Vec<Arc<DescribedModule>> {
         self.described.lock().unwrap_or_else(PoisonError::into_inner)[known..].to_vec()
+    }
+
+    pub(crate) fn put_newest(&self, newest: Earlier) {
+        *self.newest.lock().unwrap_or_else(PoisonError::into_inner) = Some(newest);
+    }
+
+    pub(crate) fn take_newest(&self) -> Option<Earlier> {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     pub(crate) fn counts(&self) -> MutexGuard<'_, Counts> {

@@ -40,6 +40,10 @@ pub struct Status {
     pub channels: Vec<ChannelStatus>,
 }
 
+/// A channel of one writer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ChannelId(pub(crate) usize);
+
 /// How one channel goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ChannelStatus {

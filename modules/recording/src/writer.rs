@@ -6,11 +6,12 @@ use crate::disk::{Disk, RealDisk};
 use crate::error::DiskError;
 use crate::format::{MESSAGE_BYTES_MAX, key, topic};
 use crate::inbox::Inbox;
+use crate::newest::{Earlier, Newest};
 use crate::options::{Options, Session};
 use crate::order::{Mark, Order, OrderError, OrderKind, PendingOrder};
 use crate::recorder::Recorder;
 use crate::shared::Shared;
-use crate::status::{ChannelState, Status};
+use crate::status::{ChannelId, ChannelState, Status};
 use rohrpost_schema::{Description, Type, describe_type};
 use std::collections::BTreeMap;
 use std::io;
@@ -34,10 +35,6 @@ pub struct ChannelSpec<'a> {
     /// Anything else that replay should know.
     pub texts: BTreeMap<String, String>,
 }
-
-/// A channel of one writer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ChannelId(usize);
 
 /// Why recording does not begin.
 #[derive(Debug, Error)]
@@ -102,6 +99,8 @@ pub struct Writer {
     channels: Vec<Arc<ChannelState>>,
     /// Names of described modules, and hashes of their interfaces.
     described: BTreeMap<String, u32>,
+    /// Most bytes of a file.
+    file_bytes: u64,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -114,17 +113,36 @@ impl Writer {
         Self::start_on(Box::new(RealDisk), options, session)
     }
 
-    /// The same on another disk.
+    /// Begins behind another recording: the first file begins with the newest messages of that, and of what came since,
+    /// as each further file does with those of the file before.
+    ///
+    /// # Errors
+    /// As of [`Self::start`].
+    pub fn start_behind(earlier: Option<Earlier>, options: Options, session: Session) -> Result<Self, StartError> {
+        Self::begin(Box::new(RealDisk), earlier, options, session)
+    }
+
+    /// The same as [`Self::start`] on another disk.
     pub(crate) fn start_on(disk: Box<dyn Disk>, options: Options, session: Session) -> Result<Self, StartError> {
+        Self::begin(disk, None, options, session)
+    }
+
+    fn begin(
+        disk: Box<dyn Disk>,
+        earlier: Option<Earlier>,
+        options: Options,
+        session: Session,
+    ) -> Result<Self, StartError> {
         let stem = &options.stem;
         if stem.is_empty() || stem.starts_with('.') || stem.contains(['/', '\0', '\n']) {
             return Err(StartError::Stem(stem.clone()));
         }
         let shared = Arc::new(Shared::new(Inbox::new(options.queue_chunks)));
-        let recorder = Recorder::new(disk, options, session, shared.clone());
+        let file_bytes = options.rotation.bytes_max;
+        let recorder = Recorder::new(disk, Newest::behind(earlier, file_bytes), options, session, shared.clone());
         let thread = std::thread::Builder::new().name("recording".into()).spawn(|| recorder.run());
         let thread = Some(thread.map_err(StartError::Thread)?);
-        Ok(Self { shared, channels: Vec::new(), described: BTreeMap::new(), thread })
+        Ok(Self { shared, channels: Vec::new(), described: BTreeMap::new(), file_bytes, thread })
     }
 
     /// Adds a channel. The same one again is the same.
@@ -233,6 +251,18 @@ impl Writer {
     /// [`Status::is_running`] is false, and [`Writer::finish`] tells at once how it ended.
     pub fn begin_end(&mut self) {
         self.shared.inbox.end();
+    }
+
+    /// For what comes from now on, as this recording ends.
+    pub fn passed_over(&self) -> Earlier {
+        Earlier::new(self.channels.clone(), Newest::new(self.file_bytes))
+    }
+
+    /// Writes what waits, closes the file, and hands out the newest messages, also those that it began with; none the
+    /// second time.
+    pub fn take_newest(&mut self) -> Option<Earlier> {
+        self.end();
+        self.shared.take_newest()
     }
 
     /// How it goes.

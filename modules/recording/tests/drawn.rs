@@ -10,7 +10,7 @@ use rohrpost_recording::{
     DrawError, DrawOptions, Drawn, DrawnBeside, Options, ReadError, Reader, RewriteError, SelectError, Selection, cut,
     draw, info, merge,
 };
-use sights::{Sight, line, pose, record, record_files, record_with, scan, sight, sights};
+use sights::{Sight, line, long_cloud, long_picture, pose, record, record_drawn, record_files, scan, sight, sights};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -130,14 +130,29 @@ fn a_rate_takes_the_first_of_each_period_and_every_line() {
 
 #[test]
 fn nothing_long_is_in_a_file_twice() {
-    let side = 160;
-    let pixels = Bytes(vec![7; side * side * 3]);
-    let long = Image { pixels, ..Image::empty(side as u32, side as u32, ImageFormat::Rgb8) };
-    let sights = [sight("camera.0", "image", &long), sight("camera.0", "image", &sights::picture())];
+    let file = Image { pixels: Bytes(vec![7; (64 << 10) + 1]), ..Image::empty(2, 2, ImageFormat::Jpeg) };
+    let sights = [
+        sight("camera.0", "image", &long_picture().0),
+        sight("camera.0", "image", &sights::picture()),
+        sight("camera.1", "image", &file),
+    ];
     let drawing = Drawing::of(&sights, &Selection::default(), true);
-    assert_eq!((drawing.told.drawn["camera.0/image/image"], drawing.told.too_long["camera.0/image"]), (1, 1));
-    assert_eq!(drawing.told.messages, 3);
-    assert_eq!(Drawing::all(&sights).told.drawn["camera.0/image/image"], 2);
+    assert_eq!(drawing.told.drawn, BTreeMap::from([("camera.0/image/image".into(), 2)]));
+    assert_eq!(drawing.told.too_long, BTreeMap::from([("camera.1/image".into(), 1)]));
+    assert_eq!(drawing.told.messages, 5);
+    assert_eq!(reduced(&drawing.to), ["camera.0/image/image"]);
+    let longest = |path: &Path| drawn_of(path).into_iter().map(|(.., data)| data.len()).max().unwrap();
+    assert!((57_600..58_000).contains(&longest(&drawing.to)), "{}", longest(&drawing.to));
+    let drawing = Drawing::all(&sights);
+    assert_eq!(drawing.told.drawn.values().sum::<u64>(), 3);
+    assert_eq!(reduced(&drawing.to), [""; 0]);
+    assert!(longest(&drawing.to) > 640 * 480 * 3, "{}", longest(&drawing.to));
+}
+
+/// Topics that are told to be reduced.
+fn reduced(path: &Path) -> Vec<String> {
+    let channels = info(path).unwrap().channels.into_iter().filter(|channel| channel.is_reduced);
+    channels.map(|channel| channel.topic).collect()
 }
 
 #[test]
@@ -193,13 +208,6 @@ fn drawn_of(path: &Path) -> Vec<(String, u64, u32, Vec<u8>)> {
     drawn
 }
 
-/// A recording that draws what it records; its file.
-fn record_drawn(folder: &Path, period_ns: u64, sights: &[Sight]) -> PathBuf {
-    let drawn = Some(DrawnBeside { period_ns, classes: BTreeMap::from([(140, "pilot".to_owned())]) });
-    record_with(Options { drawn, ..Options::new(folder, "beside") }, sights);
-    folder.join("beside-0001.mcap")
-}
-
 #[test]
 fn what_is_drawn_while_it_is_recorded_is_what_is_drawn_afterwards() {
     let folder = tempfile::tempdir().unwrap();
@@ -216,13 +224,13 @@ fn what_is_drawn_while_it_is_recorded_is_what_is_drawn_afterwards() {
 }
 
 #[test]
-fn what_is_drawn_while_it_is_recorded_is_sampled_and_short() {
+fn what_is_drawn_while_it_is_recorded_is_sampled_and_reduced() {
     let folder = tempfile::tempdir().unwrap();
     // A hundredth of a second apart: 1.25 s after a full one, so periods of 0.1 s end behind the fifth.
     let mut all: Vec<Sight> = (0..12).map(|_| sight("mapper.0", "pose", &pose(1.0, 2.0, 0.5))).collect();
     all.extend((0..3).map(|_| sight("output.0", "line", &line("battery low"))));
-    let long = Image { row_bytes: 300, pixels: Bytes(vec![7; 90_000]), ..Image::empty(100, 300, ImageFormat::Rgb8) };
-    all.push(sight("camera.0", "image", &long));
+    all.extend([0, 1].map(|_| sight("camera.0", "image", &long_picture().0)));
+    all.extend([0, 1].map(|_| sight("depth.0", "points", &long_cloud().0)));
     let path = record_drawn(folder.path(), 100_000_000, &all);
     let drawn = drawn_of(&path);
     let of = |topic: &str| -> Vec<u32> {
@@ -230,10 +238,16 @@ fn what_is_drawn_while_it_is_recorded_is_sampled_and_short() {
     };
     assert_eq!(of("mapper.0/pose/pose"), [0, 5], "the first of each period");
     assert_eq!(of("output.0/line/log"), [12, 13, 14], "each line");
-    assert_eq!(of("camera.0/image/image"), [0; 0], "it would be in the file twice");
+    assert_eq!(
+        (of("camera.0/image/image"), of("depth.0/points/points")),
+        (vec![15], vec![17]),
+        "the first of a period"
+    );
+    assert_eq!(reduced(&path), ["camera.0/image/image", "depth.0/points/points"]);
+    assert!(drawn.iter().all(|(.., data)| data.len() < 66_000), "a part of what is long");
     let told = info(&path).unwrap();
     let image = told.channels.iter().find(|channel| channel.topic == "camera.0/image").unwrap();
-    assert_eq!((image.messages, told.lost), (1, 0));
+    assert_eq!((image.messages, told.lost), (2, 0));
 }
 
 #[test]

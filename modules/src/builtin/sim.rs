@@ -104,11 +104,10 @@ pub(super) struct Sim {
 
 fn world(settings: &Settings, context: &Context) -> Result<World, ModuleError> {
     let path = context.path(&settings.map);
-    let text =
-        std::fs::read_to_string(&path).map_err(|error| ModuleError::new(format!("{}: {error}", path.display())))?;
+    let text = std::fs::read_to_string(&path).map_err(|error| ModuleError::at(path.display(), error))?;
     let world =
         if text.starts_with("type") { World::parse_octile(&text, settings.cell_m, None) } else { World::parse(&text) };
-    world.map_err(|error| ModuleError::new(format!("{}: {error}", path.display())))
+    world.map_err(|error| ModuleError::at(path.display(), error))
 }
 
 impl Module for Sim {

@@ -2,7 +2,7 @@
 
 use super::noted::NotedCallError;
 use super::{CallError, Link, append};
-use crate::journal::{Blob, ModuleJournal, NotedCommand, NotedValue, Tag};
+use crate::journal::{Blob, ModuleJournal, NotedCommand, NotedValue, Question, Tag, nanoseconds};
 use rohrpost_mailbox::Name;
 use rohrpost_schema::Description;
 use serde::Serialize;
@@ -76,7 +76,7 @@ impl Caller {
         bytes.clear();
         append(&mut bytes, arguments).map_err(|error| CallError::BadArguments(error.to_string()))?;
         journal.replay(|replay| replay.know_called(interface, description));
-        let timeout_ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
+        let timeout_ns = nanoseconds(timeout);
         let arguments = NotedValue::of(&bytes);
         journal.output(Tag::Called, &NotedCommand { to: to.raw(), function, interface, timeout_ns, arguments });
         let write = |body: &mut Vec<u8>| {
@@ -84,14 +84,16 @@ impl Caller {
             Ok(())
         };
         let begin = || link.borrow_mut().begin(to, function, interface, timeout, write);
-        let begun: Result<u32, NotedCallError> = journal.answer(Tag::Begun, || begin().map_err(NotedCallError::from));
+        let ask = || begin().map_err(NotedCallError::from);
+        let begun: Result<u32, NotedCallError> = journal.answer(Tag::Begun, Question::Plain, ask);
         begun.map_err(CallError::from)
     }
 
     /// Waits for the result of a call to this module.
     pub(crate) fn wait<T: DeserializeOwned>(&self, sequence: u32, to: Name) -> Result<T, CallError> {
         let SharedLink { link, journal, .. } = &*self.0;
-        if let Some(given) = journal.given(Tag::Answered) {
+        let question = Question::Call { to: to.raw(), sequence };
+        if let Some(given) = journal.given(Tag::Answered, question) {
             let answer: Result<Blob<'_>, NotedCallError> = given.read();
             let read = |bytes: Blob<'_>| {
                 postcard::from_bytes(bytes.0).map_err(|error| CallError::BadReply(to, error.to_string()))
@@ -100,7 +102,7 @@ impl Caller {
         }
         let mut is_noted = journal.is_none();
         let read = |bytes: &[u8]| {
-            journal.note(Tag::Answered, &Ok::<_, NotedCallError>(Blob(bytes)));
+            journal.note(Tag::Answered, question, &Ok::<_, NotedCallError>(Blob(bytes)));
             is_noted = true;
             postcard::from_bytes(bytes)
         };
@@ -108,7 +110,7 @@ impl Caller {
         match result {
             Err(error) if !is_noted => {
                 let error = NotedCallError::from(error);
-                journal.note(Tag::Answered, &Err::<Blob<'_>, _>(&error));
+                journal.note(Tag::Answered, question, &Err::<Blob<'_>, _>(&error));
                 Err(error.into())
             }
             result => result,

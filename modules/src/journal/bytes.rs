@@ -15,6 +15,12 @@ impl Serialize for Blob<'_> {
 /// Odd, so that multiplying by it loses nothing.
 const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
+/// Another word; of no two words the same. Of 0 it is not 0: memory that was never written has no sums that are right.
+pub(super) fn spread(word: u32) -> u32 {
+    // By an odd number, as above.
+    (word ^ 0x5bd1_e995).wrapping_mul(0x9e37_79b1)
+}
+
 /// A sum of bytes, on top of an earlier one. Each step can be undone, so bytes that differ in one word have different
 /// sums for sure. Against mistakes, not against malice.
 pub(super) fn digest(before: u64, bytes: &[u8]) -> u64 {

@@ -1,6 +1,7 @@
 //! What a module is called with.
 
 use super::bytes::Blob;
+use super::value::NotedValue;
 use serde::{Deserialize, Serialize};
 
 /// A call of the module's code by its runtime.
@@ -22,7 +23,7 @@ pub(crate) enum JournalEvent<'a> {
         missed: u32,
         incarnation: u32,
         #[serde(borrow)]
-        value: Blob<'a>,
+        value: NotedValue<'a>,
     },
     /// A function of its own, of the interface under its name of this index.
     Function {
@@ -35,8 +36,12 @@ pub(crate) enum JournalEvent<'a> {
         wish: Blob<'a>,
         by: &'a str,
     },
-    /// A descriptor is ready. Not replayed.
-    Ready,
+    /// A descriptor is ready.
+    Ready {
+        watch: u32,
+        readable: bool,
+        writable: bool,
+    },
 }
 
 /// How data came.
@@ -67,7 +72,7 @@ impl JournalEvent<'_> {
             }
             Self::Function { number, .. } => format!("runs its function {number}"),
             Self::Parameters { by, .. } => format!("is given parameters (by {by})"),
-            Self::Ready => "reads a descriptor".into(),
+            Self::Ready { watch, .. } => format!("finds descriptor {watch} ready"),
         }
     }
 }

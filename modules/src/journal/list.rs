@@ -1,24 +1,29 @@
 //! A journal in words.
 
-use super::entry::{self, NoEntry, Tag};
+use super::entry::{Entries, NoEntry, Tag};
 use super::event::EventAt;
 use super::outputs::{KnownTypes, describe};
+use std::io::Read;
 
-/// All entries, up to where the journal ends, or cannot be read any further.
-pub(super) fn entries(bytes: &[u8]) -> Vec<String> {
-    let (mut at, mut sum, mut events, mut entries) = (0, 0, 0_u64, Vec::new());
+/// Tells all entries, up to where the journal ends, or cannot be read any further, or `tell` says false.
+pub(super) fn each<R: Read>(mut entries: Entries<R>, mut tell: impl FnMut(&str) -> bool) {
+    let mut events = 0_u64;
     loop {
-        let entry = match entry::read(bytes, at, sum) {
-            Ok(entry) => entry,
-            Err(NoEntry::End) => return entries,
+        let text = match entries.look() {
+            Ok(tag) => {
+                events += u64::from(tag == Tag::Event);
+                text(tag, entries.content(), events)
+            }
+            Err(NoEntry::End) => return,
             Err(damage) => {
-                entries.push(words(damage));
-                return entries;
+                tell(&words(damage));
+                return;
             }
         };
-        (at, sum) = (entry.content.end, entry.sum);
-        events += u64::from(entry.tag == Tag::Event);
-        entries.push(text(entry.tag, &bytes[entry.content], events));
+        if !tell(&text) {
+            return;
+        }
+        entries.pass();
     }
 }
 
@@ -27,6 +32,7 @@ fn words(damage: NoEntry) -> String {
         NoEntry::End | NoEntry::Cut => "(the journal is cut off within an entry)".into(),
         NoEntry::Sum => "(an entry is damaged or missing)".into(),
         NoEntry::Tag(tag) => format!("(an entry of an unknown kind, {tag})"),
+        NoEntry::Unreadable(kind) => format!("(its file cannot be read: {kind})"),
     }
 }
 

@@ -16,29 +16,41 @@
 //! pays for a branch. Whatever no journal sees is noted as a hole, and a replay ends there, with the reason.
 
 mod bytes;
+mod commands;
 mod entry;
 mod event;
 mod files;
 mod list;
 mod outputs;
+mod question;
+mod records;
 mod replay;
 mod run;
+mod value;
 mod verdict;
 mod write;
 
 pub(crate) use bytes::Blob;
+pub use commands::{NotedAnswer, NotedOutcome};
 pub(crate) use entry::Tag;
 use event::EventAt;
 pub(crate) use event::{JournalEvent, NotedOrigin};
-pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply, NotedValue};
+pub(crate) use outputs::{Begin, NotedCommand, NotedItem, NotedReply};
+pub(crate) use question::{AskedInterest, AskedStream, Question, nanoseconds};
+use records::NamedRecord;
+pub use records::{RecordSum, RecordWriter};
 pub(crate) use replay::{Given, JournalReplay};
 pub use run::{ExactRun, Piece, RunError, VARIABLE};
+pub(crate) use value::NotedValue;
+pub use value::WHOLE_BYTES_MAX;
 pub use verdict::{Difference, ReplayReport, ReplayVerdict};
-pub(crate) use write::{JournalWriter, SHAPE};
+pub(crate) use write::JournalWriter;
 
-use rohrpost_mailbox::monotonic_ns;
+use rohrpost_config::RECORDED_BYTES_MAX;
+use rohrpost_mailbox::{StreamId, monotonic_ns};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
@@ -65,12 +77,41 @@ thread_local! {
 
 const STRAYED: &str = "the module reads the clock, or a stream, in another thread or within `take_in`";
 
-/// Hands on what a module that has no journal any more, since it panicked in its making, has noted.
-pub(crate) fn flush_present() {
+/// The module was not made: it failed, or panicked. With that its journal ends.
+pub(crate) fn end_unmade(tag: Tag, why: &str) {
     PRESENT.with_borrow_mut(|present| match present {
-        Some(JournalMode::Write(writer)) => writer.flush(),
-        Some(JournalMode::Replay(_)) | None => {}
+        Some(JournalMode::Write(writer)) => {
+            writer.put(tag, why);
+            writer.put(Tag::End, &());
+            writer.flush();
+        }
+        Some(JournalMode::Replay(replay)) => {
+            replay.output(tag, why);
+            replay.end()
+        }
+        None => {}
     });
+}
+
+/// The module could not be started, for a reason that is none of its own.
+pub(crate) fn end_unstarted(why: &str) {
+    PRESENT.with_borrow_mut(|present| match present {
+        Some(JournalMode::Write(writer)) => writer.put(Tag::Hole, &format!("the module could not be started: {why}")),
+        Some(JournalMode::Replay(replay)) => replay.give_up(&format!("the module cannot be started here: {why}")),
+        None => {}
+    });
+}
+
+/// The journal of this thread, put aside; it comes back also if the module panics meanwhile.
+struct Aside(Option<JournalMode>);
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        if let Some(JournalMode::Write(writer)) = self.0.as_mut().filter(|_| std::thread::panicking()) {
+            writer.put(Tag::Hole, "the module panicked within `take_in`, or the like, which a replay does not call");
+        }
+        PRESENT.set(self.0.take());
+    }
 }
 
 impl ModuleJournal {
@@ -131,46 +172,83 @@ impl ModuleJournal {
     }
 
     /// Something that the module is told: asked now, and noted; or, replayed, what was noted then.
-    pub(crate) fn answer<T: Serialize + DeserializeOwned>(&self, tag: Tag, ask: impl FnOnce() -> T) -> T {
+    pub(crate) fn answer<T: Serialize + DeserializeOwned>(
+        &self,
+        tag: Tag,
+        question: Question<'_>,
+        ask: impl FnOnce() -> T,
+    ) -> T {
         if self.0.is_none() {
             return ask();
         }
-        if let Some(given) = self.given(tag) {
+        if let Some(given) = self.given(tag, question) {
             return given.read();
         }
         let answer = ask();
-        self.note(tag, &answer);
+        self.note(tag, question, &answer);
         answer
     }
 
     /// Notes an answer that was given already; nothing, unless it is written.
-    pub(crate) fn note<T: Serialize + ?Sized>(&self, tag: Tag, answer: &T) {
-        self.write(|writer| writer.put(tag, answer));
+    pub(crate) fn note<T: Serialize + ?Sized>(&self, tag: Tag, question: Question<'_>, answer: &T) {
+        self.put(tag, &(question, answer));
     }
 
-    /// The answer that was noted then; none unless it is replayed.
-    pub(crate) fn given(&self, tag: Tag) -> Option<Given> {
-        self.replay(|replay| replay.answer(tag))
+    /// The answer that was noted then; none unless it is replayed. What is asked is what was asked then.
+    pub(crate) fn given(&self, tag: Tag, question: Question<'_>) -> Option<Given> {
+        self.replay(|replay| replay.answer(tag, &question))
+    }
+
+    /// The module wants something that has no answer.
+    pub(crate) fn asked(&self, tag: Tag, question: Question<'_>) {
+        self.answer(tag, question, || ());
+    }
+
+    fn put<T: Serialize + ?Sized>(&self, tag: Tag, content: &T) {
+        self.write(|writer| writer.put(tag, content));
+    }
+
+    /// A record that the module is given, as what comes next has it. Its bytes, or if it `is_recorded` and long, its
+    /// sum.
+    pub(crate) fn record<'b>(&self, id: StreamId, sequence: u64, is_recorded: bool, bytes: &'b [u8]) -> NotedValue<'b> {
+        if self.is_none() || !is_recorded {
+            return NotedValue::Whole(Blob(bytes));
+        }
+        let value = NotedValue::of(bytes);
+        if bytes.len() > RECORDED_BYTES_MAX {
+            self.hole(&format!("it is given a record of {} bytes, which is more than a recording takes", bytes.len()));
+        } else if let NotedValue::Sum(sum) = value {
+            self.put(Tag::Named, &NamedRecord { stream: id.into(), sequence, sum });
+        }
+        value
+    }
+
+    /// The bytes of a record that was noted so; only if it is replayed.
+    pub(crate) fn bytes<'b>(&self, value: NotedValue<'b>) -> Cow<'b, [u8]> {
+        match value {
+            NotedValue::Whole(bytes) => bytes.0.into(),
+            NotedValue::Sum(sum) => self.replay(|replay| replay.named(sum)).unwrap_or_default().into(),
+        }
     }
 
     /// How it begins.
     pub(crate) fn begin(&self, begin: &Begin<'_>) {
         if self.replay(|replay| replay.begin(begin)).is_none() {
-            self.note(Tag::Begin, begin);
+            self.put(Tag::Begin, begin);
         }
     }
 
     /// The module is called; `now_ns` is asked for if that is noted.
     pub(crate) fn event(&self, event: &JournalEvent<'_>, now_ns: impl FnOnce() -> u64) {
         if !self.is_none() && self.replay(|replay| replay.event(event)).is_none() {
-            self.note(Tag::Event, &EventAt { at_ns: now_ns(), event: *event });
+            self.put(Tag::Event, &EventAt { at_ns: now_ns(), event: *event });
         }
     }
 
     /// The module sends something, or says something of itself.
     pub(crate) fn output<T: Serialize + ?Sized>(&self, tag: Tag, output: &T) {
         if !self.is_none() && self.replay(|replay| replay.output(tag, output)).is_none() {
-            self.note(tag, output);
+            self.put(tag, output);
         }
     }
 
@@ -184,10 +262,8 @@ impl ModuleJournal {
     /// Does this without the journal. What it asks of the module's runtime meanwhile is a hole, since a replay does not
     /// ask it.
     pub(crate) fn apart<T>(&self, part: impl FnOnce() -> T) -> T {
-        let present = PRESENT.take();
-        let done = part();
-        PRESENT.set(present);
-        done
+        let _aside = Aside(PRESENT.take());
+        part()
     }
 
     /// What comes now is seen by no journal.
@@ -196,13 +272,13 @@ impl ModuleJournal {
     }
 
     /// A file that the module's settings name: a replay wants one with the same content.
-    pub(crate) fn file(&self, path: &Path) {
+    pub(crate) fn file(&self, named: &str, path: &Path) {
         if self.is_none() {
             return;
         }
-        let found = files::digest_of(path);
-        if self.replay(|replay| replay.file(path, found)).is_none() {
-            self.note(Tag::File, &found);
+        let (question, found) = (Question::File(named), files::digest_of(path));
+        if self.replay(|replay| replay.file(&question, path, found)).is_none() {
+            self.note(Tag::File, question, &found);
         }
     }
 

@@ -1,17 +1,13 @@
 //! What a module sends and says, as its journal has it.
 
-use super::bytes::{Blob, digest};
 use super::entry::{Tag, VERSION};
 use super::event::JournalEvent;
+use super::question::Question;
+use super::records::NamedRecord;
+use super::value::{NotedValue, in_hex};
 use rohrpost_mailbox::Name;
 use rohrpost_schema::{Description, Type, decode};
 use serde::{Deserialize, Serialize};
-use std::fmt::Write;
-
-/// A longer value is noted by its length and sum.
-const WHOLE_BYTES_MAX: usize = 4096;
-/// Bytes of a value without description that are shown.
-const SHOWN_BYTES: usize = 64;
 
 /// What a program knows of types: to show values.
 #[derive(Default)]
@@ -42,29 +38,6 @@ impl<'a> Begin<'a> {
     /// All but where files are.
     pub(super) fn texts(&self) -> (u32, &'a str, &'a str, Option<&'a str>) {
         (self.version, self.module, self.config.1, self.saved.map(|(_, text)| text))
-    }
-}
-
-/// A value: whole, if it is not long.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub(crate) enum NotedValue<'a> {
-    Whole(#[serde(borrow)] Blob<'a>),
-    Sum { len: u64, sum: u64 },
-}
-
-impl<'a> NotedValue<'a> {
-    pub(crate) fn of(bytes: &'a [u8]) -> Self {
-        match bytes.len() {
-            0..=WHOLE_BYTES_MAX => Self::Whole(Blob(bytes)),
-            len => Self::Sum { len: len as u64, sum: digest(0, bytes) },
-        }
-    }
-
-    fn shown(&self, decoded: impl FnOnce(&[u8]) -> Option<String>) -> String {
-        match self {
-            Self::Whole(bytes) => decoded(bytes.0).unwrap_or_else(|| in_hex(bytes.0)),
-            Self::Sum { len, sum } => format!("{len} bytes of sum {sum:016x}"),
-        }
     }
 }
 
@@ -104,10 +77,22 @@ pub(super) fn describe(tag: Tag, content: &[u8], event: Option<&JournalEvent<'_>
         Tag::Published | Tag::Written => postcard::from_bytes(content).ok().map(|its| published(&its, known)),
         Tag::Called => postcard::from_bytes(content).ok().map(|its| called(&its, known)),
         Tag::Replied => postcard::from_bytes(content).ok().map(|its| replied(&its, event, known)),
+        Tag::Named => postcard::from_bytes(content).ok().map(|its: NamedRecord| its.to_string()),
+        Tag::GaveOut => postcard::from_bytes(content).ok().map(|its: NotedValue<'_>| its.shown(|_| None)),
         Tag::Failed | Tag::Panicked => postcard::from_bytes::<&str>(content).ok().map(|text| format!("\"{text}\"")),
-        _ => return format!("it {}", tag.words()),
+        _ => return asked(tag, content),
     };
     format!("it {}: {}", tag.words(), text.unwrap_or_else(|| in_hex(content)))
+}
+
+/// An entry with a question, in words.
+fn asked(tag: Tag, content: &[u8]) -> String {
+    let is_question = !matches!(tag, Tag::Begin | Tag::Event | Tag::Hole | Tag::End);
+    let question = is_question.then(|| postcard::take_from_bytes::<Question<'_>>(content).ok()).flatten();
+    match question.and_then(|(question, _)| question.words()) {
+        Some(question) => format!("it {}: {question}", tag.words()),
+        None => format!("it {}", tag.words()),
+    }
 }
 
 impl KnownTypes {
@@ -148,16 +133,4 @@ fn replied(its: &NotedReply<'_>, event: Option<&JournalEvent<'_>>, known: &Known
         _ => None,
     });
     result.shown(|bytes| Some(decode(&ty?, bytes).ok()?.to_string()))
-}
-
-fn in_hex(bytes: &[u8]) -> String {
-    let mut text = format!("{} bytes", bytes.len());
-    for (at, byte) in bytes.iter().take(SHOWN_BYTES).enumerate() {
-        // Writing to a text does not fail.
-        let _ = write!(text, "{}{byte:02x}", if at % 4 == 0 { " " } else { "" });
-    }
-    if bytes.len() > SHOWN_BYTES {
-        text.push_str(" …");
-    }
-    text
 }

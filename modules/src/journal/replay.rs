@@ -3,14 +3,16 @@
 //! The first thing that differs ends the process: nothing behind it would mean anything, and no code of the module is
 //! to run on a made-up answer. What was found is in a file by then.
 
-use super::entry::{self, NoEntry, ReadEntry, Tag};
+use super::entry::{Entries, NoEntry, Tag};
 use super::event::{EventAt, JournalEvent};
 use super::outputs::{Begin, KnownTypes, describe};
+use super::question::Question;
+use super::records::{NamedRecord, RecordSum, Records};
 use super::verdict::{Difference, ReplayReport, ReplayVerdict};
 use rohrpost_schema::Description;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
-use std::ops::Range;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -38,31 +40,31 @@ impl ReplayProgress {
 
 /// A journal, and where in it the module is.
 pub(crate) struct JournalReplay {
-    bytes: Rc<[u8]>,
-    at: usize,
-    /// Of the entry before.
-    sum: u32,
-    /// Content of the present event.
-    event: Range<usize>,
+    entries: Entries<Box<dyn Read>>,
+    /// Content of the present event; nothing before the first.
+    event: Vec<u8>,
     known: KnownTypes,
     /// Why it is cut off at its end, if it is.
     ends: Option<String>,
-    output: Vec<u8>,
+    /// What the recording has of it.
+    records: Records,
+    /// The record that the module is given next, or now.
+    named: Option<NamedRecord>,
+    /// What the module says, as a journal has it.
+    said: Vec<u8>,
     progress: Rc<ReplayProgress>,
 }
 
 /// Content of an entry.
 pub(crate) struct Given {
-    bytes: Rc<[u8]>,
-    content: Range<usize>,
+    bytes: Vec<u8>,
     progress: Rc<ReplayProgress>,
 }
 
 impl Given {
     /// What is in it.
     pub(crate) fn read<'a, T: Deserialize<'a>>(&'a self) -> T {
-        let read = postcard::from_bytes(&self.bytes[self.content.clone()]);
-        read.unwrap_or_else(|error| {
+        postcard::from_bytes(&self.bytes).unwrap_or_else(|error| {
             let why = format!("what was noted then is not what this program asks for ({error})");
             self.progress.stop(ReplayVerdict::Refused(why))
         })
@@ -70,9 +72,10 @@ impl Given {
 }
 
 impl JournalReplay {
-    pub(super) fn new(bytes: Rc<[u8]>, ends: Option<String>, report: PathBuf) -> Self {
+    pub(super) fn new(from: Box<dyn Read>, records: Records, ends: Option<String>, report: PathBuf) -> Self {
         let progress = Rc::new(ReplayProgress { path: report, report: RefCell::default() });
-        Self { bytes, at: 0, sum: 0, event: 0..0, known: KnownTypes::default(), ends, output: Vec::new(), progress }
+        let (entries, known) = (Entries::new(from), KnownTypes::default());
+        Self { entries, event: Vec::new(), known, ends, records, named: None, said: Vec::new(), progress }
     }
 
     /// The module's interfaces, under each of its names.
@@ -89,21 +92,26 @@ impl JournalReplay {
 
     /// It is of this module and these settings, wherever their files are now.
     pub(super) fn begin(&mut self, begin: &Begin<'_>) {
-        let given = self.answer(Tag::Begin);
+        self.compare(Tag::Begin, &(), |_, _| true);
+        let given = self.given(0);
         let noted: Begin<'_> = given.read();
         if noted.texts() != begin.texts() {
             self.refuse("it is of another module, or of other settings");
         }
     }
 
-    /// The next entry. Where the journal ends, so does the replay.
-    fn look(&self) -> ReadEntry {
-        match entry::read(&self.bytes, self.at, self.sum) {
-            Ok(frame) if frame.tag == Tag::Hole => {
-                let why: &str = postcard::from_bytes(&self.bytes[frame.content]).unwrap_or("for no reason told");
-                self.progress.stop(ReplayVerdict::Refused(why.into()))
+    /// The kind of the next entry. Where the journal ends, so does the replay.
+    fn look(&mut self) -> Tag {
+        while self.entries.look() == Ok(Tag::Named) {
+            self.named = postcard::from_bytes(self.entries.content()).ok();
+            self.entries.pass();
+        }
+        match self.entries.look() {
+            Ok(Tag::Hole) => {
+                let why: &str = postcard::from_bytes(self.entries.content()).unwrap_or("for no reason told");
+                self.refuse(why)
             }
-            Ok(frame) => frame,
+            Ok(tag) => tag,
             // What the module was in when it was killed, or when the recording ended.
             Err(NoEntry::End | NoEntry::Cut) => match &self.ends {
                 Some(why) => self.refuse(why),
@@ -111,24 +119,22 @@ impl JournalReplay {
             },
             Err(NoEntry::Sum) => self.refuse("an entry of the journal is damaged or missing here"),
             Err(NoEntry::Tag(tag)) => self.refuse(&format!("an entry of the journal is of an unknown kind, {tag}")),
+            Err(NoEntry::Unreadable(kind)) => self.refuse(&format!("the journal cannot be read here: {kind}")),
         }
     }
 
-    fn pass(&mut self, frame: &ReadEntry) {
-        (self.at, self.sum) = (frame.content.end, frame.sum);
-    }
-
-    fn given(&self, frame: ReadEntry) -> Given {
-        Given { bytes: self.bytes.clone(), content: frame.content, progress: self.progress.clone() }
+    /// Content of the present entry, from there on.
+    fn given(&self, from: usize) -> Given {
+        let bytes = self.entries.content().get(from..).unwrap_or_default().to_vec();
+        Given { bytes, progress: self.progress.clone() }
     }
 
     /// The event that comes next. The module's work for the one before is done; behind the last one ends the replay.
-    pub(crate) fn next_event(&self) -> NextEvent {
-        let frame = self.look();
-        match frame.tag {
-            Tag::Event => NextEvent(self.given(frame)),
+    pub(crate) fn next_event(&mut self) -> NextEvent {
+        match self.look() {
+            Tag::Event => NextEvent(self.given(0)),
             Tag::End => self.progress.stop(ReplayVerdict::Identical { is_whole: true }),
-            _ => self.differ(self.describe(&frame), "its work is done".into()),
+            tag => self.differ(self.describe_next(tag), "its work is done".into()),
         }
     }
 
@@ -139,17 +145,17 @@ impl JournalReplay {
 
     /// The module is called with this.
     pub(super) fn event(&mut self, event: &JournalEvent<'_>) {
-        let frame = self.look();
-        if frame.tag != Tag::Event {
-            self.differ(self.describe(&frame), format!("it {}", event.words()));
+        let tag = self.look();
+        if tag != Tag::Event {
+            self.differ(self.describe_next(tag), format!("it {}", event.words()));
         }
-        let given = self.given(frame.clone());
+        let given = self.given(0);
         let EventAt { at_ns, event: noted } = given.read();
         if noted != *event {
             self.differ(format!("it {}", noted.words()), format!("it {}", event.words()));
         }
-        self.pass(&frame);
-        self.event = frame.content;
+        self.entries.pass();
+        self.event = given.bytes;
         let mut report = self.progress.report.borrow_mut();
         if report.events == 0 {
             report.first_ns = at_ns;
@@ -159,32 +165,50 @@ impl JournalReplay {
     }
 
     /// What was noted, when the module asks this.
-    pub(super) fn answer(&mut self, tag: Tag) -> Given {
-        let frame = self.look();
-        if frame.tag != tag {
-            self.differ(self.describe(&frame), format!("it {}", tag.words()));
+    pub(super) fn answer(&mut self, tag: Tag, question: &Question<'_>) -> Given {
+        self.compare(tag, question, <[u8]>::starts_with);
+        self.given(self.said.len())
+    }
+
+    /// A record that the recording has.
+    pub(super) fn named(&mut self, sum: RecordSum) -> Vec<u8> {
+        let what = self.named.filter(|named| named.sum == sum).map_or_else(|| sum.to_string(), |its| its.to_string());
+        match self.records.get(sum) {
+            Ok(Some(bytes)) => bytes,
+            Ok(None) => self.refuse(&format!(
+                "{what}, which the module is given here, is not in the recording: the recorder came too late, was too \
+                 slow, or the file is a part of it"
+            )),
+            Err(error) => self.refuse(&format!("{what}, which the module is given here, cannot be read: {error}")),
         }
-        self.pass(&frame);
-        self.given(frame)
     }
 
     /// Compares what the module sends.
     pub(super) fn output<T: Serialize + ?Sized>(&mut self, tag: Tag, output: &T) {
-        let mut bytes = std::mem::take(&mut self.output);
-        bytes.clear();
-        bytes = postcard::to_extend(output, bytes).unwrap_or_default();
-        let frame = self.look();
-        if frame.tag != tag || self.bytes[frame.content.clone()] != *bytes {
-            self.differ(self.describe(&frame), self.describe_sent(tag, &bytes));
+        self.compare(tag, output, <[u8]>::eq);
+        let is_end = matches!(tag, Tag::Failed | Tag::Panicked);
+        let is_made = self.present().is_some_and(|event| event != JournalEvent::New);
+        let not_made = (is_end && !is_made).then(|| self.describe_sent(tag, &self.said));
+        let mut report = self.progress.report.borrow_mut();
+        report.outputs += 1;
+        report.not_made = not_made;
+    }
+
+    /// Goes to the next entry, if it is of this kind, and its content fits what the module says.
+    fn compare<T: Serialize + ?Sized>(&mut self, tag: Tag, says: &T, fits: fn(&[u8], &[u8]) -> bool) {
+        let mut said = std::mem::take(&mut self.said);
+        said.clear();
+        self.said = postcard::to_extend(says, said).unwrap_or_default();
+        let next = self.look();
+        if next != tag || !fits(self.entries.content(), &self.said) {
+            self.differ(self.describe_next(next), self.describe_sent(tag, &self.said));
         }
-        self.pass(&frame);
-        self.output = bytes;
-        self.progress.report.borrow_mut().outputs += 1;
+        self.entries.pass();
     }
 
     /// A file has the content that it had.
-    pub(super) fn file(&mut self, path: &Path, found: Option<(u64, u64)>) {
-        let noted: Option<(u64, u64)> = self.answer(Tag::File).read();
+    pub(super) fn file(&mut self, question: &Question<'_>, path: &Path, found: Option<(u64, u64)>) {
+        let noted: Option<(u64, u64)> = self.answer(Tag::File, question).read();
         if noted != found {
             let text = |file: Option<(u64, u64)>| match file {
                 Some((len, _)) => format!("{len} bytes"),
@@ -195,10 +219,10 @@ impl JournalReplay {
         }
     }
 
-    /// An entry, in words.
-    fn describe(&self, frame: &ReadEntry) -> String {
-        let content = &self.bytes[frame.content.clone()];
-        match frame.tag {
+    /// The next entry, of this kind, in words.
+    fn describe_next(&self, tag: Tag) -> String {
+        let content = self.entries.content();
+        match tag {
             Tag::Event => match postcard::from_bytes::<EventAt<'_>>(content) {
                 Ok(EventAt { event, .. }) => format!("its work is done, and next it {}", event.words()),
                 Err(_) => "its work is done".into(),
@@ -209,7 +233,7 @@ impl JournalReplay {
 
     /// The event that the module is at.
     fn present(&self) -> Option<JournalEvent<'_>> {
-        postcard::from_bytes::<EventAt<'_>>(&self.bytes[self.event.clone()]).ok().map(|its| its.event)
+        postcard::from_bytes::<EventAt<'_>>(&self.event).ok().map(|its| its.event)
     }
 
     fn describe_sent(&self, tag: Tag, content: &[u8]) -> String {
@@ -226,11 +250,10 @@ impl JournalReplay {
     }
 
     /// The module has ended.
-    pub(super) fn end(&self) -> ! {
-        let frame = self.look();
-        match frame.tag {
+    pub(super) fn end(&mut self) -> ! {
+        match self.look() {
             Tag::End => self.progress.stop(ReplayVerdict::Identical { is_whole: true }),
-            _ => self.differ(self.describe(&frame), "it ends".into()),
+            tag => self.differ(self.describe_next(tag), "it ends".into()),
         }
     }
 

@@ -1,14 +1,17 @@
 //! A module's run, as a file for the program that is to repeat it.
 
 use super::bytes::Blob;
-use super::entry::{self, NoEntry, Tag};
+use super::entry::{Entries, NoEntry, Tag, VERSION};
 use super::list;
 use super::outputs::Begin;
+use super::records::{NamedRecord, RecordSum, Records};
 use super::replay::JournalReplay;
 use rohrpost_config::{Installation, Saved};
 use rohrpost_mailbox::Name;
-use rohrpost_schema::Bytes;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Variable of the environment with the path of an [`ExactRun`]: the module's program repeats it, and does nothing
@@ -71,8 +74,10 @@ pub struct ExactRun {
     pub report: String,
     /// Why the journal ends before the module did; none if nothing is known to be missing.
     pub ends: Option<String>,
-    /// All entries.
-    pub journal: Bytes,
+    /// File with all entries.
+    pub journal: String,
+    /// File of a [`RecordWriter`](super::RecordWriter) with the records that the journal names; none if it names none.
+    pub records: Option<String>,
 }
 
 /// Why a run cannot be repeated at all.
@@ -102,23 +107,27 @@ impl ExactRun {
         std::fs::write(path, bytes).map_err(|error| failed(&error))
     }
 
-    fn begin(&self) -> Result<Begin<'_>, RunError> {
-        let refused = |why: &str| Err(RunError(format!("the journal cannot be replayed: {why}")));
-        let frame = match entry::read(&self.journal, 0, 0) {
-            Ok(frame) if frame.tag == Tag::Begin => frame,
-            Ok(_) => return refused("its beginning is missing"),
-            Err(NoEntry::End | NoEntry::Cut) => return refused("it is cut off in its beginning"),
-            Err(NoEntry::Sum | NoEntry::Tag(_)) => return refused("its beginning is damaged"),
+    /// All entries.
+    pub(super) fn open(&self) -> Result<BufReader<File>, RunError> {
+        let file = File::open(&self.journal).map_err(|error| RunError(format!("{}: {error}", self.journal)))?;
+        Ok(BufReader::new(file))
+    }
+
+    /// Content of the first entry, if it is of this version.
+    fn beginning(&self) -> Result<Vec<u8>, RunError> {
+        let mut entries = Entries::new(self.open()?);
+        let why = match entries.look() {
+            Ok(Tag::Begin) => match postcard::take_from_bytes::<u32>(entries.content()) {
+                Ok((VERSION, _)) => return Ok(entries.content().to_vec()),
+                Ok((version, _)) => format!("it is of version {version}, and this program has {VERSION}"),
+                Err(_) => "its beginning is damaged".into(),
+            },
+            Ok(_) => "its beginning is missing".into(),
+            Err(NoEntry::End | NoEntry::Cut) => "it is cut off in its beginning".into(),
+            Err(NoEntry::Sum | NoEntry::Tag(_)) => "its beginning is damaged, or of another version".into(),
+            Err(NoEntry::Unreadable(kind)) => format!("its file cannot be read: {kind}"),
         };
-        let content = &self.journal[frame.content];
-        match postcard::take_from_bytes::<u32>(content) {
-            Ok((entry::VERSION, _)) => {}
-            Ok((version, _)) => {
-                return refused(&format!("it is of version {version}, and this program has {}", entry::VERSION));
-            }
-            Err(_) => return refused("its beginning is damaged"),
-        }
-        postcard::from_bytes(content).or_else(|_| refused("its beginning is damaged"))
+        Err(RunError(format!("the journal cannot be replayed: {why}")))
     }
 
     /// The configuration as it was then, and the module.
@@ -126,8 +135,10 @@ impl ExactRun {
     /// # Errors
     /// The journal does not begin as one of this version does.
     pub fn installation(&self) -> Result<(Installation, Name), RunError> {
-        let Begin { module, config: (config, text), saved, .. } = self.begin()?;
+        let beginning = self.beginning()?;
         let failed = |error: &dyn std::fmt::Display| RunError(error.to_string());
+        let Begin { module, config: (config, text), saved, .. } =
+            postcard::from_bytes(&beginning).map_err(|error| failed(&format!("its beginning is damaged: {error}")))?;
         let mut installation = Installation::parse(text, &self.here(config)).map_err(|error| failed(&error))?;
         if let Some((path, text)) = saved {
             let saved = Saved::parse(text, &self.here(path), &installation).map_err(|error| failed(&error))?;
@@ -137,9 +148,13 @@ impl ExactRun {
         Ok((installation, name))
     }
 
-    /// All entries of the journal in words, as far as they can be read.
-    pub fn entries(&self) -> Vec<String> {
-        list::entries(&self.journal)
+    /// Tells all entries of the journal in words, as far as they can be read, and until `tell` says false.
+    ///
+    /// # Errors
+    /// The journal's file cannot be opened.
+    pub fn each_entry(&self, tell: impl FnMut(&str) -> bool) -> Result<(), RunError> {
+        list::each(Entries::new(self.open()?), tell);
+        Ok(())
     }
 
     /// A file's path here.
@@ -149,7 +164,25 @@ impl ExactRun {
         self.folder.as_ref().map_or_else(|| path.to_owned(), |folder| Path::new(folder).join(name))
     }
 
-    pub(crate) fn replay(self) -> JournalReplay {
-        JournalReplay::new(self.journal.0.into(), self.ends, self.report.into())
+    /// Records that the journal names, since the recording has them.
+    ///
+    /// # Errors
+    /// The journal's file cannot be opened.
+    pub fn named_records(&self) -> Result<BTreeSet<RecordSum>, RunError> {
+        let (mut entries, mut named) = (Entries::new(self.open()?), BTreeSet::new());
+        while let Ok(tag) = entries.look() {
+            let record = (tag == Tag::Named).then(|| postcard::from_bytes::<NamedRecord>(entries.content()).ok());
+            named.extend(record.flatten().map(|record| record.sum));
+            entries.pass();
+        }
+        Ok(named)
+    }
+
+    pub(crate) fn replay(self) -> Result<JournalReplay, RunError> {
+        let records = match &self.records {
+            Some(path) => Records::open(Path::new(path)).map_err(|error| RunError(format!("{path}: {error}")))?,
+            None => Records::default(),
+        };
+        Ok(JournalReplay::new(Box::new(self.open()?), records, self.ends, self.report.into()))
     }
 }

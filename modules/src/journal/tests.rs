@@ -1,8 +1,11 @@
 //! Journals as a module writes them, and replays of these and of others with one thing changed.
 
+use super::entry::{Entries, NoEntry};
+use super::records::Records;
 use super::*;
 use rohrpost_mailbox::{Name, Next, Node, Participant, StreamId, SystemClock};
 use rohrpost_schema::{DataItem, DataKind, Description, Field, Type};
+use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const MODULE: Name = Name::new(1, 100, 0, 0);
@@ -15,7 +18,8 @@ fn work(journal: &ModuleJournal, clock_ns: &mut u64, event: u64, bias: u64) {
         *clock_ns += 7;
         *clock_ns
     };
-    let (first, second) = (journal.answer(Tag::Time, &mut ask), journal.answer(Tag::Time, &mut ask));
+    let mut ask_time = || journal.answer(Tag::Time, Question::Plain, &mut ask);
+    let (first, second) = (ask_time(), ask_time());
     let value = postcard::to_stdvec(&(first * 31 + second + bias)).unwrap();
     journal
         .output(Tag::Published, &NotedItem { endpoint: 0, number: 1, stamp_ns: first, value: NotedValue::of(&value) });
@@ -35,12 +39,12 @@ fn written(run: impl FnOnce(&ModuleJournal)) -> Vec<u8> {
     let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
     let participant = Participant::join(&node, MODULE).unwrap();
     let id = StreamId { name: MODULE, number: JOURNAL_NUMBER };
-    let stream = participant.stream_writer(id, SHAPE).unwrap();
+    let stream = participant.stream_writer(id, rohrpost_config::JOURNAL.shape()).unwrap();
     let mut reader = participant.stream_reader(id).unwrap();
     let journal = ModuleJournal::written(JournalWriter::new(stream, SystemClock::open(&node), 7));
     journal.begin(&Begin::new("pilot.0", ("robot.toml", "text"), None));
     run(&journal);
-    flush_present();
+    drop(PRESENT.take());
     let mut bytes = Vec::new();
     while let Next::Record(record) = reader.try_next().unwrap() {
         let piece = Piece::read(record.body()).unwrap();
@@ -50,12 +54,21 @@ fn written(run: impl FnOnce(&ModuleJournal)) -> Vec<u8> {
     bytes
 }
 
+fn replay_of(bytes: &[u8], records: Records, ends: Option<&str>) -> JournalReplay {
+    JournalReplay::new(Box::new(Cursor::new(bytes.to_vec())), records, ends.map(Into::into), "".into())
+}
+
 /// What a replay of these bytes finds.
 fn replayed(bytes: &[u8], ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) -> ReplayReport {
+    replayed_with(bytes, Records::default(), ends, run)
+}
+
+/// The same, with these records.
+fn replayed_with(bytes: &[u8], records: Records, ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) -> ReplayReport {
     let item = DataItem { number: 1, kind: DataKind::Data, field: Field::new("sum", Type::U64) };
     let (name, class, text) = ("Sums".into(), "pilot".into(), String::new());
     let own = Description { name, class, text, functions: Vec::new(), data: vec![item] };
-    let mut replay = JournalReplay::new(bytes.into(), ends.map(Into::into), "".into());
+    let mut replay = replay_of(bytes, records, ends);
     replay.know_own(vec![Some(own)]);
     let journal = ModuleJournal::replayed(replay);
     let run = || {
@@ -68,12 +81,12 @@ fn replayed(bytes: &[u8], ends: Option<&str>, run: impl FnOnce(&ModuleJournal)) 
 
 /// Entries of a journal: tag and content.
 fn entries(bytes: &[u8]) -> Vec<(Tag, Vec<u8>)> {
-    let (mut at, mut sum, mut entries) = (0, 0, Vec::new());
-    while let Ok(frame) = entry::read(bytes, at, sum) {
-        (at, sum) = (frame.content.end, frame.sum);
-        entries.push((frame.tag, bytes[frame.content].to_vec()));
+    let (mut read, mut entries) = (Entries::new(bytes), Vec::new());
+    while let Ok(tag) = read.look() {
+        entries.push((tag, read.content().to_vec()));
+        read.pass();
     }
-    assert_eq!(at, bytes.len());
+    assert_eq!(read.look(), Err(NoEntry::End));
     entries
 }
 
@@ -95,6 +108,7 @@ fn the_same_run_is_identical_whatever_its_own_clock_says() {
         outputs: EVENTS,
         first_ns: 0,
         last_ns: (EVENTS - 1) * 1000,
+        not_made: None,
     };
     assert_eq!(report, expected);
     let own_clock = |journal: &ModuleJournal| {
@@ -123,21 +137,18 @@ fn what_differs_is_told_with_its_event_and_both_values() {
 #[test]
 fn each_flipped_bit_is_found_in_its_event() {
     let bytes = written(|journal| run(journal, None));
-    let (mut at, mut sum, mut events) = (0, 0, 0);
-    while let Ok(frame) = entry::read(&bytes, at, sum) {
-        for bit in at * 8..frame.content.end * 8 {
+    let (mut at, mut events) = (0, 0);
+    for (tag, content) in entries(&bytes) {
+        let end = at + sealed(&[(tag, content)]).len();
+        for bit in at * 8..end * 8 {
             let mut flipped = bytes.clone();
             flipped[bit / 8] ^= 1 << (bit % 8);
             let report = replayed(&flipped, None, |journal| run(journal, None));
-            // A length that points behind the end is told as an end.
-            let is_found = match &report.verdict {
-                ReplayVerdict::Refused(why) => why == "an entry of the journal is damaged or missing here",
-                verdict => *verdict == ReplayVerdict::Identical { is_whole: false } && bit < (at + 4) * 8,
-            };
-            assert!(is_found && report.events == events, "bit {bit}, event {events}: {report:?}");
+            let damaged = ReplayVerdict::Refused("an entry of the journal is damaged or missing here".into());
+            assert_eq!((&report.verdict, report.events), (&damaged, events), "bit {bit}: {report:?}");
         }
-        events += u64::from(frame.tag == Tag::Event);
-        (at, sum) = (frame.content.end, frame.sum);
+        events += u64::from(tag == Tag::Event);
+        at = end;
     }
     assert_eq!(events, EVENTS);
 }
@@ -167,6 +178,88 @@ fn a_missing_entry_and_a_clock_reading_1_ns_off_are_found_in_their_event_though_
     }
 }
 
+/// Asks of a stream what is next, and publishes what came.
+fn look(journal: &ModuleJournal, event: u64, tag: Tag, question: Question<'_>) {
+    journal.event(&JournalEvent::Tick, || event * 1000);
+    let next: Option<u64> = journal.answer(tag, question, || Some(event));
+    let value = postcard::to_stdvec(&next.unwrap_or_default()).unwrap();
+    journal.output(Tag::Published, &NotedItem { endpoint: 0, number: 1, stamp_ns: 0, value: NotedValue::of(&value) });
+}
+
+#[test]
+fn another_question_is_told_in_its_event_with_both_though_the_answer_would_do() {
+    let [hook, lamp] = [1, 2].map(|number| StreamId { name: MODULE, number }.into());
+    let run = |tag: Tag, question: Question<'static>| {
+        move |journal: &ModuleJournal| {
+            (0..3).for_each(|event| look(journal, event, Tag::Record, Question::Sequence(hook, event)));
+            look(journal, 3, tag, question);
+            journal.end();
+        }
+    };
+    let bytes = written(run(Tag::Record, Question::Sequence(hook, 3)));
+    let same = replayed(&bytes, None, run(Tag::Record, Question::Sequence(hook, 3)));
+    assert_eq!(same.to_string(), "identical: 4 events, 4 outputs");
+    for (tag, question, told) in [
+        (Tag::Record, Question::Sequence(hook, 4), "it reads a record of a stream: stream 1 of 1.100.0.0, sequence 4"),
+        (Tag::Record, Question::Sequence(lamp, 3), "it reads a record of a stream: stream 2 of 1.100.0.0, sequence 3"),
+        (Tag::Newest, Question::Of(hook), "it reads the newest record of a stream: stream 1 of 1.100.0.0"),
+        (
+            Tag::Around,
+            Question::Time(hook, 2, 5),
+            "it looks for a time in a stream: stream 1 of 1.100.0.0, 5 ns of epoch 2",
+        ),
+    ] {
+        let report = replayed(&bytes, None, run(tag, question));
+        let ReplayVerdict::Differs(difference) = &report.verdict else { panic!("{report:?}") };
+        assert_eq!((report.events, report.outputs, report.last_ns), (4, 3, 3000), "{report:?}");
+        assert_eq!(difference.recorded, "it reads a record of a stream: stream 1 of 1.100.0.0, sequence 3");
+        assert_eq!(difference.replayed, told);
+    }
+}
+
+#[test]
+fn a_long_record_that_is_recorded_anyhow_stands_there_by_its_sum() {
+    let picture: Vec<u8> = (0..70_000_u32).map(|at| (at / 7) as u8).collect();
+    let id = StreamId { name: MODULE, number: 2 };
+    // As a reader of streams does it.
+    let read = |journal: &ModuleJournal, is_recorded: bool| {
+        journal.event(&JournalEvent::Tick, || 5);
+        let bytes = match journal.given(Tag::Newest, Question::Of(id.into())) {
+            Some(given) => journal.bytes(given.read()).into_owned(),
+            None => {
+                let noted = journal.record(id, 7, is_recorded, &picture);
+                journal.note(Tag::Newest, Question::Of(id.into()), &noted);
+                picture.clone()
+            }
+        };
+        journal.output(Tag::Replied, &NotedReply { is_fault: false, result: NotedValue::of(&bytes) });
+        journal.end();
+    };
+    let [whole, short] = [false, true].map(|is_recorded| written(|journal| read(journal, is_recorded)));
+    assert!(whole.len() > 70_000 && short.len() < 300, "{} B, {} B", whole.len(), short.len());
+    let found = replayed(&whole, None, |journal| read(journal, false));
+    assert_eq!(found.to_string(), "identical: 1 events, 1 outputs");
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("records");
+    let records = |bytes: &[u8]| {
+        let mut writer = RecordWriter::create(&path).unwrap();
+        writer.add(RecordSum::of(bytes), bytes).unwrap();
+        writer.finish().unwrap();
+        Records::open(&path).unwrap()
+    };
+    let found = replayed_with(&short, records(&picture), None, |journal| read(journal, true));
+    assert_eq!(found.to_string(), "identical: 1 events, 1 outputs");
+    let mut other = picture.clone();
+    other[40_000] ^= 1;
+    for records in [records(&other), Records::default()] {
+        let found = replayed_with(&short, records, None, |journal| read(journal, true));
+        assert_eq!((found.events, found.outputs), (1, 0));
+        let ReplayVerdict::Refused(why) = &found.verdict else { panic!("{found:?}") };
+        assert!(why.starts_with("record 7 of stream 2 of 1.100.0.0, 70000 bytes of sum "), "{why}");
+    }
+}
+
 #[test]
 fn a_journal_ends_where_something_is_that_it_does_not_see() {
     let with_hole = |journal: &ModuleJournal| {
@@ -180,6 +273,44 @@ fn a_journal_ends_where_something_is_that_it_does_not_see() {
     assert_eq!(entries(&bytes).last().map(|(tag, _)| *tag), Some(Tag::Hole));
     let report = replayed(&bytes, None, with_hole);
     assert_eq!(report.to_string(), "refused from event 2 on, at 1000 ns: it looks out of the window");
+}
+
+#[test]
+fn a_module_that_is_not_made_is_repeated_with_its_reason() {
+    for (tag, told) in [(Tag::Failed, "it fails: \"no port\""), (Tag::Panicked, "it panics: \"no port\"")] {
+        let run = |why: &'static str| {
+            move |journal: &ModuleJournal| {
+                journal.event(&JournalEvent::New, || 5);
+                end_unmade(tag, why);
+            }
+        };
+        let bytes = written(run("no port"));
+        let report = replayed(&bytes, None, run("no port"));
+        assert_eq!(report.to_string(), format!("identical: 1 events, 1 outputs; the module was not made: {told}"));
+        let report = replayed(&bytes, None, run("no money"));
+        assert!(matches!(report.verdict, ReplayVerdict::Differs(_)), "{report:?}");
+        let report = replayed(&bytes, None, |_| end_unstarted("no node"));
+        assert_eq!(report.verdict, ReplayVerdict::Refused("the module cannot be started here: no node".into()));
+    }
+    let bytes = written(|_| end_unstarted("no node"));
+    let report = replayed(&bytes, None, |journal| journal.event(&JournalEvent::New, || 5));
+    assert_eq!(report.verdict, ReplayVerdict::Refused("the module could not be started: no node".into()));
+}
+
+#[test]
+fn a_panic_while_something_is_taken_in_is_a_hole() {
+    let taking = |journal: &ModuleJournal| {
+        journal.event(&JournalEvent::Tick, || 5);
+        let taken = catch_unwind(AssertUnwindSafe(|| journal.apart(|| panic!("no device"))));
+        assert!(taken.is_err());
+        end_unmade(Tag::Panicked, "no device");
+    };
+    let bytes = written(taking);
+    let report = replayed(&bytes, None, |journal| {
+        journal.event(&JournalEvent::Tick, || 5);
+        journal.asked(Tag::TakenIn, Question::Plain);
+    });
+    assert!(report.to_string().contains("refused from event 1 on, at 5 ns: the module panicked within"), "{report}");
 }
 
 #[test]
@@ -198,7 +329,7 @@ fn another_module_or_other_settings_are_refused() {
     let bytes = written(|journal| run(journal, None));
     for (module, text) in [("pilot.1", "text"), ("pilot.0", "texT")] {
         let told = catch_unwind(AssertUnwindSafe(|| {
-            let journal = ModuleJournal::replayed(JournalReplay::new(bytes[..].into(), None, "".into()));
+            let journal = ModuleJournal::replayed(replay_of(&bytes, Records::default(), None));
             journal.begin(&Begin::new(module, ("robot.toml", text), None));
         }));
         let report = told.unwrap_err().downcast::<ReplayReport>().unwrap();

@@ -24,6 +24,8 @@ pub struct ReplayReport {
     pub first_ns: u64,
     /// And of the last one.
     pub last_ns: u64,
+    /// Why the module was not made; none if it was.
+    pub not_made: Option<String>,
 }
 
 /// How an exact replay ended.
@@ -71,11 +73,15 @@ impl ReplayReport {
 
 impl std::fmt::Display for ReplayReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { verdict, events, outputs, last_ns, .. } = self;
+        let Self { verdict, events, outputs, last_ns, not_made, .. } = self;
         match verdict {
             ReplayVerdict::Identical { is_whole } => {
                 write!(f, "identical: {events} events, {outputs} outputs")?;
-                f.write_str(if *is_whole { "" } else { " (the journal ends before the module did)" })
+                match not_made {
+                    Some(why) => write!(f, "; the module was not made: {}", line(why)),
+                    None if *is_whole => Ok(()),
+                    None => f.write_str(" (the journal ends before the module did)"),
+                }
             }
             ReplayVerdict::Differs(Difference { event, recorded, replayed }) => write!(
                 f,
@@ -96,6 +102,9 @@ mod tests {
     #[test]
     fn texts_of_modules_stay_in_their_lines() {
         let text = || "all is well\nFORGED \u{1b}[2J".to_owned();
+        let verdict = ReplayVerdict::Identical { is_whole: true };
+        let told = ReplayReport { verdict, not_made: Some(text()), ..ReplayReport::default() }.to_string();
+        assert!(told.lines().count() == 1 && !told.contains('\u{1b}'), "{told}");
         let difference = Difference { event: text(), recorded: text(), replayed: text() };
         for (verdict, lines) in [(ReplayVerdict::Differs(difference), 3), (ReplayVerdict::Refused(text()), 1)] {
             let told = ReplayReport { verdict, ..ReplayReport::default() }.to_string();

@@ -6,22 +6,18 @@
 
 use super::entry::{self, Tag};
 use super::run::{PIECE_HEAD_BYTES, Piece};
-use rohrpost_mailbox::{Stamp, StreamShape, StreamWriter, SystemClock};
+use rohrpost_config::JOURNAL;
+use rohrpost_mailbox::{Stamp, StreamWriter, SystemClock};
 use serde::Serialize;
-use std::time::Duration;
 
 /// Entries wait no longer for others to share a record with.
 const WAIT_NS: u64 = 20_000_000;
 /// Bytes of a record.
-const RECORD_BYTES: usize = 4096;
+const RECORD_BYTES: usize = JOURNAL.record_bytes as usize;
 /// Of these, the length of what follows.
 const LENGTH_BYTES: usize = 2;
 /// Entries in a record.
 const PIECE_BYTES: usize = RECORD_BYTES - LENGTH_BYTES - PIECE_HEAD_BYTES;
-
-/// The stream: with little to do it holds the last 20 s. Journals are in order by themselves, so no record is late.
-pub(crate) const SHAPE: StreamShape =
-    StreamShape { record_bytes: RECORD_BYTES as u32, keep: 1024, readers: 4, late: Duration::MAX };
 
 /// Writes a journal.
 pub(crate) struct JournalWriter {

@@ -33,6 +33,17 @@ const LOOK_KEPT: Duration = Duration::from_millis(100);
 /// Bytes of a text that are told to tools.
 const TOLD_MAX: usize = 1000;
 
+/// How a process ended, or why there is none.
+#[derive(Clone, Copy)]
+struct ProcessEnd<'a> {
+    is_success: bool,
+    how: &'a str,
+    /// The number of the kernel's error.
+    errno: Option<u16>,
+    /// What it printed, each line on one of its own.
+    printed: &'a str,
+}
+
 /// Where a module's mailboxes are. They outlive its process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mailboxes {
@@ -227,7 +238,8 @@ impl Child {
             Err(error) => {
                 let how = format!("could not be started: {}: {error}", self.program.path().display());
                 let next = self.policy.ended(false, now);
-                self.follow(next, false, &how, "", now)
+                let errno = error.raw_os_error().and_then(|number| u16::try_from(number).ok());
+                self.follow(next, &ProcessEnd { is_success: false, how: &how, errno, printed: "" }, now)
             }
         }
     }
@@ -305,7 +317,7 @@ impl Child {
             "is busy: {}; until that comes back it hears nobody, and what is sent to it waits or is lost",
             working.told(node, &self.names)
         );
-        self.printed.say(OutputLevel::Warn, &told);
+        self.printed.say(OutputLevel::Warn, &told, None);
         Some(format!("{} {told}", self.text))
     }
 

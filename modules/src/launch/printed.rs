@@ -125,9 +125,9 @@ impl Printed {
     }
 
     /// Says of the module what launch has seen.
-    pub(super) fn say(&self, level: OutputLevel, text: &str) {
+    pub(super) fn say(&self, level: OutputLevel, text: &str, errno: Option<u16>) {
         if let Some(voice) = &self.voice {
-            voice.say(level, voice.now_ns(), text.to_owned());
+            voice.say(level, voice.now_ns(), text.to_owned(), errno);
         }
     }
 
@@ -138,7 +138,7 @@ impl Printed {
             // One at a time: the thread that reads must not wait for the collector's mailbox.
             let due = lock(&self.lines).take_due(now);
             let Some(line) = due else { break };
-            voice.say(line.level, line.time_ns, line.text);
+            voice.say(line.level, line.time_ns, line.text, None);
         }
         voice.attend();
     }
@@ -162,7 +162,7 @@ impl Printed {
         for line in held {
             let last_words = failed && line.level == OutputLevel::Warn;
             let level = if last_words { OutputLevel::Error } else { line.level };
-            voice.say(level, line.time_ns, line.text);
+            voice.say(level, line.time_ns, line.text, None);
         }
     }
 }
@@ -207,7 +207,7 @@ fn keep(pipe: PipeReader, level: OutputLevel, lines: &Mutex<PrintedLines>, whisp
         lines.last.push_back(text);
         drop(lines);
         if let (Some(voice), Some(line)) = (voice, pressed) {
-            voice.say(line.level, line.time_ns, line.text);
+            voice.say(line.level, line.time_ns, line.text, None);
         }
     }
 }

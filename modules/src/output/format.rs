@@ -1,6 +1,6 @@
 //! How a line is written: for people, in a terminal or a file, and for programs.
 
-use super::{OutputLine, plain};
+use super::{OutputLine, errno_text, plain};
 use rohrpost_config::{Installation, TimeSource};
 use serde::Serialize;
 use std::fmt::Write;
@@ -26,6 +26,11 @@ struct Object<'a> {
     level: &'static str,
     lost_before: u32,
     suppressed: u32,
+    /// Left out where there is none, and so is its text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    errno: Option<u16>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    errno_text: Option<String>,
     text: &'a str,
 }
 
@@ -65,6 +70,8 @@ impl<'a> Format<'a> {
             level: line.level.name(),
             lost_before: line.lost,
             suppressed: line.suppressed,
+            errno: line.errno,
+            errno_text: line.errno.map(errno_text),
             text: &line.text,
         };
         // Text and numbers can be written.
@@ -84,7 +91,7 @@ impl<'a> Format<'a> {
             let _ = writeln!(text, "{time} {:5} {from}: … {} lines before the next one were lost", "warn", line.lost);
         }
         let _ = write!(text, "{time} {:5} {from}: ", line.level.name());
-        escape(&line.text, &mut text);
+        escape(&line.full_text(), &mut text);
         text
     }
 
@@ -131,6 +138,7 @@ mod tests {
             level: OutputLevel::Warn,
             lost: 0,
             suppressed: 0,
+            errno: None,
             text: text.into(),
         }
     }
@@ -156,6 +164,24 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], "00:00:05.006 warn  base/motor.0: … 3 lines before the next one were lost");
         assert_eq!(lines[1], "00:00:05.006 warn  base/motor.0: is on");
+    }
+
+    #[test]
+    fn a_line_has_the_number_of_an_error_once() {
+        let installation = Installation::parse(CONFIG, Path::new("two_nodes.toml")).unwrap();
+        let format = Format::new(&installation);
+        for (text, shown) in [
+            ("the disk is full", "the disk is full (errno 28: No space left on device)"),
+            ("a: No space left on device (os error 28)", "a: No space left on device (os error 28)"),
+            ("ENOSPC: No space left on device", "ENOSPC: No space left on device"),
+            ("voll (os error 28)", "voll (os error 28)"),
+        ] {
+            let line = OutputLine { errno: Some(28), ..line(Name::new(1, 200, 0, 0), text) };
+            assert_eq!(format.short(&line), format!("00:00:05.006 warn  base/motor.0: {shown}"));
+            let json: serde_json::Value = serde_json::from_str(&format.json(&line)).unwrap();
+            assert_eq!((&json["errno"], &json["text"]), (&28.into(), &text.into()), "as it was said");
+            assert_eq!(json["errno_text"], "No space left on device");
+        }
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! From `tracing` events to lines.
 
 use super::print::Print;
+use super::said::Said;
 use super::way::Lane;
-use super::{TEXT_MAX, trace, way};
+use super::{TEXT_MAX, errno_of, trace, way};
 use crate::common::OutputLevel;
 use std::backtrace::{Backtrace, BacktraceStatus};
+use std::error::Error;
 use std::fmt::{self, Write};
 use tracing::field::{Field, Visit};
 use tracing::level_filters::LevelFilter;
@@ -39,6 +41,9 @@ pub(super) fn listen_for_panics(how: Print) {
     }));
 }
 
+/// A field of this name is the number of the kernel's error that an event tells of.
+const ERRNO: &str = "errno";
+
 struct OutputLayer;
 
 impl<S: Subscriber> Layer<S> for OutputLayer {
@@ -67,9 +72,10 @@ impl<S: Subscriber> Layer<S> for OutputLayer {
         let level = level_of_event(event.metadata().level());
         // Asked before the text is written, which is what a line costs most.
         if output.allows(Lane::of(level)) {
-            let mut text = Text(String::new());
-            event.record(&mut text);
-            output.say(level, output.now_ns(), cut(text.0));
+            let mut words = EventWords::default();
+            event.record(&mut words);
+            let EventWords { text, errno } = words;
+            output.say(level, output.now_ns(), Said { text: cut(text), errno });
         }
     }
 }
@@ -103,16 +109,43 @@ pub(crate) fn cut(mut text: String) -> String {
     text
 }
 
-/// An event's message, then its other fields.
-struct Text(String);
+/// An event's message, then its other fields; but for its number of an error.
+#[derive(Default)]
+struct EventWords {
+    text: String,
+    errno: Option<u16>,
+}
 
-impl Visit for Text {
+impl EventWords {
+    /// A number of an error has a place of its own in a line.
+    fn number(&mut self, field: &Field, number: Option<u16>, value: &dyn fmt::Debug) {
+        match number.filter(|_| field.name() == ERRNO) {
+            Some(number) => self.errno = Some(number),
+            None => self.record_debug(field, value),
+        }
+    }
+}
+
+impl Visit for EventWords {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        let space = if self.0.is_empty() { "" } else { " " };
+        let space = if self.text.is_empty() { "" } else { " " };
         // Writing to a string does not fail.
         let _ = match field.name() {
-            "message" => write!(self.0, "{space}{value:?}"),
-            name => write!(self.0, "{space}{name}={value:?}"),
+            "message" => write!(self.text, "{space}{value:?}"),
+            name => write!(self.text, "{space}{name}={value:?}"),
         };
+    }
+
+    fn record_u64(&mut self, field: &Field, value: u64) {
+        self.number(field, u16::try_from(value).ok(), &value);
+    }
+
+    fn record_i64(&mut self, field: &Field, value: i64) {
+        self.number(field, u16::try_from(value).ok(), &value);
+    }
+
+    fn record_error(&mut self, field: &Field, value: &(dyn Error + 'static)) {
+        self.errno = self.errno.or_else(|| errno_of(value));
+        self.record_debug(field, &format_args!("{value}"));
     }
 }

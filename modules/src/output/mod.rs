@@ -11,6 +11,7 @@
 //! there is room.
 
 mod allowance;
+mod errno;
 #[cfg(feature = "builtin")]
 mod format;
 mod layer;
@@ -18,9 +19,11 @@ mod out;
 pub mod plain;
 mod print;
 mod relay;
+mod said;
 mod trace;
 mod way;
 
+pub use errno::{errno_of, errno_text};
 #[cfg(feature = "builtin")]
 pub use format::{Format, iso};
 pub(crate) use print::print;
@@ -36,6 +39,7 @@ use crate::common::OutputLevel;
 use rohrpost_mailbox::Name;
 use rohrpost_schema::Schema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Mailbox of the collector that takes lines; a local id of its own.
 pub const LINES: u8 = 3;
@@ -65,6 +69,8 @@ pub struct OutputLine {
     pub lost: u32,
     /// Lines of this module that were suppressed, if this is the line that tells of them; else 0.
     pub suppressed: u32,
+    /// Number of the kernel's error that it tells of (28: no space left on device), if it is about one.
+    pub errno: Option<u16>,
     /// What it says.
     pub text: String,
 }
@@ -73,6 +79,16 @@ impl OutputLine {
     /// The module that said it.
     pub fn module(&self) -> Name {
         Name::from_raw(self.module)
+    }
+
+    /// What it says; behind it the number and the text of the kernel's error, if what it says has neither.
+    pub fn full_text(&self) -> Cow<'_, str> {
+        let Some(number) = self.errno else { return Cow::Borrowed(&self.text) };
+        let text = errno_text(number);
+        if self.text.contains(&text) || self.text.contains(&format!("(os error {number})")) {
+            return Cow::Borrowed(&self.text);
+        }
+        Cow::Owned(format!("{} (errno {number}: {text})", self.text))
     }
 
     /// The time of day it was said (UTC), to the millisecond.
@@ -86,6 +102,11 @@ impl OutputLine {
 impl OutputLevel {
     /// All levels, in the order of their numbers.
     pub const ALL: [Self; 5] = [Self::Error, Self::Warn, Self::Info, Self::Debug, Self::Trace];
+
+    /// The level of this number, as it is cast; the last one if none has it.
+    pub(crate) fn of_number(number: u8) -> Self {
+        Self::ALL.into_iter().find(|its| *its as u8 == number).unwrap_or(Self::Trace)
+    }
 
     /// One word.
     pub const fn name(self) -> &'static str {

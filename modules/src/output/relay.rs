@@ -3,6 +3,7 @@
 use super::layer::cut;
 use super::out::Out;
 use super::print::Print;
+use super::said::Said;
 use super::way::{Lane, Output};
 use crate::common::OutputLevel;
 use rohrpost_config::Installation;
@@ -39,9 +40,9 @@ impl Relay {
 impl OutputProxy {
     /// Says a line as of this system time, unless the module says too much already, or its configuration wants to hear
     /// only of more important things.
-    pub(crate) fn say(&self, level: OutputLevel, time_ns: u64, text: String) {
+    pub(crate) fn say(&self, level: OutputLevel, time_ns: u64, text: String, errno: Option<u16>) {
         if level <= self.0.level() && self.0.allows(Lane::of(level)) {
-            self.0.say(level, time_ns, cut(text));
+            self.0.say(level, time_ns, Said { text: cut(text), errno });
         }
     }
 

@@ -3,6 +3,7 @@
 use super::allowance::{Bucket, Excess, Suppressed};
 use super::out::{Out, Outlet};
 use super::print::Print;
+use super::said::Said;
 use super::{CLASS, LINES, OutputLine, layer};
 use crate::common::{DataHead, OutputLevel};
 use crossbeam_queue::ArrayQueue;
@@ -171,10 +172,6 @@ fn level_of(level: Level) -> OutputLevel {
     }
 }
 
-fn level_from(number: u8) -> OutputLevel {
-    OutputLevel::ALL.into_iter().find(|level| *level as u8 == number).unwrap_or(OutputLevel::Trace)
-}
-
 pub(super) fn installed() -> Option<&'static Output> {
     OUTPUT.get()
 }
@@ -186,7 +183,7 @@ pub(crate) fn is_installed() -> bool {
 
 /// Sets which lines this process sends from now on; returns which it sent before, if it sends any.
 pub fn set_level(level: OutputLevel) -> Option<OutputLevel> {
-    let before = level_from(installed()?.level.swap(level as u8, Ordering::Relaxed));
+    let before = OutputLevel::of_number(installed()?.level.swap(level as u8, Ordering::Relaxed));
     layer::level_changed();
     Some(before)
 }
@@ -255,7 +252,7 @@ impl Output {
     }
 
     pub(super) fn level(&self) -> OutputLevel {
-        level_from(self.level.load(Ordering::Relaxed))
+        OutputLevel::of_number(self.level.load(Ordering::Relaxed))
     }
 
     /// Whether one more may be said now; else it is counted.
@@ -273,10 +270,10 @@ impl Output {
     }
 
     /// Says a line that is allowed, and was true at this system time.
-    pub(super) fn say(&self, level: OutputLevel, time_ns: u64, text: String) {
+    pub(super) fn say(&self, level: OutputLevel, time_ns: u64, said: Said) {
         forget_panics();
         self.tell(|excess, now_ns| excess.tell(now_ns));
-        self.push(Lane::of(level), level, time_ns, 0, text);
+        self.push(Lane::of(level), level, time_ns, 0, said);
         self.drain();
         if !self.is_idle() {
             // Said by another thread, it would wait for whatever wakes the module's loop next.
@@ -287,7 +284,7 @@ impl Output {
     /// Says a panic. What finds no room now is sent later by the module's loop, or at the process's end.
     pub(super) fn panicked(&self, text: String) {
         if self.allows(Lane::Panic) {
-            self.push(Lane::Panic, OutputLevel::Error, self.now_ns(), 0, text);
+            self.push(Lane::Panic, OutputLevel::Error, self.now_ns(), 0, text.into());
         }
         self.drain();
         let before = PANICS.try_with(|panics| panics.replace(panics.get() + 1)).unwrap_or(0);
@@ -300,9 +297,10 @@ impl Output {
     }
 
     /// Puts a line into its queue.
-    fn push(&self, lane: Lane, level: OutputLevel, time_ns: u64, suppressed: u32, text: String) {
-        self.print.said(level, &text);
-        let line = OutputLine { time_ns, module: self.me.raw(), level, lost: 0, suppressed, text };
+    fn push(&self, lane: Lane, level: OutputLevel, time_ns: u64, suppressed: u32, said: Said) {
+        let Said { text, errno } = said;
+        let line = OutputLine { time_ns, module: self.me.raw(), level, lost: 0, suppressed, errno, text };
+        self.print.said(level, &line.full_text());
         if !self.collected {
             self.lose(&line);
         } else if let Err(line) = self.lanes[lane as usize].queue.push(line) {
@@ -320,14 +318,14 @@ impl Output {
             if let Some(Suppressed { lines, within }) = told(&own.excess, monotonic_ns()) {
                 let ((what, level), rate) = (lane.words(), self.rate);
                 let text = format!("… {lines} {what} were suppressed in {within:.1?}: more than {rate} a second");
-                self.push(lane, level, self.now_ns(), lines, text);
+                self.push(lane, level, self.now_ns(), lines, text.into());
             }
         }
     }
 
     /// Counts it; one that launch is to repeat, launch may yet bring to the collector.
     fn lose(&self, line: &OutputLine) {
-        self.print.lost(line.level, &line.text);
+        self.print.lost(line.level, &line.full_text());
         self.lost_now.fetch_add(1, Ordering::Relaxed);
         self.lost.fetch_add(1, Ordering::Relaxed);
     }
@@ -416,7 +414,7 @@ impl Output {
             way.sequence = way.sequence.wrapping_add(1);
             way.failures = 0;
             if own {
-                self.print.sent(line.level, &line.text);
+                self.print.sent(line.level, &line.full_text());
             }
             return true;
         };

@@ -1,6 +1,6 @@
 //! The clock that a module reads.
 
-use crate::journal::{ModuleJournal, Tag};
+use crate::journal::{ModuleJournal, Question, Tag};
 use rohrpost_mailbox::{SystemClock, SystemTime, TimeRecord, TimeSource};
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ impl ModuleClock {
             let SystemTime { ns, epoch, error, age } = self.clock.now();
             (ns, epoch, error, age)
         };
-        let (ns, epoch, error, age) = self.journal.answer(Tag::Time, ask);
+        let (ns, epoch, error, age) = self.journal.answer(Tag::Time, Question::Plain, ask);
         SystemTime { ns, epoch, error, age }
     }
 
@@ -69,7 +69,8 @@ impl ModuleClock {
     /// }
     /// ```
     pub fn record(&self) -> Option<TimeRecord> {
-        let noted: Option<NotedTimeRecord> = self.journal.answer(Tag::TimeRecord, || self.clock.record().map(noted));
+        let ask = || self.clock.record().map(noted);
+        let noted: Option<NotedTimeRecord> = self.journal.answer(Tag::TimeRecord, Question::Plain, ask);
         noted.and_then(recorded)
     }
 }

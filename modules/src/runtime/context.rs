@@ -1,10 +1,12 @@
 //! What a module can ask of its runtime.
 
+mod opened;
 mod publishing;
 mod standing_in;
 mod streaming;
 mod subscribing;
 mod taking_in;
+mod watching;
 
 pub(super) use publishing::Distribution;
 
@@ -19,14 +21,11 @@ use super::stream::{FollowedStreams, OwnStreams};
 use super::time_teller::TimeTeller;
 use crate::call::{Caller, Link};
 use crate::interface::Proxy;
-use crate::journal::ModuleJournal;
+use crate::journal::{ModuleJournal, Question, Tag, nanoseconds};
 use crate::publish::Subscriptions;
+use opened::OpenedFile;
 use rohrpost_config::{Installation, Principal, TimeSource};
-use rohrpost_mailbox::{
-    Interest, Name, OverflowPolicy, Publications, Receiver, Shape, SystemTime, Watch, Watches, local,
-};
-use std::io;
-use std::os::fd::AsFd;
+use rohrpost_mailbox::{Name, OverflowPolicy, Publications, Receiver, Shape, SystemTime, Watches, local};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -75,6 +74,8 @@ pub struct Context {
     open: Vec<u8>,
     /// Descriptors that the module waits for; none as long as it never asked.
     pub(crate) watches: Option<Watches>,
+    /// Descriptors of `open_outside`, if there is a journal.
+    outside: Vec<OpenedFile>,
     /// When ticks and periods are due.
     pub(crate) schedule: Schedule,
     scratch: Vec<u8>,
@@ -116,6 +117,7 @@ impl Context {
             taking: vec![(local::DATA, data.full == OverflowPolicy::Latest)],
             open: Vec::new(),
             watches: None,
+            outside: Vec::new(),
             schedule,
             scratch: Vec::new(),
         }
@@ -161,9 +163,9 @@ impl Context {
     ///     std::fs::read(context.path("maps/office.bin"))
     /// }
     /// ```
-    pub fn path(&self, path: &str) -> PathBuf {
-        let path = self.installation.resolve(path);
-        self.journal.file(&path);
+    pub fn path(&self, named: &str) -> PathBuf {
+        let path = self.installation.resolve(named);
+        self.journal.file(named, &path);
         path
     }
 
@@ -227,6 +229,7 @@ impl Context {
     /// }
     /// ```
     pub fn set_period(&mut self, period: Duration) {
+        self.journal.asked(Tag::Ticking, Question::Period(nanoseconds(period)));
         self.schedule.set_period(period);
     }
 
@@ -270,50 +273,6 @@ impl Context {
     /// ```
     pub fn link(&self) -> &Caller {
         &self.link
-    }
-
-    /// Waits for a file descriptor too: a serial port, a socket, a pipe, anything that `poll` knows. When there is
-    /// something to do [`crate::Module::ready`] is called, while the module is on; until then it waits in the kernel.
-    ///
-    /// A duplicate is kept until [`Context::unwatch`]: closing one's own descriptor does not end it. A module that
-    /// watches one cannot be replayed exactly: its journal ends here.
-    ///
-    /// ```
-    /// # use rohrpost_modules::runtime::Context;
-    /// # use rohrpost_mailbox::{Interest, Watch};
-    /// # use std::net::UdpSocket;
-    /// fn listen(context: &mut Context) -> std::io::Result<(UdpSocket, Watch)> {
-    ///     let socket = UdpSocket::bind("127.0.0.1:4000")?;
-    ///     socket.set_nonblocking(true)?;
-    ///     let watch = context.watch(&socket, Interest::Read)?;
-    ///     Ok((socket, watch))
-    /// }
-    /// ```
-    ///
-    /// # Errors
-    /// When [`rohrpost_mailbox::WATCHES_MAX`] are watched, the process has no descriptor left, or the pipe by which
-    /// senders wake such a receiver cannot be made in the node's directory.
-    pub fn watch(&mut self, descriptor: &impl AsFd, interest: Interest) -> io::Result<Watch> {
-        self.journal.hole("the module waits for a descriptor (`Context::watch`)");
-        let watches = match &mut self.watches {
-            Some(watches) => watches,
-            none => none.insert(Watches::new(self.link.unseen().borrow().participant())?),
-        };
-        watches.add(descriptor, interest)
-    }
-
-    /// Waits for it no longer; false when it was not waited for.
-    ///
-    /// ```
-    /// # use rohrpost_modules::runtime::Context;
-    /// fn ready(context: &mut Context, ready: rohrpost_mailbox::Ready, at_end: bool) {
-    ///     if at_end {
-    ///         context.unwatch(ready.watch);
-    ///     }
-    /// }
-    /// ```
-    pub fn unwatch(&mut self, watch: Watch) -> bool {
-        self.watches.as_mut().is_some_and(|watches| watches.remove(watch))
     }
 
     /// A module that this one sends commands to.

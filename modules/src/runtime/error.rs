@@ -2,8 +2,9 @@
 
 use super::stream::{RecordError, StreamReadError};
 use crate::journal::RunError;
+use crate::output::errno_of;
 use rohrpost_config::{Errors, NameTextError, SettingsError};
-use rohrpost_mailbox::NodeError;
+use rohrpost_mailbox::{CreateError, NodeError};
 use std::path::PathBuf;
 
 /// Why a module did not start.
@@ -29,7 +30,7 @@ pub enum StartError {
     Node(#[from] NodeError),
     /// A mailbox, which the text names as the configuration does.
     #[error("{0}")]
-    Mailbox(String),
+    Mailbox(String, #[source] CreateError),
     /// An alias without an interface.
     #[error("`{0}` is an alias of `{1}`, but that program has no interface of class `{2}`")]
     Endpoint(String, String, String),
@@ -88,17 +89,32 @@ pub enum StartError {
     #[error("launch, process {0}, ended before this module began")]
     Orphan(u32),
     /// The module said no.
-    #[error("{0}: {1}")]
-    Module(String, String),
+    #[error("{module}: {text}")]
+    Module {
+        /// The module.
+        module: String,
+        /// What it said.
+        text: String,
+        /// The number of the kernel's error, if one is behind it.
+        errno: Option<u16>,
+    },
     /// The system said no.
     #[error("{0}: {1}")]
-    System(&'static str, std::io::Error),
+    System(&'static str, #[source] std::io::Error),
 }
 
 impl StartError {
     /// Exit code of a program that was configured wrongly (EX_CONFIG of sysexits.h): started again, it would end the
     /// same way.
     pub const CONFIGURATION: u8 = 78;
+
+    /// The number of the kernel's error, if one is behind it.
+    pub fn errno(&self) -> Option<u16> {
+        match self {
+            Self::Module { errno, .. } => *errno,
+            other => errno_of(other),
+        }
+    }
 
     /// The exit code that tells launch whether starting again may help.
     pub fn exit_code(&self) -> u8 {
@@ -114,11 +130,11 @@ impl StartError {
             | Self::NoStream { .. }
             | Self::Interface { .. } => Self::CONFIGURATION,
             Self::Node(_)
-            | Self::Mailbox(_)
+            | Self::Mailbox(..)
             | Self::Stream(_)
             | Self::Exact(_)
             | Self::Orphan(_)
-            | Self::Module(..)
+            | Self::Module { .. }
             | Self::System(..) => 1,
         }
     }

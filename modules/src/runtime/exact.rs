@@ -7,6 +7,7 @@ use super::received::Received;
 use super::runner::Running;
 use crate::journal::{JournalEvent, JournalReplay};
 use crate::module::Module;
+use rohrpost_mailbox::{Ready, Watch};
 
 impl<M: Module> Running<M> {
     /// Whether it repeats a journal.
@@ -42,8 +43,9 @@ impl<M: Module> Running<M> {
                 let result = self.life.work(JournalEvent::Tick, &mut self.context, M::tick);
                 self.life.check(result, &mut self.context);
             }
-            JournalEvent::Received { .. } => {
-                let Some(received) = Received::of(event) else { return };
+            JournalEvent::Received { value, .. } => {
+                let value = self.context.journal.bytes(value);
+                let Some(received) = Received::of(event, &value) else { return };
                 let part = |module: &mut M, context: &mut Context| module.received(context, &received);
                 let result = self.life.work(*event, &mut self.context, part);
                 self.life.check(result, &mut self.context);
@@ -57,7 +59,12 @@ impl<M: Module> Running<M> {
                 let mut reply = Vec::new();
                 let _ = self.hosted(0).set_parameters(wish.0, by, &mut reply);
             }
-            JournalEvent::Ready => self.give_up("it waits for a descriptor"),
+            JournalEvent::Ready { watch, readable, writable } => {
+                let ready = Ready { watch: Watch::from_number(watch), readable, writable };
+                let part = |module: &mut M, context: &mut Context| module.ready(context, ready);
+                let result = self.life.work(*event, &mut self.context, part);
+                self.life.check(result, &mut self.context);
+            }
         }
     }
 

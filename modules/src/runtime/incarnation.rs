@@ -107,7 +107,7 @@ impl<M: Module> Incarnation<M> {
         context.journal.output(Tag::Failed, &error.to_string());
         self.work(JournalEvent::Off, context, M::off);
         self.error = error.to_string();
-        tracing::error!("{error}");
+        tracing::error!(errno = error.errno(), "{error}");
         self.enter(ModuleState::Error);
     }
 
@@ -144,6 +144,6 @@ fn work_of(event: &JournalEvent<'_>) -> Work {
         JournalEvent::Received { number, .. } => Work::Received(number),
         JournalEvent::Function { number, .. } => Work::Function(number),
         JournalEvent::Parameters { .. } => Work::Parameters,
-        JournalEvent::Ready => Work::Ready,
+        JournalEvent::Ready { .. } => Work::Ready,
     }
 }

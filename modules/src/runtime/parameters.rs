@@ -101,7 +101,11 @@ pub(crate) fn check_start<M: Module>(
     }
     let Some(set) = set.as_mut() else { return Ok(()) };
     for (index, parameter) in (0..set.names().len()).filter_map(|index| Some((index, set.get(index)?))) {
-        let refused = |refusal| StartError::Module(text.to_owned(), format!("its own default: {refusal}"));
+        let refused = |refusal| StartError::Module {
+            module: text.to_owned(),
+            text: format!("its own default: {refusal}"),
+            errno: None,
+        };
         set.accept(index, &parameter.value).map_err(refused)?;
     }
     Ok(())

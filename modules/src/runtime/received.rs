@@ -4,8 +4,8 @@ use super::stream::Moment;
 use super::subscribed::{Origin, Subscribed};
 use super::unreadable::Unreadable;
 use crate::common::DataHead;
-use crate::journal::{Blob, JournalEvent, NotedOrigin};
-use rohrpost_mailbox::{Name, Stamp, local};
+use crate::journal::{JournalEvent, ModuleJournal, NotedOrigin};
+use rohrpost_mailbox::{Name, Stamp, StreamId, local};
 use rohrpost_schema::{Data, View};
 
 /// Data that a subscription brought.
@@ -41,29 +41,35 @@ impl<'a> Received<'a> {
         Self { from, number, mailbox, head, value, origin }
     }
 
-    /// As a journal has it.
-    pub(super) fn event(&self) -> JournalEvent<'a> {
+    /// As this journal is to have it.
+    pub(super) fn event(&self, journal: &ModuleJournal) -> JournalEvent<'a> {
         let DataHead { stamp_ns, sequence, missed, incarnation } = self.head;
-        let origin = match self.origin {
-            Origin::Package { mailbox, id } => NotedOrigin::Package { mailbox, id },
-            Origin::Stream { id, stamp: Stamp { epoch, ns } } => NotedOrigin::Stream { id, epoch, ns },
+        let (origin, is_recorded) = match self.origin {
+            Origin::Package { mailbox, id } => (NotedOrigin::Package { mailbox, id }, false),
+            Origin::Stream { id, stamp: Stamp { epoch, ns }, is_recorded } => {
+                (NotedOrigin::Stream { id, epoch, ns }, is_recorded)
+            }
         };
-        let (from, number, value) = (self.from.raw(), self.number, Blob(self.value));
+        let (from, number) = (self.from.raw(), self.number);
+        let id = StreamId { name: self.from, number };
+        let value = journal.record(id, sequence.into(), is_recorded, self.value);
         JournalEvent::Received { from, number, origin, stamp_ns, sequence, missed, incarnation, value }
     }
 
-    /// Of a journal; none of another event.
-    pub(super) fn of(event: &JournalEvent<'a>) -> Option<Self> {
-        let JournalEvent::Received { from, number, origin, stamp_ns, sequence, missed, incarnation, value } = *event
+    /// Of a journal, with this value; none of another event.
+    pub(super) fn of(event: &JournalEvent<'_>, value: &'a [u8]) -> Option<Self> {
+        let JournalEvent::Received { from, number, origin, stamp_ns, sequence, missed, incarnation, .. } = *event
         else {
             return None;
         };
         let origin = match origin {
             NotedOrigin::Package { mailbox, id } => Origin::Package { mailbox, id },
-            NotedOrigin::Stream { id, epoch, ns } => Origin::Stream { id, stamp: Stamp { epoch, ns } },
+            NotedOrigin::Stream { id, epoch, ns } => {
+                Origin::Stream { id, stamp: Stamp { epoch, ns }, is_recorded: false }
+            }
         };
         let head = DataHead { stamp_ns, sequence, missed, incarnation };
-        Some(Self::new(Name::from_raw(from), number, origin, head, value.0))
+        Some(Self::new(Name::from_raw(from), number, origin, head, value))
     }
 
     /// When it was true, to look for in a stream ([`super::Stream::at`]); that of a record with its epoch.

@@ -12,10 +12,12 @@ use super::stream::{self, FollowedStream, Step};
 use super::subscribed::Origin;
 use crate::common::DataHead;
 use crate::interface::Interfaces;
-use crate::journal::{JournalEvent, flush_present};
+use crate::journal::{JournalEvent, Tag, end_unmade, end_unstarted};
 use crate::module::Module;
 use crate::output;
-use rohrpost_mailbox::{Kind, ModuleState, OverflowPolicy, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any};
+use rohrpost_mailbox::{
+    Kind, ModuleState, OverflowPolicy, Ready, Receiver, Source, Waiting, Watches, monotonic_ns, wait_any,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -66,7 +68,7 @@ pub fn run<M: Module>() -> ExitCode {
 /// Tells what went wrong, and turns it into an exit code.
 pub fn exit(result: Result<(), StartError>) -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
-    tracing::error!("{error}");
+    tracing::error!(errno = error.errno(), "{error}");
     output::flush();
     if !output::is_installed() {
         output::print(&error);
@@ -88,10 +90,14 @@ pub fn exit(result: Result<(), StartError>) -> ExitCode {
 /// See [`StartError`].
 pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
     let joined = catch_unwind(AssertUnwindSafe(|| start.join::<M>()));
-    let mut running = joined.unwrap_or_else(|panic| {
-        flush_present();
+    let joined = joined.unwrap_or_else(|panic| {
+        end_unmade(Tag::Panicked, text_of(&*panic));
         output::flush();
         std::panic::resume_unwind(panic)
+    });
+    let mut running = joined.inspect_err(|error| match error {
+        StartError::Module { text: why, .. } => end_unmade(Tag::Failed, why),
+        error => end_unstarted(&error.to_string()),
     })?;
     let worked = catch_unwind(AssertUnwindSafe(|| {
         if running.is_replayed() {
@@ -106,6 +112,12 @@ pub fn run_started<M: Module>(start: Start) -> Result<(), StartError> {
     }
     running.end();
     Ok(())
+}
+
+/// What a panic says.
+fn text_of(panic: &(dyn std::any::Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told")
 }
 
 /// A module that runs.
@@ -155,9 +167,7 @@ impl<M: Module> Running<M> {
 
     /// A handler panicked; the process is about to end, and launch to start it again.
     fn panicked(&mut self, panic: &(dyn std::any::Any + Send)) {
-        let text = panic.downcast_ref::<String>().map(String::as_str);
-        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("for no reason told");
-        self.life.panicked(text, &mut self.context);
+        self.life.panicked(text_of(panic), &mut self.context);
         self.context.journal.end();
         output::flush();
     }
@@ -192,14 +202,15 @@ impl<M: Module> Running<M> {
         let mut followed = std::mem::take(&mut self.context.followed_streams.list);
         for stream in followed.iter_mut().filter(|stream| of(stream)) {
             any |= burst(|| {
-                if self.life.state != ModuleState::On {
+                if self.life.state != ModuleState::On || self.context.followed_streams.is_rewound() {
                     return false;
                 }
                 match stream.step() {
                     Step::Record(record) => {
                         let received = record.received();
                         let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-                        let result = self.life.work(received.event(), &mut self.context, part);
+                        let event = received.event(&self.context.journal);
+                        let result = self.life.work(event, &mut self.context, part);
                         self.life.check(result, &mut self.context);
                         true
                     }
@@ -208,8 +219,7 @@ impl<M: Module> Running<M> {
                 }
             });
         }
-        followed.append(&mut self.context.followed_streams.list);
-        self.context.followed_streams.list = followed;
+        self.context.followed_streams.put_back(followed);
         any
     }
 
@@ -242,8 +252,10 @@ impl<M: Module> Running<M> {
         while self.is_on()
             && let Some(ready) = self.context.watches.as_mut().and_then(Watches::next_ready)
         {
+            let Ready { watch, readable, writable } = ready;
+            let event = JournalEvent::Ready { watch: watch.number(), readable, writable };
             let part = |module: &mut M, context: &mut Context| module.ready(context, ready);
-            let result = self.life.work(JournalEvent::Ready, &mut self.context, part);
+            let result = self.life.work(event, &mut self.context, part);
             self.life.check(result, &mut self.context);
         }
     }
@@ -288,7 +300,7 @@ impl<M: Module> Running<M> {
 
     fn end(mut self) {
         // What modules did that have ended by now waits for nobody else.
-        while self.take_records(FollowedStream::is_journal) {}
+        while self.take_records(FollowedStream::is_whole) {}
         if self.life.state == ModuleState::On {
             self.life.work(JournalEvent::Off, &mut self.context, M::off);
         }
@@ -328,7 +340,7 @@ fn take<M: Module>(mailbox: &mut Receiver, life: &mut Incarnation<M>, context: &
             let origin = Origin::Package { mailbox: local, id: head.id };
             let received = Received::new(head.from, number, origin, data, value);
             let part = |module: &mut M, context: &mut Context| module.received(context, &received);
-            let result = life.work(received.event(), context, part);
+            let result = life.work(received.event(&context.journal), context, part);
             life.check(result, context);
         }
         true

@@ -10,12 +10,12 @@ use super::runner::{Running, served};
 use super::stream::{self, ServedStreams};
 use crate::call::Link;
 use crate::interface::StandIn;
-use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal, SHAPE, Tag};
+use crate::journal::{Begin, ExactRun, JOURNAL_NUMBER, JournalEvent, JournalWriter, ModuleJournal};
 use crate::module::{Module, ModuleError};
 use crate::output;
 use nix::sys::prctl::set_pdeathsig;
 use nix::sys::signal::Signal;
-use rohrpost_config::{Installation, MailboxSpec, Scheduling, Start as StartState};
+use rohrpost_config::{Installation, JOURNAL, MailboxSpec, Scheduling, Start as StartState};
 use rohrpost_mailbox::{
     CreateError, ModuleState, Name, Node, NodeError, Participant, Shape, StreamError, StreamId, SystemClock, Work,
     base_directory, local, node_directory, sys,
@@ -139,7 +139,7 @@ impl Start {
         let receiver = |name: Name, spec: &MailboxSpec| {
             participant.clone().receiver(name, shape(spec)).map_err(|error: CreateError| {
                 let text = error.to_string().replace(&name.to_string(), &installation.classes.format(name));
-                StartError::Mailbox(text)
+                StartError::Mailbox(text, error)
             })
         };
         let settings = installation.settings_as(module)?;
@@ -186,10 +186,10 @@ impl Start {
         participant.begin_work(Work::New);
         let made = M::new(settings, &mut context);
         participant.end_work();
-        let mut made = made.map_err(|error| {
-            journal.output(Tag::Failed, &error.to_string());
-            journal.end();
-            StartError::Module(text.clone(), error.to_string())
+        let mut made = made.map_err(|error| StartError::Module {
+            module: text.clone(),
+            text: error.to_string(),
+            errno: error.errno(),
         })?;
         parameters::check_start(&mut made, &installation, module, &text)?;
         let turn_on = !self.off && module.start == StartState::On;
@@ -206,12 +206,12 @@ impl Start {
         let installation = &*self.installation;
         let wanted = installation.record.as_ref().is_some_and(|record| record.is_exact(self.name));
         let journal = match ExactRun::from_environment()? {
-            Some(run) => ModuleJournal::replayed(run.replay()),
+            Some(run) => ModuleJournal::replayed(run.replay()?),
             None if wanted => {
                 let id = StreamId { name: self.name, number: JOURNAL_NUMBER };
                 let text = installation.classes.format(self.name);
                 let failed = |error: StreamError| StartError::Stream(format!("the journal of `{text}`: {error}"));
-                let stream = participant.stream_writer(id, SHAPE).map_err(failed)?;
+                let stream = participant.stream_writer(id, JOURNAL.shape()).map_err(failed)?;
                 ModuleJournal::written(JournalWriter::new(stream, clock.clone(), participant.node().next_incarnation()))
             }
             None => return Ok(ModuleJournal::default()),
@@ -233,7 +233,11 @@ fn stand_ins<M: Module>(
     module: &rohrpost_config::Module,
 ) -> Result<Vec<StandIn>, StartError> {
     let text = |name| installation.classes.format(name);
-    let failed = |error: ModuleError| StartError::Module(text(module.name), error.to_string());
+    let failed = |error: ModuleError| StartError::Module {
+        module: text(module.name),
+        text: error.to_string(),
+        errno: error.errno(),
+    };
     let stand_ins = M::stand_ins(settings, installation).map_err(failed)?;
     for (at, StandIn { name, description }) in stand_ins.iter().enumerate() {
         let why = if !module.names().any(|own| own == *name) {
@@ -309,13 +313,14 @@ fn schedule(wanted: Scheduling) {
             let _ = sys::schedule(sys::Scheduling::Normal(0));
         }
         tracing::warn!(
+            errno = error.raw_os_error(),
             "runs without {wanted}: {error}; allow it with a limit `rtprio` for this user (limits.conf) or CAP_SYS_NICE"
         );
     } else if let sys::Scheduling::Fifo(_) = how {
         match sys::lock_memory() {
             Ok(true) => {}
             Ok(false) => tracing::debug!("memory is not locked: the memlock limit is finite (`ulimit -l`)"),
-            Err(error) => tracing::warn!("memory is not locked: {error}"),
+            Err(error) => tracing::warn!(errno = error.raw_os_error(), "memory is not locked: {error}"),
         }
     }
 }

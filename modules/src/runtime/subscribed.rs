@@ -8,8 +8,8 @@ use rohrpost_schema::Data;
 pub enum Origin {
     /// In a package, by the subscription of this id if it is one's own mailbox.
     Package { mailbox: u8, id: u16 },
-    /// In a stream's record, by the subscription of this id.
-    Stream { id: u16, stamp: Stamp },
+    /// In a stream's record, by the subscription of this id. Whether each record of the stream is recorded.
+    Stream { id: u16, stamp: Stamp, is_recorded: bool },
 }
 
 /// A subscription, to data or to a stream.

@@ -127,3 +127,54 @@ fn a_restarted_writer_is_followed() {
     wait("it sees the last", || (widths(&seen).last() == Some(&5)).then_some(()));
     assert_eq!(*seen.lock().unwrap(), (0..6).map(|n| (n, n, 0)).collect::<Vec<_>>());
 }
+
+#[test]
+fn a_stream_can_be_followed_from_the_oldest_record_of_its_present_writer() {
+    let place = Place::with("");
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 0..3);
+    camera.crashes();
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 3..6);
+    let viewer = place.start::<Watcher>(VIEWER);
+    let seen = Seen::default();
+    let noted = seen.clone();
+    viewer.does(move |part, context| {
+        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
+        context.rewind(&images);
+        part.handler = Some(Box::new(move |data| {
+            let image = data.read(&images)?.unwrap();
+            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
+            Ok(())
+        }));
+    });
+    shoots(&camera, 6..7);
+    wait("it sees the last", || (widths(&seen).last() == Some(&6)).then_some(()));
+    assert_eq!(*seen.lock().unwrap(), (3..7).map(|n| (n, n, 0)).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_is_rewound_while_it_is_received_comes_again_and_passes_no_module_by() {
+    let place = Place::with("");
+    let (camera, viewer) = (place.start::<Eye>(CAMERA), place.start::<Watcher>(VIEWER));
+    let seen = Seen::default();
+    let noted = seen.clone();
+    viewer.does(move |part, context| {
+        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
+        part.handler = Some(Box::new(move |data| {
+            let image = data.read(&images)?.unwrap();
+            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
+            Ok(())
+        }));
+        part.rewinds = Some(images);
+    });
+    // Rewound behind the first one.
+    shoots(&camera, 0..1);
+    wait("it sees the first twice", || (widths(&seen) == [0, 0]).then_some(()));
+    let mut tool = place.tool();
+    tool.switch(VIEWER, false).unwrap();
+    shoots(&camera, 1..3);
+    tool.switch(VIEWER, true).unwrap();
+    wait("it sees the last", || (widths(&seen).last() == Some(&2)).then_some(()));
+    assert_eq!(*seen.lock().unwrap(), [0, 0, 1, 2].map(|n| (n, n, 0)));
+}

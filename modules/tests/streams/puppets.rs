@@ -5,7 +5,7 @@ use rohrpost_mailbox::{Name, Node, node_directory};
 use rohrpost_modules::call::Caller;
 use rohrpost_modules::common::State;
 use rohrpost_modules::interface;
-use rohrpost_modules::runtime::{Context, Received, Start, StartError, ToolLink, run_started};
+use rohrpost_modules::runtime::{Context, Received, Start, StartError, StreamSubscription, ToolLink, run_started};
 use rohrpost_modules::schema::{Bytes, Schema, View};
 use rohrpost_modules::types::Pose;
 use rohrpost_modules::{Module, ModuleError};
@@ -88,6 +88,8 @@ impl OtherCamera for OtherEye {}
 pub(crate) struct Watcher {
     /// What it does with data.
     pub(crate) handler: Option<Handler>,
+    /// What it rewinds behind the next data.
+    pub(crate) rewinds: Option<StreamSubscription<Picture>>,
 }
 type Handler = Box<dyn FnMut(&Received<'_>) -> Result<(), ModuleError>>;
 
@@ -106,7 +108,7 @@ pub(crate) struct Puppet<P> {
 pub(crate) trait Part: Default + 'static {
     type Interfaces;
 
-    fn received(&mut self, _: &Received<'_>) -> Result<(), ModuleError> {
+    fn received(&mut self, _: &mut Context, _: &Received<'_>) -> Result<(), ModuleError> {
         Ok(())
     }
 }
@@ -114,7 +116,10 @@ pub(crate) trait Part: Default + 'static {
 impl Part for Watcher {
     type Interfaces = ();
 
-    fn received(&mut self, data: &Received<'_>) -> Result<(), ModuleError> {
+    fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
+        if let Some(subscription) = self.rewinds.take() {
+            context.rewind(&subscription);
+        }
         self.handler.as_mut().map_or(Ok(()), |handler| handler(data))
     }
 }
@@ -139,8 +144,8 @@ macro_rules! puppets {
                 Ok(())
             }
 
-            fn received(&mut self, _: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
-                self.part.received(data)
+            fn received(&mut self, context: &mut Context, data: &Received<'_>) -> Result<(), ModuleError> {
+                self.part.received(context, data)
             }
         }
     )*};

@@ -7,9 +7,9 @@
 //! ```
 //! A thread looks at the clock before each frame, and may lose its processor between that and the system call. It knows
 //! that itself when the call is back. So a frame outside is right if, and only if, its sender counted that very window,
-//! and it is the only one of that window. The call itself takes microseconds: if the window is full, it comes back in the
-//! guard, which is there for that. A router that is slow itself overruns the guard in window after window, and counts
-//! that as well; so no node may overrun half of the guard more than a few times.
+//! and it is the only one of that window. The call itself takes microseconds: if the window is full, it comes back in
+//! the guard, which is there for that. A router that is slow itself overruns the guard in window after window, and
+//! counts that as well; so no node may overrun half of the guard more than a few times.
 
 use super::own_log::{EVERY, OwnLog, OwnWindow};
 use super::{Crossed, MASTERS, NODES, Segment, table};

@@ -25,7 +25,8 @@ def scan(range_m):
 
 def line(module, words, lost=0, ahead_s=0):
     stamp_ns = time.time_ns() + ahead_s * 1_000_000_000
-    return varint(stamp_ns) + varint(module) + b"\x02" + varint(lost) + varint(0) + text(words)
+    no_errno = b"\x00"
+    return varint(stamp_ns) + varint(module) + b"\x02" + varint(lost) + varint(0) + no_errno + text(words)
 
 
 class Attacks:

@@ -1,17 +1,23 @@
 //! Recordings: how much a recorder writes in a second without a loss, what of a processor each message takes, and
-//! whether others notice it.
+//! whether others notice it; what a journal costs a module, and how fast and how exactly recordings are replayed.
 
 mod bare;
 mod beside;
+mod journal;
 mod recorder;
+mod replayed;
 mod workload;
+
+pub(super) use journal::run_hidden_module;
 
 use super::Case;
 use crate::harness::{Failure, Scratch, sample_in_child};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use beside::PairBeside;
+use journal::NotedEvent;
 use nix::sys::resource::{UsageWho, getrusage};
+use replayed::Replayed;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use workload::Workload;
@@ -29,8 +35,9 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
     let cases = |figure| SIZES.map(|bytes| -> Box<dyn Case> { Box::new(Recorded { bytes, figure }) });
-    let beside: [Box<dyn Case>; 1] = [Box::new(PairBeside)];
-    cases(TurnFigure::Rate).into_iter().chain(cases(TurnFigure::ProcessorTime)).chain(beside).collect()
+    let others: [Box<dyn Case>; 4] =
+        [Box::new(PairBeside), Box::new(NotedEvent), Box::new(Replayed::Exact), Box::new(Replayed::Spacing)];
+    cases(TurnFigure::Rate).into_iter().chain(cases(TurnFigure::ProcessorTime)).chain(others).collect()
 }
 
 /// What of a turn is told.

@@ -61,7 +61,10 @@ impl ControlServer {
         if let Some(address) = self.address
             && !self.has_complained
         {
-            tracing::error!("log control: cannot listen at {address}: {error}; tries again, and records all the same");
+            tracing::error!(
+                errno = error.raw_os_error(),
+                "log control: cannot listen at {address}: {error}; tries again, and records all the same"
+            );
             self.has_complained = true;
         }
     }

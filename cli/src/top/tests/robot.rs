@@ -119,6 +119,7 @@ impl Robot {
             level,
             lost: 0,
             suppressed: 0,
+            errno: None,
             text: text.into(),
         };
         let mut page = output::Output::new(&self.installation);

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 /// That a recording has drawn channels beside what it records.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DrawnBeside {
-    /// Of each channel the first message of every such time is drawn, by its stamp; of output lines each. One that is
-    /// longer than 64 KiB is not, so that nothing long is in a file twice.
+    /// Of each channel the first message of every such time is drawn, by its stamp; of output lines each. Of one that
+    /// is longer than 64 KiB a part is, or nothing, so that nothing long is in a file twice.
     pub period_ns: u64,
     /// Names of classes by their numbers: output lines say which module they are of.
     pub classes: BTreeMap<u8, String>,
@@ -35,7 +35,8 @@ struct SampledChannel {
 impl DrawingBeside {
     pub(crate) fn new(options: &DrawnBeside) -> Self {
         let DrawnBeside { period_ns, classes } = options;
-        Self { drawer: Drawer::new(classes.clone()), period_ns: (*period_ns).max(1), channels: BTreeMap::new() }
+        let drawer = Drawer::new(classes.clone(), Some(TWICE_BYTES_MAX));
+        Self { drawer, period_ns: (*period_ns).max(1), channels: BTreeMap::new() }
     }
 
     /// Whether a channel was added that is drawn.
@@ -52,13 +53,16 @@ impl DrawingBeside {
 
     /// What is drawn of a message of the file.
     pub(crate) fn draw(&mut self, id: u16, stamp_ns: u64, data: &[u8]) -> Vec<DrawnMessage> {
-        let Some(sampled) = self.channels.get_mut(&id).filter(|_| data.len() <= TWICE_BYTES_MAX) else {
-            return Vec::new();
-        };
+        let Some(sampled) = self.channels.get_mut(&id) else { return Vec::new() };
         let period = Some(stamp_ns / self.period_ns);
-        if !sampled.is_each && std::mem::replace(&mut sampled.period, period) == period {
+        if !sampled.is_each && sampled.period == period {
             return Vec::new();
         }
-        self.drawer.draw(id, &sampled.channel, stamp_ns, data).unwrap_or_default()
+        let drawn = self.drawer.draw(id, &sampled.channel, stamp_ns, data).unwrap_or_default();
+        // A long one of which nothing comes is not decoded again and again.
+        if !drawn.is_empty() || data.len() > TWICE_BYTES_MAX {
+            sampled.period = period;
+        }
+        drawn
     }
 }

@@ -17,6 +17,19 @@ pub(crate) struct PackedPoints {
     pub(crate) is_in_world: bool,
 }
 
+impl PackedPoints {
+    /// Leaves every k-th point, with the smallest k by which they have at most so many bytes. Whether some are gone.
+    pub(crate) fn reduce(&mut self, bytes_max: usize) -> bool {
+        let stride = self.cloud.point_stride as usize;
+        let count = self.cloud.data.len() / stride;
+        let every = count.div_ceil((bytes_max / stride).max(1));
+        if every > 1 {
+            self.cloud.data = self.cloud.data.chunks_exact(stride).step_by(every).flatten().copied().collect();
+        }
+        every > 1
+    }
+}
+
 /// The beams that hit something. If the scan says where its scanner stood, as points of the world.
 pub(crate) fn of_scan(value: Value) -> Option<PackedPoints> {
     let mut scan = ValueFields::of(value)?;

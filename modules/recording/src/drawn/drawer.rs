@@ -2,7 +2,7 @@
 //! recorded.
 
 use super::kind::Kind;
-use super::one::{Origin, WORLD, draw_one, draw_world};
+use super::one::{DrawnPart, Origin, WORLD, draw_one, draw_world};
 use super::schema;
 use crate::format::{MESSAGE_ENCODING, key};
 use crate::read::definitions::{Definition, SchemaText};
@@ -10,6 +10,9 @@ use crate::shape::Shape;
 use rohrpost_schema::{Type, decode};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// A longer scan is none that a scanner makes, and is not drawn in part: half a million beams take it.
+const SCAN_BYTES_MAX: usize = 1 << 20;
 
 /// Draws messages of one file, one after the other.
 pub(crate) struct Drawer {
@@ -23,6 +26,8 @@ pub(crate) struct Drawer {
     carrier: Option<String>,
     /// Names of classes by their numbers.
     classes: BTreeMap<u8, String>,
+    /// Of a longer message at most so much is drawn.
+    bytes_max: Option<usize>,
 }
 
 /// A channel that is drawn.
@@ -30,8 +35,8 @@ struct DrawnChannel {
     module: String,
     shape: Shape,
     ty: Type,
-    /// As the file has them, once there is a message.
-    kinds: BTreeMap<Kind, Arc<Definition>>,
+    /// As the file has them, once there is a message: by kind, and whether they are reduced.
+    kinds: BTreeMap<(Kind, bool), Arc<Definition>>,
 }
 
 /// A message that was drawn.
@@ -43,13 +48,16 @@ pub(crate) struct DrawnMessage {
 }
 
 impl DrawnMessage {
-    /// Kinds, and where the world is.
-    const NUMBERS: usize = Kind::ALL.len() + 1;
+    /// Kinds, reduced and not, and where the world is.
+    const NUMBERS: usize = 2 * Kind::ALL.len() + 1;
 }
 
 impl Drawer {
-    pub(crate) fn new(classes: BTreeMap<u8, String>) -> Self {
-        Self { sources: BTreeMap::new(), schema: schema::descriptor_set(), has_world: false, carrier: None, classes }
+    /// With a bound, of messages that are longer at most so many bytes of pixels or points are drawn, and nothing of
+    /// all others.
+    pub(crate) fn new(classes: BTreeMap<u8, String>, bytes_max: Option<usize>) -> Self {
+        let (sources, schema) = (BTreeMap::new(), schema::descriptor_set());
+        Self { sources, schema, has_world: false, carrier: None, classes, bytes_max }
     }
 
     /// Adds a channel of the file; what its values look like, if they are drawn. A drawn channel is not.
@@ -77,8 +85,8 @@ impl Drawer {
         self.carrier.as_ref()
     }
 
-    /// Draws a value of a channel; none if it contradicts itself, or is nowhere. With the first one in space comes
-    /// where the world is.
+    /// Draws a value of a channel; none if it contradicts itself, or is nowhere; nothing if it is too long. With the
+    /// first one in space comes where the world is.
     pub(crate) fn draw(
         &mut self,
         id: u16,
@@ -87,22 +95,28 @@ impl Drawer {
         data: &[u8],
     ) -> Option<Vec<DrawnMessage>> {
         let source = self.sources.get_mut(&id)?;
+        let bytes_max = self.bytes_max.filter(|max| data.len() > *max);
+        let is_too_long = source.shape == Shape::Scan && data.len() > SCAN_BYTES_MAX;
+        if bytes_max.is_some() && (is_too_long || !source.shape.can_be_reduced()) {
+            return Some(Vec::new());
+        }
         let origin = Origin {
             module: &source.module,
             carrier: self.carrier.as_deref().unwrap_or(WORLD),
             stamp_ns,
             classes: &self.classes,
         };
-        let messages = draw_one(source.shape, decode(&source.ty, data).ok()?, &origin)?;
-        let mut drawn = Vec::with_capacity(messages.len() + 1);
-        if !self.has_world && messages.iter().any(|(kind, _)| kind.is_in_space()) {
+        let value = decode(&source.ty, data).ok()?;
+        let parts = draw_one(source.shape, value, &origin, bytes_max.unwrap_or(usize::MAX))?;
+        let mut drawn = Vec::with_capacity(parts.len() + 1);
+        if !self.has_world && parts.iter().any(|part| part.kind.is_in_space()) {
             self.has_world = true;
-            let world = drawn_channel(WORLD, Kind::Transform, channel, &self.schema);
+            let world = drawn_channel(WORLD, Kind::Transform, false, channel, &self.schema);
             drawn.push(DrawnMessage { number: DrawnMessage::NUMBERS - 1, channel: world, data: draw_world(stamp_ns) });
         }
-        for (kind, data) in messages {
-            let channel = source.channel(kind, channel, &self.schema).clone();
-            drawn.push(DrawnMessage { number: kind as usize, channel, data });
+        for DrawnPart { kind, is_reduced, data } in parts {
+            let channel = source.channel(kind, is_reduced, channel, &self.schema).clone();
+            drawn.push(DrawnMessage { number: 2 * kind as usize + usize::from(is_reduced), channel, data });
         }
         Some(drawn)
     }
@@ -115,15 +129,19 @@ impl DrawnChannel {
         Some(Self { module, shape: Shape::of(&ty)?, ty, kinds: BTreeMap::new() })
     }
 
-    fn channel(&mut self, kind: Kind, of: &Definition, schema: &[u8]) -> &Arc<Definition> {
-        self.kinds.entry(kind).or_insert_with(|| drawn_channel(&of.topic, kind, of, schema))
+    fn channel(&mut self, kind: Kind, is_reduced: bool, of: &Definition, schema: &[u8]) -> &Arc<Definition> {
+        let new = || drawn_channel(&of.topic, kind, is_reduced, of, schema);
+        self.kinds.entry((kind, is_reduced)).or_insert_with(new)
     }
 }
 
 /// A channel below a topic, marked as drawn of another one.
-fn drawn_channel(topic: &str, kind: Kind, of: &Definition, schema: &[u8]) -> Arc<Definition> {
+fn drawn_channel(topic: &str, kind: Kind, is_reduced: bool, of: &Definition, schema: &[u8]) -> Arc<Definition> {
     let mut texts = of.texts.clone();
     texts.insert(key::DRAWN.into(), of.topic.clone());
+    if is_reduced {
+        texts.insert(key::REDUCED.into(), "true".into());
+    }
     Arc::new(Definition {
         topic: format!("{topic}/{}", kind.suffix()),
         message_encoding: schema::MESSAGE_ENCODING.into(),

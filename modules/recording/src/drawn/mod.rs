@@ -18,6 +18,8 @@ mod pictures;
 mod poses;
 mod proto;
 mod schema;
+#[cfg(test)]
+mod tests;
 
 use crate::error::{DiskError, ReadError};
 use crate::format::{key, metadata};
@@ -32,7 +34,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
-/// A longer message is not in one file both as it was recorded and drawn.
+/// A longer message is not in one file both as it was recorded and drawn: fewer of its pixels or points are drawn.
 const TWICE_BYTES_MAX: usize = 64 << 10;
 /// Numbers of sources in the new file: what is copied, then what is drawn.
 const COPIED: usize = 0;
@@ -41,7 +43,7 @@ const DRAWN: usize = 1;
 /// How it is drawn.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DrawOptions {
-    /// What was recorded is copied, too. A value that is longer than 64 KiB is then not drawn.
+    /// What was recorded is copied, too. Of a value that is longer than 64 KiB fewer pixels or points are then drawn.
     pub with_original: bool,
     /// Names of classes by their numbers: output lines say which module they are of.
     pub classes: BTreeMap<u8, String>,
@@ -58,7 +60,8 @@ pub struct Drawn {
     pub drawn: BTreeMap<String, u64>,
     /// Values that could not be drawn, by topic: they contradict themselves, or have a place that is no number.
     pub not_drawn: BTreeMap<String, u64>,
-    /// Values that are in the file as they were recorded, and too long to be in it twice, by topic.
+    /// Values that are in the file as they were recorded, too long to be in it twice, and no pixels or points: by
+    /// topic.
     pub too_long: BTreeMap<String, u64>,
     /// Topics of which nothing is drawn.
     pub without: Vec<String>,
@@ -101,7 +104,7 @@ pub fn draw(
     progress: &mut Progress<'_>,
 ) -> Result<Drawn, DrawError> {
     let mut selected = Selected::open(path, selection)?;
-    let mut drawing = Drawing::new(&selected, options.classes.clone())?;
+    let mut drawing = Drawing::new(&selected, options)?;
     let mut new = Rewriter::create(to)?;
     selected.each_metadata(|its| {
         if options.with_original || its.name != metadata::LOST {
@@ -125,8 +128,9 @@ struct Drawing {
 }
 
 impl Drawing {
-    fn new(selected: &Selected, classes: BTreeMap<u8, String>) -> Result<Self, DrawError> {
-        let mut drawing = Self { drawer: Drawer::new(classes), told: Drawn::default() };
+    fn new(selected: &Selected, options: &DrawOptions) -> Result<Self, DrawError> {
+        let bytes_max = options.with_original.then_some(TWICE_BYTES_MAX);
+        let mut drawing = Self { drawer: Drawer::new(options.classes.clone(), bytes_max), told: Drawn::default() };
         for (id, channel) in selected.channels().filter(|(_, its)| !its.texts.contains_key(key::DRAWN)) {
             if drawing.drawer.add(id, channel).is_none() {
                 drawing.told.without.push(channel.topic.clone());
@@ -157,14 +161,13 @@ impl Drawing {
             return Ok(());
         }
         let count = |counts: &mut BTreeMap<String, u64>, topic: &str| *counts.entry(topic.into()).or_default() += 1;
-        if with_original && data.len() > TWICE_BYTES_MAX {
-            count(&mut self.told.too_long, &channel.topic);
-            return Ok(());
-        }
         let Some(messages) = self.drawer.draw(id, channel, header.publish_time, data) else {
             count(&mut self.told.not_drawn, &channel.topic);
             return Ok(());
         };
+        if messages.is_empty() {
+            count(&mut self.told.too_long, &channel.topic);
+        }
         for drawn in messages {
             count(&mut self.told.drawn, &drawn.channel.topic);
             new.message(DRAWN + drawn.number, &drawn.channel, header, &drawn.data)?;

@@ -29,8 +29,23 @@ pub(crate) struct Origin<'a> {
     pub(crate) classes: &'a BTreeMap<u8, String>,
 }
 
-/// Messages of a value. None if it contradicts itself, or is nowhere.
-pub(crate) fn draw_one(shape: Shape, value: Value, origin: &Origin<'_>) -> Option<Vec<(Kind, Vec<u8>)>> {
+/// What is drawn of a value.
+pub(crate) struct DrawnPart {
+    pub(crate) kind: Kind,
+    /// It has fewer pixels or points than the value.
+    pub(crate) is_reduced: bool,
+    pub(crate) data: Vec<u8>,
+}
+
+impl DrawnPart {
+    fn whole(kind: Kind, message: &impl Message) -> Self {
+        Self { kind, is_reduced: false, data: message.encode_to_vec() }
+    }
+}
+
+/// Messages of a value, with at most so many bytes of pixels or points; none of a file that is longer. None if it
+/// contradicts itself, or is nowhere.
+pub(crate) fn draw_one(shape: Shape, value: Value, origin: &Origin<'_>, bytes_max: usize) -> Option<Vec<DrawnPart>> {
     let timestamp = origin.timestamp();
     Some(match shape {
         Shape::Pose => origin.pose(&PlanePose::of(value)?),
@@ -39,20 +54,21 @@ pub(crate) fn draw_one(shape: Shape, value: Value, origin: &Origin<'_>) -> Optio
             let Value::List(poses) = value else { return None };
             let poses = poses.into_iter().map(|pose| Some(PlanePose::of(pose)?.in_space())).collect::<Option<_>>()?;
             let drawn = PosesInFrame { timestamp, frame_id: WORLD.into(), poses };
-            vec![(Kind::Poses, drawn.encode_to_vec())]
+            vec![DrawnPart::whole(Kind::Poses, &drawn)]
         }
-        Shape::Scan => origin.points(of_scan(value)?),
-        Shape::Points => origin.points(of_cloud(value)?),
-        Shape::Picture => vec![match of_picture(value)? {
-            Picture::Raw(image) => {
+        Shape::Scan => origin.points(of_scan(value)?, bytes_max),
+        Shape::Points => origin.points(of_cloud(value)?, bytes_max),
+        Shape::Picture => match of_picture(value, bytes_max)? {
+            Picture::Raw { image, is_reduced } => {
                 let drawn = RawImage { timestamp, frame_id: origin.module.into(), ..image };
-                (Kind::Image, drawn.encode_to_vec())
+                vec![DrawnPart { kind: Kind::Image, is_reduced, data: drawn.encode_to_vec() }]
             }
+            Picture::File(image) if image.data.len() > bytes_max => Vec::new(),
             Picture::File(image) => {
                 let drawn = CompressedImage { timestamp, frame_id: origin.module.into(), ..image };
-                (Kind::Compressed, drawn.encode_to_vec())
+                vec![DrawnPart::whole(Kind::Compressed, &drawn)]
             }
-        }],
+        },
         Shape::Line => {
             let mut line = ValueFields::of(value)?;
             let level = level(line.word("level")?).into();
@@ -60,7 +76,7 @@ pub(crate) fn draw_one(shape: Shape, value: Value, origin: &Origin<'_>) -> Optio
             // Rerun shows the text alone.
             let message = format!("{name}: {}", line.text("text")?);
             let drawn = Log { timestamp, level, message, name };
-            vec![(Kind::Log, drawn.encode_to_vec())]
+            vec![DrawnPart::whole(Kind::Log, &drawn)]
         }
     })
 }
@@ -88,10 +104,10 @@ impl Origin<'_> {
         }
     }
 
-    fn pose(&self, pose: &PlanePose) -> Vec<(Kind, Vec<u8>)> {
+    fn pose(&self, pose: &PlanePose) -> Vec<DrawnPart> {
         let transform = self.transform(WORLD, pose);
         let there = PoseInFrame { timestamp: self.timestamp(), frame_id: WORLD.into(), pose: Some(pose.in_space()) };
-        vec![(Kind::Transform, transform.encode_to_vec()), (Kind::Pose, there.encode_to_vec())]
+        vec![DrawnPart::whole(Kind::Transform, &transform), DrawnPart::whole(Kind::Pose, &there)]
     }
 
     /// Class and instance, or all by their numbers.
@@ -100,10 +116,11 @@ impl Origin<'_> {
         self.classes.get(&class).map_or(format!("{system}.{class}.{instance}"), |class| format!("{class}.{instance}"))
     }
 
-    fn points(&self, points: PackedPoints) -> Vec<(Kind, Vec<u8>)> {
+    fn points(&self, mut points: PackedPoints, bytes_max: usize) -> Vec<DrawnPart> {
+        let is_reduced = points.reduce(bytes_max);
         let frame = if points.is_in_world { WORLD } else { self.carrier };
         let drawn = PointCloud { timestamp: self.timestamp(), frame_id: frame.into(), ..points.cloud };
-        vec![(Kind::Points, drawn.encode_to_vec())]
+        vec![DrawnPart { kind: Kind::Points, is_reduced, data: drawn.encode_to_vec() }]
     }
 }
 

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 const SECOND_NS: u64 = 1_000_000_000;
 /// What is true now, but for the arrival: topic, stamp, epoch, sequence.
-type Kept = (String, u64, u64, u32);
+pub(super) type Kept = (String, u64, u64, u32);
 
 /// A line of output, as far as this crate looks at it.
 fn line() -> Type {
@@ -109,7 +109,7 @@ fn numbers(files: &[PathBuf]) -> Vec<u32> {
 }
 
 /// What a file repeats, with its log time and bytes; and the first message behind that.
-fn beginning(path: &Path) -> (Vec<(Kept, u64, Vec<u8>)>, u64) {
+pub(super) fn beginning(path: &Path) -> (Vec<(Kept, u64, Vec<u8>)>, u64) {
     let mut reader = Reader::open(path).unwrap();
     let mut repeated = Vec::new();
     while let Some((channel, message)) = reader.next().unwrap() {
@@ -243,4 +243,51 @@ fn after_a_step_of_time_all_is_repeated_in_its_own_epoch() {
     let kept: Vec<_> = repeated.iter().map(|((topic, _, epoch, _), log_ns, _)| (&topic[..], *epoch, *log_ns)).collect();
     assert_eq!(kept, [("mapper.0/map", 1, first_ns), ("laser.0/scan", 1, first_ns)]);
     assert_eq!(info(&files[1]).unwrap().epochs.iter().map(|its| its.epoch).collect::<Vec<_>>(), [2]);
+}
+
+#[test]
+fn a_recording_begins_with_what_came_before_it_in_another_one_and_since_then() {
+    let folder = memory_folder();
+    let mut recording = Recording::begin(folder.path());
+    recording.say(MAP, 1, b"map");
+    recording.say(SCAN, 1, b"old scan");
+    recording.say(LINE, 1, b"is on");
+    let Recording { mut writer, channels, arrival_ns, .. } = recording;
+    let late = |number: u32, data: &'static [u8]| {
+        let arrival_ns = arrival_ns + u64::from(number) * 2 * SECOND_NS;
+        Message { arrival_ns, stamp_ns: arrival_ns, epoch: 1, sequence: number, data }
+    };
+    // It comes while the recording ends.
+    let mut earlier = writer.passed_over();
+    earlier.note(channels[SCAN], &late(10, b"scan"));
+    earlier.note(channels[LINE], &late(11, b"is off"));
+    earlier.fill(writer.take_newest().unwrap());
+    assert!(writer.take_newest().is_none());
+    writer.finish().1.unwrap();
+    earlier.note(channels[SCAN], &late(12, b"newest scan"));
+
+    // Channels have other numbers there, and one has another type.
+    let mut writer = Writer::start_behind(Some(earlier), options(folder.path()), session()).unwrap();
+    let mut channel = |name: &str, item: &str, ty: Type| {
+        writer.channel(&ChannelSpec { name, item, ty: &ty, texts: BTreeMap::new() }).unwrap()
+    };
+    let others = [("pilot.0", "goal", Type::Bytes), ("laser.0", "scan", Type::Bytes), ("mapper.0", "map", Type::Text)];
+    let [goal, ..] = others.map(|(name, item, ty)| channel(name, item, ty));
+    writer.write(goal, &late(20, b"go")).unwrap();
+    let newest = writer.take_newest();
+    writer.finish().1.unwrap();
+    let (repeated, first_ns) = beginning(&folder.path().join("base-0002.mcap"));
+    let Message { stamp_ns, .. } = late(12, b"");
+    assert_eq!(repeated, [(("laser.0/scan".to_owned(), stamp_ns, 1, 12), first_ns, b"newest scan".to_vec())]);
+
+    // And again, though nothing came of it in between.
+    let mut writer = Writer::start_behind(newest, options(folder.path()), session()).unwrap();
+    let [scan, goal] = [("laser.0", "scan"), ("pilot.0", "goal")].map(|(name, item)| {
+        writer.channel(&ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() }).unwrap()
+    });
+    assert_ne!(scan, goal);
+    writer.write(goal, &late(30, b"stop")).unwrap();
+    writer.finish().1.unwrap();
+    let numbers: Vec<u32> = beginning(&folder.path().join("base-0003.mcap")).0.iter().map(|its| its.0.3).collect();
+    assert_eq!(numbers, [12, 20]);
 }

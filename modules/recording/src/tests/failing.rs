@@ -1,5 +1,6 @@
 //! A disk that fails at any operation: all messages are in exactly one file, or counted as lost; and files say so.
 
+use super::beginning::beginning;
 use super::disks::{FailingDisk, Faults};
 use super::support::{Said, files, memory_folder, options, read, record, said, session};
 use crate::disk::{Disk, DiskFile, RealDisk};
@@ -142,4 +143,33 @@ fn a_removed_folder_is_noticed_and_a_new_one_is_used() {
     told.unwrap();
     assert_eq!((status.synced, status.unsure, status.lost), (1, 1, 0));
     assert_eq!(found(&folder).0.len(), 1);
+}
+
+#[test]
+fn what_no_disk_took_is_what_the_next_recording_begins_with() {
+    let folder = memory_folder();
+    let free = Arc::new(AtomicU64::new(1 << 30));
+    let low = Options { leave_bytes: 1 << 20, ..options(folder.path()) };
+    let mut writer = Writer::start_on(Box::new(SmallDisk(free.clone())), low, session()).unwrap();
+    let spec = |name: &'static str| ChannelSpec { name, item: "scan", ty: &Type::Bytes, texts: BTreeMap::new() };
+    let channel = writer.channel(&spec("laser.0")).unwrap();
+    let message = |sequence: u32| {
+        let arrival_ns = 10_000_000_000 * u64::from(sequence);
+        Message { arrival_ns, stamp_ns: arrival_ns, epoch: 1, sequence, data: b"scan" }
+    };
+    writer.write(channel, &message(1)).unwrap();
+    until("the first is written", || writer.status().written == 1);
+    free.store(0, Relaxed);
+    writer.write(channel, &message(2)).unwrap();
+    until("the problem is told", || writer.status().problem.is_some());
+    let newest = writer.take_newest();
+    let (status, _) = writer.finish();
+    assert_eq!((status.written, status.lost), (1, 1));
+    let mut writer = Writer::start_behind(newest, options(folder.path()), session()).unwrap();
+    let other = writer.channel(&spec("laser.1")).unwrap();
+    writer.channel(&spec("laser.0")).unwrap();
+    writer.write(other, &message(3)).unwrap();
+    writer.finish().1.unwrap();
+    let numbers: Vec<u32> = beginning(files(folder.path()).last().unwrap()).0.iter().map(|its| its.0.3).collect();
+    assert_eq!(numbers, [2]);
 }

@@ -1,6 +1,7 @@
 //! Files of other programs: listed, whatever they hold and however they are packed.
 
 use super::support::memory_folder;
+use crate::format::key;
 use crate::read::chunk;
 use crate::{Damage, Info, Reader, Selection, cut, info};
 use mcap::records::MessageHeader;
@@ -79,6 +80,38 @@ fn channels_types_encodings_counts_and_times_of_others_are_told() {
             assert_eq!(reader.next().unwrap().unwrap().1.arrival_ns, from_ns, "{case}");
         }
         assert!(!reader.seek(39_001).unwrap(), "{case}");
+    }
+}
+
+/// Other programs may mean anything by our words, and nothing is repeated, drawn, or of an epoch.
+#[test]
+fn our_words_in_files_of_others_mean_nothing() {
+    let folder = memory_folder();
+    for profile in ["ros2", ""] {
+        let path = folder.path().join(format!("{profile}.mcap"));
+        let options = WriteOptions::new().profile(profile);
+        let mut writer = options.create(std::fs::File::create(&path).unwrap()).unwrap();
+        let (epoch, most) = (key::EPOCH, u64::MAX.to_string());
+        for (number, word) in [(key::REPEATED, "true"), (key::DRAWN, "/scan"), (epoch, &most)].into_iter().enumerate() {
+            let texts = BTreeMap::from([(word.0.to_owned(), word.1.to_owned())]);
+            let channel_id = writer.add_channel(0, &format!("/{number}"), "raw", &texts).unwrap();
+            let header = MessageHeader { channel_id, sequence: 0, log_time: 5, publish_time: 0 };
+            writer.write_to_known_channel(&header, &[7]).unwrap();
+        }
+        writer.finish().unwrap();
+        let mut readers =
+            [Reader::open(&path).unwrap(), Reader::select(&path, &Selection::default()).unwrap()].into_iter();
+        assert!(readers.all(|mut reader| {
+            let mut messages = 0;
+            while let Some((channel, message)) = reader.next().unwrap() {
+                assert!(!channel.is_repeated() && !channel.is_drawn() && message.epoch == 0, "{channel:?}");
+                messages += 1;
+            }
+            messages == 3
+        }));
+        let info = info(&path).unwrap();
+        assert_eq!((info.messages, info.repeated, info.epochs.len()), (3, 0, 0));
+        assert!(info.channels.iter().all(|channel| channel.drawn_of.is_none()));
     }
 }
 

@@ -3,7 +3,7 @@
 use rohrpost_modules::common::OutputLevel;
 use rohrpost_modules::output::OutputLine;
 use rohrpost_modules::types::{Bytes, Image, ImageFormat, LaserScan, Odometry, PointCloud, PointFormat, Pose, Twist};
-use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
+use rohrpost_recording::{ChannelSpec, DrawnBeside, Message, Options, Session, Writer};
 use rohrpost_schema::{Data, Type};
 use std::collections::BTreeMap;
 use std::f32::consts::FRAC_PI_2;
@@ -44,10 +44,29 @@ pub(crate) fn cloud() -> PointCloud {
     PointCloud { points: Bytes(points), ..PointCloud::empty(2, 1, PointFormat::XyzRgb) }
 }
 
+/// Of 640 by 480 pixels, which tell their column and row; and those of every fourth of every fourth row, which are as
+/// many as fit in 64 KiB.
+pub(crate) fn long_picture() -> (Image, Vec<u8>) {
+    let pixels = |every: usize| {
+        let row = move |y: u32| (0..640_u32).step_by(every).flat_map(move |x| [x as u8, y as u8, (x >> 8) as u8]);
+        (0..480).step_by(every).flat_map(row).collect::<Vec<u8>>()
+    };
+    (Image { pixels: Bytes(pixels(1)), ..Image::empty(640, 480, ImageFormat::Rgb8) }, pixels(4))
+}
+
+/// Of ten thousand points, and the bytes of every second, which are as many as fit in 64 KiB.
+pub(crate) fn long_cloud() -> (PointCloud, Vec<u8>) {
+    let points = |every: usize| {
+        let point = |number: u32| [number as f32, 1.0, -1.0].map(f32::to_le_bytes).concat();
+        (0..10_000).step_by(every).flat_map(point).collect::<Vec<u8>>()
+    };
+    (PointCloud { points: Bytes(points(1)), ..PointCloud::empty(10_000, 1, PointFormat::Xyz) }, points(2))
+}
+
 pub(crate) fn line(text: &str) -> OutputLine {
     let module = u32::from_be_bytes([1, 140, 3, 0]);
     let (lost, suppressed) = (0, 0);
-    OutputLine { time_ns: STAMP_NS, module, level: OutputLevel::Warn, lost, suppressed, text: text.into() }
+    OutputLine { time_ns: STAMP_NS, module, level: OutputLevel::Warn, lost, suppressed, errno: None, text: text.into() }
 }
 
 /// One of each, and one that is not drawn.
@@ -78,6 +97,13 @@ pub(crate) fn record(folder: &Path, stem: &str, sights: &[Sight]) -> PathBuf {
 /// The same with other options.
 pub(crate) fn record_with(options: Options, sights: &[Sight]) {
     record_files(options, &[sights]);
+}
+
+/// A recording that draws what it records; its file.
+pub(crate) fn record_drawn(folder: &Path, period_ns: u64, sights: &[Sight]) -> PathBuf {
+    let drawn = Some(DrawnBeside { period_ns, classes: BTreeMap::from([(140, "pilot".to_owned())]) });
+    record_with(Options { drawn, ..Options::new(folder, "beside") }, sights);
+    folder.join("beside-0001.mcap")
 }
 
 /// The same, each of these in a file of its own.

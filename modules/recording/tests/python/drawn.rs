@@ -1,7 +1,7 @@
 //! What is drawn, as Python reads it by the descriptions in the file: each channel with its content.
 
 use super::python;
-use super::sights::{record, sights};
+use super::sights::{long_cloud, long_picture, record, record_drawn, sight, sights};
 use rohrpost_recording::{DrawOptions, Selection, draw};
 
 #[test]
@@ -31,4 +31,26 @@ fn python_finds_each_drawn_channel_with_its_content() {
         "output.0/line/log: foxglove.Log WARNING of 1.140.3: 1.140.3: battery low".into(),
     ];
     assert_eq!(python("drawn.py", &[to]), wanted);
+}
+
+/// What is drawn while it is recorded, in the same file: of what is long, a part.
+#[test]
+fn python_finds_the_picture_and_the_points_in_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = [sight("camera.0", "image", &long_picture().0), sight("depth.0", "points", &long_cloud().0)];
+    let path = record_drawn(folder.path(), 1, &all);
+    let (pixels, points) = (long_picture().1, long_cloud().1);
+    let wanted = [
+        format!(
+            "camera.0/image/image: foxglove.RawImage of camera.0: 160 by 120 rgb8, sum {:08x}",
+            crc32fast::hash(&pixels)
+        ),
+        "world/transform: foxglove.FrameTransform world in tf#/ at (0 0 0) turned (0 0 0.000 1.000)".into(),
+        format!(
+            "depth.0/points/points: foxglove.PointCloud in world: {} bytes, sum {:08x}",
+            points.len(),
+            crc32fast::hash(&points)
+        ),
+    ];
+    assert_eq!(python("drawn.py", &[path]), wanted);
 }

@@ -1,6 +1,6 @@
 //! What is drawn, as Rerun's converter understands it: by content, as it also converts what it shows as bytes only.
 
-use super::sights::{record, sights};
+use super::sights::{long_cloud, long_picture, record, record_drawn, sight, sights};
 use rohrpost_recording::{DrawOptions, Selection, draw};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -74,4 +74,23 @@ fn rerun_finds_each_drawn_channel_with_its_content() {
     }
     let format = &all["/camera.0/image/image"]["Image:format"];
     assert!(format.starts_with("[{width: 2, height: 2, "), "{format}");
+}
+
+/// A recording that is not exported: the picture and the points of what is long, in part.
+#[test]
+fn rerun_finds_the_picture_and_the_points_in_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = [sight("camera.0", "image", &long_picture().0), sight("depth.0", "points", &long_cloud().0)];
+    let (path, rrd) = (record_drawn(folder.path(), 1, &all), folder.path().join("drawn.rrd"));
+    rerun(&["mcap", "convert", "-o", rrd.to_str().unwrap()], &path);
+    let all = entities(&rerun(&["rrd", "print", "-vvv"], &rrd));
+    // Long lists are printed up to some place.
+    for (entity, component, wanted) in [
+        ("/camera.0/image/image", "Image:buffer", "[[0, 0, 0, 4, 0, 0, 8, 0, 0, 12, 0, 0, "),
+        ("/camera.0/image/image", "Image:format", "[{width: 160, height: 120, "),
+        ("/depth.0/points/points", "Points3D:positions", "[[0.0, 1.0, -1.0], [2.0, 1.0, -1.0], [4.0, 1.0, -1.0], "),
+    ] {
+        let found = all.get(entity).and_then(|components| components.get(component));
+        assert!(found.is_some_and(|found| found.starts_with(wanted)), "{entity} {component} of {all:#?}");
+    }
 }

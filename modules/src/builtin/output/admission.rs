@@ -170,7 +170,7 @@ mod tests {
 
     fn line(module: Name) -> OutputLine {
         let (module, time_ns, text) = (module.raw(), NOW.time_ns, "is on".into());
-        OutputLine { time_ns, module, level: OutputLevel::Info, lost: 0, suppressed: 0, text }
+        OutputLine { time_ns, module, level: OutputLevel::Info, lost: 0, suppressed: 0, errno: None, text }
     }
 
     #[test]

@@ -48,7 +48,7 @@ fn fields(datagram: &mut Vec<u8>, line: &OutputLine, installation: &Installation
         OutputLevel::Info => "6",
         OutputLevel::Debug | OutputLevel::Trace => "7",
     };
-    field(datagram, "MESSAGE", &line.text);
+    field(datagram, "MESSAGE", &line.full_text());
     field(datagram, "PRIORITY", priority);
     field(datagram, "SYSLOG_IDENTIFIER", "rohrpost");
     field(datagram, "ROHRPOST_INSTALLATION", &installation.name);
@@ -60,6 +60,10 @@ fn fields(datagram: &mut Vec<u8>, line: &OutputLine, installation: &Installation
         field(datagram, "ROHRPOST_CLASS", class);
     }
     field(datagram, "ROHRPOST_TIME_NS", &line.time_ns.to_string());
+    if let Some(number) = line.errno {
+        // systemd has a field for it.
+        field(datagram, "ERRNO", &number.to_string());
+    }
     for (name, count) in [("ROHRPOST_LOST_BEFORE", line.lost), ("ROHRPOST_SUPPRESSED", line.suppressed)] {
         if count > 0 {
             field(datagram, name, &count.to_string());
@@ -127,7 +131,7 @@ optional = true
 
     fn line(level: OutputLevel, text: &str) -> OutputLine {
         let module = Name::new(1, 200, 0, 0).raw();
-        OutputLine { time_ns: 123, module, level, lost: 0, suppressed: 0, text: text.into() }
+        OutputLine { time_ns: 123, module, level, lost: 0, suppressed: 0, errno: None, text: text.into() }
     }
 
     #[test]
@@ -159,10 +163,11 @@ optional = true
             let expected = expected.map(|(name, value)| (name.to_owned(), value.to_owned()));
             assert_eq!(fields.into_iter().collect::<Vec<_>>(), expected);
         }
-        let told = OutputLine { lost: 2, suppressed: 5, ..line(OutputLevel::Warn, "x") };
+        let told = OutputLine { lost: 2, suppressed: 5, errno: Some(28), ..line(OutputLevel::Warn, "x") };
         journal.write(&told, &installation, Instant::now());
         let fields = read(&listening);
         assert_eq!((fields["ROHRPOST_LOST_BEFORE"].as_str(), fields["ROHRPOST_SUPPRESSED"].as_str()), ("2", "5"));
+        assert_eq!(fields["ERRNO"], "28");
     }
 
     #[test]

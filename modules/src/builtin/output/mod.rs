@@ -26,8 +26,9 @@ use std::time::Instant;
 const SLOTS: u16 = 512;
 /// Bytes of lines in a page, so that it fits in any reply mailbox.
 const PAGE_BYTES: usize = 2500;
-/// Most bytes that a line has besides its text: time, module, level, two counts, the length of the text.
-const NUMBERS_BYTES: usize = 10 + 5 + 1 + 5 + 5 + 2;
+/// Most bytes that a line has besides its text: time, module, level, two counts, a number of an error, the length of
+/// the text.
+const NUMBERS_BYTES: usize = 10 + 5 + 1 + 5 + 5 + 4 + 2;
 
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields)]
@@ -53,7 +54,7 @@ impl Module for OutputModule {
         let output = context.installation().output.clone();
         let file = output.file.as_deref().map(|path| open(path, &output)).transpose()?;
         let journal = output.journal.then(|| Journal::new(Path::new(journal::SOCKET)));
-        let journal = journal.transpose().map_err(|error| ModuleError::new(format!("journal: {error}")))?;
+        let journal = journal.transpose().map_err(|error| ModuleError::at("journal", error))?;
         context.open_mailbox_to_all(LINES, Shape { slots: SLOTS, body_bytes_max: 1024, ..Shape::default() })?;
         let (admission, ring) = (Admission::new(output.rate, output.burst), Ring::new(output.ring as usize));
         let life = context.link().borrow().participant().incarnation();
@@ -76,7 +77,7 @@ impl Module for OutputModule {
 
 fn open(path: &Path, output: &Output) -> Result<LogFile, ModuleError> {
     let file = LogFile::open(path, output.file_size, output.files);
-    file.map_err(|error| ModuleError::new(format!("output file {}: {error}", path.display())))
+    file.map_err(|error| ModuleError::at(format_args!("output file {}", path.display()), error))
 }
 
 impl OutputModule {
@@ -113,7 +114,10 @@ impl OutputModule {
 fn tell(change: Option<SinkChange>, what: &dyn std::fmt::Display) {
     match change {
         Some(SinkChange::Fails(error)) => {
-            tracing::error!("{what} takes no lines: {error}; goes on without, and tries again every second");
+            tracing::error!(
+                errno = error.raw_os_error(),
+                "{what} takes no lines: {error}; goes on without, and tries again every second"
+            );
         }
         Some(SinkChange::Works(missing)) => tracing::warn!("{what} takes lines again; {missing} are missing there"),
         None => {}

@@ -66,7 +66,7 @@ mod tests {
 
     fn line(text: &str) -> OutputLine {
         let text = text.into();
-        OutputLine { time_ns: 0, module: 0, level: OutputLevel::Info, lost: 0, suppressed: 0, text }
+        OutputLine { time_ns: 0, module: 0, level: OutputLevel::Info, lost: 0, suppressed: 0, errno: None, text }
     }
 
     /// All lines with their numbers, run by run.

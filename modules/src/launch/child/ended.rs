@@ -1,6 +1,6 @@
 //! What follows when a process has ended, and what is said about it.
 
-use super::{Child, Phase, cut};
+use super::{Child, Phase, ProcessEnd, cut};
 use crate::common::OutputLevel;
 use crate::launch::policy::Next;
 use crate::launch::repeats::Tell;
@@ -30,18 +30,12 @@ impl Child {
         let misconfigured = status.code() == Some(i32::from(StartError::CONFIGURATION));
         let success = status.success();
         let next = if misconfigured || self.last_incarnation { Next::Stay } else { self.policy.ended(success, now) };
-        self.follow(next, success, &how, &printed, now)
+        self.follow(next, &ProcessEnd { is_success: success, how: &how, errno: None, printed: &printed }, now)
     }
 
     /// What follows an end of its own accord; what there is to say about it.
-    pub(super) fn follow(
-        &mut self,
-        next: Next,
-        success: bool,
-        how: &str,
-        printed: &str,
-        now: Instant,
-    ) -> Option<String> {
+    pub(super) fn follow(&mut self, next: Next, end: &ProcessEnd<'_>, now: Instant) -> Option<String> {
+        let ProcessEnd { is_success: success, how, errno, printed } = *end;
         self.last_end = format!("{how}{printed}");
         let (told, tell) = match next {
             Next::Stay => {
@@ -84,7 +78,7 @@ impl Child {
         };
         self.printed.pass_on(!success);
         if !success {
-            self.printed.say(OutputLevel::Error, &told);
+            self.printed.say(OutputLevel::Error, &told, errno);
         }
         Some(format!("{} {told}{below}", self.text))
     }

@@ -2,13 +2,16 @@
 
 use super::Context;
 use crate::interface::StreamPort;
-use crate::journal::Tag;
+use crate::journal::{AskedStream, Question, Tag};
 use crate::runtime::error::ContextError;
 use crate::runtime::stream::{
     CheckedReader, KnownStream, OpenValue, OwnStream, RecordError, Stream, StreamSubscription, note, opened,
 };
-use rohrpost_mailbox::{Name, Stamp};
+use rohrpost_mailbox::{Name, Stamp, StreamId};
 use rohrpost_schema::{Data, DataItem};
+
+/// How it is asked for a stream of an interface.
+type OpenQuestion = fn(AskedStream, u32) -> Question<'static>;
 
 impl Context {
     /// Writes a value that was true at `stamp_ns` (system time) into the module's stream: straight into shared memory,
@@ -93,17 +96,18 @@ impl Context {
         let (_, streams, outlet) = self.split();
         let OwnStream { about, writer } = &mut streams[at];
         let journal = outlet.journal;
-        let noted = journal.given(Tag::Wrote).map(|given| given.read::<Result<(u64, u64), RecordError>>());
+        let question = Question::Own { endpoint: about.endpoint as u16, number: about.item.number, stamp_ns };
+        let noted = journal.given(Tag::Wrote, question).map(|given| given.read::<Result<(u64, u64), RecordError>>());
         let (epoch, sequence) = noted.unwrap_or_else(|| Ok((epoch, writer.written())))?;
         match writer.begin(Stamp { epoch, ns: stamp_ns }) {
             Ok(record) => {
-                journal.note(Tag::Wrote, &Ok::<_, RecordError>((epoch, sequence)));
+                journal.note(Tag::Wrote, question, &Ok::<_, RecordError>((epoch, sequence)));
                 Ok(OpenValue::new(record, (sequence, stamp_ns), about, outlet))
             }
             Err(error) => {
                 let error = about.explain(error);
                 journal.replay(|replay| replay.give_up(&format!("a record that was written is refused now: {error}")));
-                journal.note(Tag::Wrote, &Err::<(u64, u64), _>(&error));
+                journal.note(Tag::Wrote, question, &Err::<(u64, u64), _>(&error));
                 Err(error.into())
             }
         }
@@ -125,7 +129,7 @@ impl Context {
     /// When the text names no module, one of another class, or one of another node ([`ContextError::FarStream`]), and
     /// [`ContextError::Read`] when all seats of the stream are taken.
     pub fn stream<T: Data>(&mut self, port: StreamPort<T>, module: &str) -> Result<Stream<T>, ContextError> {
-        Ok(Stream::new(self.open_stream(&port, module)?, self.clock.clone()))
+        Ok(Stream::new(self.open_stream(&port, module, Question::Interface)?, self.clock.clone()))
     }
 
     /// Opens a stream of which the type is known by its description alone, such as one that a view draws. Each record's
@@ -160,7 +164,7 @@ impl Context {
     /// [`ContextError::FarStream`] for a module of another node, and [`ContextError::Read`] when all seats of the
     /// stream are taken.
     pub fn stream_untyped(&mut self, from: Name, item: &DataItem, interface: u32) -> Result<Stream<()>, ContextError> {
-        Ok(Stream::new(self.open_untyped(from, item, interface)?, self.clock.clone()))
+        Ok(Stream::new(self.open_untyped(from, item, interface, Question::Interface)?, self.clock.clone()))
     }
 
     /// Follows a stream of another module of this node: each record comes to [`crate::Module::received`], while this
@@ -189,7 +193,7 @@ impl Context {
         port: StreamPort<T>,
         module: &str,
     ) -> Result<StreamSubscription<T>, ContextError> {
-        let reader = self.open_stream(&port, module)?;
+        let reader = self.open_stream(&port, module, Question::Followed)?;
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
     }
 
@@ -218,27 +222,55 @@ impl Context {
         item: &DataItem,
         interface: u32,
     ) -> Result<StreamSubscription<()>, ContextError> {
-        let reader = self.open_untyped(from, item, interface)?;
+        let reader = self.open_untyped(from, item, interface, Question::Followed)?;
         self.followed_streams.follow(reader).ok_or(ContextError::TooMany)
     }
 
-    fn open_untyped(&self, from: Name, item: &DataItem, interface: u32) -> Result<CheckedReader, ContextError> {
-        let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
-        let beyond = (from.system() != self.me.system()).then_some("?");
-        self.open_known(known, from, beyond, || self.installation.classes.format(from))
+    /// Goes back to the oldest record that a followed stream keeps of its present writer: also those come that were
+    /// written before it was followed. And at the module's end it is given those that are there by then.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, ContextError, StreamSubscription};
+    /// # use rohrpost_modules::{interface::StreamPort, types::Pose};
+    /// fn follow_all(context: &mut Context, hook: StreamPort<Pose>) -> Result<StreamSubscription<Pose>, ContextError> {
+    ///     let subscription = context.subscribe_stream(hook, "crane.0")?;
+    ///     context.rewind(&subscription);
+    ///     Ok(subscription)
+    /// }
+    /// ```
+    pub fn rewind<T>(&mut self, subscription: &StreamSubscription<T>) {
+        self.journal.asked(Tag::Rewound, Question::Rewound(subscription.id()));
+        self.followed_streams.rewind(subscription);
     }
 
-    fn open_stream<T>(&self, port: &StreamPort<T>, module: &str) -> Result<CheckedReader, ContextError> {
+    fn open_untyped(
+        &self,
+        from: Name,
+        item: &DataItem,
+        interface: u32,
+        question: OpenQuestion,
+    ) -> Result<CheckedReader, ContextError> {
+        let known = KnownStream { number: item.number, name: item.field.name.clone().into(), interface };
+        let beyond = (from.system() != self.me.system()).then_some("?");
+        self.open_known(known, (from, beyond), question, || self.installation.classes.format(from))
+    }
+
+    fn open_stream<T>(
+        &self,
+        port: &StreamPort<T>,
+        module: &str,
+        question: OpenQuestion,
+    ) -> Result<CheckedReader, ContextError> {
         let (from, is_beyond) = self.of_class(module, port.class)?;
-        self.open_known((*port).into(), from, is_beyond.then_some("?"), || module.into())
+        self.open_known((*port).into(), (from, is_beyond.then_some("?")), question, || module.into())
     }
 
     /// Opens a stream, which is `beyond` if the node is not of this configuration.
     fn open_known(
         &self,
         known: KnownStream,
-        from: Name,
-        beyond: Option<&str>,
+        (from, beyond): (Name, Option<&str>),
+        question: OpenQuestion,
         module: impl FnOnce() -> String,
     ) -> Result<CheckedReader, ContextError> {
         let node = beyond.or_else(|| self.installation.node_of(from));
@@ -250,10 +282,12 @@ impl Context {
             return Err(ContextError::FarStream { stream, module, node: node.into() });
         }
         let participant = self.link.unseen().borrow().participant().clone();
-        let then = opened(&self.journal).transpose()?;
+        let id = StreamId { name: from.module(), number: known.number };
+        let question = question(id.into(), known.interface);
+        let then = opened(&self.journal, question).transpose()?;
         let reader = CheckedReader::open(&participant, &self.installation, known, from);
         if then.is_none() {
-            note(&self.journal, Tag::Opened, &reader, |_| ());
+            note(&self.journal, Tag::Opened, question, &reader, |_| ());
         }
         Ok(reader?)
     }

@@ -3,6 +3,7 @@
 use super::Context;
 use crate::common::DataHead;
 use crate::interface::DataPort;
+use crate::journal::{Question, Tag, nanoseconds};
 use crate::runtime::error::ContextError;
 use crate::runtime::follow::{Rate, Subscription};
 use rohrpost_mailbox::{CreateError, Head, Name, OverflowPolicy, Shape, local};
@@ -100,6 +101,11 @@ impl Context {
     ) -> Result<Subscription<T>, ContextError> {
         let known = self.taking.iter().copied().find(|(local, _)| *local == mailbox);
         let (mailbox, latest) = known.ok_or(ContextError::NoMailbox(mailbox))?;
+        let period_ns = match rate {
+            Rate::Each => None,
+            Rate::Every(period) => Some(nanoseconds(period)),
+        };
+        self.journal.asked(Tag::Subscribed, Question::Data { from: from.raw(), number, interface, mailbox, period_ns });
         let followed = self.followings.follow((mailbox, latest), from, number, interface, rate);
         Ok(Subscription::new(followed.ok_or(ContextError::TooMany)?, mailbox))
     }
@@ -118,7 +124,7 @@ impl Context {
     /// # Errors
     /// When it cannot be made.
     pub fn open_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
-        self.make_mailbox(local, shape)?;
+        self.make_mailbox(local, shape, false)?;
         self.taking.push((local, shape.full == OverflowPolicy::Latest));
         Ok(())
     }
@@ -144,12 +150,14 @@ impl Context {
     /// # Errors
     /// When it cannot be made.
     pub fn open_mailbox_to_all(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
-        self.make_mailbox(local, shape)?;
+        self.make_mailbox(local, shape, true)?;
         self.open.push(local);
         Ok(())
     }
 
-    fn make_mailbox(&mut self, local: u8, shape: Shape) -> Result<(), CreateError> {
+    fn make_mailbox(&mut self, local: u8, shape: Shape, is_to_all: bool) -> Result<(), CreateError> {
+        let Shape { slots, body_bytes_max: bytes, .. } = shape;
+        self.journal.asked(Tag::MadeMailbox, Question::Mailbox { local, slots, bytes, is_to_all });
         let participant = self.link.unseen().borrow().participant().clone();
         let made = participant.receiver(self.me.with_local(local), shape);
         if made.is_err() {

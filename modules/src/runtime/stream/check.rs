@@ -4,7 +4,9 @@ use super::error::{StreamReadError, in_words};
 use crate::interface::StreamPort;
 use crate::journal::JOURNAL_NUMBER;
 use rohrpost_config::Installation;
-use rohrpost_mailbox::{HeldRecord, Name, Next, Participant, RecordInfo, StreamError, StreamId, StreamReader};
+use rohrpost_mailbox::{
+    HeldRecord, Name, Next, Participant, RecordInfo, StreamError, StreamId, StreamInfo, StreamReader,
+};
 use rohrpost_schema::Description;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -30,6 +32,8 @@ pub(super) struct Source {
     pub(super) id: StreamId,
     /// The stream's name.
     pub(super) name: Cow<'static, str>,
+    /// Each of its records is recorded.
+    pub(super) is_recorded: bool,
     /// Hash of the interface that this program knows.
     interface: u32,
     installation: Arc<Installation>,
@@ -56,6 +60,7 @@ impl CheckedReader {
         let KnownStream { number, name, interface } = known;
         let source = Source {
             id: StreamId { name: from.module(), number },
+            is_recorded: installation.records_each(from.module(), &name),
             name,
             interface,
             installation: installation.clone(),
@@ -65,6 +70,25 @@ impl CheckedReader {
         };
         let reader = participant.stream_reader(source.id).map_err(|error| source.explain(&error))?;
         Ok(Self { reader, source })
+    }
+
+    /// Goes back to the oldest record of its present writer that is kept. A stream that cannot be looked at says why
+    /// when it is read.
+    pub(super) fn rewind(&mut self) {
+        let Source { participant, id, .. } = &self.source;
+        let info = participant.node().inspect_stream(*id).ok().flatten();
+        let Some(StreamInfo { oldest: Some(oldest), newest: Some(newest), .. }) = info else { return };
+        let (mut from, mut to) = (oldest.sequence, newest.sequence);
+        // What is not there any more counts as older.
+        while from < to {
+            let middle = from.midpoint(to);
+            let record = self.reader.record(middle);
+            match record.is_some_and(|record| record.info().incarnation == newest.incarnation) {
+                true => to = middle,
+                false => from = middle + 1,
+            }
+        }
+        self.reader.seek(from);
     }
 
     /// Whether it reads a module's journal.

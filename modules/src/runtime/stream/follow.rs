@@ -32,6 +32,13 @@ pub struct StreamSubscription<T> {
     data: PhantomData<fn() -> T>,
 }
 
+impl<T> StreamSubscription<T> {
+    /// Tells it from others of the module.
+    pub(in crate::runtime) fn id(&self) -> u16 {
+        self.id
+    }
+}
+
 impl<T> Clone for StreamSubscription<T> {
     fn clone(&self) -> Self {
         *self
@@ -54,6 +61,8 @@ impl<T> seal::Kind for StreamSubscription<T> {
 pub(crate) struct FollowedStream {
     reader: CheckedReader,
     id: u16,
+    /// Nothing of it is to be missing at its ends.
+    is_whole: bool,
     notices: Notices,
 }
 
@@ -76,6 +85,8 @@ struct Notices {
 pub(crate) struct FollowedStreams {
     /// Those that are not being worked off.
     pub(in crate::runtime) list: Vec<FollowedStream>,
+    /// To be rewound once they are not being worked off.
+    rewound: Vec<u16>,
     /// Ever made.
     made: u16,
 }
@@ -110,7 +121,8 @@ impl FollowedRecord<'_> {
             incarnation: 0,
         };
         let (from, number) = (self.source.id.name, self.source.id.number);
-        Received::new(from, number, Origin::Stream { id: self.id, stamp: info.stamp }, head, self.held.body())
+        let origin = Origin::Stream { id: self.id, stamp: info.stamp, is_recorded: self.source.is_recorded };
+        Received::new(from, number, origin, head, self.held.body())
     }
 }
 
@@ -120,18 +132,41 @@ impl FollowedStreams {
         let id = self.made;
         self.made = id.checked_add(1)?;
         let (stream, module) = (reader.source.name.clone().into_owned(), reader.source.module());
-        if reader.is_journal() {
+        let is_whole = reader.is_journal();
+        if is_whole {
             // From its beginning on, as far as it is there.
             reader.reader.seek(0);
         }
         let notices = Notices { stream, module, throttle: Throttle::default(), refusal: None, retry: None };
-        self.list.push(FollowedStream { reader, id, notices });
+        self.list.push(FollowedStream { reader, id, is_whole, notices });
         Some(StreamSubscription { id, data: PhantomData })
     }
 
-    /// Passes over what was written until now; of a journal nothing is to be missing.
+    /// Goes back to the oldest record that a stream keeps of its present writer.
+    pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>) {
+        match self.list.iter_mut().find(|stream| stream.id == of.id) {
+            Some(stream) => stream.rewind(),
+            None => self.rewound.push(of.id),
+        }
+    }
+
+    /// Whether one that is being worked off is to be rewound first.
+    pub(in crate::runtime) fn is_rewound(&self) -> bool {
+        !self.rewound.is_empty()
+    }
+
+    /// Those that were worked off come back.
+    pub(in crate::runtime) fn put_back(&mut self, mut worked: Vec<FollowedStream>) {
+        worked.append(&mut self.list);
+        self.list = worked;
+        for id in std::mem::take(&mut self.rewound) {
+            self.list.iter_mut().filter(|stream| stream.id == id).for_each(FollowedStream::rewind);
+        }
+    }
+
+    /// Passes over what was written until now, but of those of which nothing is to be missing.
     pub(in crate::runtime) fn pass_over(&mut self) {
-        for stream in self.list.iter_mut().filter(|stream| !stream.is_journal()) {
+        for stream in self.list.iter_mut().filter(|stream| !stream.is_whole) {
             if let Err(error) = stream.reader.reader.pass_over() {
                 stream.notices.refused(&stream.reader.source.explain(&error));
             }
@@ -166,13 +201,23 @@ impl FollowedStreams {
 
 impl FollowedStream {
     /// Whether it is the journal of a module.
-    pub(in crate::runtime) fn is_journal(&self) -> bool {
+    fn is_journal(&self) -> bool {
         self.reader.is_journal()
+    }
+
+    /// Whether what is there at the module's end is read before.
+    pub(in crate::runtime) fn is_whole(&self) -> bool {
+        self.is_whole
+    }
+
+    fn rewind(&mut self) {
+        self.is_whole = true;
+        self.reader.rewind();
     }
 
     /// The next record, or what there is instead.
     pub(in crate::runtime) fn step(&mut self) -> Step<'_> {
-        let Self { reader, id, notices } = self;
+        let Self { reader, id, notices, .. } = self;
         if notices.retry.is_some_and(|retry| Instant::now() < retry) {
             return Step::Nothing;
         }

@@ -1,7 +1,8 @@
 //! What the reader of a stream said, as a journal has it.
 
+use super::check::Source;
 use super::error::StreamReadError;
-use crate::journal::{Blob, ModuleJournal, Tag};
+use crate::journal::{ModuleJournal, NotedValue, Question, Tag};
 use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo, Stamp};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +22,7 @@ pub(super) struct NotedInfo {
 pub(super) struct NotedRecord<'a> {
     info: NotedInfo,
     #[serde(borrow)]
-    bytes: Blob<'a>,
+    bytes: NotedValue<'a>,
 }
 
 /// What is next.
@@ -66,23 +67,29 @@ impl From<NotedInfo> for RecordInfo {
     }
 }
 
-impl<'a> From<&'a HeldRecord<'_>> for NotedRecord<'a> {
-    fn from(held: &'a HeldRecord<'_>) -> Self {
-        Self { info: held.info().into(), bytes: Blob(held.body()) }
+impl<'a> NotedRecord<'a> {
+    /// As this journal is to have it.
+    pub(super) fn of(journal: &ModuleJournal, (held, source): &'a (HeldRecord<'_>, &Source)) -> Self {
+        let info = held.info();
+        let bytes = journal.record(source.id, info.sequence, source.is_recorded, held.body());
+        Self { info: info.into(), bytes }
     }
-}
 
-impl NotedRecord<'_> {
-    fn given(self) -> GivenRecord {
-        (self.info.into(), self.bytes.0.to_vec())
+    /// The same of one that is there, perhaps.
+    pub(super) fn of_some(journal: &ModuleJournal, record: &'a Option<(HeldRecord<'_>, &Source)>) -> Option<Self> {
+        record.as_ref().map(|record| Self::of(journal, record))
+    }
+
+    fn given(self, journal: &ModuleJournal) -> GivenRecord {
+        (self.info.into(), journal.bytes(self.bytes).into_owned())
     }
 }
 
 impl<'a> NotedNext<'a> {
-    /// What a reader said, and of which stream.
-    pub(super) fn of<S>(next: &'a Next<(HeldRecord<'_>, S)>) -> Self {
+    /// As this journal is to have it.
+    pub(super) fn of(journal: &ModuleJournal, next: &'a Next<(HeldRecord<'_>, &Source)>) -> Self {
         match next {
-            Next::Record((held, _)) => Self::Record(held.into()),
+            Next::Record(record) => Self::Record(NotedRecord::of(journal, record)),
             Next::Lost(lost) => Self::Lost(*lost),
             Next::Nothing => Self::Nothing,
         }
@@ -140,34 +147,45 @@ impl From<NotedReadError> for StreamReadError {
 pub(in crate::runtime) fn note<'r, R, N: Serialize>(
     journal: &ModuleJournal,
     tag: Tag,
+    question: Question<'_>,
     answer: &'r Result<R, StreamReadError>,
     content: impl FnOnce(&'r R) -> N,
 ) {
     if !journal.is_none() {
-        journal.note(tag, &answer.as_ref().map(content).map_err(NotedReadError::from));
+        journal.note(tag, question, &answer.as_ref().map(content).map_err(NotedReadError::from));
     }
 }
 
 /// Whether it was opened then.
-pub(in crate::runtime) fn opened(journal: &ModuleJournal) -> Option<Result<(), StreamReadError>> {
-    let given = journal.given(Tag::Opened)?;
+pub(in crate::runtime) fn opened(
+    journal: &ModuleJournal,
+    question: Question<'_>,
+) -> Option<Result<(), StreamReadError>> {
+    let given = journal.given(Tag::Opened, question)?;
     let opened: Result<(), NotedReadError> = given.read();
     Some(opened.map_err(StreamReadError::from))
 }
 
 /// The record that was read then, if there was one.
-pub(super) fn record(journal: &ModuleJournal, tag: Tag) -> Option<Result<Option<GivenRecord>, StreamReadError>> {
-    let given = journal.given(tag)?;
+pub(super) fn record(
+    journal: &ModuleJournal,
+    tag: Tag,
+    question: Question<'_>,
+) -> Option<Result<Option<GivenRecord>, StreamReadError>> {
+    let given = journal.given(tag, question)?;
     let record: Result<Option<NotedRecord<'_>>, NotedReadError> = given.read();
-    Some(record.map(|record| record.map(NotedRecord::given)).map_err(StreamReadError::from))
+    Some(record.map(|record| record.map(|record| record.given(journal))).map_err(StreamReadError::from))
 }
 
 /// What was next then.
-pub(super) fn next(journal: &ModuleJournal) -> Option<Result<Next<GivenRecord>, StreamReadError>> {
-    let given = journal.given(Tag::Next)?;
+pub(super) fn next(
+    journal: &ModuleJournal,
+    question: Question<'_>,
+) -> Option<Result<Next<GivenRecord>, StreamReadError>> {
+    let given = journal.given(Tag::Next, question)?;
     let next: Result<NotedNext<'_>, NotedReadError> = given.read();
     let next = next.map(|next| match next {
-        NotedNext::Record(record) => Next::Record(record.given()),
+        NotedNext::Record(record) => Next::Record(record.given(journal)),
         NotedNext::Lost(lost) => Next::Lost(lost),
         NotedNext::Nothing => Next::Nothing,
     });
@@ -175,8 +193,8 @@ pub(super) fn next(journal: &ModuleJournal) -> Option<Result<Next<GivenRecord>, 
 }
 
 /// What was around a time then.
-pub(super) fn around(journal: &ModuleJournal) -> Option<Result<Around, StreamReadError>> {
-    let given = journal.given(Tag::Around)?;
+pub(super) fn around(journal: &ModuleJournal, question: Question<'_>) -> Option<Result<Around, StreamReadError>> {
+    let given = journal.given(Tag::Around, question)?;
     let around: Result<NotedAround, NotedReadError> = given.read();
     Some(around.map(Around::from).map_err(StreamReadError::from))
 }

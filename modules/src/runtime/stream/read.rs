@@ -5,7 +5,7 @@ use super::error::StreamReadError;
 use super::moment::Moment;
 use super::noted::{self, GivenRecord, NotedAround, NotedNext, NotedRecord, note};
 use crate::fusion::{Interpolate, NoValue, Share, Stamp};
-use crate::journal::Tag;
+use crate::journal::{Question, Tag, nanoseconds};
 use crate::runtime::clock::ModuleClock;
 use crate::runtime::unreadable::Unreadable;
 use rohrpost_mailbox::{Around, HeldRecord, Next, RecordInfo};
@@ -76,12 +76,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// The stream cannot be read, or is of another interface.
     pub fn newest(&mut self) -> Result<Option<Record<'_, T>>, StreamReadError> {
-        let Self { reader, clock, .. } = self;
-        if let Some(given) = noted::record(clock.journal(), Tag::Newest) {
+        let (reader, journal) = (&mut self.reader, self.clock.journal());
+        let question = Question::Of(reader.source.id.into());
+        if let Some(given) = noted::record(journal, Tag::Newest, question) {
             return Ok(given?.map(|record| Record::given(record, &reader.source)));
         }
         let newest = reader.newest();
-        note(clock.journal(), Tag::Newest, &newest, |newest| newest.as_ref().map(|(held, _)| NotedRecord::from(held)));
+        note(journal, Tag::Newest, question, &newest, |newest| NotedRecord::of_some(journal, newest));
         Ok(newest?.map(Record::new))
     }
 
@@ -105,12 +106,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn try_next(&mut self) -> Result<Next<Record<'_, T>>, StreamReadError> {
-        let Self { reader, clock, .. } = self;
-        if let Some(given) = noted::next(clock.journal()) {
+        let (reader, journal) = (&mut self.reader, self.clock.journal());
+        let question = Question::Of(reader.source.id.into());
+        if let Some(given) = noted::next(journal, question) {
             return Ok(given?.map(|record| Record::given(record, &reader.source)));
         }
         let next = reader.next();
-        note(clock.journal(), Tag::Next, &next, NotedNext::of);
+        note(journal, Tag::Next, question, &next, |next| NotedNext::of(journal, next));
         Ok(next?.map(Record::new))
     }
 
@@ -127,21 +129,22 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn next_within(&mut self, timeout: Duration) -> Result<Next<Record<'_, T>>, StreamReadError> {
-        let Self { reader: CheckedReader { reader, source }, clock, .. } = self;
-        if let Some(given) = noted::next(clock.journal()) {
+        let (CheckedReader { reader, source }, journal) = (&mut self.reader, self.clock.journal());
+        let question = Question::Within(source.id.into(), nanoseconds(timeout));
+        if let Some(given) = noted::next(journal, question) {
             return Ok(given?.map(|record| Record::given(record, source)));
         }
         let next = match reader.next_timeout(timeout) {
             Ok(next) => source.check_next(next),
             Err(error) => Err(source.explain(&error)),
         };
-        note(clock.journal(), Tag::Next, &next, NotedNext::of);
+        note(journal, Tag::Next, question, &next, |next| NotedNext::of(journal, next));
         Ok(next?.map(Record::new))
     }
 
     /// Whether [`Stream::try_next`] has something to tell.
     pub fn has_next(&self) -> bool {
-        self.clock.journal().answer(Tag::HasNext, || self.reader.reader.has_next())
+        self.clock.journal().answer(Tag::HasNext, self.asked(), || self.reader.reader.has_next())
     }
 
     /// The record of this sequence; none when it is there no more, or not yet. The position stays.
@@ -156,12 +159,13 @@ impl<T: Data> Stream<T> {
     /// # Errors
     /// As for [`Stream::newest`].
     pub fn record(&mut self, sequence: u64) -> Result<Option<Record<'_, T>>, StreamReadError> {
-        let Self { reader, clock, .. } = self;
-        if let Some(given) = noted::record(clock.journal(), Tag::Record) {
+        let (reader, journal) = (&mut self.reader, self.clock.journal());
+        let question = Question::Sequence(reader.source.id.into(), sequence);
+        if let Some(given) = noted::record(journal, Tag::Record, question) {
             return Ok(given?.map(|record| Record::given(record, &reader.source)));
         }
         let record = reader.record(sequence);
-        note(clock.journal(), Tag::Record, &record, |record| record.as_ref().map(|(held, _)| NotedRecord::from(held)));
+        note(journal, Tag::Record, question, &record, |record| NotedRecord::of_some(journal, record));
         Ok(record?.map(Record::new))
     }
 
@@ -174,17 +178,19 @@ impl<T: Data> Stream<T> {
     /// }
     /// ```
     pub fn from(&mut self, sequence: u64) {
+        let question = Question::Sequence(self.reader.source.id.into(), sequence);
+        self.clock.journal().asked(Tag::Sought, question);
         self.reader.reader.seek(sequence);
     }
 
     /// Sequence of the next record to read.
     pub fn position(&self) -> u64 {
-        self.clock.journal().answer(Tag::Position, || self.reader.reader.position())
+        self.clock.journal().answer(Tag::Position, self.asked(), || self.reader.reader.position())
     }
 
     /// Records read by [`Stream::try_next`], and records lost on the way.
     pub fn accounts(&self) -> (u64, u64) {
-        self.clock.journal().answer(Tag::Accounts, || self.reader.reader.accounts())
+        self.clock.journal().answer(Tag::Accounts, self.asked(), || self.reader.reader.accounts())
     }
 
     /// The two records around a time, or exactly why not. [`Stream::record`] reads each.
@@ -203,12 +209,13 @@ impl<T: Data> Stream<T> {
     /// As for [`Stream::newest`].
     pub fn around(&mut self, at: impl Into<Moment>) -> Result<Around, StreamReadError> {
         let Stamp { epoch, ns } = self.stamp(at.into());
-        let Self { reader: CheckedReader { reader, source }, clock, .. } = self;
-        if let Some(given) = noted::around(clock.journal()) {
+        let (CheckedReader { reader, source }, journal) = (&mut self.reader, self.clock.journal());
+        let question = Question::Time(source.id.into(), epoch, ns);
+        if let Some(given) = noted::around(journal, question) {
             return given;
         }
         let around = reader.around(rohrpost_mailbox::Stamp { epoch, ns }).map_err(|error| source.explain(&error));
-        note(clock.journal(), Tag::Around, &around, |around| NotedAround::from(*around));
+        note(journal, Tag::Around, question, &around, |around| NotedAround::from(*around));
         around
     }
 
@@ -259,6 +266,11 @@ impl<T: Data> Stream<T> {
     fn value(&mut self, sequence: u64) -> Result<Option<T>, StreamReadError> {
         let record = self.record(sequence)?;
         Ok(record.map(|record| record.read()).transpose()?)
+    }
+
+    /// Asks something of the stream.
+    fn asked(&self) -> Question<'static> {
+        Question::Of(self.reader.source.id.into())
     }
 
     fn stamp(&self, moment: Moment) -> Stamp {

@@ -1,0 +1,204 @@
+//! How long a command takes to a module that writes a journal, and to one that writes none.
+
+use super::super::Case;
+use super::super::case::{Done, as_failure};
+use crate::harness::{Child, End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use rohrpost_config::Installation;
+use rohrpost_mailbox::{Name, Node, StreamId, node_directory};
+use rohrpost_modules::call::Caller;
+use rohrpost_modules::interface::Proxy;
+use rohrpost_modules::interfaces::{DriveError, Motor, MotorInterface, MotorProxy};
+use rohrpost_modules::journal::JOURNAL_NUMBER;
+use rohrpost_modules::runtime::{Context, Start, ToolLink, run_started};
+use rohrpost_modules::{Module, ModuleError};
+use std::fs;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Commands of a turn, and those before them that do not count.
+const COMMANDS: usize = 20_000;
+const WARM_UP: usize = 2_000;
+/// A module starts in milliseconds.
+const READY_WITHIN: Duration = Duration::from_secs(20);
+const LOOK_EACH: Duration = Duration::from_millis(2);
+/// No command waits longer for its answer.
+const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+const PATIENCE: Duration = Duration::from_secs(120);
+/// Set for the hidden program that is the module.
+const ROLE: &str = "ROHRPOST_BENCH_MODULE";
+const MOTOR: Name = Name::new(1, 200, 0, 0);
+const NODE: &str = "main";
+const CONFIGURATION: &str = r#"
+installation = "bench"
+[system]
+name = "bench"
+id = 1
+[classes]
+motor = { id = 200, text = "Drives" }
+logd = { id = 24, text = "Records" }
+tool = { id = 16, text = "Tools" }
+[nodes.main]
+[[module]]
+name = "motor.0"
+program = "motor"
+optional = true
+"#;
+/// Nobody records: it says which module writes a journal.
+const RECORDING: &str = r#"
+[[module]]
+name = "logd.0"
+builtin = "logd"
+[record]
+directory = "."
+exact = ["motor.0"]
+"#;
+
+/// A command to a module and its answer.
+pub(super) struct NotedEvent;
+
+impl Case for NotedEvent {
+    fn name(&self) -> String {
+        "event with journal".into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        let contenders = [
+            Contender::sampled("rohrpost", || turn(settings, true)),
+            Contender::sampled("without journal", || turn(settings, false)),
+        ];
+        let versus = Versus { name: contenders[1].name, p50: Some(Target::AtMost(1.15)), p99: None };
+        let subject = Subject { case: self.name(), bytes: None, unit: "us" };
+        Ok(compare(settings, &subject, &contenders, &[versus]))
+    }
+}
+
+/// Microseconds of each command.
+fn turn(settings: &Settings, has_journal: bool) -> Result<Vec<f64>, Failure> {
+    let scratch = Scratch::new()?;
+    let config = scratch.directory().join("bench.toml");
+    let text = if has_journal { format!("{CONFIGURATION}{RECORDING}") } else { CONFIGURATION.into() };
+    fs::write(&config, text).map_err(|error| Failure::of("its configuration", error))?;
+    let mut module = start_module(&scratch.directory(), &config)?;
+    let commands = settings.count(COMMANDS);
+    let samples = sample_in_child(PATIENCE, |samples| {
+        let commanded = command(&scratch.directory(), &config, settings.count(WARM_UP), commands, samples);
+        commanded.and_then(|node| check(&node, has_journal)).map_err(as_failure("commanding a module"))
+    })?;
+    if module.has_ended()? {
+        return Err(Failure::Failed("the module has ended".into()));
+    }
+    Ok(samples)
+}
+
+/// The module: this program again, on the other processor.
+fn start_module(scratch: &Path, config: &Path) -> Result<Child, Failure> {
+    Child::start(|| {
+        settle(End::Pong, Placement::TwoCores, Scheduling::Fifo)?;
+        let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
+        let error = Command::new(own)
+            .arg("--config")
+            .arg(config)
+            .args(["--name", "motor.0"])
+            .env(ROLE, "")
+            .env("ROHRPOST_DIR", scratch)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .exec();
+        Err(Failure::of("a module", error))
+    })
+}
+
+/// Gives the module its commands, one after the other.
+fn command(scratch: &Path, config: &Path, warm_up: usize, commands: usize, samples: &Samples) -> Done<Arc<Node>> {
+    settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
+    let installation = Installation::load(config)?;
+    let node = await_node(&path_in(scratch, &installation))?;
+    let tool = ToolLink::join(&installation, &node, NODE, ANSWER_WITHIN)?;
+    let motor = MotorProxy::new(&Caller::from(tool.link), MOTOR).with_timeout(ANSWER_WITHIN);
+    let deadline = Instant::now() + READY_WITHIN;
+    while let Err(error) = motor.halt() {
+        if Instant::now() > deadline {
+            return Err(error.into());
+        }
+        std::thread::sleep(LOOK_EACH);
+    }
+    for number in 0..warm_up + commands {
+        let began = Instant::now();
+        motor.drive(0.5, 0.25)?;
+        let took = began.elapsed();
+        if number >= warm_up {
+            samples.push(took.as_secs_f64() * 1e6);
+        }
+    }
+    Ok(node)
+}
+
+/// Whether there is a journal, with something in it, or none.
+fn check(node: &Node, has_journal: bool) -> Done<()> {
+    let journal = node.inspect_stream(StreamId { name: MOTOR, number: JOURNAL_NUMBER })?;
+    match journal.map(|journal| journal.written) {
+        Some(1..) if has_journal => Ok(()),
+        None if !has_journal => Ok(()),
+        written => Err(format!("records of the journal: {written:?}").into()),
+    }
+}
+
+/// The module makes its node.
+fn await_node(path: &Path) -> Done<Arc<Node>> {
+    let deadline = Instant::now() + READY_WITHIN;
+    loop {
+        match Node::open(path) {
+            Ok(node) => return Ok(node),
+            Err(error) if Instant::now() > deadline => return Err(error.into()),
+            Err(_) => std::thread::sleep(LOOK_EACH),
+        }
+    }
+}
+
+/// Where the node lies when `ROHRPOST_DIR` is `base`.
+fn path_in(base: &Path, installation: &Installation) -> PathBuf {
+    let file = node_directory(&installation.name, NODE);
+    base.join(file.file_name().unwrap_or_default())
+}
+
+/// If this process was started as the module: runs it until it is killed.
+pub(in crate::cases) fn run_hidden_module() -> Option<Result<(), Failure>> {
+    std::env::var_os(ROLE)?;
+    let ended = Start::from_environment().and_then(run_started::<CommandedMotor>);
+    Some(ended.map_err(|error| Failure::of("the module", error)))
+}
+
+/// Does nothing else.
+struct CommandedMotor {
+    speed_m_s: f64,
+}
+
+impl Module for CommandedMotor {
+    type Settings = NoSettings;
+    type Interfaces = MotorInterface;
+
+    fn new(_: NoSettings, _: &mut Context) -> Result<Self, ModuleError> {
+        Ok(Self { speed_m_s: 0.0 })
+    }
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NoSettings {}
+
+impl Motor for CommandedMotor {
+    fn drive(&mut self, speed_m_s: f64, _: f64) -> Result<(), DriveError> {
+        self.speed_m_s = speed_m_s;
+        Ok(())
+    }
+
+    fn halt(&mut self) -> Result<(), DriveError> {
+        self.speed_m_s = 0.0;
+        Ok(())
+    }
+}

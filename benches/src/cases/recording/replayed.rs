@@ -1,0 +1,167 @@
+//! How fast the programs of a recorded demo are run again, and how exactly a replay keeps the distances between values.
+
+use super::super::Case;
+use crate::harness::{Child, Failure, Scratch};
+use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
+use crate::settings::Settings;
+use crate::statistics::Summary;
+use std::cell::OnceCell;
+use std::fs::{self, File};
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Seconds of a demo that are recorded.
+const DEMO_S: u32 = 20;
+const QUICK_DEMO_S: u32 = 3;
+/// Seconds of it that are replayed at their speed in a turn.
+const PLAYED_S: u32 = 5;
+const QUICK_PLAYED_S: u32 = 1;
+const PATIENCE: Duration = Duration::from_secs(180);
+const FILE: &str = "demo.mcap";
+/// The largest error of 99 in 100 distances, microseconds.
+const SPACING_US: f64 = 1000.0;
+
+/// What is done with the recording of a demo.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Replayed {
+    /// The programs of all its modules are run again, one after the other, and compared.
+    Exact,
+    /// It is played at its speed.
+    Spacing,
+}
+
+impl Case for Replayed {
+    fn name(&self) -> String {
+        match self {
+            Self::Exact => "exact replay of the demo",
+            Self::Spacing => "replay, error of spacing",
+        }
+        .into()
+    }
+
+    fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
+        // The same for all rounds.
+        let recording = OnceCell::new();
+        let recorded = || recording.get_or_init(|| DemoRecording::make(settings)).as_ref().map_err(Failure::clone);
+        let ours = Contender {
+            name: "rohrpost",
+            turn: Box::new(|| match self {
+                Self::Exact => recorded()?.speed().map(Summary::single),
+                Self::Spacing => recorded()?.spacing(settings),
+            }),
+        };
+        let (unit, versus, figure) = match self {
+            Self::Exact => {
+                let target = Some(Target::AtLeast(20.0));
+                ("s/s", Versus { name: "real time", p50: target, p99: None }, Summary::single(1.0))
+            }
+            Self::Spacing => {
+                let figure = Summary { p99: Some(SPACING_US), ..Summary::single(SPACING_US) };
+                ("us", Versus { name: "1 ms", p50: None, p99: Some(Target::AtMost(1.0)) }, figure)
+            }
+        };
+        let beside = Contender { name: versus.name, turn: Box::new(move || Ok(figure)) };
+        let subject = Subject { case: self.name(), bytes: None, unit };
+        Ok(compare(settings, &subject, &[ours, beside], &[versus]))
+    }
+}
+
+/// A recording of the demo, with journals of its modules; and the command that made it.
+struct DemoRecording {
+    rohrpost: PathBuf,
+    scratch: Scratch,
+}
+
+impl DemoRecording {
+    fn make(settings: &Settings) -> Result<Self, Failure> {
+        let made = Self { rohrpost: settings.command()?, scratch: Scratch::new()? };
+        fs::create_dir(made.nodes()).map_err(|error| Failure::of("a folder for nodes", error))?;
+        let seconds = if settings.quick { QUICK_DEMO_S } else { DEMO_S }.to_string();
+        made.run(&["demo", "--no-gui", "--quiet", "--seconds", &seconds, "--record", FILE])?;
+        Ok(made)
+    }
+
+    fn nodes(&self) -> PathBuf {
+        self.scratch.directory().join("nodes")
+    }
+
+    /// What the command says. It ends with this process.
+    fn run(&self, arguments: &[&str]) -> Result<String, Failure> {
+        let folder = self.scratch.directory();
+        let [said, complained] = ["said", "complained"].map(|name| folder.join(name));
+        let command = arguments.join(" ");
+        let failed = |error| Failure::of(&command, error);
+        let child = Child::start(|| {
+            let (out, error) = (File::create(&said).map_err(failed)?, File::create(&complained).map_err(failed)?);
+            let mut command = Command::new(&self.rohrpost);
+            command.args(arguments).current_dir(&folder).env("ROHRPOST_DIR", self.nodes());
+            Err(failed(command.stdin(Stdio::null()).stdout(out).stderr(error).exec()))
+        })?;
+        let ended = child.finish_program(Instant::now() + PATIENCE);
+        let text = fs::read_to_string(&said).map_err(failed)?;
+        ended.map(|()| text).map_err(|failure| {
+            let complaint = fs::read_to_string(&complained).unwrap_or_default();
+            Failure::Failed(format!("rohrpost {command}: {failure}: {}", complaint.trim_end()))
+        })
+    }
+
+    /// Seconds of the demo that all its programs run through in a second, one program after the other.
+    fn speed(&self) -> Result<f64, Failure> {
+        let began = Instant::now();
+        let said = self.run(&["replay", "--exact", FILE, "--json"])?;
+        let took = began.elapsed();
+        let runs: Vec<serde_json::Value> = said
+            .lines()
+            .map(serde_json::from_str)
+            .collect::<Result<_, _>>()
+            .map_err(|error| Failure::of("what exact replay says", error))?;
+        if runs.is_empty() || runs.iter().any(|run| run["result"] != "identical") {
+            return Err(Failure::Failed(format!("not identical: {said}")));
+        }
+        let times = |key: &str| runs.iter().filter_map(|run| run[key].as_u64()).collect::<Vec<u64>>();
+        let (first_ns, last_ns) = (times("first_ns").into_iter().min(), times("last_ns").into_iter().max());
+        let recorded_ns = last_ns.unwrap_or_default().saturating_sub(first_ns.unwrap_or_default());
+        Ok(recorded_ns as f64 / 1e9 / took.as_secs_f64())
+    }
+
+    /// How far distances between values were off, microseconds.
+    fn spacing(&self, settings: &Settings) -> Result<Summary, Failure> {
+        let until = format!("+{}s", if settings.quick { QUICK_PLAYED_S } else { PLAYED_S });
+        let said = self.run(&["replay", FILE, "--until", &until, "--no-gui", "--quiet"])?;
+        let told = said.lines().find_map(|line| line.strip_prefix("error of spacing at rate 1: "));
+        let figures = told.map(|told| told.split(", ").map(microseconds).collect::<Vec<_>>());
+        match figures.as_deref() {
+            Some([Some(p50), Some(p99), Some(max)]) => {
+                Ok(Summary { p99: Some(*p99), max: Some(*max), ..Summary::single(*p50) })
+            }
+            _ => Err(Failure::Failed(format!("no error of spacing: {said}"))),
+        }
+    }
+}
+
+/// Of `p99 151 µs`.
+fn microseconds(text: &str) -> Option<f64> {
+    let (_, figure) = text.split_once(' ')?;
+    let (number, unit) = figure.split_once(' ')?;
+    let each_us = match unit {
+        "ns" => 1e-3,
+        "µs" => 1.0,
+        "ms" => 1e3,
+        "s" => 1e6,
+        _ => return None,
+    };
+    Some(number.parse::<f64>().ok()? * each_us)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_in_each_unit() {
+        let read = ["p50 12 µs", "p99 1.5 ms", "max 2 s", "p50 800 ns", "p50 12 h", "p50"].map(microseconds);
+        assert_eq!(read, [Some(12.0), Some(1500.0), Some(2e6), Some(0.8), None, None]);
+    }
+}

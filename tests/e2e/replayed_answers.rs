@@ -1,0 +1,116 @@
+//! Commands to modules that are played: they get the answers that the modules' journals have, or a fault that says why
+//! not.
+
+use crate::harness::{Place, wait};
+use crate::replayed::{call, position, replay};
+use rohrpost_recording::{Reader, info};
+use std::path::Path;
+
+const CONFIG: &str = r#"
+installation = "test"
+[system]
+name = "robot"
+id = 1
+[classes]
+motor = { id = 200 }
+odometry = { id = 160 }
+laser = { id = 150 }
+mapper = { id = 96 }
+logd = { id = 24 }
+tool = { id = 16 }
+[scheduling]
+real-time-from = 256
+[nodes.main]
+[time]
+source = "simulation"
+speed = 4.0
+[[module]]
+name = "logd.0"
+builtin = "logd"
+stop-within = "60 s"
+[[module]]
+name = "motor.0"
+aliases = ["odometry.0", "laser.0"]
+builtin = "sim"
+settings = { map = "building.map", seed = 1 }
+[module.stream.odometry]
+record = "128 B"
+keep = 1024
+[[module]]
+name = "mapper.0"
+builtin = "mapper"
+calls = ["laser.0", "odometry.0"]
+settings = { laser = "laser.0", odometry = "odometry.0" }
+[record]
+directory = "recordings"
+streams = ["odometry.0/*"]
+exact = ["motor.0", "mapper.0"]
+leave-free = "0 B"
+flush = "20 ms"
+"#;
+
+/// Messages of a topic in a file that is being written.
+fn count(file: &Path, topic: &str) -> usize {
+    let Ok(mut reader) = Reader::open(file) else { return 0 };
+    let mut count = 0;
+    while let Ok(Some((channel, _))) = reader.next() {
+        count += usize::from(channel.topic == topic);
+    }
+    count
+}
+
+#[test]
+fn a_command_to_a_played_module_gets_the_answer_that_was_recorded_for_it() {
+    let place = Place::new();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
+    let config = place.path("test.toml");
+    std::fs::write(&config, CONFIG).unwrap();
+    let file = place.path("recordings/main-0001.mcap");
+    let mut launch = place.launch(&config);
+    let robot = place.robot(&config, "main", &mut launch);
+    robot.wait_on(&mut launch);
+    let journaled = || ["motor.0/journal", "mapper.0/journal"].map(|topic| count(&file, topic));
+    wait("journals are recorded", || journaled().iter().all(|count| *count > 0).then_some(()));
+    let drive = ["call", "motor.0", "drive", "0.25", "0.125"];
+    let driven = place.say(&drive).ok();
+    let early = call(&place, "mapper.0", &["counts"]);
+    wait("it maps on", || (call(&place, "mapper.0", &["counts"])["mapped"] != early["mapped"]).then_some(()));
+    let before = journaled();
+    wait("the journals go on", || {
+        let now = journaled();
+        (now[0] > before[0] + 2 && now[1] > before[1] + 2).then_some(())
+    });
+    let late = call(&place, "mapper.0", &["counts"]);
+    let before = journaled();
+    wait("the journals go on", || {
+        let now = journaled();
+        (now[0] > before[0] + 2 && now[1] > before[1] + 2).then_some(())
+    });
+    drop(robot);
+    launch.stop();
+    assert_eq!(info(&file).unwrap().lost, 0);
+
+    let mut replay = replay(&place, &file, &["--paused"]);
+    let begun = wait("time begins", || {
+        replay.assert_runs();
+        let said = place.say(&["call", "replay.0", "position", "--json"]);
+        (said.code == Some(0)).then(|| said.json()).filter(|position| position["time_ns"] != 0)
+    });
+    assert_eq!(place.say(&drive).ok(), driven);
+    assert_eq!(call(&place, "mapper.0", &["counts"]), early, "that at the beginning");
+    let near_end_s = begun["length_s"].as_f64().unwrap() - 0.3;
+    place.say(&["call", "replay.0", "seek", &format!("{near_end_s:.6}")]).ok();
+    wait("it is near its end", || (position(&place)["at_s"].as_f64() > Some(0.0)).then_some(()));
+    assert_eq!(call(&place, "mapper.0", &["counts"]), late, "that at the end");
+    assert_eq!(place.say(&drive).ok(), driven, "it was given once");
+    for (words, told) in [
+        (&["call", "motor.0", "drive", "0.25", "0.5"][..], "motor.0 is played from a recording and has no answer: its"),
+        (&["call", "motor.0", "halt"], "journal has no such command with these arguments"),
+    ] {
+        let refused = place.say(words);
+        assert!(refused.code != Some(0) && refused.err.contains(told), "{refused:?}");
+    }
+    replay.stop();
+    place.assert_empty();
+}
