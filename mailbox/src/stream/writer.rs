@@ -10,7 +10,7 @@ use crate::participant::Participant;
 use crate::step::step;
 use crate::stream::error::{StreamError, WriteError};
 use crate::stream::record::RecordInfo;
-use crate::stream::ring::{About, Line, Look, Seat, Stamp};
+use crate::stream::ring::{About, Line, Seat, Stamp};
 use crate::stream::segment::StreamSegment;
 use crate::stream::shape::{StreamId, StreamShape};
 use crate::stream::writing::{Frame, Progress};

@@ -105,6 +105,8 @@ impl Progress {
             self.free.extend(leave_out(ring, left_out, self.newest));
         }
         self.next = self.next.max(sequence);
+        // ORDERING (E): the new words before the looks at the seats, when one of these frames is claimed.
+        seq_cst_accesses();
     }
 
     /// Makes a filled frame the next record, and calls `wake` for each seat that says that its reader sleeps; `expect`
@@ -149,11 +151,14 @@ impl Progress {
     }
 }
 
-/// Behind the last record that an entry names: what a writer counts, or, if it died before it could, more.
+/// Behind the last record that an entry names, and not before one that was begun: what a writer counts, or, if it died
+/// before it could, more. Readers may have been told by the entries that all up to there is gone.
 fn named_end(ring: &Ring<'_>, counted: u64) -> u64 {
-    let named = |at| ring.entry(at).named_sequence(counted).filter(|sequence| sequence % ring.keep() == at);
-    let last = (0..ring.keep()).filter_map(named).max();
-    last.map_or(counted, |last| counted.max(last + 1))
+    let end = |at| {
+        let (sequence, is_named) = ring.entry(at).says(counted)?;
+        (sequence % ring.keep() == at).then_some(sequence + u64::from(is_named))
+    };
+    (0..ring.keep()).filter_map(end).fold(counted, u64::max)
 }
 
 /// Makes this an entry of a record that never came: the frame that it named, of a record that may be more than a turn
@@ -183,12 +188,12 @@ impl IndexEntry {
         ((word & FRAME) as u32).checked_sub(1).filter(|frame| (*frame as usize) < frames)
     }
 
-    /// The sequence that this names a frame for, or that it says was left out, as its word has it near `counted`.
-    fn named_sequence(&self, counted: u64) -> Option<u64> {
+    /// The sequence of its word, as one near `counted`, and whether the record is there or said to be left out.
+    fn says(&self, counted: u64) -> Option<(u64, bool)> {
         // ORDERING: Acquire (B), as in `look`.
         let word = self.word.load(Ordering::Acquire);
         let sequence = counted.checked_add_signed(ahead(word, counted))?;
-        (word & FRAME != 0 && sequence < SEQUENCE_MAX).then_some(sequence)
+        (sequence < SEQUENCE_MAX).then_some((sequence, word & FRAME != 0))
     }
 
     /// Whether it has an older record than this one, which has the same place.

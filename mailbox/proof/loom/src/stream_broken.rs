@@ -204,10 +204,19 @@ pub(crate) const BROKEN: &[Broken] = &[
         "a reader waits for what was left out",
     ),
     broken(
+        "stream_no_fence_e_for_what_is_left_out",
+        &[writing(
+            "when one of these frames is claimed.\n        seq_cst_accesses();",
+            "when one of these frames is claimed.",
+        )],
+        "the_writer_goes_round_what_is_held_and_left_out",
+        RACE,
+    ),
+    broken(
         "stream_leaves_out_and_frees_at_once",
         &[writing("leave_out(ring, left_out, self.newest)", "ring.entry(left_out).named_frame(ring.frames())")],
         "the_writer_goes_round_what_is_held_and_left_out",
-        RACE,
+        TORN,
     ),
     // ---- sleep ----
     broken(

@@ -189,7 +189,7 @@ fn a_writer_of_a_replica_dies_leaving_records_out() {
                 &format!("stream: {bytes}leave out {left_out}"),
                 6,
                 |ground| orphan(ground, shape),
-                |ground, reader, death| {
+                |ground, mut reader, death| {
                     let mut holder = ground.join().stream_reader(ID).unwrap();
                     let mut writer = writer(ground, shape);
                     let (written, finished) = (writer.written(), WRITTEN + left_out + 1);
@@ -197,6 +197,8 @@ fn a_writer_of_a_replica_dies_leaving_records_out() {
                     let may_be = death.is_some_and(|death| death.step == "entry: published");
                     assert!((WRITTEN..=finished).contains(&written), "{written}: {death:?}");
                     assert!(may_be || is_finished(death) == (written == finished), "{written}: {death:?}");
+                    read_on(&mut reader);
+                    assert_eq!(reader.position(), written, "a reader waits for what was left out: {death:?}");
                     let last = (0..written).rev().find(|sequence| holder.record(*sequence).is_some());
                     let held = last.and_then(|last| holder.record(last));
                     assert!(held.is_some() || left_out >= u64::from(shape.keep), "{death:?}");
