@@ -5,7 +5,7 @@ use crate::node::{Node, Reach};
 use crate::reader::{Section, nearest};
 use crate::record::{RecordedItems, Sampling};
 use rohrpost_mailbox::Name;
-use rohrpost_network::{Network, Security, Tdma};
+use rohrpost_network::{Network, Security};
 use std::time::Duration;
 
 /// Most replicas of an installation.
@@ -31,16 +31,13 @@ pub struct Replica {
 }
 
 impl Replica {
-    /// `network` and `tdma` are as the file has them.
+    /// `network` is as the file has it.
     pub(crate) fn read(
         section: Section<'_>,
         directory: &Directory<'_>,
         nodes: &[Node],
-        (network, tdma): (Option<&Network>, Option<&Tdma>),
+        network: Option<&Network>,
     ) -> Option<Self> {
-        if tdma.is_some() {
-            section.report("with time slots no replica is carried yet; drop it, or `mode = \"tdma\"` of [network]");
-        }
         if network.is_some_and(|network| network.security == Security::Keys) {
             section.report(
                 "replicas are not sealed yet, and [network] says `security = \"keys\"`; drop the replica, or read the \

@@ -1,4 +1,5 @@
-//! A part of a record on its way from ring to ring takes nothing from the heap, and gives nothing back to it.
+//! A part of a record on its way from ring to ring takes nothing from the heap, and gives nothing back to it: with time
+//! slots too, where a thread reads the rings that must not wait for any.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -8,12 +9,14 @@ pub mod counting;
 use counting::{CountingHeap, heap_uses};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Head, Name, Next, Node, Participant, Stamp, StreamId, StreamShape, SystemTime};
+use rohrpost_network::{Tdma, TimeSlot};
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{FrameHead, NodeIndex, ReplicaFrame};
 use rohrpost_routers::inbound::{Datagram, Inbound};
 use rohrpost_routers::outbound::Outbound;
 use rohrpost_routers::replication::{Describe, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
+use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
 use rohrpost_testbed::pair::{address, settings};
 use std::sync::Arc;
@@ -60,10 +63,25 @@ fn join(node: &Arc<Node>) -> Arc<Participant> {
     Participant::join(node, Name::NONE).unwrap()
 }
 
+/// A slot for each node.
+fn slots() -> Tdma {
+    let us = Duration::from_micros;
+    let slot =
+        |node: u8| TimeSlot { node, offset: us(1000 + 2000 * u64::from(node)), length: us(1000), period: 1, phase: 0 };
+    Tdma {
+        cycle: us(5000),
+        synchronisation: us(500),
+        guard: us(150),
+        link_bytes_s: 125_000_000,
+        slots: (0..2).map(slot).collect(),
+        tunnel: None,
+    }
+}
+
 /// Records of both kinds of memory: of words, and of plain bytes.
 #[test]
 fn parts_take_nothing_from_the_heap() {
-    for record_bytes in [64, 10_000] {
+    for (record_bytes, tdma) in [(64, None), (10_000, None), (10_000, Some(slots()))] {
         let shape = StreamShape { record_bytes, keep: 8, readers: 2, late: Duration::ZERO };
         let replica = ReplicaSettings {
             from: ID.name,
@@ -77,7 +95,8 @@ fn parts_take_nothing_from_the_heap() {
         };
         let folder = tempfile::tempdir().unwrap();
         let nodes = ["here", "there"].map(|name| Node::create(&folder.path().join(name), 0o700).unwrap());
-        let (base, arm, begin_ns) = (settings(0), settings(1), 1000 * MS);
+        let [base, arm] = [0, 1].map(|own| Settings { tdma: tdma.clone(), ..settings(own) });
+        let begin_ns = 1000 * MS;
         let mut sender = ReplicaSender::new(&base, std::slice::from_ref(&replica));
         let mut outbound = Outbound::new(&base, Stats::new(&base, begin_ns));
         let receiver = ReplicaReceiver::new(&arm, &[replica], join(&nodes[1]), Arc::new(Always));

@@ -47,14 +47,36 @@ to = ["brain"]
 /// The number of the feeder's stream in its interface.
 const FRAME: u16 = 2;
 
-fn config(place: &Place, [base, brain]: &[String; 2]) -> PathBuf {
+/// In its place where nodes send in time slots.
+const SLOTS: &str = r#"
+[network]
+security = "none"
+mode = "tdma"
+[tdma]
+cycle = "10 ms"
+synchronisation = "1 ms"
+guard = "400 us"
+link = "1 Gbit/s"
+[[slot]]
+node = "base"
+offset = "3 ms"
+length = "2 ms"
+[[slot]]
+node = "brain"
+offset = "6 ms"
+length = "1 ms"
+[time]
+source = "master"
+"#;
+
+fn config(place: &Place, network: &str, [base, brain]: &[String; 2]) -> PathBuf {
     let config = place.path("test.toml");
     let at = |node: &str, entry: &str| entry.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1);
     let nodes = format!(
         "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.brain]\naddress = \"{brain}\"\ntools = [16, 31]\n"
     );
     let modules = [at("base", OUTPUT), at("base", &feeder_entry(0)), LOGD.to_owned()].concat();
-    std::fs::write(&config, [HEAD, &nodes, NETWORK, &modules].concat()).unwrap();
+    std::fs::write(&config, [HEAD, &nodes, network, &modules].concat()).unwrap();
     config
 }
 
@@ -99,7 +121,7 @@ struct Pair {
 impl Pair {
     fn launched() -> Self {
         let place = Place::new();
-        let config = config(&place, &addresses());
+        let config = config(&place, NETWORK, &addresses());
         let start = |node: &str| {
             let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), "--node", node]));
             let robot = place.robot(&config, node, &mut launch);
@@ -180,13 +202,12 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
     place.assert_empty();
 }
 
-#[test]
-fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
-    let place = Place::new();
-    let config = config(&place, &["10.77.0.1".into(), "10.77.0.2".into()]);
-    let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=22"];
+/// Both nodes in namespaces, with these words for launch, until the recorder of one follows the replica of the other's
+/// stream; none where that cannot be made.
+fn followed(place: &Place, network: &str, words: &[&str]) -> Option<Running> {
+    let config = config(place, network, &["10.77.0.1".into(), "10.77.0.2".into()]);
     let mut launch =
-        Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], &bad].concat()));
+        Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
     // It ends at once where there are none.
     let begun = wait("both nodes run", || {
         let runs = ["base", "brain"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
@@ -194,25 +215,55 @@ fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
     });
     if !begun {
         assert!(lacks_namespaces(&launch.err()));
-        return;
+        return None;
     }
-    let file = place.path("recordings/brain-0001.mcap");
-    let recorded = || values(&file, "feeder.0/frame");
     wait("the recorder follows the replica", || {
-        feed(&place, "feeder.0", 1);
-        (!recorded().is_empty()).then_some(())
+        feed(place, "feeder.0", 1);
+        (!recorded(place).is_empty()).then_some(())
     });
-    let target = feed(&place, "feeder.0", 300);
+    Some(launch)
+}
+
+fn file(place: &Place) -> PathBuf {
+    place.path("recordings/brain-0001.mcap")
+}
+
+fn recorded(place: &Place) -> Vec<(u32, u64)> {
+    values(&file(place), "feeder.0/frame")
+}
+
+/// Has so many records written, and waits for one behind them; how many are recorded since the first, and how many were
+/// lost: all that were written.
+fn feed_and_count(place: &Place, mut launch: Running, count: u64) -> (u64, u64) {
+    let target = feed(place, "feeder.0", count);
     wait("records behind the last of them", || {
-        feed(&place, "feeder.0", 1);
-        recorded().last().is_some_and(|(_, number)| *number > target).then_some(())
+        feed(place, "feeder.0", 1);
+        recorded(place).last().is_some_and(|(_, number)| *number > target).then_some(())
     });
     launch.stop();
-    let (recorded, told) = (recorded(), info(&file).unwrap());
+    let (recorded, told) = (recorded(place), info(&file(place)).unwrap());
     assert!(recorded.is_sorted_by(|a, b| a.1 < b.1), "{recorded:?}");
     let channel = told.channels.iter().find(|channel| channel.topic == "feeder.0/frame").unwrap();
     let (first, last) = (recorded[0].1, recorded[recorded.len() - 1].1);
     assert!(recorded.len() as u64 + channel.lost > last - first, "{} recorded, {} lost", recorded.len(), channel.lost);
-    assert!(channel.lost > 0 && recorded.len() > 100, "{} recorded, {} lost", recorded.len(), channel.lost);
+    (recorded.len() as u64, channel.lost)
+}
+
+#[test]
+fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
+    let place = Place::new();
+    let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=22"];
+    let Some(launch) = followed(&place, NETWORK, &bad) else { return };
+    let (recorded, lost) = feed_and_count(&place, launch, 300);
+    assert!(lost > 0 && recorded > 100, "{recorded} recorded, {lost} lost");
+    place.assert_empty();
+}
+
+#[test]
+fn in_time_slots_records_cross_as_well() {
+    let place = Place::new();
+    let Some(launch) = followed(&place, SLOTS, &[]) else { return };
+    let (recorded, lost) = feed_and_count(&place, launch, 200);
+    assert!(recorded > 100, "{recorded} recorded, {lost} lost");
     place.assert_empty();
 }

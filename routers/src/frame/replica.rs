@@ -1,9 +1,8 @@
 //! Parts of what a replica needs: of records, and of the description of the module that writes them.
 
 use super::fields::{BadFrame, half, long, word};
+use rohrpost_network::RECORD_PART_HEAD_BYTES;
 
-/// Bytes between the head of the datagram and a record's bytes.
-pub const RECORD_PART_HEAD_BYTES: usize = 56;
 /// Bytes between the head of the datagram and a description's bytes.
 pub const DESCRIPTION_PART_HEAD_BYTES: usize = 24;
 /// Longest description that is carried.

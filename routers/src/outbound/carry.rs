@@ -20,9 +20,14 @@ impl Outbound {
         Self { reached: peers, ..self }
     }
 
-    /// Whether a datagram of this level may leave now; else when.
+    /// Whether a datagram of this level may leave now; else when. In time slots the window says it.
     pub(crate) fn may_leave(&self, now_ns: u64, level: u8) -> Result<(), u64> {
-        self.pace.may_leave(now_ns, level)
+        if self.in_slots { Ok(()) } else { self.pace.may_leave(now_ns, level) }
+    }
+
+    /// Notes which peers hear this node: for time slots, in which nothing is polled here.
+    pub(crate) fn look_at_peers(&mut self, now_ns: u64) {
+        self.look_at_what_is_real_time(now_ns);
     }
 
     /// Peers to which something may leave now, one bit each.

@@ -2,7 +2,7 @@
 
 use crate::frame::NodeIndex;
 use rohrpost_config::{Installation, Sampling};
-use rohrpost_mailbox::{Name, Priority, StreamShape};
+use rohrpost_mailbox::{Name, StreamShape};
 
 /// One replica, as all routers of a system know it.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,12 +28,13 @@ pub struct ReplicaSettings {
 impl ReplicaSettings {
     /// All of an installation, in the order of their places on the wire.
     pub fn all(installation: &Installation) -> Vec<Self> {
-        let Some(network) = installation.network else { return Vec::new() };
+        if installation.network.is_none() {
+            return Vec::new();
+        }
         let index = |node: &str| installation.lan_index(node);
         let of = |replica: &rohrpost_config::Replica| {
             // Configuration checks that these are nodes of the LAN.
             let node = index(installation.node_of(replica.from).unwrap_or_default()).unwrap_or(NodeIndex::MAX);
-            let class = installation.module(replica.from).map_or(replica.from, |module| module.name).class();
             Self {
                 from: replica.from,
                 item: replica.item.clone(),
@@ -42,7 +43,7 @@ impl ReplicaSettings {
                 to: replica.to.iter().filter_map(|name| index(name)).fold(0, |all, node| all | 1 << node),
                 sampling: replica.sampling,
                 delay_alarm_ns: u64::try_from(replica.delay_alarm.as_nanos()).unwrap_or(u64::MAX),
-                level: network.level(Priority(class.0)),
+                level: replica.level(installation),
             }
         };
         installation.replicas.iter().map(of).collect()

@@ -4,9 +4,13 @@
 //! They have sockets and a port of their own, so a flood of parts takes no room in a socket, and no time of a thread,
 //! from packages. Both are scheduled like modules that are not real time. What is sent, and when, says the
 //! [driver](crate::driver); what becomes a record says [`replication`](crate::replication).
+//!
+//! With time slots the thread of the slots sends the parts, by the same port, and the first thread here only looks for
+//! the streams: that takes system calls, for which a slot has no time.
 
 use super::rx_thread::{RxSystem, RxThread};
-use super::sending::Sending;
+use super::sending::{NoPackages, Sending};
+use super::slots::SlotParts;
 use super::socket::{InSocket, REPLICA_BYTES};
 use super::threads::{Awake, Shared, schedule_below};
 use super::wire::PeerSockets;
@@ -22,11 +26,13 @@ use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Name, Node, Participant, SystemClock, monotonic_ns, wait_any};
 use std::os::fd::OwnedFd;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Modules that have begun are looked for this often, ns.
 const LOOK_EVERY_NS: u64 = 500_000_000;
+/// With time slots, the end of the router is looked at this often.
+const END_EVERY: Duration = Duration::from_millis(50);
 
 /// What replicas need.
 pub struct ReplicaParts<'a> {
@@ -38,13 +44,6 @@ pub struct ReplicaParts<'a> {
     pub socket: Option<OwnedFd>,
     /// A bad network between it and its sockets.
     pub impair: Option<impair::ImpairmentSettings>,
-}
-
-/// No package goes here, so none is lost.
-pub(super) struct NoPackages;
-
-impl Report for NoPackages {
-    fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
 }
 
 /// Writes parts that come.
@@ -110,15 +109,41 @@ impl ReplicaTx {
     }
 }
 
+/// State of the thread in its place where there are time slots.
+struct StreamFinder {
+    shared: Arc<Shared>,
+    participant: Arc<Participant>,
+    describe: Arc<dyn Describe>,
+    /// The thread of the slots has it, too.
+    sender: Arc<Mutex<ReplicaSender>>,
+}
+
+impl StreamFinder {
+    /// Runs until the router ends.
+    fn run(self) {
+        let mut look_ns = 0;
+        while !self.shared.ends() {
+            // If it waited for the lock, the other would have to wake it in a slot.
+            if monotonic_ns() >= look_ns
+                && let Ok(mut sender) = self.sender.try_lock()
+            {
+                sender.look(&self.participant, &*self.describe);
+                look_ns = monotonic_ns() + LOOK_EVERY_NS;
+            }
+            std::thread::sleep(END_EVERY);
+        }
+    }
+}
+
 impl Shell {
-    /// Starts the two threads, if this node writes or has a replica. Datagrams are not sealed, and there are no time
-    /// slots: configuration checks that.
+    /// Starts the two threads, if this node writes or has a replica. Datagrams are not sealed: configuration checks
+    /// that.
     ///
     /// # Errors
     /// [`ShellError`]
     pub fn replicate(&mut self, node: &Arc<Node>, parts: ReplicaParts<'_>) -> Result<(), ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
-        if self.peer_sessions.is_some() || settings.tdma.is_some() {
+        if self.peer_sessions.is_some() {
             return Err(ShellError::Replicas);
         }
         let [sending, receiving] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
@@ -141,15 +166,20 @@ impl Shell {
         }
         let port = settings.network.replica_port();
         let wire = PeerSockets::new(&settings, port, None, parts.impair, &self.failures);
-        let tx_thread = ReplicaTx {
-            participant: sending,
-            describe: parts.describe,
-            driver: ReplicaDriver::new(&settings),
-            sender,
-            sending: Sending { outbound, answers: NoPackages, wire, rest: None },
-            clock: SystemClock::open(node),
-            shared,
-        };
+        let (participant, describe, clock) = (sending, parts.describe, SystemClock::open(node));
+        let sending = Sending { outbound, answers: NoPackages, wire, rest: None };
+        if let Some(slots) = self.slot_parts.take() {
+            let sender = Arc::new(Mutex::new(sender));
+            // It has room for one. If that thread has ended, the router is about to.
+            let _ = slots.try_send(SlotParts { sender: sender.clone(), sending, clock });
+            let finder = StreamFinder { shared, participant, describe, sender };
+            return self.begin("replicas-out", move || {
+                schedule_below();
+                finder.run();
+            });
+        }
+        let driver = ReplicaDriver::new(&settings);
+        let tx_thread = ReplicaTx { participant, describe, driver, sender, sending, clock, shared };
         self.begin("replicas-out", move || {
             schedule_below();
             tx_thread.run();
