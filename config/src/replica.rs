@@ -5,7 +5,7 @@ use crate::node::{Node, Reach};
 use crate::reader::{Section, nearest};
 use crate::record::{RecordedItems, Sampling};
 use rohrpost_mailbox::Name;
-use rohrpost_network::{Network, Security, Tdma};
+use rohrpost_network::Tdma;
 use std::time::Duration;
 
 /// Most replicas of an installation.
@@ -31,21 +31,15 @@ pub struct Replica {
 }
 
 impl Replica {
-    /// `network` and `tdma` are as the file has them.
+    /// `tdma` is as the file has it.
     pub(crate) fn read(
         section: Section<'_>,
         directory: &Directory<'_>,
         nodes: &[Node],
-        (network, tdma): (Option<&Network>, Option<&Tdma>),
+        tdma: Option<&Tdma>,
     ) -> Option<Self> {
         if tdma.is_some() {
             section.report("with time slots no replica is carried yet; drop it, or `mode = \"tdma\"` of [network]");
-        }
-        if network.is_some_and(|network| network.security == Security::Keys) {
-            section.report(
-                "replicas are not sealed yet, and [network] says `security = \"keys\"`; drop the replica, or read the \
-                 stream on its own node",
-            );
         }
         let stream = section.required("stream", "stream = \"camera.0/image\"");
         let stream = stream.and_then(|item| {

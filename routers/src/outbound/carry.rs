@@ -14,10 +14,10 @@ impl Outbound {
         self
     }
 
-    /// From now on it sends to these peers alone, one bit each; for a router that seals nothing.
+    /// From now on it sends to these peers alone, one bit each.
     #[must_use]
     pub(crate) fn only_to(self, peers: u64) -> Self {
-        Self { reached: peers, ..self }
+        Self { only: peers, reached: self.reached & peers, ..self }
     }
 
     /// Whether a datagram of this level may leave now; else when.

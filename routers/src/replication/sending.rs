@@ -127,7 +127,8 @@ impl ReplicaSender {
                 return ReplicaStep::Wait { until_ns };
             }
             // A record that was overwritten meanwhile is gone: another one is chosen.
-            let content = &mut datagram[frame::HEAD_BYTES..];
+            // Behind it is room for a seal.
+            let content = &mut datagram[frame::HEAD_BYTES..][..RECORD_PART_HEAD_BYTES + self.part_bytes];
             let filled = stream.fill(now_ns, &system, (to, self.part_bytes), content);
             let Some((kind, bytes)) = filled else { continue };
             if stream.destinations[to].under_way.is_none() {

@@ -2,6 +2,7 @@
 
 mod hostile;
 mod lossy;
+mod sealed;
 
 use super::{Describe, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};

@@ -98,8 +98,8 @@ pub enum ShellError {
     /// No unused incarnation number was found.
     #[error(transparent)]
     Random(#[from] NoRandom),
-    /// Replicas with time slots, or sealed.
-    #[error("replicas are carried by networks without time slots and without seals only")]
+    /// Replicas with time slots.
+    #[error("replicas are carried by networks without time slots only")]
     Replicas,
     /// The system has no thread for it.
     #[error("a thread of the router: {0}; is the limit of processes reached (ulimit -u)?")]
