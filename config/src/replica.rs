@@ -24,6 +24,8 @@ pub struct Replica {
     pub to: Vec<String>,
     /// Which of its records are sent.
     pub sampling: Sampling,
+    /// Of these, only those are sent whose bytes differ from the last one that was.
+    pub changed: bool,
     /// A record that arrives later than this after it was written is told.
     pub delay_alarm: Duration,
     /// Line in the file.
@@ -63,11 +65,13 @@ impl Replica {
             }
             Some(destinations(&section, &texts, nodes))
         });
+        let changed = section.get("changed").and_then(|item| item.flag()).unwrap_or(false);
         let delay_alarm = section.get("delay-alarm").and_then(|item| item.duration_above_zero("5 ms"));
         let line = section.line;
         section.finish();
         let ((from, item, sampling), to) = (stream?, to?);
-        Some(Self { from, item, to, sampling, delay_alarm: delay_alarm.unwrap_or(DELAY_ALARM), line })
+        let delay_alarm = delay_alarm.unwrap_or(DELAY_ALARM);
+        Some(Self { from, item, to, sampling, changed, delay_alarm, line })
     }
 
     /// Whether a node has by it what an entry of the recorder names.

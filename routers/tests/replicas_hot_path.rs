@@ -132,6 +132,7 @@ fn parts_take_nothing_from_the_heap() {
             node: 0,
             to: 1 << 1,
             sampling: Sampling::Each,
+            changed: false,
             delay_alarm_ns: 5 * MS,
             level: 18,
         };

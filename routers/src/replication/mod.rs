@@ -15,6 +15,7 @@
 
 mod counts;
 mod destination;
+mod fingerprint;
 mod receiving;
 mod sending;
 mod settings;

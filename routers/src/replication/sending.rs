@@ -6,6 +6,7 @@
 
 use super::counts::{ReplicaLoss, SentReplica};
 use super::destination::Destination;
+use super::fingerprint::Fingerprints;
 use super::settings::ReplicaSettings;
 use super::{DESCRIBE_EVERY_NS, Describe, check, part_bytes};
 use crate::frame::{
@@ -60,6 +61,8 @@ struct OutgoingReplica {
     /// The newest record, when it was looked at last.
     newest: Option<RecordInfo>,
     destinations: Vec<Destination>,
+    /// Where only changes are sent.
+    fingerprints: Option<Fingerprints>,
     /// The destination that is asked first.
     turn: usize,
     /// What is wrong with it was told.
@@ -175,6 +178,7 @@ impl OutgoingReplica {
         Self {
             place,
             destinations: peers.map(|peer| Destination::new(place, peer)).collect(),
+            fingerprints: replica.changed.then(Fingerprints::default),
             settings: replica.clone(),
             description: Vec::new(),
             check: 0,
@@ -207,6 +211,7 @@ impl OutgoingReplica {
         (self.check, self.description, self.told) = (check(&words), words, false);
         for destination in &mut self.destinations {
             (destination.describe_ns, destination.describing, destination.under_way) = (0, None, None);
+            destination.sent = None;
         }
         self.note_newest();
     }
@@ -242,7 +247,7 @@ impl OutgoingReplica {
             // The stream was made anew.
             self.generation = self.generation.wrapping_add(1);
             for destination in &mut self.destinations {
-                (destination.next, destination.under_way) = (None, None);
+                (destination.next, destination.under_way, destination.sent) = (None, None, None);
             }
         }
         self.newest = Some(newest);
@@ -255,7 +260,7 @@ impl OutgoingReplica {
             let incarnation = outbound.incarnation_of(destination.peer);
             if std::mem::replace(&mut destination.incarnation, incarnation) != incarnation {
                 // It may have nothing: the description and the newest record go to it at once.
-                (destination.describe_ns, destination.describing) = (0, None);
+                (destination.describe_ns, destination.describing, destination.sent) = (0, None, None);
                 let under_way = destination.under_way.take().map(|(record, _)| record.sequence);
                 let again = under_way.or(newest.map(|newest| newest.sequence));
                 destination.next = destination.next.zip(again).map(|(next, again)| next.min(again));
@@ -270,14 +275,15 @@ impl OutgoingReplica {
 
     /// The first destination with something to send, in turn.
     fn choose(&mut self, now_ns: u64, ready: u64) -> Option<usize> {
-        let Self { reader, newest, destinations, settings, turn, .. } = self;
+        let Self { reader, newest, destinations, fingerprints, settings, turn, .. } = self;
         let (reader, count) = (reader.as_mut()?, destinations.len());
         (0..count).map(|step| (*turn + step) % count).find(|at| {
             let destination = &mut destinations[*at];
             let is_ready = ready & 1 << destination.peer != 0;
+            let which = (settings.sampling, fingerprints.as_mut());
             is_ready
                 && (destination.describing.is_some()
-                    || newest.is_some_and(|newest| destination.begin(now_ns, reader, &newest, settings.sampling)))
+                    || newest.is_some_and(|newest| destination.begin(now_ns, reader, &newest, which)))
         })
     }
 
@@ -304,7 +310,7 @@ impl OutgoingReplica {
         let (info, offset) = destination.under_way?;
         let record = self.reader.as_mut().and_then(|reader| reader.record(info.sequence));
         let Some(record) = record.filter(|record| record.info() == info) else {
-            destination.under_way = None;
+            (destination.under_way, destination.sent) = (None, None);
             destination.counts.lost.add(ReplicaLoss::Passed, 1);
             return None;
         };

@@ -1,5 +1,6 @@
 //! Both halves, over a wire in memory: with the outbound and the inbound that ship, and rings of two nodes.
 
+mod changed;
 mod hostile;
 mod lossy;
 mod sealed;
@@ -50,6 +51,7 @@ fn image() -> ReplicaSettings {
         node: ORIGIN,
         to: 1 << HOLDER,
         sampling: Sampling::Each,
+        changed: false,
         delay_alarm_ns: 5 * MS,
         level: 18,
     }
