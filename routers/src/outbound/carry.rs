@@ -27,7 +27,9 @@ impl Outbound {
 
     /// Peers to which something may leave now, one bit each.
     pub(crate) fn ready_peers(&self) -> u64 {
-        self.open()
+        // Sessions as they are now: in time slots nothing is polled here that would look at them.
+        let reached = self.peer_sessions.as_ref().map_or(self.reached, |all| all.reached() & self.only);
+        reached & !self.full & self.hearing
     }
 
     /// Whether a peer is there, as far as is known: what is not sent to it now waits for nothing.
