@@ -74,9 +74,9 @@ impl Replica {
         Some(Self { from, item, to, sampling, changed, delay_alarm, line })
     }
 
-    /// Whether a node has by it what an entry of the recorder names.
+    /// Whether a node has by it the one stream that an entry of the recorder names.
     pub(crate) fn is_of(&self, items: &RecordedItems, node: &str) -> bool {
-        let is_it = items.item.as_ref().is_none_or(|item| *item == self.item);
+        let is_it = items.item.as_ref().is_some_and(|item| *item == self.item);
         is_it && items.from == Some(self.from) && self.to.iter().any(|to| to == node)
     }
 }

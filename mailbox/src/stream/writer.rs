@@ -160,9 +160,7 @@ impl StreamWriter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn newest(&self) -> Option<(RecordInfo, &[u8])> {
-        let last = self.progress.next().checked_sub(1)?;
-        let Look::There(line) = self.segment.ring().look(last) else { return None };
-        Some(self.seen(line))
+        self.segment.ring().newest().map(|line| self.seen(line))
     }
 
     /// A record that an entry names, as readers see it.

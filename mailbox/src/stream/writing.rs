@@ -8,7 +8,9 @@
 //! shared: a successor works it out from the index.
 
 use crate::step::step;
-use crate::stream::ring::{About, LEFT_OUT, Look, Ring, STREAM_READERS_MAX, Seat, Stamp};
+use crate::stream::ring::{
+    About, FRAME, IndexEntry, LEFT_OUT, Look, Ring, SEQUENCE_MAX, STREAM_READERS_MAX, Seat, Stamp, ahead,
+};
 use crate::sync::{Ordering, fence, prefetch_to_write, seq_cst_accesses};
 
 /// What the writer knows.
@@ -36,26 +38,25 @@ impl Frame {
 impl Progress {
     /// Goes on where the writer before ended, whichever step that was. For the one writer, before it writes.
     pub(crate) fn resume(ring: &Ring<'_>) -> Self {
-        let mut next = ring.written().max(ring.first());
-        let counted = next;
-        while ring.left_out(next).is_some() && next < counted + ring.keep() {
-            next += 1;
-        }
-        if let Look::There(_) = ring.look(next) {
-            // Its writer died before it could count it.
-            next += 1;
+        let counted = ring.written().max(ring.first());
+        let next = named_end(ring, counted);
+        let kept = ring.oldest_before(next)..next;
+        let newest = kept.clone().rev().find_map(|sequence| match ring.look(sequence) {
+            Look::There(line) => Some(line.reached()),
+            Look::NotYet | Look::Gone => ring.left_out(sequence).filter(|stamp| stamp.ns != 0),
+        });
+        if next > counted {
+            // Its writer died before it could count it, or among those that it left out before it.
+            for sequence in kept.filter(|sequence| ring.entry(*sequence).is_of_older(*sequence)) {
+                leave_out(ring, sequence, newest);
+            }
             ring.count(next);
             step!("resume: counted");
-        } else {
-            next = counted;
         }
+        // Whatever entry names a frame: a reader may find it there.
         let mut used = vec![false; ring.frames()];
-        let mut newest = None;
-        for sequence in ring.oldest_before(next)..next {
-            if let Look::There(line) = ring.look(sequence) {
-                used[line.frame] = true;
-                newest = Some(Stamp { epoch: line.about.stamp.epoch, ns: line.newest_ns() });
-            }
+        for frame in (0..ring.keep()).filter_map(|at| ring.entry(at).named_frame(ring.frames())) {
+            used[frame as usize] = true;
         }
         // For every frame, once: later ones only come back.
         let mut free = Vec::with_capacity(ring.frames());
@@ -100,15 +101,8 @@ impl Progress {
     /// replica, where such records never came. A number of steps bounded by what the ring keeps.
     pub(crate) fn skip_to(&mut self, ring: &Ring<'_>, sequence: u64) {
         let from = self.next.max(sequence.saturating_sub(ring.keep()));
-        let stamp = self.newest.unwrap_or(Stamp { epoch: 0, ns: 0 });
-        let about = About { stamp, before_ns: stamp.ns, written_ns: 0, len_bytes: 0, incarnation: 0 };
         for left_out in from..sequence {
-            let (entry, hint) = ring.place(left_out);
-            // Of a record that may be more than a turn of the ring behind.
-            let old = entry.named_frame(ring.frames());
-            hint.store(stamp.ns, Ordering::Relaxed);
-            entry.write(left_out, LEFT_OUT, &about);
-            self.free.extend(old);
+            self.free.extend(leave_out(ring, left_out, self.newest));
         }
         self.next = self.next.max(sequence);
     }
@@ -152,6 +146,54 @@ impl Progress {
             }
         }
         sequence
+    }
+}
+
+/// Behind the last record that an entry names: what a writer counts, or, if it died before it could, more.
+fn named_end(ring: &Ring<'_>, counted: u64) -> u64 {
+    let named = |at| ring.entry(at).named_sequence(counted).filter(|sequence| sequence % ring.keep() == at);
+    let last = (0..ring.keep()).filter_map(named).max();
+    last.map_or(counted, |last| counted.max(last + 1))
+}
+
+/// Makes this an entry of a record that never came: the frame that it named, of a record that may be more than a turn
+/// of the ring behind. `newest` is what the stream had reached.
+fn leave_out(ring: &Ring<'_>, sequence: u64, newest: Option<Stamp>) -> Option<u32> {
+    let stamp = newest.unwrap_or(Stamp { epoch: 0, ns: 0 });
+    let about = About { stamp, before_ns: stamp.ns, written_ns: 0, len_bytes: 0, incarnation: 0 };
+    let (entry, hint) = ring.place(sequence);
+    let old = entry.named_frame(ring.frames());
+    hint.store(stamp.ns, Ordering::Relaxed);
+    entry.write(sequence, LEFT_OUT, &about);
+    old
+}
+
+/// What the writer asks of an entry, which it alone changes.
+impl IndexEntry {
+    /// The frame of the record of this sequence; none if this is another's entry, or its writer died over it.
+    fn frame(&self, sequence: u64, frames: usize) -> Option<u32> {
+        let is_its = ahead(self.word.load(Ordering::Relaxed), sequence) == 0;
+        self.named_frame(frames).filter(|_| is_its)
+    }
+
+    /// The frame of whichever record has this entry.
+    fn named_frame(&self, frames: usize) -> Option<u32> {
+        let word = self.word.load(Ordering::Relaxed);
+        // Of a damaged file any number is possible.
+        ((word & FRAME) as u32).checked_sub(1).filter(|frame| (*frame as usize) < frames)
+    }
+
+    /// The sequence that this names a frame for, or that it says was left out, as its word has it near `counted`.
+    fn named_sequence(&self, counted: u64) -> Option<u64> {
+        // ORDERING: Acquire (B), as in `look`.
+        let word = self.word.load(Ordering::Acquire);
+        let sequence = counted.checked_add_signed(ahead(word, counted))?;
+        (word & FRAME != 0 && sequence < SEQUENCE_MAX).then_some(sequence)
+    }
+
+    /// Whether it has an older record than this one, which has the same place.
+    fn is_of_older(&self, sequence: u64) -> bool {
+        ahead(self.word.load(Ordering::Relaxed), sequence) < 0
     }
 }
 

@@ -13,6 +13,7 @@
 //! goes along unread. Rings are memory of this node; making one and laying down a description are system calls, a part
 //! is none.
 
+mod assembly;
 mod counts;
 mod destination;
 mod fingerprint;

@@ -9,9 +9,10 @@
 //! Records are known by sequence, incarnation and stamp, never by when they come. A sequence does not go back, unless
 //! the origin's router says in a later life that its stream was made anew: then so is the replica.
 
+use super::assembly::DescriptionAssembly;
 use super::counts::{ReceivedReplica, ReplicaLoss};
 use super::settings::ReplicaSettings;
-use super::{Describe, check, part_bytes};
+use super::{Describe, part_bytes};
 use crate::frame::{DescriptionPart, FrameHead, RecordPart, ReplicaFrame};
 use crate::settings::Settings;
 use rohrpost_mailbox::{
@@ -21,6 +22,8 @@ use rohrpost_mailbox::{
 use std::sync::Arc;
 use std::time::Duration;
 
+/// A ring that cannot be made is tried again after this, ns.
+const RETRY_NS: u64 = 1_000_000_000;
 /// Late records of a replica are told this often at most.
 const DELAY_TOLD_EVERY_NS: u64 = 1_000_000_000;
 
@@ -42,6 +45,13 @@ struct Life {
     generation: u16,
 }
 
+impl Life {
+    /// Whether the same router says that this ended. As it wraps: earlier by less than half of all numbers.
+    fn is_before(self, other: Self) -> bool {
+        self.router == other.router && (other.generation.wrapping_sub(self.generation) as i16) > 0
+    }
+}
+
 struct IncomingReplica {
     settings: ReplicaSettings,
     counts: Arc<ReceivedReplica>,
@@ -58,6 +68,10 @@ struct IncomingReplica {
     came: Box<[u64]>,
     /// How many have not.
     missing: usize,
+    /// The ring could not be opened or made.
+    is_unopened: bool,
+    /// It is not tried again before, ns.
+    retry_ns: u64,
     /// What is wrong with it was told.
     told: bool,
     delays_told: Throttle,
@@ -68,14 +82,6 @@ struct IncomingReplica {
 struct KnownOrigin {
     check: u32,
     id: StreamId,
-}
-
-/// A description on its way, from the front.
-#[derive(Default)]
-struct DescriptionAssembly {
-    check: u32,
-    len: u32,
-    bytes: Vec<u8>,
 }
 
 impl ReplicaReceiver {
@@ -121,8 +127,12 @@ impl ReplicaReceiver {
         match part {
             ReplicaFrame::Record(part) => {
                 let life = Life { router: head.incarnation, generation: part.generation };
-                if stream.take(&self.participant, life, part, self.part_bytes) {
+                if now_ns < stream.retry_ns {
+                    stream.counts.lost.add(ReplicaLoss::Unwritable, 1);
+                } else if stream.take(&self.participant, life, part, self.part_bytes) {
                     stream.note_delay(now_ns, &system(), part);
+                } else if std::mem::take(&mut stream.is_unopened) {
+                    stream.retry_ns = now_ns + RETRY_NS;
                 }
             }
             ReplicaFrame::Description(part) => self.describe(head.incarnation, part),
@@ -132,7 +142,11 @@ impl ReplicaReceiver {
 
     fn describe(&mut self, router: u64, part: &DescriptionPart<'_>) {
         let Some(Some(stream)) = self.streams.get_mut(usize::from(part.place)) else { return };
-        stream.announced = Some((Life { router, generation: part.generation }, part.written));
+        let life = Life { router, generation: part.generation };
+        if stream.is_over(life) {
+            return;
+        }
+        stream.announced = Some((life, part.written));
         if stream.known.is_some_and(|known| known.check == part.check) {
             return;
         }
@@ -185,6 +199,8 @@ impl IncomingReplica {
             begun_in: None,
             came: vec![0; parts.div_ceil(64)].into(),
             missing: 0,
+            is_unopened: false,
+            retry_ns: 0,
             told: false,
             delays_told: Throttle::default(),
         }
@@ -246,6 +262,9 @@ impl IncomingReplica {
         {
             return self.lose(ReplicaLoss::Unsound);
         }
+        if self.is_over(life) {
+            return self.lose(ReplicaLoss::Late);
+        }
         let record = OriginRecord {
             sequence: part.sequence,
             incarnation: part.incarnation,
@@ -255,6 +274,12 @@ impl IncomingReplica {
         let is_begun = self.begun() == Some(record) && self.begun_in == Some(life);
         (is_begun || self.begin(participant, known.id, life, record, part_bytes))
             && self.put(offset / part_bytes, offset, part.bytes)
+    }
+
+    /// Whether the stream was made anew since, as its router has said.
+    fn is_over(&self, life: Life) -> bool {
+        let announced = self.announced.map(|(life, _)| life);
+        [announced, self.life, self.begun_in].into_iter().flatten().any(|known| life.is_before(known))
     }
 
     fn begun(&self) -> Option<OriginRecord> {
@@ -299,7 +324,7 @@ impl IncomingReplica {
             self.writer = None;
         }
         let mut written = self.write(participant, id, record);
-        if written.is_err() && self.life != Some(life) {
+        if written.is_err() && !self.is_unopened && self.life != Some(life) {
             // Its time may have begun anew, too: what is there then fits no more.
             self.writer = None;
             let _ = participant.node().remove_orphan_stream(id);
@@ -321,6 +346,7 @@ impl IncomingReplica {
             Some(writer) => writer,
             None => {
                 let opened = participant.replica_writer(id, self.settings.shape, record.sequence);
+                self.is_unopened = opened.is_err();
                 opened.map_err(|error| error.to_string())?
             }
         };
@@ -332,14 +358,10 @@ impl IncomingReplica {
     /// Whether a record that is not newer says that its stream was made anew.
     fn is_anew(&self, life: Life, sequence: u64, next: u64) -> bool {
         match self.life {
-            Some(newest) if newest.router == life.router => {
-                // As it wraps: later by less than half of all numbers.
-                (life.generation.wrapping_sub(newest.generation) as i16) > 0
-            }
-            Some(_) => true,
+            Some(newest) => newest.is_before(life) || newest.router != life.router,
             None => {
                 let written = self.announced.filter(|(announced, _)| *announced == life).map(|(_, written)| written);
-                sequence + 1 == next || written.is_some_and(|written| sequence < written && written < next)
+                sequence + 1 == next || written.is_some_and(|written| written < next)
             }
         }
     }
@@ -369,24 +391,4 @@ impl IncomingReplica {
 fn is_same(newest: &RecordInfo, record: &OriginRecord) -> bool {
     let there = (newest.sequence, newest.incarnation, newest.stamp, newest.len_bytes);
     there == (record.sequence, record.incarnation, record.stamp, record.len_bytes)
-}
-
-impl DescriptionAssembly {
-    /// Takes a part; the whole, once it is there. A part that is missing comes with the next round.
-    fn take(&mut self, part: &DescriptionPart<'_>) -> Option<Vec<u8>> {
-        if part.offset == 0 {
-            self.bytes.clear();
-            (self.check, self.len) = (part.check, part.len);
-        }
-        let is_next = part.offset as usize == self.bytes.len() && (part.check, part.len) == (self.check, self.len);
-        if !is_next {
-            return None;
-        }
-        self.bytes.extend_from_slice(part.bytes);
-        if self.bytes.len() < part.len as usize {
-            return None;
-        }
-        let whole = std::mem::take(&mut self.bytes);
-        (check(&whole) == self.check).then_some(whole)
-    }
 }

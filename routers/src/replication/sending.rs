@@ -16,6 +16,7 @@ use crate::frame::{
 use crate::outbound::Outbound;
 use crate::settings::Settings;
 use rohrpost_mailbox::{Participant, RecordInfo, StreamId, StreamReader, SystemTime};
+use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
 /// Next step for the code around the core.
@@ -45,8 +46,8 @@ pub struct ReplicaSender {
     part_bytes: usize,
     /// The most important first.
     streams: Vec<OutgoingReplica>,
-    /// Among those of one level, the first to be asked.
-    turn: usize,
+    /// Of each level, the first of its streams to be asked.
+    turns: [usize; LEVELS],
 }
 
 struct OutgoingReplica {
@@ -58,6 +59,8 @@ struct OutgoingReplica {
     reader: Option<StreamReader>,
     /// How often the stream was made anew.
     generation: u16,
+    /// There is more to read, and it is not written to its end: its writer died.
+    is_stalled: bool,
     /// The newest record, when it was looked at last.
     newest: Option<RecordInfo>,
     destinations: Vec<Destination>,
@@ -75,7 +78,7 @@ impl ReplicaSender {
         let own = (0..).zip(replicas).filter(|(_, replica)| replica.node == settings.own);
         let mut streams: Vec<_> = own.map(|(place, replica)| OutgoingReplica::new(place, replica, settings)).collect();
         streams.sort_by_key(|stream| stream.settings.level);
-        Self { part_bytes: part_bytes(settings), streams, turn: 0 }
+        Self { part_bytes: part_bytes(settings), streams, turns: [0; LEVELS] }
     }
 
     /// Whether no stream of this node has a replica.
@@ -102,7 +105,11 @@ impl ReplicaSender {
 
     /// The streams that are read, to sleep until there is a record.
     pub fn readers(&mut self) -> Vec<&mut StreamReader> {
-        self.streams.iter_mut().filter_map(|stream| stream.reader.as_mut()).collect()
+        self.streams
+            .iter_mut()
+            .filter(|stream| !stream.is_stalled)
+            .filter_map(|stream| stream.reader.as_mut())
+            .collect()
     }
 
     /// The next datagram, or when to ask again. `datagram` has room for the largest; `system` tells system time at a
@@ -135,7 +142,7 @@ impl ReplicaSender {
             let filled = stream.fill(now_ns, &system, (to, self.part_bytes), content);
             let Some((kind, bytes)) = filled else { continue };
             if stream.destinations[to].under_way.is_none() {
-                self.turn = at + 1;
+                self.turns[usize::from(level)] = at + 1;
             }
             stream.turn = to + 1;
             let to = stream.destinations[to].peer;
@@ -146,9 +153,10 @@ impl ReplicaSender {
     /// A stream and one of its destinations that have something for a ready peer: of the most important level, and
     /// there in turn.
     fn choose(&mut self, now_ns: u64, ready: u64) -> Option<(usize, usize)> {
-        let (mut begin, turn) = (0, self.turn);
+        let mut begin = 0;
         for level in self.streams.chunk_by_mut(|a, b| a.settings.level == b.settings.level) {
             let count = level.len();
+            let turn = self.turns[usize::from(level[0].settings.level)];
             let first = turn.checked_sub(begin).filter(|first| *first < count).unwrap_or(0);
             for at in (0..count).map(|step| (first + step) % count) {
                 if let Some(to) = level[at].choose(now_ns, ready) {
@@ -184,6 +192,7 @@ impl OutgoingReplica {
             check: 0,
             reader: None,
             generation: 0,
+            is_stalled: false,
             newest: None,
             turn: 0,
             told: false,
@@ -224,8 +233,11 @@ impl OutgoingReplica {
 
     /// Looks for a newer record. One load if there is none.
     fn refresh(&mut self) {
+        self.is_stalled = false;
         if self.reader.as_ref().is_some_and(StreamReader::has_next) {
+            let before = self.newest;
             self.note_newest();
+            self.is_stalled = self.newest == before;
         }
     }
 
@@ -260,14 +272,18 @@ impl OutgoingReplica {
             let incarnation = outbound.incarnation_of(destination.peer);
             if std::mem::replace(&mut destination.incarnation, incarnation) != incarnation {
                 // It may have nothing: the description and the newest record go to it at once.
-                (destination.describe_ns, destination.describing, destination.sent) = (0, None, None);
+                (destination.describe_ns, destination.describing) = (0, None);
                 let under_way = destination.under_way.take().map(|(record, _)| record.sequence);
                 let again = under_way.or(newest.map(|newest| newest.sequence));
                 destination.next = destination.next.zip(again).map(|(next, again)| next.min(again));
+                destination.has_none = true;
             }
             if !outbound.is_there(now_ns, destination.peer) {
                 destination.pass_over(newest.as_ref());
-            } else if now_ns >= destination.describe_ns && destination.describing.is_none() && reader.is_some() {
+                continue;
+            }
+            destination.come();
+            if now_ns >= destination.describe_ns && destination.describing.is_none() && reader.is_some() {
                 destination.describing = Some(0);
             }
         }

@@ -139,6 +139,8 @@ pub struct Shell {
     slots: Option<Arc<slots::SlotStatus>>,
     tunnel: Option<Arc<tunnel::Passed>>,
     replicas: ReplicaCounts,
+    /// Datagrams of replicas, where there are any.
+    replica_stats: Option<Arc<Stats>>,
     /// Where datagrams are sealed.
     peer_sessions: Option<Arc<PeerSessions>>,
     /// The clock's own thread.
@@ -242,6 +244,7 @@ impl Shell {
             slots: None,
             tunnel: None,
             replicas: ReplicaCounts::default(),
+            replica_stats: None,
             service: None,
             threads: Vec::new(),
             peer_sessions: all,

@@ -128,6 +128,7 @@ impl Shell {
         let receiver = ReplicaReceiver::new(&settings, parts.replicas, receiving, parts.describe.clone());
         self.replicas = ReplicaCounts { sent: sender.counts(), received: receiver.counts() };
         let stats = Stats::of_rest(&settings, &self.stats);
+        self.replica_stats = Some(stats.clone());
         if !receiver.is_empty() {
             self.receive_replicas((receiver, SystemClock::open(node)), &stats, parts.socket)?;
         }
@@ -188,6 +189,12 @@ impl Shell {
             schedule_below();
             rx_thread.run();
         })
+    }
+
+    /// Counters of datagrams, as [`stats`](Shell::stats), for replicas, which have threads and a port of their own; no
+    /// package is among them.
+    pub fn replica_stats(&self) -> Option<&Arc<Stats>> {
+        self.replica_stats.as_ref()
     }
 
     /// Counters of the replicas of this node.

@@ -58,11 +58,8 @@ pub(crate) const REPLICAS: Group = Group {
             shows_in: "replication::tests::changed::what_may_not_have_arrived_goes_again",
             edits: &[edit(
                 "replication/sending.rs",
-                "(destination.describe_ns, destination.describing, destination.sent) = (0, None, None);",
-                r"(destination.describe_ns, destination.describing) = (0, None);
-                if !broken!(TrustsWhatLeft) {
-                    destination.sent = None;
-                }",
+                "destination.has_none = true;",
+                "destination.has_none = !broken!(TrustsWhatLeft);",
             )],
         },
     ],
