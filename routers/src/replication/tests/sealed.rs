@@ -226,6 +226,7 @@ fn of_what_was_recorded_and_altered_no_part_is_taken() {
         attacker.recorded.extend(datagrams);
         let Next::Record(record) = reader.try_next().unwrap() else { panic!("record {round} is not there") };
         assert_eq!((record.info().sequence, record.body()), (round, &body[..]));
+        drop(record);
         let before = holder.taken();
         for attempt in 0..ATTEMPTS {
             let datagram = attacker.datagram();
