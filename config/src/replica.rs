@@ -24,7 +24,7 @@ pub struct Replica {
     pub to: Vec<String>,
     /// Which of its records are sent.
     pub sampling: Sampling,
-    /// Of these, only those are sent whose bytes differ from the last one that was.
+    /// Of these, only those with other bytes than the last one that was sent.
     pub changed: bool,
     /// A record that arrives later than this after it was written is told.
     pub delay_alarm: Duration,

@@ -1,4 +1,4 @@
-//! A replica on a sealed network, beside a node of it that has the key, and sends to the port of replicas what it likes.
+//! A replica on a sealed network, beside a node of it that has the key and sends what it likes to the port of replicas.
 
 use crate::harness::{NETWORK, wait};
 use crate::lan::addresses;

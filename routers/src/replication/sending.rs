@@ -295,7 +295,7 @@ impl OutgoingReplica {
         let (reader, count) = (reader.as_mut()?, destinations.len());
         (0..count).map(|step| (*turn + step) % count).find(|at| {
             let destination = &mut destinations[*at];
-            let is_ready = ready & 1 << destination.peer != 0;
+            let is_ready = ready & 1 << destination.peer != 0 && !destination.is_absent;
             let which = (settings.sampling, fingerprints.as_mut());
             is_ready
                 && (destination.describing.is_some()
@@ -306,7 +306,8 @@ impl OutgoingReplica {
     /// Whether something waits for this destination.
     fn waits_for(&self, to: &Destination) -> bool {
         let is_behind = self.newest.zip(to.next).is_some_and(|(newest, next)| next <= newest.sequence);
-        self.reader.is_some() && (to.describing.is_some() || to.under_way.is_some() || is_behind)
+        let has_some = to.describing.is_some() || to.under_way.is_some() || is_behind;
+        self.reader.is_some() && !to.is_absent && has_some
     }
 
     /// Writes the next part for a destination behind the datagram's head: its kind and length. None: its record was

@@ -27,9 +27,9 @@
 //! No nonce serves twice with one key, and nothing opens twice:
 //!
 //! - A key is for one port, one direction, and one incarnation of each end ([`Port`]); so ports may count alike.
-//! - At a port one thread writes heads, from the counters of that port; their sequence is the nonce, and the same thread
-//!   seals. Should two do so: a sequence is used up by one atomic operation, and a thread that meets a used one panics
-//!   before it seals.
+//! - At a port one thread writes heads, from the counters of that port; their sequence is the nonce, and the same
+//!   thread seals. Should two do so: a sequence is used up by one atomic operation, and a thread that meets a used one
+//!   panics before it seals.
 //! - At a port one thread opens, with a window for each peer's incarnation. Hellos say where those of packages and time
 //!   begin. What else is sealed, is sealed to a present incarnation, so its window begins with the first datagram; and
 //!   an incarnation that is taken for the present one again goes on behind what was opened of it.

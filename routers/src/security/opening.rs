@@ -44,8 +44,8 @@ pub struct Opening {
 /// not in hellos.
 const PAST: usize = 4;
 
-/// An incarnation that was heard at such a port, and from which sequence on it is heard when it is taken for the present
-/// one again.
+/// An incarnation that was heard at such a port, and from which sequence on it is heard when it is taken for the
+/// present one again.
 #[derive(Clone, Copy, Default)]
 struct Past {
     incarnation: u64,

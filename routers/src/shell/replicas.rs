@@ -2,9 +2,9 @@
 //! other nodes into rings of this one.
 //!
 //! They have sockets and a port of their own, so a flood of parts takes no room in a socket, and no time of a thread,
-//! from packages; where datagrams are sealed, they have keys and sequences of their own ([`Port::Replicas`]). One thread
-//! seals and sends whatever leaves by that port, the other opens whatever comes: so parts may go either way, and an
-//! answer to one back. Both are scheduled like modules that are not real time. What is sent, and when, says the
+//! from packages; where datagrams are sealed, they have keys and sequences of their own ([`Port::Replicas`]). One
+//! thread seals and sends whatever leaves by that port, the other opens whatever comes: so parts may go either way, and
+//! an answer to one back. Both are scheduled like modules that are not real time. What is sent, and when, says the
 //! [driver](crate::driver); what becomes a record says [`replication`](crate::replication).
 
 use super::rx_thread::{RxSystem, RxThread};
@@ -114,7 +114,8 @@ impl ReplicaTx {
 }
 
 impl Shell {
-    /// Starts the two threads, if this node writes or has a replica. There are no time slots: configuration checks that.
+    /// Starts the two threads, if this node writes or has a replica. There are no time slots: configuration checks
+    /// that.
     ///
     /// # Errors
     /// [`ShellError`]
