@@ -5,7 +5,6 @@ use crate::node::{Node, Reach};
 use crate::reader::{Section, nearest};
 use crate::record::{RecordedItems, Sampling};
 use rohrpost_mailbox::Name;
-use rohrpost_network::{Network, Security};
 use std::time::Duration;
 
 /// Most replicas of an installation.
@@ -24,6 +23,8 @@ pub struct Replica {
     pub to: Vec<String>,
     /// Which of its records are sent.
     pub sampling: Sampling,
+    /// Of these, only those with other bytes than the last one that was sent.
+    pub changed: bool,
     /// A record that arrives later than this after it was written is told.
     pub delay_alarm: Duration,
     /// Line in the file.
@@ -31,19 +32,11 @@ pub struct Replica {
 }
 
 impl Replica {
-    /// `network` is as the file has it.
     pub(crate) fn read(
         section: Section<'_>,
         directory: &Directory<'_>,
         nodes: &[Node],
-        network: Option<&Network>,
     ) -> Option<Self> {
-        if network.is_some_and(|network| network.security == Security::Keys) {
-            section.report(
-                "replicas are not sealed yet, and [network] says `security = \"keys\"`; drop the replica, or read the \
-                 stream on its own node",
-            );
-        }
         let stream = section.required("stream", "stream = \"camera.0/image\"");
         let stream = stream.and_then(|item| {
             if !item.is_table() {
@@ -66,11 +59,13 @@ impl Replica {
             }
             Some(destinations(&section, &texts, nodes))
         });
+        let changed = section.get("changed").and_then(|item| item.flag()).unwrap_or(false);
         let delay_alarm = section.get("delay-alarm").and_then(|item| item.duration_above_zero("5 ms"));
         let line = section.line;
         section.finish();
         let ((from, item, sampling), to) = (stream?, to?);
-        Some(Self { from, item, to, sampling, delay_alarm: delay_alarm.unwrap_or(DELAY_ALARM), line })
+        let delay_alarm = delay_alarm.unwrap_or(DELAY_ALARM);
+        Some(Self { from, item, to, sampling, changed, delay_alarm, line })
     }
 
     /// Whether a node has by it the one stream that an entry of the recorder names.

@@ -1,5 +1,5 @@
-//! A part of a record on its way from ring to ring takes nothing from the heap, and gives nothing back to it: with time
-//! slots too, where a thread reads the rings that must not wait for any.
+//! A part of a record on its way from ring to ring takes nothing from the heap, and gives nothing back to it: sealed or
+//! not, and with time slots too, where a thread reads the rings that must not wait for any.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -9,16 +9,17 @@ pub mod counting;
 use counting::{CountingHeap, heap_uses};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Head, Name, Next, Node, Participant, Stamp, StreamId, StreamShape, SystemTime};
-use rohrpost_network::{Tdma, TimeSlot};
+use rohrpost_network::{Security, Tdma, TimeSlot};
 use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{FrameHead, NodeIndex, ReplicaFrame};
-use rohrpost_routers::inbound::{Datagram, Inbound};
-use rohrpost_routers::outbound::Outbound;
+use rohrpost_routers::inbound::{Datagram, Envelope, Inbound};
+use rohrpost_routers::outbound::{Outbound, OutboundStep};
 use rohrpost_routers::replication::{Describe, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use rohrpost_routers::report::{Deliver, NotDelivered, Report, RouterEvent};
+use rohrpost_routers::security::{Gate, Port, Sealing, TAG_BYTES};
 use rohrpost_routers::settings::Settings;
 use rohrpost_routers::stats::Stats;
-use rohrpost_testbed::pair::{address, settings};
+use rohrpost_testbed::pair::{SealedRouter, address, settings};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -26,6 +27,7 @@ use std::time::Duration;
 static HEAP: CountingHeap = CountingHeap;
 
 const MS: u64 = 1_000_000;
+const BEGIN_NS: u64 = 1000 * MS;
 const ID: StreamId = StreamId { name: Name::new(1, 112, 0, 0), number: 2 };
 const RECORDS: u64 = 200;
 
@@ -78,10 +80,66 @@ fn slots() -> Tdma {
     }
 }
 
+/// The way from the router of node 0 to that of node 1.
+struct Wire {
+    settings: [Settings; 2],
+    outbound: Outbound,
+    inbound: Inbound,
+    seals: Option<(Sealing, Gate)>,
+}
+
+impl Wire {
+    fn open() -> Self {
+        Self::of([0, 1].map(settings))
+    }
+
+    /// The two know each other.
+    fn sealed(tdma: Option<Tdma>) -> Self {
+        let (mut base, mut arm) = (SealedRouter::new(0), SealedRouter::new(1));
+        base.acquaint(&mut arm, 0);
+        let mut wire = Self::of([0, 1].map(|own| {
+            let mut settings = Settings { incarnation: 100 + u64::from(own), tdma: tdma.clone(), ..settings(own) };
+            settings.network.security = Security::Keys;
+            settings.network.datagram_bytes_max -= TAG_BYTES;
+            settings
+        }));
+        wire.outbound = wire.outbound.sealed(base.peer_sessions.clone());
+        let gate = Gate::without_hellos(&arm.peer_sessions, Port::Replicas);
+        wire.seals = Some((Sealing::new(&base.peer_sessions, Port::Replicas), gate));
+        wire
+    }
+
+    fn of(settings: [Settings; 2]) -> Self {
+        let [here, there] = settings.each_ref().map(|settings| Stats::new(settings, BEGIN_NS));
+        let (outbound, inbound) = (Outbound::new(&settings[0], here), Inbound::new(&settings[1], there));
+        Self { outbound, inbound, seals: None, settings }
+    }
+
+    /// Looks which peers there are, as routers do before each datagram.
+    fn look(&mut self, now_ns: u64, datagram: &mut [u8], parts: &mut Parts) {
+        while let OutboundStep::Send { bytes, .. } = self.outbound.poll(now_ns, datagram, parts) {
+            self.carry(now_ns, datagram, bytes, parts);
+        }
+    }
+
+    fn carry(&mut self, now_ns: u64, datagram: &mut [u8], bytes: usize, parts: &mut Parts) {
+        let (source, arrived_ns) = (address(0), now_ns);
+        let Some((sealing, gate)) = &mut self.seals else {
+            let came = Datagram { source, arrived_ns, bytes: &datagram[..bytes] };
+            return self.inbound.handle(now_ns, &came, parts);
+        };
+        let datagram = &mut datagram[..bytes + TAG_BYTES];
+        sealing.close(datagram).unwrap();
+        let came = Envelope { source, arrived_ns, bytes: datagram.len() };
+        assert_eq!(gate.take(now_ns, &came, datagram, &mut self.inbound, parts, &mut []), None);
+    }
+}
+
 /// Records of both kinds of memory: of words, and of plain bytes.
 #[test]
 fn parts_take_nothing_from_the_heap() {
-    for (record_bytes, tdma) in [(64, None), (10_000, None), (10_000, Some(slots()))] {
+    let cases = [(64, false, None), (10_000, false, None), (64, true, None), (10_000, true, None)];
+    for (record_bytes, is_sealed, tdma) in cases.into_iter().chain([(10_000, true, Some(slots()))]) {
         let shape = StreamShape { record_bytes, keep: 8, readers: 2, late: Duration::ZERO };
         let replica = ReplicaSettings {
             from: ID.name,
@@ -90,17 +148,16 @@ fn parts_take_nothing_from_the_heap() {
             node: 0,
             to: 1 << 1,
             sampling: Sampling::Each,
+            changed: false,
             delay_alarm_ns: 5 * MS,
             level: 18,
         };
         let folder = tempfile::tempdir().unwrap();
         let nodes = ["here", "there"].map(|name| Node::create(&folder.path().join(name), 0o700).unwrap());
-        let [base, arm] = [0, 1].map(|own| Settings { tdma: tdma.clone(), ..settings(own) });
-        let begin_ns = 1000 * MS;
+        let mut wire = if is_sealed { Wire::sealed(tdma) } else { Wire::open() };
+        let [base, arm] = wire.settings.clone();
         let mut sender = ReplicaSender::new(&base, std::slice::from_ref(&replica));
-        let mut outbound = Outbound::new(&base, Stats::new(&base, begin_ns));
-        let receiver = ReplicaReceiver::new(&arm, &[replica], join(&nodes[1]), Arc::new(Always));
-        let (mut inbound, mut parts) = (Inbound::new(&arm, Stats::new(&arm, begin_ns)), Parts(receiver));
+        let mut parts = Parts(ReplicaReceiver::new(&arm, &[replica], join(&nodes[1]), Arc::new(Always)));
         join(&nodes[0]).describe_replicas(ID.name, b"of a camera").unwrap();
         let mut writer = join(&nodes[0]).stream_writer(ID, shape).unwrap();
         sender.look(&join(&nodes[0]), &Always);
@@ -112,13 +169,11 @@ fn parts_take_nothing_from_the_heap() {
                 before = heap_uses();
             }
             writer.write(Stamp { epoch: 1, ns: 1 + number }, &body).unwrap();
-            let mut now_ns = begin_ns + number * MS;
+            let mut now_ns = BEGIN_NS + number * MS;
             loop {
-                match sender.poll(now_ns, time, &mut outbound, &mut datagram) {
-                    ReplicaStep::Send { bytes, .. } => {
-                        let came = Datagram { source: address(0), arrived_ns: now_ns, bytes: &datagram[..bytes] };
-                        inbound.handle(now_ns, &came, &mut parts);
-                    }
+                wire.look(now_ns, &mut datagram, &mut parts);
+                match sender.poll(now_ns, time, &mut wire.outbound, &mut datagram) {
+                    ReplicaStep::Send { bytes, .. } => wire.carry(now_ns, &mut datagram, bytes, &mut parts),
                     ReplicaStep::Wait { .. } => now_ns += MS / 10,
                     ReplicaStep::Idle { .. } => break,
                 }
@@ -126,6 +181,6 @@ fn parts_take_nothing_from_the_heap() {
             let Next::Record(record) = reader.try_next().unwrap() else { panic!("record {number} is not there") };
             assert_eq!(record.body(), body);
         }
-        assert_eq!(heap_uses(), before, "records of {record_bytes} bytes");
+        assert_eq!(heap_uses(), before, "records of {record_bytes} bytes, sealed: {is_sealed}");
     }
 }

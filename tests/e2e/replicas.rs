@@ -69,7 +69,8 @@ length = "1 ms"
 source = "master"
 "#;
 
-fn config(place: &Place, network: &str, [base, brain]: &[String; 2]) -> PathBuf {
+/// `network`: that section, and further ones.
+fn config(place: &Place, [base, brain]: &[String; 2], network: &str) -> PathBuf {
     let config = place.path("test.toml");
     let at = |node: &str, entry: &str| entry.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1);
     let nodes = format!(
@@ -81,14 +82,14 @@ fn config(place: &Place, network: &str, [base, brain]: &[String; 2]) -> PathBuf 
 }
 
 /// A reader on a node, and all that it has read.
-struct Follower {
+pub(crate) struct Follower {
     reader: StreamReader,
     records: BTreeMap<u64, (RecordInfo, Vec<u8>)>,
     lost: u64,
 }
 
 impl Follower {
-    fn new(robot: &Robot) -> Self {
+    pub(crate) fn new(robot: &Robot) -> Self {
         let participant = Participant::join(&robot.node, Name::NONE).unwrap();
         let reader = participant.stream_reader(StreamId { name: robot.name("feeder.0"), number: FRAME }).unwrap();
         Self { reader, records: BTreeMap::new(), lost: 0 }
@@ -111,17 +112,24 @@ impl Follower {
 }
 
 /// Two nodes on this computer, at addresses of the loopback device.
-struct Pair {
-    place: Place,
-    config: PathBuf,
-    base: (Running, Robot),
-    brain: (Running, Robot),
+pub(crate) struct Pair {
+    pub(crate) place: Place,
+    pub(crate) config: PathBuf,
+    pub(crate) base: (Running, Robot),
+    pub(crate) brain: (Running, Robot),
 }
 
 impl Pair {
     fn launched() -> Self {
+        Self::launched_at(&addresses(), NETWORK)
+    }
+
+    pub(crate) fn launched_at(addresses: &[String; 2], network: &str) -> Self {
         let place = Place::new();
-        let config = config(&place, NETWORK, &addresses());
+        let config = config(&place, addresses, network);
+        if network.contains("keys") {
+            place.say(&["keys", "new", config.to_str().unwrap()]).ok();
+        }
         let start = |node: &str| {
             let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), "--node", node]));
             let robot = place.robot(&config, node, &mut launch);
@@ -132,12 +140,12 @@ impl Pair {
         Self { place, config, base, brain }
     }
 
-    fn say(&self, node: &str, arguments: &[&str]) -> String {
+    pub(crate) fn say(&self, node: &str, arguments: &[&str]) -> String {
         self.place.say_at(&self.config, node, arguments).ok()
     }
 
     /// Has the feeder write until its newest record is read on both nodes.
-    fn feed_through(&self, count: u64, [here, there]: [&mut Follower; 2]) {
+    pub(crate) fn feed_through(&self, count: u64, [here, there]: [&mut Follower; 2]) {
         self.say("base", &["call", "feeder.0", "feed", &count.to_string()]);
         wait("the newest record is read on the other node", || {
             here.follow();
@@ -152,6 +160,30 @@ impl Pair {
             None
         });
     }
+
+    /// Ends both; what they left stays.
+    pub(crate) fn stop(self) -> Place {
+        for (mut launch, robot) in [self.brain, self.base] {
+            drop(robot);
+            launch.stop();
+        }
+        self.place
+    }
+}
+
+/// Each record of the replica is as it was written, and none is missing without a word.
+pub(crate) fn compare(here: &Follower, there: &Follower) {
+    assert_eq!(here.lost, 0);
+    for (sequence, (info, body)) in &there.records {
+        let (origin, written) = &here.records[sequence];
+        let told = |info: &RecordInfo| (info.stamp, info.incarnation, info.len_bytes);
+        assert_eq!((told(info), body), (told(origin), written), "record {sequence}");
+        let frame: Frame = from_bytes(body).unwrap();
+        assert_eq!(frame.bytes, noise(frame.number));
+    }
+    let (first, _) = there.records.first_key_value().unwrap();
+    let newest = here.records.last_key_value().unwrap().0;
+    assert!(there.records.len() as u64 + there.lost > newest - first, "each is read or told as lost");
 }
 
 #[test]
@@ -164,17 +196,7 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
     pair.base.1.wait_restarted("feeder.0", feeder);
     pair.feed_through(60, [&mut here, &mut there]);
 
-    assert_eq!(here.lost, 0);
-    for (sequence, (info, body)) in &there.records {
-        let (origin, written) = &here.records[sequence];
-        let told = |info: &RecordInfo| (info.stamp, info.incarnation, info.len_bytes);
-        assert_eq!((told(info), body), (told(origin), written), "record {sequence}");
-        let frame: Frame = from_bytes(body).unwrap();
-        assert_eq!(frame.bytes, noise(frame.number));
-    }
-    let (first, _) = there.records.first_key_value().unwrap();
-    let newest = here.records.last_key_value().unwrap().0;
-    assert!(there.records.len() as u64 + there.lost > newest - first, "each is read or told as lost");
+    compare(&here, &there);
     let incarnations: std::collections::BTreeSet<u32> =
         there.records.values().map(|(info, _)| info.incarnation).collect();
     assert_eq!(incarnations.len(), 2, "the writer has begun anew once");
@@ -191,12 +213,8 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
         assert!(has_it, "{net}");
     }
 
-    let Pair { place, base, brain, .. } = pair;
     drop((here, there));
-    for (mut launch, robot) in [brain, base] {
-        drop(robot);
-        launch.stop();
-    }
+    let place = pair.stop();
     let recorded = values(&place.path("recordings/brain-0001.mcap"), "feeder.0/frame");
     assert!(recorded.len() > 60, "{} of the replica's records are recorded", recorded.len());
     place.assert_empty();
@@ -205,8 +223,8 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
 /// Both nodes in namespaces, with these words for launch, until the recorder of one follows the replica of the other's
 /// stream; none where that cannot be made.
 fn followed(place: &Place, network: &str, words: &[&str]) -> Option<Running> {
-    let config = config(place, network, &["10.77.0.1".into(), "10.77.0.2".into()]);
-    let mut launch =
+    let config = config(place, &["10.77.0.1".into(), "10.77.0.2".into()], network);
+    let launch =
         Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
     // It ends at once where there are none.
     let begun = wait("both nodes run", || {

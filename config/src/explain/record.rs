@@ -62,10 +62,11 @@ impl Page<'_> {
         for replica in &self.installation.replicas {
             let node = self.installation.node_of(replica.from).unwrap_or_default();
             let words = format!(
-                "{} of node {node} to {}: {} of its records, each of at most {}; told if later than {}",
+                "{} of node {node} to {}: {} of its records{}, each of at most {}; told if later than {}",
                 replica.text(self.installation),
                 replica.to.join(", "),
                 replica.sampling,
+                if replica.changed { ", if it has changed" } else { "" },
                 size_text(replica.spec(self.installation).record_bytes.into()),
                 duration_text(replica.delay_alarm)
             );

@@ -14,10 +14,10 @@ impl Outbound {
         self
     }
 
-    /// From now on it sends to these peers alone, one bit each; for a router that seals nothing.
+    /// From now on it sends to these peers alone, one bit each.
     #[must_use]
     pub(crate) fn only_to(self, peers: u64) -> Self {
-        Self { reached: peers, ..self }
+        Self { only: peers, reached: self.reached & peers, ..self }
     }
 
     /// Whether a datagram of this level may leave now; else when. In time slots the window says it.
@@ -32,7 +32,9 @@ impl Outbound {
 
     /// Peers to which something may leave now, one bit each.
     pub(crate) fn ready_peers(&self) -> u64 {
-        self.open()
+        // Sessions as they are now: in time slots nothing is polled here that would look at them.
+        let reached = self.peer_sessions.as_ref().map_or(self.reached, |all| all.reached() & self.only);
+        reached & !self.full & self.hearing
     }
 
     /// Whether a peer is there, as far as is known: what is not sent to it now waits for nothing.

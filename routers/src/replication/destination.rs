@@ -1,10 +1,15 @@
 //! A place in a stream: how far one node's replica has come.
 
 use super::counts::{ReplicaLoss, SentReplica};
+use super::fingerprint::{Fingerprint, Fingerprints};
 use crate::frame::NodeIndex;
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{RecordInfo, StreamReader};
 use std::sync::Arc;
+
+/// Where only changes are sent, a record like the last one goes after this time nevertheless: that one may have been
+/// lost on its way, and nobody says so.
+pub(super) const UNCHANGED_EVERY_NS: u64 = 10_000_000_000;
 
 /// A node that has the replica.
 pub(super) struct Destination {
@@ -20,6 +25,9 @@ pub(super) struct Destination {
     pub(super) has_none: bool,
     /// The record that is under way, and where its next part begins.
     pub(super) under_way: Option<(RecordInfo, usize)>,
+    /// Where only changes are sent: the record that went last, or is under way, and when it was chosen, ns. None: the
+    /// next one goes, whatever its bytes.
+    pub(super) sent: Option<(Fingerprint, u64)>,
     /// No further record is chosen before, ns.
     pub(super) sample_ns: u64,
     /// When the description is due, ns.
@@ -38,19 +46,20 @@ impl Destination {
             is_absent: true,
             has_none: true,
             under_way: None,
+            sent: None,
             sample_ns: 0,
             describe_ns: 0,
             describing: None,
         }
     }
 
-    /// Whether a record is under way; if none is, takes the next.
+    /// Whether a record is under way; if none is, takes the next. `fingerprints`: only of those that changed.
     pub(super) fn begin(
         &mut self,
         now_ns: u64,
         reader: &mut StreamReader,
         newest: &RecordInfo,
-        sampling: Sampling,
+        (sampling, mut fingerprints): (Sampling, Option<&mut Fingerprints>),
     ) -> bool {
         let Some(keep) = reader.shape().map(|shape| u64::from(shape.keep)) else { return false };
         let (lost, mut next) = (&self.counts.lost, self.next.unwrap_or(newest.sequence));
@@ -81,6 +90,17 @@ impl Destination {
                 lost.add(ReplicaLoss::Passed, 1);
                 continue;
             };
+            if let Some(fingerprints) = &mut fingerprints {
+                let fingerprint = fingerprints.of(&record);
+                let is_sent = |(sent, at_ns): (Fingerprint, u64)| {
+                    sent == fingerprint && now_ns.saturating_sub(at_ns) < UNCHANGED_EVERY_NS
+                };
+                if !self.has_none && self.sent.is_some_and(is_sent) {
+                    lost.add(ReplicaLoss::Sampled, 1);
+                    continue;
+                }
+                self.sent = Some((fingerprint, now_ns));
+            }
             (self.under_way, self.has_none) = (Some((record.info(), 0)), false);
             if let Sampling::Rate(rate_hz) = sampling {
                 self.sample_ns = now_ns.saturating_add((1e9 / rate_hz) as u64);

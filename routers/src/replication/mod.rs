@@ -16,6 +16,7 @@
 mod assembly;
 mod counts;
 mod destination;
+mod fingerprint;
 mod receiving;
 mod sending;
 mod settings;

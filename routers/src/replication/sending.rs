@@ -6,6 +6,7 @@
 
 use super::counts::{ReplicaLoss, SentReplica};
 use super::destination::Destination;
+use super::fingerprint::Fingerprints;
 use super::settings::ReplicaSettings;
 use super::{DESCRIBE_EVERY_NS, Describe, check, part_bytes};
 use crate::frame::{
@@ -63,6 +64,8 @@ struct OutgoingReplica {
     /// The newest record, when it was looked at last.
     newest: Option<RecordInfo>,
     destinations: Vec<Destination>,
+    /// Where only changes are sent.
+    fingerprints: Option<Fingerprints>,
     /// The destination that is asked first.
     turn: usize,
     /// What is wrong with it was told.
@@ -134,7 +137,8 @@ impl ReplicaSender {
                 return ReplicaStep::Wait { until_ns };
             }
             // A record that was overwritten meanwhile is gone: another one is chosen.
-            let content = &mut datagram[frame::HEAD_BYTES..];
+            // Behind it is room for a seal.
+            let content = &mut datagram[frame::HEAD_BYTES..][..RECORD_PART_HEAD_BYTES + self.part_bytes];
             let filled = stream.fill(now_ns, &system, (to, self.part_bytes), content);
             let Some((kind, bytes)) = filled else { continue };
             if stream.destinations[to].under_way.is_none() {
@@ -182,6 +186,7 @@ impl OutgoingReplica {
         Self {
             place,
             destinations: peers.map(|peer| Destination::new(place, peer)).collect(),
+            fingerprints: replica.changed.then(Fingerprints::default),
             settings: replica.clone(),
             description: Vec::new(),
             check: 0,
@@ -215,6 +220,7 @@ impl OutgoingReplica {
         (self.check, self.description, self.told) = (check(&words), words, false);
         for destination in &mut self.destinations {
             (destination.describe_ns, destination.describing, destination.under_way) = (0, None, None);
+            destination.sent = None;
         }
         self.note_newest();
     }
@@ -253,7 +259,7 @@ impl OutgoingReplica {
             // The stream was made anew.
             self.generation = self.generation.wrapping_add(1);
             for destination in &mut self.destinations {
-                (destination.next, destination.under_way) = (None, None);
+                (destination.next, destination.under_way, destination.sent) = (None, None, None);
             }
         }
         self.newest = Some(newest);
@@ -285,21 +291,23 @@ impl OutgoingReplica {
 
     /// The first destination with something to send, in turn.
     fn choose(&mut self, now_ns: u64, ready: u64) -> Option<usize> {
-        let Self { reader, newest, destinations, settings, turn, .. } = self;
+        let Self { reader, newest, destinations, fingerprints, settings, turn, .. } = self;
         let (reader, count) = (reader.as_mut()?, destinations.len());
         (0..count).map(|step| (*turn + step) % count).find(|at| {
             let destination = &mut destinations[*at];
-            let is_ready = ready & 1 << destination.peer != 0;
+            let is_ready = ready & 1 << destination.peer != 0 && !destination.is_absent;
+            let which = (settings.sampling, fingerprints.as_mut());
             is_ready
                 && (destination.describing.is_some()
-                    || newest.is_some_and(|newest| destination.begin(now_ns, reader, &newest, settings.sampling)))
+                    || newest.is_some_and(|newest| destination.begin(now_ns, reader, &newest, which)))
         })
     }
 
     /// Whether something waits for this destination.
     fn waits_for(&self, to: &Destination) -> bool {
         let is_behind = self.newest.zip(to.next).is_some_and(|(newest, next)| next <= newest.sequence);
-        self.reader.is_some() && (to.describing.is_some() || to.under_way.is_some() || is_behind)
+        let has_some = to.describing.is_some() || to.under_way.is_some() || is_behind;
+        self.reader.is_some() && !to.is_absent && has_some
     }
 
     /// Writes the next part for a destination behind the datagram's head: its kind and length. None: its record was
@@ -319,7 +327,7 @@ impl OutgoingReplica {
         let (info, offset) = destination.under_way?;
         let record = self.reader.as_mut().and_then(|reader| reader.record(info.sequence));
         let Some(record) = record.filter(|record| record.info() == info) else {
-            destination.under_way = None;
+            (destination.under_way, destination.sent) = (None, None);
             destination.counts.lost.add(ReplicaLoss::Passed, 1);
             return None;
         };

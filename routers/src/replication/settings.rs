@@ -19,6 +19,8 @@ pub struct ReplicaSettings {
     pub to: u64,
     /// Which records are sent.
     pub sampling: Sampling,
+    /// Of these, only those with other bytes than the last one that was sent.
+    pub changed: bool,
     /// A record that arrives so much later than it was written is told, ns.
     pub delay_alarm_ns: u64,
     /// The level on which they are sent: that of the writer's class.
@@ -42,6 +44,7 @@ impl ReplicaSettings {
                 node,
                 to: replica.to.iter().filter_map(|name| index(name)).fold(0, |all, node| all | 1 << node),
                 sampling: replica.sampling,
+                changed: replica.changed,
                 delay_alarm_ns: u64::try_from(replica.delay_alarm.as_nanos()).unwrap_or(u64::MAX),
                 level: replica.level(installation),
             }

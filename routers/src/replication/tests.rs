@@ -1,7 +1,9 @@
 //! Both halves, over a wire in memory: with the outbound and the inbound that ship, and rings of two nodes.
 
+mod changed;
 mod hostile;
 mod lossy;
+mod sealed;
 
 use super::{Describe, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
@@ -49,6 +51,7 @@ fn image() -> ReplicaSettings {
         node: ORIGIN,
         to: 1 << HOLDER,
         sampling: Sampling::Each,
+        changed: false,
         delay_alarm_ns: 5 * MS,
         level: 18,
     }
@@ -372,5 +375,5 @@ fn an_absent_node_is_not_waited_for() {
         let waits = origin.sender.poll(silent_ns + step, time, &mut origin.outbound, &mut datagram);
         assert!(matches!(waits, ReplicaStep::Idle { .. }), "{waits:?}");
     }
-    assert_eq!(origin.lost(ReplicaLoss::Absent), 40);
+    assert_eq!(origin.lost(ReplicaLoss::Absent), 39, "the newest is for when it is there again");
 }

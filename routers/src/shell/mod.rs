@@ -98,9 +98,6 @@ pub enum ShellError {
     /// No unused incarnation number was found.
     #[error(transparent)]
     Random(#[from] NoRandom),
-    /// Replicas, sealed.
-    #[error("replicas are carried by networks without seals only")]
-    Replicas,
     /// The system has no thread for it.
     #[error("a thread of the router: {0}; is the limit of processes reached (ulimit -u)?")]
     Thread(io::Error),

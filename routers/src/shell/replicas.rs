@@ -2,7 +2,9 @@
 //! other nodes into rings of this one.
 //!
 //! They have sockets and a port of their own, so a flood of parts takes no room in a socket, and no time of a thread,
-//! from packages. Both are scheduled like modules that are not real time. What is sent, and when, says the
+//! from packages; where datagrams are sealed, they have keys and sequences of their own ([`Port::Replicas`]). One
+//! thread seals and sends whatever leaves by that port, the other opens whatever comes: so parts may go either way, and
+//! an answer to one back. Both are scheduled like modules that are not real time. What is sent, and when, says the
 //! [driver](crate::driver); what becomes a record says [`replication`](crate::replication).
 //!
 //! With time slots the thread of the slots sends the parts, by the same port, and the first thread here only looks for
@@ -22,6 +24,7 @@ use crate::impair;
 use crate::outbound::Outbound;
 use crate::replication::{Describe, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
 use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
+use crate::security::{Gate, Port, Sealing};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Name, Node, Participant, SystemClock, monotonic_ns, wait_any};
@@ -136,16 +139,12 @@ impl StreamFinder {
 }
 
 impl Shell {
-    /// Starts the two threads, if this node writes or has a replica. Datagrams are not sealed: configuration checks
-    /// that.
+    /// Starts the two threads, if this node writes or has a replica.
     ///
     /// # Errors
     /// [`ShellError`]
     pub fn replicate(&mut self, node: &Arc<Node>, parts: ReplicaParts<'_>) -> Result<(), ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
-        if self.peer_sessions.is_some() {
-            return Err(ShellError::Replicas);
-        }
         let [sending, receiving] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         let sender = ReplicaSender::new(&settings, parts.replicas);
         let receiver = ReplicaReceiver::new(&settings, parts.replicas, receiving, parts.describe.clone());
@@ -164,8 +163,12 @@ impl Shell {
         if let Some(rest) = &self.rest_stats {
             outbound = outbound.yielding_to(rest);
         }
+        if let Some(all) = &self.peer_sessions {
+            outbound = outbound.sealed(all.clone());
+        }
+        let sealing = self.peer_sessions.as_ref().map(|all| Sealing::new(all, Port::Replicas));
         let port = settings.network.replica_port();
-        let wire = PeerSockets::new(&settings, port, None, parts.impair, &self.failures);
+        let wire = PeerSockets::new(&settings, port, sealing, parts.impair, &self.failures);
         let (participant, describe, clock) = (sending, parts.describe, SystemClock::open(node));
         let sending = Sending { outbound, answers: NoPackages, wire, rest: None };
         if let Some(slots) = self.slot_parts.take() {
@@ -197,8 +200,9 @@ impl Shell {
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.replica_port()).into();
         let socket = Arc::new(InSocket::kept(kept, own, &settings.peer_addresses(), REPLICA_BYTES)?);
         self.sockets.push(socket.clone());
+        let gate = self.peer_sessions.as_ref().map(|all| Gate::without_hellos(all, Port::Replicas));
         let rx_thread = RxThread {
-            driver: RxDriver::new(&settings, stats, None).of_rest(),
+            driver: RxDriver::new(&settings, stats, gate).of_rest(),
             stats: stats.clone(),
             system: RxSystem {
                 shared: self.shared.clone(),

@@ -160,5 +160,5 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
     (Mistake::BelievesUnopened, "120 networks kept all promises: a belief changes what callers are told"),
 ];
 
-/// Groups of mistakes of sessions, which no simulated network has.
-pub(crate) const UNSEEN_GROUPS: [&str; 2] = ["SESSION", "FOLLOWER"];
+/// Groups of mistakes of sessions and of replicas, which no simulated network has.
+pub(crate) const UNSEEN_GROUPS: [&str; 3] = ["SESSION", "FOLLOWER", "REPLICAS"];
