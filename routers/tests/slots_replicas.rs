@@ -44,6 +44,7 @@ fn replicate(segment: &mut Segment) {
         node: 0,
         to: 1 << 1 | 1 << 2,
         sampling: Sampling::Each,
+        changed: false,
         delay_alarm_ns: PATIENCE.as_nanos() as u64,
         level: 18,
     };
