@@ -78,6 +78,7 @@ impl Replicated {
             node: 0,
             to: 1 << HOLDER,
             sampling: Sampling::Each,
+            changed: false,
             delay_alarm_ns: 1000 * MS,
             level: 18,
         };
