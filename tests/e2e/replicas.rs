@@ -206,8 +206,7 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
 /// stream; none where that cannot be made.
 fn followed(place: &Place, network: &str, words: &[&str]) -> Option<Running> {
     let config = config(place, network, &["10.77.0.1".into(), "10.77.0.2".into()]);
-    let mut launch =
-        Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
+    let launch = Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
     // It ends at once where there are none.
     let begun = wait("both nodes run", || {
         let runs = ["base", "brain"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
