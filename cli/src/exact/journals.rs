@@ -214,7 +214,6 @@ mod tests {
             message_encoding: String::new(),
             schema_encoding: String::new(),
             texts: texts.into_iter().collect(),
-            is_ours: true,
         }
     }
 
