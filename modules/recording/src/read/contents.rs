@@ -245,8 +245,8 @@ impl Contents {
 
     /// The next record of the file; none if it is nothing of its own.
     fn next_outside(&mut self) -> Result<Option<Item>, ReadError> {
-        let (begins, step, unpacked) = self.step()?;
-        self.begins = begins;
+        let (step, unpacked) = self.step()?;
+        let begins = self.begins;
         let damaged = |damage| Some(Item::Damaged(begins, damage));
         if let Some(unpacked) = unpacked {
             return Ok(self.enter_chunk(unpacked).err().and_then(damaged));
@@ -274,21 +274,25 @@ impl Contents {
         })
     }
 
-    /// What is next in the file, where it begins, and whether it is a chunk that was unpacked or could not be.
-    fn step(&mut self) -> Result<(u64, Step, Option<Result<(), Damage>>), ReadError> {
-        let Some(ahead) = &mut self.ahead else { return Ok((self.frames.at(), self.frames.step()?, None)) };
+    /// What is next in the file, and whether it is a chunk that was unpacked or could not be.
+    fn step(&mut self) -> Result<(Step, Option<Result<(), Damage>>), ReadError> {
+        let Some(ahead) = &mut self.ahead else {
+            self.begins = self.frames.at();
+            return Ok((self.frames.step()?, None));
+        };
         let Some(AheadRecord { begins, ends, step, mut body, unpacked }) = ahead.next() else {
             self.ahead = None;
             self.frames.seek(self.frames.at())?;
             return self.step();
         };
+        self.begins = begins;
         self.frames.pass_to(ends);
         match unpacked {
             Some(_) => std::mem::swap(&mut self.records, &mut body),
             None => self.frames.swap_body(&mut body),
         }
         ahead.give_back(body);
-        Ok((begins, step?, unpacked))
+        Ok((step?, unpacked))
     }
 
     fn record(&mut self, op: u8) -> Result<Option<Item>, ReadError> {
