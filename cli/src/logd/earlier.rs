@@ -2,7 +2,7 @@
 //! behind that: nothing of it is recorded twice.
 
 use super::leftovers::files;
-use rohrpost_mailbox::{Participant, StreamId};
+use rohrpost_mailbox::{Participant, StreamId, StreamReader};
 use rohrpost_recording::{LastMessage, last_message};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +23,7 @@ impl EarlierFiles {
         let mut all = files(directory, stem);
         let written = |file: &PathBuf| file.metadata().and_then(|its| its.modified()).unwrap_or(SystemTime::UNIX_EPOCH);
         // Of those that were written at the same time, the last of their numbers.
-        all.sort_by_key(written);
+        all.sort_by_cached_key(written);
         all.reverse();
         Self { newest_first: all }
     }
@@ -32,18 +32,29 @@ impl EarlierFiles {
     /// last one of its topic there. None also if the files are of another run: then records differ.
     pub(super) fn behind(&self, topic: &str, participant: &Arc<Participant>, id: StreamId) -> Option<u64> {
         let newest = participant.node().inspect_stream(id).ok().flatten()?.newest?;
-        // What cannot be read says nothing: better twice than missing.
-        let mut files = self.newest_first.iter().take(FILES_MAX);
-        let last = files.find_map(|file| last_message(file, topic).ok().flatten())?;
-        // A recording has 32 bits of it.
-        let back = (newest.sequence as u32).wrapping_sub(last.sequence);
-        let sequence = newest.sequence.checked_sub(back.into())?;
         let mut reader = participant.stream_reader(id).ok()?;
-        let record = reader.record(sequence)?;
-        let LastMessage { epoch, stamp_ns, data, .. } = last;
-        let stamp = record.info().stamp;
-        ((stamp.epoch, stamp.ns) == (epoch, stamp_ns) && record.body() == data).then_some(sequence + 1)
+        // What was written before the node began is of other streams.
+        let begun = participant.node().path().metadata().and_then(|its| its.created()).ok();
+        let is_of_it = |file: &&PathBuf| {
+            let written = file.metadata().and_then(|its| its.modified()).ok();
+            begun.zip(written).is_none_or(|(begun, written)| begun <= written)
+        };
+        // What cannot be read says nothing: better twice than missing.
+        let files = self.newest_first.iter().filter(is_of_it).take(FILES_MAX);
+        let mut last = files.filter_map(|file| last_message(file, topic).ok().flatten());
+        last.find_map(|last| behind(&mut reader, newest.sequence, &last))
     }
+}
+
+/// The sequence behind this message, if it is a record that the stream still keeps.
+fn behind(reader: &mut StreamReader, newest: u64, last: &LastMessage) -> Option<u64> {
+    // A recording has 32 bits of it.
+    let back = (newest as u32).wrapping_sub(last.sequence);
+    let sequence = newest.checked_sub(back.into())?;
+    let record = reader.record(sequence)?;
+    let LastMessage { epoch, stamp_ns, data, .. } = last;
+    let stamp = record.info().stamp;
+    ((stamp.epoch, stamp.ns) == (*epoch, *stamp_ns) && record.body() == data).then_some(sequence + 1)
 }
 
 #[cfg(test)]
@@ -121,6 +132,8 @@ mod tests {
         assert_eq!(place.behind(), Some(3));
         place.record("image", 3..5, stamp_ns, |number| number);
         assert_eq!(place.behind(), Some(5), "a later file has more");
+        place.record("image", 3..5, |number| stamp_ns(number) + 1, |number| number);
+        assert_eq!(place.behind(), Some(5), "a later file is of another run");
         place.record("other", 0..1, stamp_ns, |number| number);
         assert_eq!(place.behind(), Some(5), "the newest file has none of it");
         place.write(5..4 + KEEP);

@@ -10,7 +10,7 @@ use crate::read::frames::{Frames, Step};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The thread reads on while fewer bytes wait: some chunks of ours, more than a burst of pictures and clouds fills.
+/// The thread reads on while less memory waits: some chunks of ours, more than a burst of pictures and clouds fills.
 const AHEAD_BYTES: usize = 8 << 20;
 /// Buffers that were used and are kept for what is read next, and the largest of them: none of ours is larger, unless
 /// for a single message.
@@ -33,6 +33,13 @@ pub(crate) struct AheadRecord {
     pub(crate) unpacked: Option<Result<(), Damage>>,
 }
 
+impl AheadRecord {
+    /// Memory that it takes, also if it has no bytes.
+    fn memory(&self) -> usize {
+        size_of::<Self>() + self.body.capacity()
+    }
+}
+
 /// What the thread and its reader share.
 #[derive(Default)]
 struct Passage {
@@ -43,6 +50,7 @@ struct Passage {
 #[derive(Default)]
 struct WaitingRecords {
     records: VecDeque<AheadRecord>,
+    /// Memory of these.
     bytes: usize,
     spare: Vec<Vec<u8>>,
     /// The thread reads no further, or nobody wants it to.
@@ -68,7 +76,7 @@ impl ReadAhead {
         let mut waiting = self.0.lock();
         loop {
             if let Some(record) = waiting.records.pop_front() {
-                waiting.bytes -= record.body.len();
+                waiting.bytes -= record.memory();
                 self.0.changed.notify_all();
                 return Some(record);
             }
@@ -81,9 +89,14 @@ impl ReadAhead {
 
     /// A buffer that is used no more.
     pub(crate) fn give_back(&mut self, buffer: Vec<u8>) {
-        let mut waiting = self.0.lock();
-        if waiting.spare.len() < SPARE_MAX && buffer.capacity() <= SPARE_BYTES_MAX {
-            waiting.spare.push(buffer);
+        self.0.lock().keep(buffer);
+    }
+}
+
+impl WaitingRecords {
+    fn keep(&mut self, buffer: Vec<u8>) {
+        if self.spare.len() < SPARE_MAX && buffer.capacity() <= SPARE_BYTES_MAX {
+            self.spare.push(buffer);
         }
     }
 }
@@ -121,9 +134,19 @@ impl Passage {
         (!waiting.is_over).then(|| waiting.spare.pop().unwrap_or_default())
     }
 
-    fn put(&self, record: AheadRecord) {
+    fn is_over(&self) -> bool {
+        self.lock().is_over
+    }
+
+    fn put(&self, mut record: AheadRecord) {
+        // A few bytes in a large buffer are copied: that serves the next large record.
+        let large = (record.body.len() < record.body.capacity() / 4).then(|| {
+            let exact = record.body.as_slice().into();
+            std::mem::replace(&mut record.body, exact)
+        });
         let mut waiting = self.lock();
-        waiting.bytes += record.body.len();
+        large.into_iter().for_each(|buffer| waiting.keep(buffer));
+        waiting.bytes += record.memory();
         waiting.records.push_back(record);
         self.changed.notify_all();
     }
@@ -133,7 +156,7 @@ fn read_all(mut frames: Frames, passage: &Passage) {
     while let Some(mut body) = passage.room() {
         let (mut begins, mut step) = (frames.at(), frames.step());
         // They say where messages are in a chunk, and these are read in turn.
-        while matches!(step, Ok(Step::Record(op::MESSAGE_INDEX))) {
+        while matches!(step, Ok(Step::Record(op::MESSAGE_INDEX))) && !passage.is_over() {
             (begins, step) = (frames.at(), frames.step());
         }
         let mut unpacked = None;
@@ -181,7 +204,7 @@ mod tests {
             // Until it stands still, or has read all.
             loop {
                 let waiting = ahead.0.lock();
-                assert!(waiting.bytes < AHEAD_BYTES + BYTES, "{} bytes wait", waiting.bytes);
+                assert!(waiting.bytes < AHEAD_BYTES + 2 * BYTES + 1024, "{} bytes wait", waiting.bytes);
                 assert!(waiting.spare.len() <= SPARE_MAX);
                 if waiting.is_over || waiting.bytes >= AHEAD_BYTES {
                     break;
@@ -194,6 +217,47 @@ mod tests {
         let end = |number: usize| (mcap::MAGIC.len() + number * BYTES) as u64;
         let records = (1..=RECORDS).map(|number| (end(number), Step::Record(0x80)));
         assert_eq!(ends, records.chain([(end(RECORDS), Step::End)]).collect::<Vec<_>>());
+    }
+
+    /// As many as a hostile file has: records without bytes, and chunks that unpack to nothing right.
+    #[test]
+    fn what_has_no_bytes_takes_room_as_well() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(mcap::MAGIC).unwrap();
+        let zeros = zstd_of_zeros(16 << 20);
+        let mut chunk = vec![op::CHUNK];
+        chunk.extend_from_slice(&(44 + zeros.len() as u64).to_le_bytes());
+        chunk.extend_from_slice(&[0; 16]);
+        chunk.extend_from_slice(&(16_u64 << 20).to_le_bytes());
+        // A sum that it does not have.
+        chunk.extend_from_slice(&1_u32.to_le_bytes());
+        chunk.extend_from_slice(&4_u32.to_le_bytes());
+        chunk.extend_from_slice(b"zstd");
+        chunk.extend_from_slice(&(zeros.len() as u64).to_le_bytes());
+        chunk.extend_from_slice(&zeros);
+        let empty = [0x80, 0, 0, 0, 0, 0, 0, 0, 0];
+        (0..8).for_each(|_| file.write_all(&chunk).unwrap());
+        file.write_all(&empty.repeat(2 * AHEAD_BYTES / size_of::<AheadRecord>())).unwrap();
+        let mut ahead = ReadAhead::start(Frames::open(file.path()).unwrap()).unwrap();
+        loop {
+            let waiting = ahead.0.lock();
+            let memory: usize = waiting.records.iter().map(AheadRecord::memory).sum();
+            assert!(memory == waiting.bytes && memory < AHEAD_BYTES + 1024, "{memory} bytes wait");
+            if waiting.bytes >= AHEAD_BYTES {
+                break;
+            }
+            assert!(!waiting.is_over, "all of it waits");
+            drop(waiting);
+            std::thread::yield_now();
+        }
+        for _ in 0..8 {
+            assert!(ahead.next().unwrap().unpacked.unwrap().is_err());
+        }
+        assert_eq!(ahead.next().unwrap().step.unwrap(), Step::Record(0x80));
+    }
+
+    fn zstd_of_zeros(bytes: usize) -> Vec<u8> {
+        zstd::encode_all(&vec![0; bytes][..], 1).unwrap()
     }
 
     #[test]

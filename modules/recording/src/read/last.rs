@@ -29,7 +29,7 @@ pub struct LastMessage {
 /// not count. None if it has none, or is no file of ours.
 ///
 /// # Errors
-/// When it cannot be read, or is no MCAP file. What is damaged is passed over.
+/// When it cannot be read, or is no MCAP file. Behind damage between its records nothing is found.
 pub fn last_message(path: &Path, topic: &str) -> Result<Option<LastMessage>, ReadError> {
     let mut search = LastSearch { contents: Contents::open(path)?, topic, last_in: None };
     search.contents.read_header()?;
