@@ -192,6 +192,21 @@ pub fn wait_above(
     slept
 }
 
+impl Participant {
+    /// Waits until another thread [rings](Participant::ring) and `other` says that there is something to do, or the
+    /// deadline has passed: for a thread that waits for no mailbox and no stream. May return early for no reason. Says
+    /// how long it slept.
+    pub fn wait(&self, waiting: impl Into<Waiting>, other: impl Fn() -> bool) -> Duration {
+        let waiting = waiting.into();
+        // Before the look: a thread that makes `other` true rings afterwards, and so changes this value.
+        let seen = self.entry().bell().seen();
+        if other() || waiting.is_over() {
+            return Duration::ZERO;
+        }
+        timed(|| _ = crate::doorbell::sleep(&self.entry().bell, seen, waiting.left()))
+    }
+}
+
 impl Receiver {
     /// The most important package; sleeps until there is one.
     pub fn receive(&mut self) -> Package<'_> {
