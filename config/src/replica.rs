@@ -12,6 +12,8 @@ use std::time::Duration;
 pub const REPLICAS_MAX: usize = 64;
 /// A picture of a few hundred kilobytes takes about as long on a wire of 1 Gbit/s.
 const DELAY_ALARM: Duration = Duration::from_millis(5);
+/// Some round trips of a bad radio, or cycles of time slots; and what is older is of little use to a robot.
+const DEADLINE: Duration = Duration::from_millis(200);
 
 /// One `[[replica]]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +28,8 @@ pub struct Replica {
     pub sampling: Sampling,
     /// A record that arrives later than this after it was written is told.
     pub delay_alarm: Duration,
+    /// Lost parts of a record are asked for until nothing came of it for so long; zero: never.
+    pub deadline: Duration,
     /// Line in the file.
     pub line: usize,
 }
@@ -70,10 +74,12 @@ impl Replica {
             Some(destinations(&section, &texts, nodes))
         });
         let delay_alarm = section.get("delay-alarm").and_then(|item| item.duration_above_zero("5 ms"));
+        let deadline = section.get("deadline").and_then(|item| item.duration("200 ms"));
         let line = section.line;
         section.finish();
         let ((from, item, sampling), to) = (stream?, to?);
-        Some(Self { from, item, to, sampling, delay_alarm: delay_alarm.unwrap_or(DELAY_ALARM), line })
+        let (delay_alarm, deadline) = (delay_alarm.unwrap_or(DELAY_ALARM), deadline.unwrap_or(DEADLINE));
+        Some(Self { from, item, to, sampling, delay_alarm, deadline, line })
     }
 
     /// Whether a node has by it what an entry of the recorder names.

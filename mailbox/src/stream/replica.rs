@@ -299,7 +299,10 @@ mod tests {
                     replica.finish(older).unwrap();
                 }
                 replica.finish(newer).unwrap();
-                assert!(replica.begun(older).is_none() && replica.finish(older).is_err(), "a sequence does not go back");
+                assert!(
+                    replica.begun(older).is_none() && replica.finish(older).is_err(),
+                    "a sequence does not go back"
+                );
                 let (all, lost) = read(&mut reader);
                 let before = u64::from(older > 0);
                 let expected = if older % 2 == 0 { (vec![older, newer], before) } else { (vec![newer], before + 1) };

@@ -2,15 +2,17 @@
 //!
 //! Each node that has a replica has a place of its own in the stream, so one without room in its socket delays no
 //! other. A place that is behind by more than half of the ring goes on with the newest record: older ones would be
-//! overwritten on their way.
+//! overwritten on their way. What such a node asks for again goes before what is new to it. Requests of this node for
+//! parts of others leave here as well, each at the level of its stream, and before parts of that level.
 
 use super::counts::{ReplicaLoss, SentReplica};
+use super::description::OwnDescription;
 use super::destination::Destination;
+use super::requests::{OwnRequests, PartRequests};
 use super::settings::ReplicaSettings;
-use super::{DESCRIBE_EVERY_NS, Describe, check, part_bytes};
+use super::{DESCRIBE_EVERY_NS, Describe, part_bytes};
 use crate::frame::{
-    self, DESCRIPTION_BYTES_MAX, DESCRIPTION_PART_HEAD_BYTES, DescriptionPart, FrameKind, NodeIndex,
-    RECORD_PART_HEAD_BYTES, RecordPart,
+    self, DESCRIPTION_BYTES_MAX, FrameKind, NodeIndex, PartRequest, RECORD_PART_HEAD_BYTES, RecordPart,
 };
 use crate::outbound::Outbound;
 use crate::settings::Settings;
@@ -42,6 +44,11 @@ pub enum ReplicaStep {
 /// The sending half of all replicas of a node's streams. One thread has it.
 pub struct ReplicaSender {
     part_bytes: usize,
+    /// Incarnation of this router.
+    incarnation: u64,
+    own_requests: OwnRequests,
+    /// The nodes that such requests go to, one bit each.
+    origins: u64,
     /// The most important first.
     streams: Vec<OutgoingReplica>,
     /// Among those of one level, the first to be asked.
@@ -51,9 +58,8 @@ pub struct ReplicaSender {
 struct OutgoingReplica {
     place: u16,
     settings: ReplicaSettings,
-    /// Of the module that writes it; empty until it is known.
-    description: Vec<u8>,
-    check: u32,
+    /// Of the module that writes it.
+    description: OwnDescription,
     reader: Option<StreamReader>,
     /// How often the stream was made anew.
     generation: u16,
@@ -72,18 +78,27 @@ impl ReplicaSender {
         let own = (0..).zip(replicas).filter(|(_, replica)| replica.node == settings.own);
         let mut streams: Vec<_> = own.map(|(place, replica)| OutgoingReplica::new(place, replica, settings)).collect();
         streams.sort_by_key(|stream| stream.settings.level);
-        Self { part_bytes: part_bytes(settings), streams, turn: 0 }
+        let here = replicas.iter().filter(|replica| replica.to & 1 << settings.own != 0);
+        let origins = here.fold(0, |all, replica| all | 1 << replica.node) & !(1 << settings.own);
+        let own_requests = OwnRequests::new(PartRequests::new(settings, replicas));
+        let (part_bytes, incarnation) = (part_bytes(settings), settings.incarnation);
+        Self { part_bytes, incarnation, own_requests, origins, streams, turn: 0 }
     }
 
-    /// Whether no stream of this node has a replica.
+    /// Whether no stream of this node has a replica, and this one has none.
     pub fn is_empty(&self) -> bool {
-        self.streams.is_empty()
+        self.streams.is_empty() && self.origins == 0
     }
 
-    /// The nodes that have a replica of a stream of this one, one bit each.
+    /// The queues between this half and [`ReplicaReceiver::asking_by`](super::ReplicaReceiver::asking_by).
+    pub fn requests(&self) -> &Arc<PartRequests> {
+        self.own_requests.queues()
+    }
+
+    /// The nodes that something goes to, one bit each.
     pub(crate) fn peers(&self) -> u64 {
         let all = self.streams.iter().flat_map(|stream| &stream.destinations);
-        all.fold(0, |peers, destination| peers | 1 << destination.peer)
+        all.fold(self.origins, |peers, destination| peers | 1 << destination.peer)
     }
 
     /// Counters of each replica and node.
@@ -118,9 +133,20 @@ impl ReplicaSender {
             stream.refresh();
             stream.meet(now_ns, outbound);
         }
+        for (from, request) in self.own_requests.queues().take_all() {
+            let stream = self.streams.iter_mut().find(|stream| stream.place == request.place);
+            stream.into_iter().for_each(|stream| stream.ask(from, &request, (self.incarnation, self.part_bytes)));
+        }
         loop {
             let ready = outbound.ready_peers();
-            let Some((at, to)) = self.choose(now_ns, ready) else { return self.wait(now_ns) };
+            let chosen = self.choose(now_ns, ready);
+            let level = chosen.map(|(at, _)| self.streams[at].settings.level);
+            match self.own_requests.next(now_ns, level, outbound, datagram) {
+                Some(Ok((to, bytes))) => return ReplicaStep::Send { to, bytes },
+                Some(Err(until_ns)) => return ReplicaStep::Wait { until_ns },
+                None => {}
+            }
+            let Some((at, to)) = chosen else { return self.wait(now_ns) };
             let stream = &mut self.streams[at];
             let level = stream.settings.level;
             if let Err(until_ns) = outbound.may_leave(now_ns, level) {
@@ -130,7 +156,7 @@ impl ReplicaSender {
             let content = &mut datagram[frame::HEAD_BYTES..];
             let filled = stream.fill(now_ns, &system, (to, self.part_bytes), content);
             let Some((kind, bytes)) = filled else { continue };
-            if stream.destinations[to].under_way.is_none() {
+            if stream.destinations[to].under_way.is_none() && !stream.destinations[to].is_asked() {
                 self.turn = at + 1;
             }
             stream.turn = to + 1;
@@ -171,12 +197,12 @@ impl ReplicaSender {
 impl OutgoingReplica {
     fn new(place: u16, replica: &ReplicaSettings, settings: &Settings) -> Self {
         let peers = settings.peers().filter(|peer| replica.to & 1 << peer != 0);
+        let parts = (replica.shape.record_bytes as usize).div_ceil(part_bytes(settings));
         Self {
             place,
-            destinations: peers.map(|peer| Destination::new(place, peer)).collect(),
+            destinations: peers.map(|peer| Destination::new(place, peer, parts)).collect(),
             settings: replica.clone(),
-            description: Vec::new(),
-            check: 0,
+            description: OwnDescription::default(),
             reader: None,
             generation: 0,
             newest: None,
@@ -188,7 +214,7 @@ impl OutgoingReplica {
     fn look(&mut self, participant: &Arc<Participant>, describe: &dyn Describe) {
         let (from, item) = (self.settings.from, &self.settings.item);
         let Some(words) = participant.node().about(from) else { return };
-        if self.reader.is_some() && words == self.description {
+        if self.reader.is_some() && self.description.is(&words) {
             return;
         }
         let number = describe.number(&words, item).filter(|_| words.len() <= DESCRIPTION_BYTES_MAX);
@@ -203,7 +229,7 @@ impl OutgoingReplica {
             Ok(reader) => self.reader = Some(reader),
             Err(error) => return self.tell(&error.to_string()),
         }
-        (self.check, self.description, self.told) = (check(&words), words, false);
+        (self.description, self.told) = (OwnDescription::new(words), false);
         for destination in &mut self.destinations {
             (destination.describe_ns, destination.describing, destination.under_way) = (0, None, None);
         }
@@ -241,7 +267,8 @@ impl OutgoingReplica {
             // The stream was made anew.
             self.generation = self.generation.wrapping_add(1);
             for destination in &mut self.destinations {
-                (destination.next, destination.under_way) = (None, None);
+                destination.next = None;
+                destination.begin_anew();
             }
         }
         self.newest = Some(newest);
@@ -255,7 +282,8 @@ impl OutgoingReplica {
             if std::mem::replace(&mut destination.incarnation, incarnation) != incarnation {
                 // It may have nothing: the description and the newest record go to it at once.
                 (destination.describe_ns, destination.describing) = (0, None);
-                let under_way = destination.under_way.take().map(|(record, _)| record.sequence);
+                let under_way = destination.under_way.map(|(record, _)| record.sequence);
+                destination.begin_anew();
                 let again = under_way.or(newest.map(|newest| newest.sequence));
                 destination.next = destination.next.zip(again).map(|(next, again)| next.min(again));
             }
@@ -264,6 +292,20 @@ impl OutgoingReplica {
             } else if now_ns >= destination.describe_ns && destination.describing.is_none() && reader.is_some() {
                 destination.describing = Some(0);
             }
+        }
+    }
+
+    /// A node asks for parts of a record.
+    fn ask(&mut self, from: NodeIndex, request: &PartRequest, (incarnation, part_bytes): (u64, usize)) {
+        let Self { generation, reader, destinations, .. } = self;
+        let Some(destination) = destinations.iter_mut().find(|destination| destination.peer == from) else { return };
+        let is_present = (request.router, request.generation) == (incarnation, *generation);
+        let asked = match reader.as_mut().filter(|_| is_present) {
+            Some(reader) => destination.ask(reader, request, part_bytes),
+            None => Err(ReplicaLoss::NotSent),
+        };
+        if let Err(cause) = asked {
+            destination.counts.lost.add(cause, 1);
         }
     }
 
@@ -276,6 +318,7 @@ impl OutgoingReplica {
             let is_ready = ready & 1 << destination.peer != 0;
             is_ready
                 && (destination.describing.is_some()
+                    || destination.is_asked()
                     || newest.is_some_and(|newest| destination.begin(now_ns, reader, &newest, settings.sampling)))
         })
     }
@@ -283,7 +326,7 @@ impl OutgoingReplica {
     /// Whether something waits for this destination.
     fn waits_for(&self, to: &Destination) -> bool {
         let is_behind = self.newest.zip(to.next).is_some_and(|(newest, next)| next <= newest.sequence);
-        self.reader.is_some() && (to.describing.is_some() || to.under_way.is_some() || is_behind)
+        self.reader.is_some() && (to.describing.is_some() || to.is_asked() || to.under_way.is_some() || is_behind)
     }
 
     /// Writes the next part for a destination behind the datagram's head: its kind and length. None: its record was
@@ -298,15 +341,16 @@ impl OutgoingReplica {
         if let Some(offset) = self.destinations[to].describing {
             return Some((FrameKind::Description, self.describe(now_ns, to, offset, content)));
         }
-        let Self { place, generation, check: description, .. } = *self;
+        let (place, generation, description) = (self.place, self.generation, self.description.check());
         let destination = &mut self.destinations[to];
-        let (info, offset) = destination.under_way?;
+        let again = destination.next_again();
+        let (info, offset) = again.map(|(info, index)| (info, index * part_bytes)).or(destination.under_way)?;
         let record = self.reader.as_mut().and_then(|reader| reader.record(info.sequence));
         let Some(record) = record.filter(|record| record.info() == info) else {
-            destination.under_way = None;
-            destination.counts.lost.add(ReplicaLoss::Passed, 1);
+            destination.is_overwritten(again.map(|_| info.sequence));
             return None;
         };
+        let step = destination.before.filter(|_| again.is_none()).and_then(|before| info.sequence.checked_sub(before));
         let written = system(info.written_ns);
         let is_comparable = written.epoch == info.stamp.epoch;
         let (len, end) = (info.len_bytes, (offset + part_bytes).min(info.len_bytes));
@@ -322,13 +366,19 @@ impl OutgoingReplica {
             stamp_ns: info.stamp.ns,
             written_ns: if is_comparable { written.ns } else { 0 },
             error_ns: u32::try_from(written.error.as_nanos()).unwrap_or(u32::MAX),
+            step: step.and_then(|step| u32::try_from(step).ok()).unwrap_or(0),
             bytes: &record.body()[offset..end],
         };
         let bytes = RECORD_PART_HEAD_BYTES + part.bytes.len();
         content[..RECORD_PART_HEAD_BYTES].copy_from_slice(&part.head_bytes());
         content[RECORD_PART_HEAD_BYTES..bytes].copy_from_slice(part.bytes);
+        if again.is_some() {
+            destination.sent_again(info.sequence, offset / part_bytes);
+            return Some((FrameKind::RecordPart, bytes));
+        }
         destination.under_way = (end < len).then_some((info, end));
         if end == len {
+            destination.before = Some(info.sequence);
             destination.counts.records.add(1);
             destination.counts.bytes.add(len as u64);
         }
@@ -337,22 +387,11 @@ impl OutgoingReplica {
 
     /// Writes a part of the description; its length.
     fn describe(&mut self, now_ns: u64, to: usize, offset: usize, content: &mut [u8]) -> usize {
-        let room = content.len() - DESCRIPTION_PART_HEAD_BYTES;
-        let end = (offset + room).min(self.description.len());
-        let part = DescriptionPart {
-            place: self.place,
-            generation: self.generation,
-            check: self.check,
-            len: self.description.len() as u32,
-            offset: offset as u32,
-            written: self.newest.map_or(0, |newest| newest.sequence + 1),
-            bytes: &self.description[offset..end],
-        };
-        let bytes = DESCRIPTION_PART_HEAD_BYTES + part.bytes.len();
-        content[..DESCRIPTION_PART_HEAD_BYTES].copy_from_slice(&part.head_bytes());
-        content[DESCRIPTION_PART_HEAD_BYTES..bytes].copy_from_slice(part.bytes);
+        let (place, generation) = (self.place, self.generation);
+        let written = self.newest.map_or(0, |newest| newest.sequence + 1);
+        let (bytes, end) = self.description.write((place, generation, written), offset, content);
         let destination = &mut self.destinations[to];
-        destination.describing = (end < self.description.len()).then_some(end);
+        destination.describing = end;
         destination.describe_ns = now_ns + DESCRIBE_EVERY_NS;
         bytes
     }

@@ -3,6 +3,7 @@
 use crate::frame::NodeIndex;
 use rohrpost_config::{Installation, Sampling};
 use rohrpost_mailbox::{Name, Priority, StreamShape};
+use std::time::Duration;
 
 /// One replica, as all routers of a system know it.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +22,8 @@ pub struct ReplicaSettings {
     pub sampling: Sampling,
     /// A record that arrives so much later than it was written is told, ns.
     pub delay_alarm_ns: u64,
+    /// Lost parts are asked for until nothing came of a record for so long, ns; 0: never.
+    pub deadline_ns: u64,
     /// The level on which they are sent: that of the writer's class.
     pub level: u8,
 }
@@ -33,6 +36,7 @@ impl ReplicaSettings {
         let of = |replica: &rohrpost_config::Replica| {
             // Configuration checks that these are nodes of the LAN.
             let node = index(installation.node_of(replica.from).unwrap_or_default()).unwrap_or(NodeIndex::MAX);
+            let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
             let class = installation.module(replica.from).map_or(replica.from, |module| module.name).class();
             Self {
                 from: replica.from,
@@ -41,7 +45,8 @@ impl ReplicaSettings {
                 node,
                 to: replica.to.iter().filter_map(|name| index(name)).fold(0, |all, node| all | 1 << node),
                 sampling: replica.sampling,
-                delay_alarm_ns: u64::try_from(replica.delay_alarm.as_nanos()).unwrap_or(u64::MAX),
+                delay_alarm_ns: ns(replica.delay_alarm),
+                deadline_ns: ns(replica.deadline),
                 level: network.level(Priority(class.0)),
             }
         };

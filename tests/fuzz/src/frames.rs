@@ -50,7 +50,9 @@ fn validate(datagram: &[u8]) {
             let asked = request.asked();
             assert!((1..=ASKED_PARTS_MAX).contains(&asked.count()));
         }
-        Frame::Replica(ReplicaFrame::Record(part)) => is_part(rest, &part.head_bytes(), (part.bytes, part.offset, part.len)),
+        Frame::Replica(ReplicaFrame::Record(part)) => {
+            is_part(rest, &part.head_bytes(), (part.bytes, part.offset, part.len))
+        }
         Frame::Replica(ReplicaFrame::Description(part)) => {
             is_part(rest, &part.head_bytes(), (part.bytes, part.offset, part.len));
         }
