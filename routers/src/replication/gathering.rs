@@ -10,7 +10,7 @@
 
 use super::settings::ReplicaSettings;
 use crate::frame::{ASKED_PARTS_MAX, RecordPart};
-use rohrpost_mailbox::{OriginRecord, Stamp};
+use rohrpost_mailbox::{OriginRecord, RecordInfo, Stamp};
 
 /// A record is asked for this often at most: a fifth of all datagrams may be lost, and the rest comes.
 pub(super) const ROUNDS_MAX: u32 = 32;
@@ -45,6 +45,12 @@ impl Arriving {
         };
         Self { record, written_ns: part.written_ns, error_ns: part.error_ns }
     }
+
+    /// Whether it is this record of the ring here.
+    pub(super) fn is(&self, there: &RecordInfo) -> bool {
+        let OriginRecord { sequence, incarnation, stamp, len_bytes } = self.record;
+        (sequence, incarnation, stamp, len_bytes) == (there.sequence, there.incarnation, there.stamp, there.len_bytes)
+    }
 }
 
 /// Room for one record at a time.
@@ -62,6 +68,8 @@ pub(super) struct Gathering {
     expected: usize,
     /// When a part came that was missing, or it was opened, ns.
     came_ns: u64,
+    /// Time between parts that come one after the other, smoothed, ns.
+    pace_ns: u64,
     asked_ns: u64,
     /// Requests so far, and of these since the last missing part came.
     rounds: u32,
@@ -83,6 +91,7 @@ impl Gathering {
             missing: 0,
             expected: 0,
             came_ns: 0,
+            pace_ns: 0,
             asked_ns: 0,
             rounds: 0,
             in_vain: 0,
@@ -113,7 +122,8 @@ impl Gathering {
         (self.is_open, self.sequence, self.life, self.arriving) = (true, sequence, life, None);
         self.came[..parts.div_ceil(64)].fill(0);
         (self.parts, self.missing, self.expected) = (parts, parts, parts - 1);
-        (self.came_ns, self.asked_ns, self.rounds, self.in_vain, self.is_due) = (now_ns, 0, 0, 0, false);
+        (self.came_ns, self.pace_ns, self.asked_ns) = (now_ns, 0, 0);
+        (self.rounds, self.in_vain, self.is_due) = (0, 0, false);
     }
 
     pub(super) fn close(&mut self) {
@@ -154,6 +164,9 @@ impl Gathering {
         self.came[index / 64] |= 1 << (index % 64);
         self.missing -= 1;
         self.is_due |= index == self.expected;
+        if self.in_vain == 0 {
+            self.pace_ns = (7 * self.pace_ns + now_ns.saturating_sub(self.came_ns)) / 8;
+        }
         let took_ns = (self.in_vain == 1).then(|| now_ns.saturating_sub(self.asked_ns));
         (self.came_ns, self.in_vain) = (now_ns, 0);
         took_ns
@@ -171,7 +184,8 @@ impl Gathering {
 
     /// Whether it is time to ask. An answer takes `patience_ns`.
     pub(super) fn is_due(&self, now_ns: u64, (deadline_ns, patience_ns): (u64, u64)) -> bool {
-        let waited_ns = patience_ns << self.in_vain.saturating_sub(1).min(8);
+        // On a slow wire parts come with pauses of their own.
+        let waited_ns = (patience_ns << self.in_vain.saturating_sub(1).min(8)) + 4 * self.pace_ns;
         let is_quiet = now_ns.saturating_sub(self.came_ns.max(self.asked_ns)) >= waited_ns;
         let is_missing = self.is_open && self.missing > 0;
         is_missing && (self.is_due || is_quiet) && !self.is_given_up(now_ns, deadline_ns)
@@ -179,7 +193,7 @@ impl Gathering {
 
     /// Parts that are missing, by request: the first that it can name, and a bit for each.
     pub(super) fn missing(&self) -> impl Iterator<Item = (usize, [u64; WORDS])> {
-        let of_word = |at: usize| {
+        let of_word = move |at: usize| {
             let behind = (64 * (at + 1)).saturating_sub(self.parts);
             !self.came[at] & u64::MAX >> behind
         };

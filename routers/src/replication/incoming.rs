@@ -20,7 +20,7 @@ use super::requests::{OutgoingRequest, PartRequests};
 use super::settings::ReplicaSettings;
 use crate::frame::{PartRequest, RecordPart};
 use rohrpost_mailbox::{
-    OriginRecord, Participant, RecordInfo, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
+    OriginRecord, Participant, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
 };
 use std::sync::Arc;
 
@@ -50,6 +50,8 @@ pub(super) struct IncomingReplica {
     /// Of the newest record; none: it was written before this router began.
     life: Option<Life>,
     open: [Gathering; 2],
+    /// The newest record that was given up: what still comes of it, or of older ones, is late.
+    given_up: Option<(Life, u64)>,
     /// When the newer one was whole, ns.
     whole_ns: u64,
     patience: Patience,
@@ -75,6 +77,7 @@ impl IncomingReplica {
             writer: None,
             life: None,
             open: std::array::from_fn(|_| Gathering::new(replica, part_bytes)),
+            given_up: None,
             whole_ns: 0,
             patience: Patience::default(),
             requests: None,
@@ -158,7 +161,7 @@ impl IncomingReplica {
                 .map_or((0, None), |there| (there.written, there.newest)),
         };
         if record.sequence < next {
-            if newest.is_some_and(|newest| is_same(&newest, &record)) {
+            if newest.is_some_and(|newest| arriving.is(&newest)) {
                 self.life = Some(life);
                 self.lose(ReplicaLoss::Duplicate);
                 return None;
@@ -207,8 +210,8 @@ impl IncomingReplica {
     fn begin_older(&mut self, now: Now<'_>, id: StreamId, life: Life, arriving: Arriving) -> Option<usize> {
         let (record, older) = (arriving.record, &self.open[OLDER]);
         let has_room = !older.is_open() || older.is_unseen(record.sequence, life);
-        let is_other = record.sequence < self.open[NEWER].sequence;
-        if !has_room || !is_other || self.requests.is_none() {
+        let is_over = self.given_up.is_some_and(|(of, newest)| of == life && record.sequence <= newest);
+        if !has_room || is_over || record.sequence == self.open[NEWER].sequence || self.requests.is_none() {
             self.lose(ReplicaLoss::Late);
             return None;
         }
@@ -268,6 +271,7 @@ impl IncomingReplica {
         if matches!(begun, Err(ReplicaError::Begun(_))) && older.is_open() && older.sequence < record.sequence {
             writer.give_up(older.sequence);
             older.close();
+            self.given_up = Some((older.life, older.sequence));
             self.counts.lost.add(ReplicaLoss::Incomplete, 1);
             begun = writer.begin(record);
         }
@@ -321,7 +325,7 @@ impl IncomingReplica {
             self.tell(&why.to_string());
             return self.lose(ReplicaLoss::Unwritable);
         }
-        let (open, counts) = (&self.open[at], &self.counts);
+        let (open, counts) = (&self.open[at], &*self.counts);
         counts.gaps.add(record.sequence.saturating_sub(next));
         counts.records.add(1);
         counts.bytes.add(record.len_bytes as u64);
@@ -336,6 +340,7 @@ impl IncomingReplica {
         if open.is_open() {
             self.writer.iter_mut().for_each(|writer| writer.give_up(open.sequence));
             open.close();
+            self.given_up = Some((open.life, open.sequence));
             self.lose(ReplicaLoss::Incomplete);
         }
     }
@@ -391,9 +396,4 @@ impl IncomingReplica {
             self.has_asked = true;
         }
     }
-}
-
-fn is_same(newest: &RecordInfo, record: &OriginRecord) -> bool {
-    let there = (newest.sequence, newest.incarnation, newest.stamp, newest.len_bytes);
-    there == (record.sequence, record.incarnation, record.stamp, record.len_bytes)
 }

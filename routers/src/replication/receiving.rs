@@ -59,11 +59,6 @@ impl ReplicaReceiver {
         self
     }
 
-    /// Whether this node has no replica.
-    pub fn is_empty(&self) -> bool {
-        self.streams.iter().all(Option::is_none)
-    }
-
     /// Counters of each replica.
     pub fn counts(&self) -> Vec<Arc<ReceivedReplica>> {
         self.streams.iter().flatten().map(|stream| stream.counts.clone()).collect()

@@ -66,7 +66,7 @@ impl PartRequests {
     pub(super) fn take_all(&self) -> impl Iterator<Item = (NodeIndex, PartRequest)> {
         let all = (0..).zip(&self.incoming).filter_map(|(node, queue)| Some((node, queue.as_ref()?)));
         all.flat_map(|(node, queue)| {
-            std::iter::from_fn(|| queue.pop()).take(INCOMING_MAX).map(move |request| (node, request))
+            std::iter::from_fn(move || queue.pop()).take(INCOMING_MAX).map(move |request| (node, request))
         })
     }
 
