@@ -287,7 +287,9 @@ mod tests {
             let mut reader = participant.stream_reader(id).unwrap();
             for older in (0..60).step_by(3) {
                 let newer = older + 1;
-                [older, newer].map(|sequence| begin(&mut replica, sequence, 100 + sequence).unwrap());
+                for sequence in [older, newer] {
+                    begin(&mut replica, sequence, 100 + sequence).unwrap();
+                }
                 assert!(matches!(begin(&mut replica, newer + 1, 900), Err(ReplicaError::Begun(_))), "a third");
                 for half in [0, 4] {
                     for sequence in [newer, older] {
