@@ -36,7 +36,8 @@ impl Describe for Always {
     }
 }
 
-struct Parts(ReplicaReceiver);
+/// Takes parts at this time, ns.
+struct Parts(ReplicaReceiver, u64);
 
 impl Report for Parts {
     fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
@@ -48,7 +49,7 @@ impl Deliver for Parts {
     }
 
     fn replica(&mut self, head: &FrameHead, part: &ReplicaFrame<'_>) -> bool {
-        self.0.take(0, || time(1), head, part)
+        self.0.take(self.1, || time(self.1), head, part)
     }
 
     fn event(&mut self, _: RouterEvent) {}
@@ -77,7 +78,7 @@ impl End {
         let sender = ReplicaSender::new(&settings, replicas);
         let receiver = ReplicaReceiver::new(&settings, replicas, join(node), Arc::new(Always));
         Self {
-            parts: Parts(receiver.asking_by(sender.requests())),
+            parts: Parts(receiver.asking_by(sender.requests()), BEGIN_NS),
             sender,
             outbound: Outbound::new(&settings, Stats::new(&settings, BEGIN_NS)),
             inbound: Inbound::new(&settings, Stats::new(&settings, BEGIN_NS)),
@@ -87,6 +88,7 @@ impl End {
 
     /// All that leaves now arrives there, but each datagram of which `loses` says so.
     fn send(&mut self, now_ns: u64, own: NodeIndex, there: &mut Self, mut loses: impl FnMut() -> bool) {
+        there.parts.1 = now_ns;
         while let ReplicaStep::Send { bytes, .. } =
             self.sender.poll(now_ns, time, &mut self.outbound, &mut self.datagram)
         {
@@ -130,7 +132,7 @@ fn parts_take_nothing_from_the_heap() {
                 before = heap_uses();
             }
             writer.write(Stamp { epoch: 1, ns: 1 + number }, &body).unwrap();
-            for _ in 0..10 {
+            for _ in 0..6 {
                 now_ns += MS / 2;
                 origin.send(now_ns, 0, &mut holder, || {
                     left += 1;
