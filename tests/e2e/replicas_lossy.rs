@@ -283,27 +283,25 @@ impl Trial {
         self.place.say_at(&self.config, "base", &[&["call"], words].concat()).ok()
     }
 
-    /// Has both written so many more, until the newest of each has come.
+    /// Has both written so many more, until the last of these, or a newer one, has come.
     fn write(&mut self, counts: [u64; 2]) {
         for (at, count) in counts.into_iter().enumerate() {
             self.call(&[self.streams[at].0, "feed", &count.to_string()]);
             self.streams[at].1 += count;
         }
-        wait("the newest of both has come", || {
-            let mut has_all = true;
+        let last = [0, 1].map(|at: usize| self.streams[at].1 - 1);
+        wait("the last of both has come", || {
             for at in 0..2 {
                 self.streams.iter_mut().for_each(|(.., follower)| follower.follow());
-                let (module, fed, ref follower) = self.streams[at];
-                if follower.newest < Some(fed - 1) {
-                    has_all = false;
-                    // A busy computer may have passed over the newest, and the description comes each second.
-                    if self.call(&[module, "--json", "is_fed"]).trim() == "true" {
-                        self.call(&[module, "feed", "1"]);
-                        self.streams[at].1 += 1;
-                    }
+                let (module, _, ref follower) = self.streams[at];
+                // A busy computer may have passed over the last one, and the description comes each second.
+                if follower.newest < Some(last[at]) && self.call(&[module, "--json", "is_fed"]).trim() == "true" {
+                    self.call(&[module, "feed", "1"]);
+                    self.streams[at].1 += 1;
                 }
             }
-            has_all.then_some(())
+            let has_come = |at: usize| self.streams[at].2.newest >= Some(last[at]);
+            (has_come(0) && has_come(1)).then_some(())
         });
     }
 
