@@ -78,7 +78,9 @@ impl Replicated {
             node: 0,
             to: 1 << HOLDER,
             sampling: Sampling::Each,
+            changed: false,
             delay_alarm_ns: 1000 * MS,
+            deadline_ns: 200_000_000,
             level: 18,
         };
         let folder = tempfile::tempdir().unwrap();
