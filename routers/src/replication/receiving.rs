@@ -64,8 +64,8 @@ impl ReplicaReceiver {
         self.streams.iter().flatten().map(|stream| stream.counts.clone()).collect()
     }
 
-    /// Takes what came in a datagram with this head; false when this node has no such replica, or takes no such request.
-    /// `system` tells system time now.
+    /// Takes what came in a datagram with this head; false when this node has no such replica, or takes no such
+    /// request. `system` tells system time now.
     pub fn take(
         &mut self,
         now_ns: u64,
