@@ -36,11 +36,7 @@ pub struct Replica {
 }
 
 impl Replica {
-    pub(crate) fn read(
-        section: Section<'_>,
-        directory: &Directory<'_>,
-        nodes: &[Node],
-    ) -> Option<Self> {
+    pub(crate) fn read(section: Section<'_>, directory: &Directory<'_>, nodes: &[Node]) -> Option<Self> {
         let stream = section.required("stream", "stream = \"camera.0/image\"");
         let stream = stream.and_then(|item| {
             if !item.is_table() {

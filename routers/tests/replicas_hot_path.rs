@@ -218,7 +218,12 @@ fn parts_take_nothing_from_the_heap() {
                 }
             }
         }
-        assert_eq!(heap_uses(), before, "records of {record_bytes} bytes, sealed: {is_sealed}, in slots: {}", tdma.is_some());
+        assert_eq!(
+            heap_uses(),
+            before,
+            "records of {record_bytes} bytes, sealed: {is_sealed}, in slots: {}",
+            tdma.is_some()
+        );
         let counts = holder.parts.0.counts()[0].clone();
         assert!(records > RECORDS - 5 && lost == 0, "{records} records, {lost} lost");
         assert!(counts.completed.get() > 20, "{} completed by asking", counts.completed.get());

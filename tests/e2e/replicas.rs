@@ -226,8 +226,7 @@ fn followed(place: &Place, network: &str, replica: &str, words: &[&str]) -> Opti
     let config = config(place, &["10.77.0.1".into(), "10.77.0.2".into()], network);
     // The file ends with the replica.
     std::fs::write(&config, std::fs::read_to_string(&config).unwrap() + replica).unwrap();
-    let launch =
-        Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
+    let launch = Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
     // It ends at once where there are none.
     let begun = wait("both nodes run", || {
         let runs = ["base", "brain"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
