@@ -70,7 +70,7 @@ pub(crate) fn of(installation: &Installation, only: Option<&str>) -> Value {
     let replicas = installation.replicas.iter().map(|replica| {
         json!({
             "from": text(replica.from), "stream": replica.item, "to": replica.to,
-            "sampling": replica.sampling.to_string(),
+            "sampling": replica.sampling.to_string(), "changed": replica.changed,
         })
     });
     let access = installation.access.iter().map(|rule| {

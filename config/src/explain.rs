@@ -43,6 +43,7 @@ pub fn explain(installation: &Installation, node: Option<&str>) -> String {
     page.flows();
     page.replicas();
     page.at_worst();
+    page.replicas_in_slots();
     page.text
 }
 
@@ -134,7 +135,8 @@ impl Page<'_> {
             (Some(rest), None) => {
                 format!("{port} (packages), {time_port} (time) and {rest} (packages that are not real time)")
             }
-            (None, _) => format!("{port} (packages) and {time_port} (time)"),
+            (None, Some(replicas)) => format!("{port} (packages), {time_port} (time) and {replicas} (replicas)"),
+            (None, None) => format!("{port} (packages) and {time_port} (time)"),
         };
         self.entry(
             "network",

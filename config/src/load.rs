@@ -101,8 +101,7 @@ fn read<'d>(reader: &'d Reader<'d>, table: &'d DeTable<'d>, text: &str, path: &P
     let gui = Gui::read(file.section("gui", "[gui]"), &directory);
     let record = Recording::read(file.section("record", "[record]"), &directory, &folder);
     let replica_sections = self::sections(&file, "replica").into_iter();
-    let ways = (network.as_ref(), tdma.as_ref());
-    let replicas = replica_sections.filter_map(|section| Replica::read(section, &directory, &nodes, ways));
+    let replicas = replica_sections.filter_map(|section| Replica::read(section, &directory, &nodes));
     let replicas: Vec<Replica> = replicas.collect();
     let has_replica = |items: &_, node: &_| replicas.iter().any(|replica| replica.is_of(items, node));
     record::connect((record.as_ref(), &has_replica), &file, &classes, &mut modules, &mut lines);

@@ -2,7 +2,10 @@
 
 use crate::flow::Flow;
 use crate::installation::Installation;
-use rohrpost_network::{FlowBound, Link, Plan, PlannedFlow, Tdma};
+use crate::record::Sampling;
+use crate::replica::Replica;
+use rohrpost_network::{FlowBound, Link, Plan, PlannedFlow, PlannedReplica, Tdma};
+use std::time::Duration;
 
 /// The bounds of all flows between different nodes of the LAN, by their places in [`Installation::flows`]; none if
 /// nodes send as packages come.
@@ -17,7 +20,19 @@ pub(crate) fn plan(installation: &Installation, tdma: &Tdma) -> Option<Plan> {
     let is_v6 = nodes.iter().filter_map(|node| node.address).any(|address| address.is_ipv6());
     let link = Link::new(tdma, &network, is_v6, nodes.len(), installation.time.masters().len());
     let flows = installation.flows.iter().map(|flow| planned(installation, flow)).collect();
-    Some(Plan { link, network, flows })
+    let replicas = installation.replicas.iter().map(|replica| replicated(installation, replica)).collect();
+    Some(Plan { link, network, flows, replicas })
+}
+
+/// None if the node that writes it is not on the LAN.
+fn replicated(installation: &Installation, replica: &Replica) -> Option<PlannedReplica> {
+    let node = installation.lan_index(installation.node_of(replica.from)?)?;
+    let period = match replica.sampling {
+        Sampling::Rate(rate_hz) => Duration::try_from_secs_f64(1.0 / rate_hz).ok(),
+        Sampling::Each | Sampling::Every(_) => None,
+    };
+    let record_bytes = replica.spec(installation).record_bytes;
+    Some(PlannedReplica { node, receivers: replica.to.len() as u32, record_bytes, period })
 }
 
 /// None if both ends are on one node, or one is not on the LAN.

@@ -5,7 +5,6 @@ use crate::node::{Node, Reach};
 use crate::reader::{Section, nearest};
 use crate::record::{RecordedItems, Sampling};
 use rohrpost_mailbox::Name;
-use rohrpost_network::{Network, Security, Tdma};
 use std::time::Duration;
 
 /// Most replicas of an installation.
@@ -26,6 +25,8 @@ pub struct Replica {
     pub to: Vec<String>,
     /// Which of its records are sent.
     pub sampling: Sampling,
+    /// Of these, only those with other bytes than the last one that was sent.
+    pub changed: bool,
     /// A record that arrives later than this after it was written is told.
     pub delay_alarm: Duration,
     /// Lost parts of a record are asked for until nothing came of it for so long; zero: never.
@@ -35,22 +36,7 @@ pub struct Replica {
 }
 
 impl Replica {
-    /// `network` and `tdma` are as the file has them.
-    pub(crate) fn read(
-        section: Section<'_>,
-        directory: &Directory<'_>,
-        nodes: &[Node],
-        (network, tdma): (Option<&Network>, Option<&Tdma>),
-    ) -> Option<Self> {
-        if tdma.is_some() {
-            section.report("with time slots no replica is carried yet; drop it, or `mode = \"tdma\"` of [network]");
-        }
-        if network.is_some_and(|network| network.security == Security::Keys) {
-            section.report(
-                "replicas are not sealed yet, and [network] says `security = \"keys\"`; drop the replica, or read the \
-                 stream on its own node",
-            );
-        }
+    pub(crate) fn read(section: Section<'_>, directory: &Directory<'_>, nodes: &[Node]) -> Option<Self> {
         let stream = section.required("stream", "stream = \"camera.0/image\"");
         let stream = stream.and_then(|item| {
             if !item.is_table() {
@@ -73,18 +59,19 @@ impl Replica {
             }
             Some(destinations(&section, &texts, nodes))
         });
+        let changed = section.get("changed").and_then(|item| item.flag()).unwrap_or(false);
         let delay_alarm = section.get("delay-alarm").and_then(|item| item.duration_above_zero("5 ms"));
         let deadline = section.get("deadline").and_then(|item| item.duration("200 ms"));
         let line = section.line;
         section.finish();
         let ((from, item, sampling), to) = (stream?, to?);
         let (delay_alarm, deadline) = (delay_alarm.unwrap_or(DELAY_ALARM), deadline.unwrap_or(DEADLINE));
-        Some(Self { from, item, to, sampling, delay_alarm, deadline, line })
+        Some(Self { from, item, to, sampling, changed, delay_alarm, deadline, line })
     }
 
-    /// Whether a node has by it what an entry of the recorder names.
+    /// Whether a node has by it the one stream that an entry of the recorder names.
     pub(crate) fn is_of(&self, items: &RecordedItems, node: &str) -> bool {
-        let is_it = items.item.as_ref().is_none_or(|item| *item == self.item);
+        let is_it = items.item.as_ref().is_some_and(|item| *item == self.item);
         is_it && items.from == Some(self.from) && self.to.iter().any(|to| to == node)
     }
 }

@@ -11,6 +11,12 @@ impl Replica {
         format!("{}/{}", installation.classes.format(self.from), self.item)
     }
 
+    /// The level on which it leaves: that of the class of the process that writes it.
+    pub fn level(&self, installation: &Installation) -> u8 {
+        let class = installation.module(self.from).map_or(self.from, |module| module.name).class();
+        installation.network.map_or(0, |network| network.level(class.priority()))
+    }
+
     /// The shape that the stream has on each node.
     pub fn spec(&self, installation: &Installation) -> StreamSpec {
         let module = installation.module(self.from);

@@ -52,6 +52,7 @@ fn files_that_ship_load_and_explain_themselves() {
         "tests/beyond.toml",
         "tests/record.toml",
         "tests/replica.toml",
+        "tests/replica-slots.toml",
         "tests/full.toml",
     ] {
         let text = fs::read_to_string(folder().join(file)).unwrap();

@@ -164,3 +164,12 @@ fn routers_may_be_called_and_have_levels_of_output() {
     assert!(mapper.calls.contains(&full.router_of("base").unwrap()));
     assert_eq!(full.output_level(full.router_of("desk").unwrap()), rohrpost_config::Level::Trace);
 }
+
+#[test]
+fn replicas_are_carried_sealed_or_not() {
+    for security in ["none", "keys"] {
+        let text = include_str!("replica.toml").replace("security = \"none\"", &format!("security = \"{security}\""));
+        let replicas = parse(&text).replicas;
+        assert_eq!(replicas.iter().map(|replica| replica.changed).collect::<Vec<_>>(), [false, true], "{security}");
+    }
+}

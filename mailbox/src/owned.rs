@@ -72,8 +72,8 @@ pub(crate) trait Owned: Sized {
     fn format(file: &File, id: Self::Id, shape: Self::Shape, old: Option<&Self>) -> io::Result<Self>;
     /// Whether a new owner that wants this shape takes it over as it is.
     fn goes_on_as(&self, shape: &Self::Shape) -> bool;
-    /// Takes over what a dead owner left.
-    fn adopt(&self);
+    /// Takes over what a dead owner left, as what it goes on as.
+    fn adopt(&self, shape: &Self::Shape);
     /// Gives the old one up, and goes on with its counts.
     fn replace(&self, old: &Self);
     /// Gives it up.
@@ -131,7 +131,7 @@ fn take_over<S: Owned>(path: &Path, id: S::Id, shape: &S::Shape) -> Result<Prede
         return Ok(Predecessor::Other(old));
     }
     step!("adopt: before");
-    old.adopt();
+    old.adopt(shape);
     Ok(Predecessor::Same(old, lock))
 }
 

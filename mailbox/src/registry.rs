@@ -140,7 +140,7 @@ impl Owned for Segment {
         self.shape == *shape && !self.slots().is_retired()
     }
 
-    fn adopt(&self) {
+    fn adopt(&self, _: &Self::Shape) {
         let page = self.page();
         self.slots().adopt(|priority| page.counters.lost(priority, Loss::Poison, 1));
         page.owner.adoptions.fetch_add(1, Ordering::Relaxed);

@@ -60,6 +60,7 @@ mod replayed_answers;
 mod replayed_others;
 mod replicas;
 mod replicas_lossy;
+mod replicas_sealed;
 mod restart;
 mod screen;
 mod seer;

@@ -47,26 +47,49 @@ to = ["brain"]
 /// The number of the feeder's stream in its interface.
 const FRAME: u16 = 2;
 
-fn config(place: &Place, [base, brain]: &[String; 2]) -> PathBuf {
+/// In its place where nodes send in time slots.
+const SLOTS: &str = r#"
+[network]
+security = "none"
+mode = "tdma"
+[tdma]
+cycle = "10 ms"
+synchronisation = "1 ms"
+guard = "400 us"
+link = "1 Gbit/s"
+[[slot]]
+node = "base"
+offset = "3 ms"
+length = "2 ms"
+[[slot]]
+node = "brain"
+offset = "6 ms"
+length = "1 ms"
+[time]
+source = "master"
+"#;
+
+/// `network`: that section, and further ones.
+fn config(place: &Place, [base, brain]: &[String; 2], network: &str) -> PathBuf {
     let config = place.path("test.toml");
     let at = |node: &str, entry: &str| entry.replacen("[[module]]\n", &format!("[[module]]\nnode = \"{node}\"\n"), 1);
     let nodes = format!(
         "[nodes.base]\naddress = \"{base}\"\ntools = [0, 15]\n[nodes.brain]\naddress = \"{brain}\"\ntools = [16, 31]\n"
     );
     let modules = [at("base", OUTPUT), at("base", &feeder_entry(0)), LOGD.to_owned()].concat();
-    std::fs::write(&config, [HEAD, &nodes, NETWORK, &modules].concat()).unwrap();
+    std::fs::write(&config, [HEAD, &nodes, network, &modules].concat()).unwrap();
     config
 }
 
 /// A reader on a node, and all that it has read.
-struct Follower {
+pub(crate) struct Follower {
     reader: StreamReader,
     records: BTreeMap<u64, (RecordInfo, Vec<u8>)>,
     lost: u64,
 }
 
 impl Follower {
-    fn new(robot: &Robot) -> Self {
+    pub(crate) fn new(robot: &Robot) -> Self {
         let participant = Participant::join(&robot.node, Name::NONE).unwrap();
         let reader = participant.stream_reader(StreamId { name: robot.name("feeder.0"), number: FRAME }).unwrap();
         Self { reader, records: BTreeMap::new(), lost: 0 }
@@ -89,17 +112,24 @@ impl Follower {
 }
 
 /// Two nodes on this computer, at addresses of the loopback device.
-struct Pair {
-    place: Place,
-    config: PathBuf,
-    base: (Running, Robot),
-    brain: (Running, Robot),
+pub(crate) struct Pair {
+    pub(crate) place: Place,
+    pub(crate) config: PathBuf,
+    pub(crate) base: (Running, Robot),
+    pub(crate) brain: (Running, Robot),
 }
 
 impl Pair {
     fn launched() -> Self {
+        Self::launched_at(&addresses(), NETWORK)
+    }
+
+    pub(crate) fn launched_at(addresses: &[String; 2], network: &str) -> Self {
         let place = Place::new();
-        let config = config(&place, &addresses());
+        let config = config(&place, addresses, network);
+        if network.contains("keys") {
+            place.say(&["keys", "new", config.to_str().unwrap()]).ok();
+        }
         let start = |node: &str| {
             let mut launch = Running::start(place.command(&["launch", config.to_str().unwrap(), "--node", node]));
             let robot = place.robot(&config, node, &mut launch);
@@ -110,12 +140,12 @@ impl Pair {
         Self { place, config, base, brain }
     }
 
-    fn say(&self, node: &str, arguments: &[&str]) -> String {
+    pub(crate) fn say(&self, node: &str, arguments: &[&str]) -> String {
         self.place.say_at(&self.config, node, arguments).ok()
     }
 
     /// Has the feeder write until its newest record is read on both nodes.
-    fn feed_through(&self, count: u64, [here, there]: [&mut Follower; 2]) {
+    pub(crate) fn feed_through(&self, count: u64, [here, there]: [&mut Follower; 2]) {
         self.say("base", &["call", "feeder.0", "feed", &count.to_string()]);
         wait("the newest record is read on the other node", || {
             here.follow();
@@ -130,6 +160,30 @@ impl Pair {
             None
         });
     }
+
+    /// Ends both; what they left stays.
+    pub(crate) fn stop(self) -> Place {
+        for (mut launch, robot) in [self.brain, self.base] {
+            drop(robot);
+            launch.stop();
+        }
+        self.place
+    }
+}
+
+/// Each record of the replica is as it was written, and none is missing without a word.
+pub(crate) fn compare(here: &Follower, there: &Follower) {
+    assert_eq!(here.lost, 0);
+    for (sequence, (info, body)) in &there.records {
+        let (origin, written) = &here.records[sequence];
+        let told = |info: &RecordInfo| (info.stamp, info.incarnation, info.len_bytes);
+        assert_eq!((told(info), body), (told(origin), written), "record {sequence}");
+        let frame: Frame = from_bytes(body).unwrap();
+        assert_eq!(frame.bytes, noise(frame.number));
+    }
+    let (first, _) = there.records.first_key_value().unwrap();
+    let newest = here.records.last_key_value().unwrap().0;
+    assert!(there.records.len() as u64 + there.lost > newest - first, "each is read or told as lost");
 }
 
 #[test]
@@ -142,17 +196,7 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
     pair.base.1.wait_restarted("feeder.0", feeder);
     pair.feed_through(60, [&mut here, &mut there]);
 
-    assert_eq!(here.lost, 0);
-    for (sequence, (info, body)) in &there.records {
-        let (origin, written) = &here.records[sequence];
-        let told = |info: &RecordInfo| (info.stamp, info.incarnation, info.len_bytes);
-        assert_eq!((told(info), body), (told(origin), written), "record {sequence}");
-        let frame: Frame = from_bytes(body).unwrap();
-        assert_eq!(frame.bytes, noise(frame.number));
-    }
-    let (first, _) = there.records.first_key_value().unwrap();
-    let newest = here.records.last_key_value().unwrap().0;
-    assert!(there.records.len() as u64 + there.lost > newest - first, "each is read or told as lost");
+    compare(&here, &there);
     let incarnations: std::collections::BTreeSet<u32> =
         there.records.values().map(|(info, _)| info.incarnation).collect();
     assert_eq!(incarnations.len(), 2, "the writer has begun anew once");
@@ -169,26 +213,18 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
         assert!(has_it, "{net}");
     }
 
-    let Pair { place, base, brain, .. } = pair;
     drop((here, there));
-    for (mut launch, robot) in [brain, base] {
-        drop(robot);
-        launch.stop();
-    }
+    let place = pair.stop();
     let recorded = values(&place.path("recordings/brain-0001.mcap"), "feeder.0/frame");
     assert!(recorded.len() > 60, "{} of the replica's records are recorded", recorded.len());
     place.assert_empty();
 }
 
-#[test]
-fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
-    let place = Place::new();
-    let config = config(&place, &["10.77.0.1".into(), "10.77.0.2".into()]);
-    // What is lost stays lost; the file ends with the replica.
-    std::fs::write(&config, std::fs::read_to_string(&config).unwrap() + "deadline = \"0 ms\"\n").unwrap();
-    let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=22"];
-    let mut launch =
-        Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], &bad].concat()));
+/// Both nodes in namespaces, with these words for launch, until the recorder of one follows the replica of the other's
+/// stream; none where that cannot be made.
+fn followed(place: &Place, network: &str, words: &[&str]) -> Option<Running> {
+    let config = config(place, &["10.77.0.1".into(), "10.77.0.2".into()], network);
+    let launch = Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
     // It ends at once where there are none.
     let begun = wait("both nodes run", || {
         let runs = ["base", "brain"].iter().all(|node| launch.out().contains(&format!("│ node {node} of test runs: ")));
@@ -196,25 +232,55 @@ fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
     });
     if !begun {
         assert!(lacks_namespaces(&launch.err()));
-        return;
+        return None;
     }
-    let file = place.path("recordings/brain-0001.mcap");
-    let recorded = || values(&file, "feeder.0/frame");
     wait("the recorder follows the replica", || {
-        feed(&place, "feeder.0", 1);
-        (!recorded().is_empty()).then_some(())
+        feed(place, "feeder.0", 1);
+        (!recorded(place).is_empty()).then_some(())
     });
-    let target = feed(&place, "feeder.0", 300);
+    Some(launch)
+}
+
+fn file(place: &Place) -> PathBuf {
+    place.path("recordings/brain-0001.mcap")
+}
+
+fn recorded(place: &Place) -> Vec<(u32, u64)> {
+    values(&file(place), "feeder.0/frame")
+}
+
+/// Has so many records written, and waits for one behind them; how many are recorded since the first, and how many were
+/// lost: all that were written.
+fn feed_and_count(place: &Place, mut launch: Running, count: u64) -> (u64, u64) {
+    let target = feed(place, "feeder.0", count);
     wait("records behind the last of them", || {
-        feed(&place, "feeder.0", 1);
-        recorded().last().is_some_and(|(_, number)| *number > target).then_some(())
+        feed(place, "feeder.0", 1);
+        recorded(place).last().is_some_and(|(_, number)| *number > target).then_some(())
     });
     launch.stop();
-    let (recorded, told) = (recorded(), info(&file).unwrap());
+    let (recorded, told) = (recorded(place), info(&file(place)).unwrap());
     assert!(recorded.is_sorted_by(|a, b| a.1 < b.1), "{recorded:?}");
     let channel = told.channels.iter().find(|channel| channel.topic == "feeder.0/frame").unwrap();
     let (first, last) = (recorded[0].1, recorded[recorded.len() - 1].1);
     assert!(recorded.len() as u64 + channel.lost > last - first, "{} recorded, {} lost", recorded.len(), channel.lost);
-    assert!(channel.lost > 0 && recorded.len() > 100, "{} recorded, {} lost", recorded.len(), channel.lost);
+    (recorded.len() as u64, channel.lost)
+}
+
+#[test]
+fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
+    let place = Place::new();
+    let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=22"];
+    let Some(launch) = followed(&place, NETWORK, &bad) else { return };
+    let (recorded, lost) = feed_and_count(&place, launch, 300);
+    assert!(recorded > 100, "{recorded} recorded, {lost} lost");
+    place.assert_empty();
+}
+
+#[test]
+fn in_time_slots_records_cross_as_well() {
+    let place = Place::new();
+    let Some(launch) = followed(&place, SLOTS, &[]) else { return };
+    let (recorded, lost) = feed_and_count(&place, launch, 200);
+    assert!(recorded > 100, "{recorded} recorded, {lost} lost");
     place.assert_empty();
 }

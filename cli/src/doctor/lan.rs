@@ -23,6 +23,8 @@ pub(super) struct LanView {
 /// A port that a router needs.
 #[derive(Clone, Debug)]
 pub(super) struct Port {
+    /// What it is for.
+    pub(super) what: &'static str,
     pub(super) number: u16,
     pub(super) state: PortState,
 }

@@ -39,6 +39,8 @@ fn compare(name: &str, said: &str) {
     assert_eq!(said, fs::read_to_string(&golden).unwrap(), "{}", golden.display());
 }
 
+const PORTS: [&str; 3] = ["port of packages", "port of time", "port of the rest"];
+
 fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> LanView {
     let peer = |(host, (name, mtu, reach)): (u8, &(&str, u32, Reach))| PeerNode {
         name: (*name).into(),
@@ -52,7 +54,7 @@ fn lan(ports: [PortState; 3], peers: &[(&str, u32, Reach)]) -> LanView {
         mtu: 1500,
         is_here: true,
         addresses: vec![("eth0".into(), [10, 77, 0, 1].into())],
-        ports: (21117..).zip(ports).map(|(number, state)| Port { number, state }).collect(),
+        ports: (21117..).zip(PORTS).zip(ports).map(|((number, what), state)| Port { what, number, state }).collect(),
         runs: true,
         stamps: Stamps::Both,
         peers: (2..).zip(peers).map(peer).collect(),

@@ -118,9 +118,8 @@ impl Taps {
             let description = match source.own {
                 Some(host) if runs(&node, host) => noted(&node, source.from),
                 Some(_) => None,
-                // With a replica comes the description.
-                None if !source.replicas.is_empty() => noted(&node, source.from),
-                None => source.asking.poll(context, source.from),
+                // With a replica comes the description, unless that is too long.
+                None => noted(&node, source.from).or_else(|| source.asking.poll(context, source.from)),
             };
             let Some(description) = description else { continue };
             let mut taps = source.taps(&self.recording, &description);

@@ -37,9 +37,9 @@ pub(super) fn of(shell: &Shell) -> Links {
     }
 }
 
-/// Datagram counters: for real time, and for the rest where that has its own port.
+/// Datagram counters: for real time, and for the rest and for replicas where these have ports of their own.
 fn lanes(shell: &Shell) -> impl Iterator<Item = &Stats> {
-    [Some(shell.stats()), shell.rest_stats()].into_iter().flatten().map(|stats| &**stats)
+    [Some(shell.stats()), shell.rest_stats(), shell.replica_stats()].into_iter().flatten().map(|stats| &**stats)
 }
 
 fn rejections(shell: &Shell) -> Vec<Rejected> {

@@ -77,7 +77,8 @@ impl Module for RouterModule {
         let clock = ClockParts::new(&settings, installation, &node).map(|parts| ClockParts { impair, ..parts });
         let (name, mut sockets) = (context.me(), kept());
         // In the order of `listen`.
-        let socket = if sockets.len() > 2 { sockets.pop() } else { None };
+        let others = 1 + usize::from(installation.rest_port().is_some());
+        let socket = if sockets.len() > others { sockets.pop() } else { None };
         let replicas = ReplicaSettings::all(installation);
         let parts = Parts { node: &node, name, settings, faults, sockets, impair, clock };
         let mut shell = match keys {

@@ -20,12 +20,12 @@ mod table;
 
 pub use bounds::{Bound, FlowBound, TAKEN_BEFORE, Unbounded};
 pub use link::{Link, Parcel, TimeShare};
-pub use plan::{Plan, PlannedFlow};
+pub use plan::{Plan, PlannedFlow, PlannedReplica};
 pub use remedy::Remedy;
 pub use room::{ARRIVES_WITHIN, round_up};
 pub use setup::{LEVEL_NOT_REAL_TIME, LEVELS, NODES_MAX, Network, Route, Security, TRANSIT_LOOK, level};
 pub use sizes::{
     ALIVE_BYTES, BEND_MAX_PER, ETHERNET_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES, HAND_OVER, HELLO_BYTES,
-    KEPT_IN_BYTES, PAYLOAD_MAX, RATE_MAX_PER, REFUSAL_BYTES, TAG_BYTES, TIME_BYTES,
+    KEPT_IN_BYTES, PAYLOAD_MAX, RATE_MAX_PER, RECORD_PART_HEAD_BYTES, REFUSAL_BYTES, TAG_BYTES, TIME_BYTES,
 };
 pub use table::{GATE, LATE, Tdma, TimeSlot, Tunnel};

@@ -2,8 +2,8 @@
 
 use crate::setup::{Network, Security};
 use crate::sizes::{
-    ALIVE_BYTES, ETHERNET_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES, HAND_OVER, HELLO_BYTES, REFUSAL_BYTES,
-    TIME_BYTES,
+    ALIVE_BYTES, ETHERNET_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES, HAND_OVER, HELLO_BYTES, RECORD_PART_HEAD_BYTES,
+    REFUSAL_BYTES, TIME_BYTES,
 };
 use crate::table::{LATE, Tdma};
 use rohrpost_mailbox::HEAD_BYTES as PACKAGE_HEAD_BYTES;
@@ -104,6 +104,11 @@ impl Link {
     /// How long a keep-alive keeps a slot busy, ns.
     pub fn alive_ns(&self) -> u64 {
         self.takes_ns(FRAME_HEAD_BYTES + ALIVE_BYTES)
+    }
+
+    /// Bytes of a record in a part of full length: what a largest datagram has room for.
+    pub fn part_bytes(&self) -> usize {
+        self.datagram_bytes_max.saturating_sub(FRAME_HEAD_BYTES + RECORD_PART_HEAD_BYTES).max(1)
     }
 
     /// Which frames of time go where.

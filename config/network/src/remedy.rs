@@ -50,6 +50,12 @@ impl Plan {
         };
         (1..=CYCLES_MAX).map(|cycles| tdma.cycle * cycles).filter(|period| *period > own.period).find(holds)
     }
+
+    /// The slot of a node that has to grow least, until its slots leave so many parts of replicas a second, in
+    /// thousandths.
+    pub fn longer_for_parts(&self, tdma: &Tdma, node: u8, parts: u64) -> Option<(usize, TimeSlot)> {
+        longer(tdma, node, |tdma| self.parts_left(tdma, node) >= parts)
+    }
 }
 
 /// Up to a tenth of a millisecond.
@@ -82,14 +88,8 @@ impl<'a> Search<'a> {
 
     /// The slot with the least growth.
     fn longer(&self) -> Option<Remedy> {
-        let tries = self.own().filter_map(|(index, slot)| {
-            let free = self.tdma.free_behind(slot).saturating_sub(slot.length);
-            let steps = (free.as_nanos() / STEP.as_nanos()) as u32;
-            let longer = |steps: u32| TimeSlot { length: slot.length + STEP * steps, ..*slot };
-            let suffices = |steps| self.keeps(&self.tdma.with(index, longer(steps)));
-            least(steps, suffices).map(|steps| (steps, Remedy::Longer(index, longer(steps))))
-        });
-        tries.min_by_key(|(steps, _)| *steps).map(|(_, remedy)| remedy)
+        let node = self.plan.flows[self.flow]?.node;
+        longer(self.tdma, node, |tdma| self.keeps(tdma)).map(|(index, longer)| Remedy::Longer(index, longer))
     }
 
     /// The slot with a shorter period, the longest that suffices.
@@ -124,6 +124,19 @@ impl<'a> Search<'a> {
         });
         tries.min_by_key(|slot| slot.length)
     }
+}
+
+/// The slot of a node that has to grow least until this holds.
+fn longer(tdma: &Tdma, node: u8, holds: impl Fn(&Tdma) -> bool) -> Option<(usize, TimeSlot)> {
+    let own = tdma.slots.iter().enumerate().filter(|(_, slot)| slot.node == node);
+    let tries = own.filter_map(|(index, slot)| {
+        let free = tdma.free_behind(slot).saturating_sub(slot.length);
+        let steps = (free.as_nanos() / STEP.as_nanos()) as u32;
+        let longer = |steps: u32| TimeSlot { length: slot.length + STEP * steps, ..*slot };
+        let suffices = |steps| holds(&tdma.with(index, longer(steps)));
+        least(steps, suffices).map(|steps| (steps, index, longer(steps)))
+    });
+    tries.min_by_key(|(steps, ..)| *steps).map(|(_, index, longer)| (index, longer))
 }
 
 /// The least number from 1 to `most` that suffices, if larger ones do no harm; the result always suffices.

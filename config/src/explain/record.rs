@@ -67,11 +67,12 @@ impl Page<'_> {
                 deadline => format!("asked for during {}", duration_text(deadline)),
             };
             let words = format!(
-                "{} of node {node} to {}: {} of its records, each of at most {}; told if later than {}; what is lost \
+                "{} of node {node} to {}: {} of its records{}, each of at most {}; told if later than {}; what is lost \
                  is {asks}",
                 replica.text(self.installation),
                 replica.to.join(", "),
                 replica.sampling,
+                if replica.changed { ", if it has changed" } else { "" },
                 size_text(replica.spec(self.installation).record_bytes.into()),
                 duration_text(replica.delay_alarm)
             );

@@ -1,8 +1,8 @@
-//! Explains time slots: a drawing of the cycle, the slots, and the bounds of the flows.
+//! Explains time slots: a drawing of the cycle, the slots, the bounds of the flows, and what is left for replicas.
 
 use super::{Page, timeline};
-use crate::plan::bounds;
-use crate::units::{duration_decimal, duration_text, rate_text};
+use crate::plan::{bounds, plan};
+use crate::units::{duration_decimal, duration_text, rate_text, size_text};
 use rohrpost_network::{Bound, GATE, LATE, Tdma, TimeSlot, round_up};
 use std::time::Duration;
 
@@ -103,6 +103,50 @@ impl Page<'_> {
             ),
         );
     }
+
+    /// What replicas have of the slots.
+    pub(super) fn replicas_in_slots(&mut self) {
+        let Some(tdma) = &self.installation.tdma else { return };
+        let Some(plan) = plan(self.installation, tdma) else { return };
+        let all = plan.replicas.iter().zip(&self.installation.replicas);
+        let all: Vec<_> = all.filter_map(|(planned, replica)| Some(((*planned)?, replica))).collect();
+        let names: Vec<_> = all.iter().map(|(_, replica)| replica.text(self.installation)).collect();
+        let Some(width) = names.iter().map(|name| name.chars().count()).max() else { return };
+        self.line("");
+        self.line("Replicas have what packages leave of the slots of their node, the more important first:");
+        self.line("");
+        let columns = "of node   left in 1 s    record  to   at least  records in 1 s";
+        self.line(format!("  {:width$}  {columns}", "replica", width = width.max(7)));
+        for ((planned, _), name) in all.into_iter().zip(names) {
+            let (left, parts) = (plan.parts_left(tdma, planned.node), planned.parts(&plan.link));
+            let bytes = size_text(left / 1000 * plan.link.part_bytes() as u64 >> 10 << 10);
+            let record = size_text(planned.record_bytes.into());
+            let least = long(plan.record_least(tdma, &planned));
+            let (node, receivers) = (self.node_name(planned.node), planned.receivers);
+            let many = left as f64 / (1000 * parts) as f64;
+            self.line(format!(
+                "  {name:width$}  {node:8}  {bytes:>11}  {record:>8}  {receivers:>2}  {least:>9}  {many:>14.2}",
+                width = width.max(7)
+            ));
+        }
+        self.entry(
+            "",
+            "left in 1 s: bytes of records that the slots carry for sure behind all declared flows; what is not \
+             declared, and ordinary traffic through the tunnel, go before them as well. at least: the time of a record \
+             of full size to all nodes that have it, if nothing else is sent. records in 1 s: so many of full size are \
+             sure, if no other replica of the node sends any.",
+        );
+    }
+}
+
+/// Up to ten microseconds, or ten milliseconds if it is long.
+fn long(duration: Duration) -> String {
+    const HUNDREDTH_NS: u64 = 10_000_000;
+    if duration < Duration::from_secs(1) {
+        return round(duration);
+    }
+    let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+    duration_decimal(Duration::from_nanos(ns.div_ceil(HUNDREDTH_NS).saturating_mul(HUNDREDTH_NS)))
 }
 
 /// Components of a bound, as columns.

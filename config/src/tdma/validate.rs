@@ -5,6 +5,7 @@
 
 mod flows;
 mod places;
+mod replicas;
 
 use super::{GUARD, TdmaLines};
 use crate::installation::Installation;
@@ -22,7 +23,7 @@ const SLOT_WITHIN: Duration = Duration::from_millis(500);
 /// A check of all cycles of a table must end.
 const CYCLES_MAX: u64 = 64;
 
-/// Validates the table, then whether every flow keeps its deadline with it.
+/// Validates the table, then whether every flow keeps its deadline with it, and whether replicas have room.
 pub(crate) fn validate(installation: &Installation, lines: &TdmaLines, reader: &Reader<'_>) {
     let Some(tdma) = &installation.tdma else { return };
     let Some(plan) = plan(installation, tdma) else { return };
@@ -46,6 +47,7 @@ pub(crate) fn validate(installation: &Installation, lines: &TdmaLines, reader: &
     if reader.is_content() {
         validate.quotas();
         validate.mailboxes();
+        validate.replicas();
     }
 }
 

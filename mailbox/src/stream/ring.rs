@@ -28,6 +28,7 @@
 //! | writer, filling a frame | bytes that no entry names | nothing to fix: its successor counts the frame as free |
 //! | writer, entry begun | an entry without a frame, the record there before is gone | the successor writes it; readers of the old record are told that they lost it |
 //! | writer, entry named its frame | a record that `written` does not count | the record is finished: the successor counts it |
+//! | replica's writer, leaving records out | entries of records that never came, beside older ones | the successor leaves out the rest up to the last of them, and goes on behind it |
 //! | writer, counted | readers that were not woken | the successor wakes all when it begins |
 //! | reader, holding | a seat that names a frame | nothing to fix: the frame is the seat's own room, the next reader there clears it |
 //! | reader, asleep | a seat that says so | the writer rings for nobody once, asks whether it lives, and clears it |
@@ -41,7 +42,7 @@ use std::cmp;
 
 /// Bits of a word that name the frame, plus one; 0: none yet.
 const FRAME_BITS: u32 = 20;
-const FRAME: u64 = (1 << FRAME_BITS) - 1;
+pub(super) const FRAME: u64 = (1 << FRAME_BITS) - 1;
 /// Most frames of a stream.
 pub(crate) const FRAMES_MAX: usize = FRAME as usize;
 /// In place of a frame: a replica has no such record, it is gone. Its ring has fewer frames than there may be.
@@ -65,7 +66,7 @@ pub struct Stamp {
 #[derive(Debug, Default)]
 #[repr(C, align(64))]
 pub(crate) struct IndexEntry {
-    word: AtomicU64,
+    pub(super) word: AtomicU64,
     stamp_ns: AtomicU64,
     /// The greatest stamp of its epoch among all records before it; 0: there is none.
     before_ns: AtomicU64,
@@ -136,7 +137,7 @@ pub(crate) fn word(sequence: u64, frame: Option<usize>) -> u64 {
 
 /// How far the word's record is behind (negative) or before the one of this sequence. The word has the sequence's low
 /// 44 bits: at a million records a second two records 200 days apart look the same.
-fn ahead(word: u64, sequence: u64) -> i64 {
+pub(super) fn ahead(word: u64, sequence: u64) -> i64 {
     ((word >> FRAME_BITS).wrapping_sub(sequence) << FRAME_BITS) as i64 >> FRAME_BITS
 }
 
@@ -291,9 +292,17 @@ impl<'a> Ring<'a> {
 
     /// The newest record; none before the first. A writer that overwrites it at each try has none to show either.
     pub(crate) fn newest(&self) -> Option<Line> {
-        (0..TRIES).find_map(|_| match self.look(self.written().checked_sub(1)?) {
+        let there = |sequence: u64| match self.look(sequence) {
             Look::There(line) => Some(line),
             Look::NotYet | Look::Gone => None,
+        };
+        (0..TRIES).find_map(|_| {
+            let end = self.written();
+            // The last ones are left out if the writer of a replica died over them.
+            there(end.checked_sub(1)?).or_else(|| {
+                let last = (self.oldest_before(end)..end).rev().find(|sequence| self.left_out(*sequence).is_none());
+                there(last?)
+            })
         })
     }
 
@@ -361,20 +370,6 @@ impl<'a> Ring<'a> {
 pub(super) const TRIES: usize = 8;
 
 impl IndexEntry {
-    /// The frame of the record of this sequence; none if this is another's entry, or its writer died over it. For the
-    /// writer, which alone changes it.
-    pub(super) fn frame(&self, sequence: u64, frames: usize) -> Option<u32> {
-        let is_its = ahead(self.word.load(Ordering::Relaxed), sequence) == 0;
-        self.named_frame(frames).filter(|_| is_its)
-    }
-
-    /// The frame of whichever record has this entry.
-    pub(super) fn named_frame(&self, frames: usize) -> Option<u32> {
-        let word = self.word.load(Ordering::Relaxed);
-        // Of a damaged file any number is possible.
-        ((word & FRAME) as u32).checked_sub(1).filter(|frame| (*frame as usize) < frames)
-    }
-
     /// Makes this the entry of a record; the writer alone. The word is the last to be written.
     pub(super) fn write(&self, sequence: u64, frame: usize, about: &About) {
         self.word.store(word(sequence, None), Ordering::Relaxed);

@@ -232,8 +232,9 @@ impl Owned for StreamSegment {
         self.shape == *shape && !self.is_retired() && is_behind()
     }
 
-    /// Nothing: the writer looks through the index when it begins.
-    fn adopt(&self) {
+    /// Nothing of the records: the writer looks through the index when it begins.
+    fn adopt(&self, (_, first): &Self::Shape) {
+        self.page.writer.replica.store(first.is_some().into(), Ordering::Relaxed);
         self.page.writer.adoptions.fetch_add(1, Ordering::Relaxed);
     }
 

@@ -10,7 +10,7 @@ use crate::participant::Participant;
 use crate::step::step;
 use crate::stream::error::{StreamError, WriteError};
 use crate::stream::record::RecordInfo;
-use crate::stream::ring::{About, Line, Look, Seat, Stamp};
+use crate::stream::ring::{About, Line, Seat, Stamp};
 use crate::stream::segment::StreamSegment;
 use crate::stream::shape::{StreamId, StreamShape};
 use crate::stream::writing::{Frame, Progress};
@@ -160,9 +160,7 @@ impl StreamWriter {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn newest(&self) -> Option<(RecordInfo, &[u8])> {
-        let last = self.progress.next().checked_sub(1)?;
-        let Look::There(line) = self.segment.ring().look(last) else { return None };
-        Some(self.seen(line))
+        self.segment.ring().newest().map(|line| self.seen(line))
     }
 
     /// A record that an entry names, as readers see it.

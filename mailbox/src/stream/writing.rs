@@ -8,7 +8,9 @@
 //! shared: a successor works it out from the index.
 
 use crate::step::step;
-use crate::stream::ring::{About, LEFT_OUT, Look, Ring, STREAM_READERS_MAX, Seat, Stamp};
+use crate::stream::ring::{
+    About, FRAME, IndexEntry, LEFT_OUT, Look, Ring, SEQUENCE_MAX, STREAM_READERS_MAX, Seat, Stamp, ahead,
+};
 use crate::sync::{Ordering, fence, prefetch_to_write, seq_cst_accesses};
 
 /// What the writer knows.
@@ -36,26 +38,25 @@ impl Frame {
 impl Progress {
     /// Goes on where the writer before ended, whichever step that was. For the one writer, before it writes.
     pub(crate) fn resume(ring: &Ring<'_>) -> Self {
-        let mut next = ring.written().max(ring.first());
-        let counted = next;
-        while ring.left_out(next).is_some() && next < counted + ring.keep() {
-            next += 1;
-        }
-        if let Look::There(_) = ring.look(next) {
-            // Its writer died before it could count it.
-            next += 1;
+        let counted = ring.written().max(ring.first());
+        let next = named_end(ring, counted);
+        let kept = ring.oldest_before(next)..next;
+        let newest = kept.clone().rev().find_map(|sequence| match ring.look(sequence) {
+            Look::There(line) => Some(line.reached()),
+            Look::NotYet | Look::Gone => ring.left_out(sequence).filter(|stamp| stamp.ns != 0),
+        });
+        if next > counted {
+            // Its writer died before it could count it, or among those that it left out before it.
+            for sequence in kept.filter(|sequence| ring.entry(*sequence).is_of_older(*sequence)) {
+                leave_out(ring, sequence, newest);
+            }
             ring.count(next);
             step!("resume: counted");
-        } else {
-            next = counted;
         }
+        // Whatever entry names a frame: a reader may find it there.
         let mut used = vec![false; ring.frames()];
-        let mut newest = None;
-        for sequence in ring.oldest_before(next)..next {
-            if let Look::There(line) = ring.look(sequence) {
-                used[line.frame] = true;
-                newest = Some(Stamp { epoch: line.about.stamp.epoch, ns: line.newest_ns() });
-            }
+        for frame in (0..ring.keep()).filter_map(|at| ring.entry(at).named_frame(ring.frames())) {
+            used[frame as usize] = true;
         }
         // For every frame, once: later ones only come back.
         let mut free = Vec::with_capacity(ring.frames());
@@ -101,17 +102,12 @@ impl Progress {
     /// replica, where such records never came. A number of steps bounded by what the ring keeps.
     pub(crate) fn skip_to(&mut self, ring: &Ring<'_>, sequence: u64) {
         let from = self.next.max(sequence.saturating_sub(ring.keep()));
-        let stamp = self.newest.unwrap_or(Stamp { epoch: 0, ns: 0 });
-        let about = About { stamp, before_ns: stamp.ns, written_ns: 0, len_bytes: 0, incarnation: 0 };
         for left_out in from..sequence {
-            let (entry, hint) = ring.place(left_out);
-            // Of a record that may be more than a turn of the ring behind.
-            let old = entry.named_frame(ring.frames());
-            hint.store(stamp.ns, Ordering::Relaxed);
-            entry.write(left_out, LEFT_OUT, &about);
-            self.free.extend(old);
+            self.free.extend(leave_out(ring, left_out, self.newest));
         }
         self.next = self.next.max(sequence);
+        // ORDERING (E): the new words before the looks at the seats, when one of these frames is claimed.
+        seq_cst_accesses();
     }
 
     /// Makes a filled frame the next record, and calls `wake` for each seat that says that its reader sleeps; `expect`
@@ -153,6 +149,57 @@ impl Progress {
             }
         }
         sequence
+    }
+}
+
+/// Behind the last record that an entry names, and not before one that was begun: what a writer counts, or, if it died
+/// before it could, more. Readers may have been told by the entries that all up to there is gone.
+fn named_end(ring: &Ring<'_>, counted: u64) -> u64 {
+    let end = |at| {
+        let (sequence, is_named) = ring.entry(at).says(counted)?;
+        (sequence % ring.keep() == at).then_some(sequence + u64::from(is_named))
+    };
+    (0..ring.keep()).filter_map(end).fold(counted, u64::max)
+}
+
+/// Makes this an entry of a record that never came: the frame that it named, of a record that may be more than a turn
+/// of the ring behind. `newest` is what the stream had reached.
+fn leave_out(ring: &Ring<'_>, sequence: u64, newest: Option<Stamp>) -> Option<u32> {
+    let stamp = newest.unwrap_or(Stamp { epoch: 0, ns: 0 });
+    let about = About { stamp, before_ns: stamp.ns, written_ns: 0, len_bytes: 0, incarnation: 0 };
+    let (entry, hint) = ring.place(sequence);
+    let old = entry.named_frame(ring.frames());
+    hint.store(stamp.ns, Ordering::Relaxed);
+    entry.write(sequence, LEFT_OUT, &about);
+    old
+}
+
+/// What the writer asks of an entry, which it alone changes.
+impl IndexEntry {
+    /// The frame of the record of this sequence; none if this is another's entry, or its writer died over it.
+    fn frame(&self, sequence: u64, frames: usize) -> Option<u32> {
+        let is_its = ahead(self.word.load(Ordering::Relaxed), sequence) == 0;
+        self.named_frame(frames).filter(|_| is_its)
+    }
+
+    /// The frame of whichever record has this entry.
+    fn named_frame(&self, frames: usize) -> Option<u32> {
+        let word = self.word.load(Ordering::Relaxed);
+        // Of a damaged file any number is possible.
+        ((word & FRAME) as u32).checked_sub(1).filter(|frame| (*frame as usize) < frames)
+    }
+
+    /// The sequence of its word, as one near `counted`, and whether the record is there or said to be left out.
+    fn says(&self, counted: u64) -> Option<(u64, bool)> {
+        // ORDERING: Acquire (B), as in `look`.
+        let word = self.word.load(Ordering::Acquire);
+        let sequence = counted.checked_add_signed(ahead(word, counted))?;
+        (sequence < SEQUENCE_MAX).then_some((sequence, word & FRAME != 0))
+    }
+
+    /// Whether it has an older record than this one, which has the same place.
+    fn is_of_older(&self, sequence: u64) -> bool {
+        ahead(self.word.load(Ordering::Relaxed), sequence) < 0
     }
 }
 

@@ -6,8 +6,9 @@
 //!  sim   ──▶ virtual ones, events: poll, plan a wake-up …   ──▶
 //! ```
 //!
-//! [`SlotDriver`] sends in time slots. Without them [`FreeDriver`] sends what is real time, and [`RestDriver`] the
-//! rest. [`ReplicaDriver`] sends parts of replicas. [`RxDriver`] receives, and [`ClockDriver`] keeps time.
+//! [`SlotDriver`] sends in time slots, parts of replicas too. Without them [`FreeDriver`] sends what is real time,
+//! [`RestDriver`] the rest, and [`ReplicaDriver`] parts of replicas. [`RxDriver`] receives, and [`ClockDriver`] keeps
+//! time.
 //!
 //! They are compiled for each platform, and take nothing from the heap once they run.
 
@@ -19,6 +20,7 @@ mod free;
 mod held;
 mod log;
 mod outlet;
+mod parts;
 mod platform;
 mod replicas;
 mod rest;
@@ -39,6 +41,6 @@ pub use platform::{NotSent, Platform, SlotEvent};
 pub use replicas::{ReplicaDriver, ReplicaWait};
 pub use rest::{RestDriver, RestInlet, RestStep};
 pub use rx::{RxDriver, RxPlatform};
-pub use slots::{SlotDriver, SlotStep};
+pub use slots::SlotDriver;
 pub use time_platform::{TIME_DATAGRAM_BYTES, TimeArrival, TimeCounts, TimeEvent, TimeInput, TimePlatform, TimeSource};
-pub use timing::spin_ns;
+pub use timing::{SlotStep, spin_ns};

@@ -47,6 +47,14 @@ pub trait Platform {
     fn take_stranger(&mut self) -> Option<IpAddr>;
     /// Does between windows what is due besides.
     fn tidy(&mut self, now_ns: u64);
+    /// Writes the next part of a replica into a buffer with room for the largest datagram: its receiver and its length.
+    /// None: none waits, or streams are looked for just now.
+    fn next_part(&mut self, _datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
+        None
+    }
+    /// Hands over a part, in the first `bytes` of a buffer that has room for a seal behind them. One that the system
+    /// does not take is lost.
+    fn send_part(&mut self, _to: NodeIndex, _buffer: &mut [u8], _bytes: usize) {}
     /// Lets others see how it stands.
     fn publish(&mut self, scheduler: &SlotScheduler, log: &WindowLog);
     /// The queue has become longer or shorter.

@@ -4,15 +4,17 @@
 //!        sleep, about a millisecond at a time                  wake    call begin              guard
 //!  ──┬──────────────┬──────────────┬─────────────────────────┬───────┬────┬───────────────────┬─────▶ local time
 //!    is the mailbox full?   the same      the same           │ spin  │lead│ time, refusal,    │
-//!                                         mailbox ─▶ queue ──┼──────▶│    │ packages by level │ stamps … ─▶ Clock ─▶ page, tools
+//!                                         mailbox ─▶ queue ──┼──────▶│    │ packages by level,│ stamps … ─▶ Clock ─▶ page, tools
+//!                                                            │       │    │ parts of replicas │
 //!                                       stamps, datagrams of time ─▶ Clock
 //! ```
 
 use super::answer_queue::AnswerQueue;
 use super::held::{self, HeldDatagram};
 use super::log::WindowLog;
+use super::parts::NextPart;
 use super::platform::{NotSent, Platform, SlotEvent};
-use super::timing::{LAST_LOOK_NS, LOOK_BURST, NAP_NS, SLEEP_NS_MAX, TIDY_NS};
+use super::timing::{LAST_LOOK_NS, LOOK_BURST, NAP_NS, SLEEP_NS_MAX, SlotStep, TIDY_NS};
 use crate::frame::{FrameHead, NodeIndex};
 use crate::intake::{Intake, MAKING_NS, QUIET_NS, Transit};
 use crate::outbound::Outbound;
@@ -35,6 +37,7 @@ pub struct SlotDriver {
     datagram: Box<[u8]>,
     /// A datagram that lies there since the last slot.
     held: Option<HeldDatagram>,
+    parts: NextPart,
     phase: Phase,
     /// When the socket of time was read last, local ns.
     looked_ns: u64,
@@ -45,21 +48,6 @@ pub struct SlotDriver {
     /// The first datagram of the last window, if the kernel stamps it.
     first: Option<First>,
     log: WindowLog,
-}
-
-/// What to do until the next poll.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum SlotStep {
-    /// Sleep, ns from now on.
-    Sleep {
-        /// For so long.
-        for_ns: u64,
-    },
-    /// Spin: packages that come meanwhile are taken. Nothing else is due before then, local ns.
-    Spin {
-        /// Until when.
-        until_ns: u64,
-    },
 }
 
 /// What the driver waits for.
@@ -102,6 +90,7 @@ impl SlotDriver {
             intake: Intake::new(now_ns),
             datagram: vec![0; network.datagram_bytes_max + network.security.tag_bytes()].into(),
             held: None,
+            parts: NextPart::new(settings),
             phase: Phase::Plans,
             looked_ns: 0,
             tidied_ns: 0,
@@ -259,7 +248,7 @@ impl SlotDriver {
             self.answers.answer(on, &mut tx_window);
         }
         if tx_window.carries == Carries::All {
-            self.send_packages(on, &mut tx_window);
+            self.send_all(on, &mut tx_window);
             on.queue_changed();
         }
         self.scheduler.close(&tx_window);
@@ -291,20 +280,28 @@ impl SlotDriver {
         }
     }
 
-    fn send_packages(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
+    fn send_all(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) {
         self.drop_if_old(on);
-        while let Some(made) = self.next_datagram(on, tx_window) {
-            let (HeldDatagram { to, bytes, .. }, now_ns) = (made, on.local_ns());
-            if !tx_window.fits(now_ns, bytes) {
-                self.missed(on, made);
-                break;
-            }
-            self.hand_over(on, tx_window, now_ns, to, bytes);
-        }
+        let goes_on = self.send_packages(on, tx_window);
         if tx_window.is_behind(on.local_ns()) {
             tx_window.fell_behind = true;
             left_out(on, on.monotonic_ns());
         }
+        // Between any two parts packages that came meanwhile have their turn.
+        while goes_on && self.parts.send_next(on, tx_window) && self.send_packages(on, tx_window) {}
+    }
+
+    /// Until none may leave; false: the thread stood still with one.
+    fn send_packages(&mut self, on: &mut impl Platform, tx_window: &mut TransmitWindow) -> bool {
+        while let Some(made) = self.next_datagram(on, tx_window) {
+            let (HeldDatagram { to, bytes, .. }, now_ns) = (made, on.local_ns());
+            if !tx_window.fits(now_ns, bytes) {
+                self.missed(on, made);
+                return false;
+            }
+            self.hand_over(on, tx_window, now_ns, to, bytes);
+        }
+        true
     }
 
     /// What leaves next. Room is reckoned for when it will be made, so that it misses the slot only if the thread

@@ -1,5 +1,7 @@
 //! The driver of time slots, on a platform that stands still where it is told to.
 
+mod parts;
+
 use super::{ANSWER_BYTES, Answer, NotSent, Platform, SlotDriver, SlotEvent, SlotStep, WINDOWS, WindowLog, spin_ns};
 use crate::frame::NodeIndex;
 use crate::harness::{End, MS, S, START, address, head, module};
@@ -9,6 +11,7 @@ use crate::report::Report;
 use crate::stats::Stats;
 use crate::tdma::{SlotScheduler, SlotTable, WindowVerdict};
 use crate::time::{Clock, SentId, Stamp, TIME_BYTES, TimeSettings};
+use parts::Replicated;
 use rohrpost_mailbox::{Head, Priority};
 use rohrpost_network::{Tdma, TimeSlot};
 use std::net::IpAddr;
@@ -45,6 +48,9 @@ struct Computer {
     is_in_window: bool,
     answer: Option<Answer>,
     log: WindowLog,
+    replicated: Option<Replicated>,
+    /// In each window the datagrams of packages, and those of parts: true.
+    sent: Vec<Vec<bool>>,
 }
 
 impl Computer {
@@ -118,6 +124,7 @@ impl Platform for Computer {
 
     fn send(&mut self, _: u64, _: NodeIndex, _: &mut [u8], _: usize) -> Result<(), NotSent> {
         self.comes_to(Moment::Sends);
+        self.sent.last_mut().unwrap().push(false);
         Ok(())
     }
 
@@ -141,6 +148,17 @@ impl Platform for Computer {
 
     fn tidy(&mut self, _: u64) {}
 
+    fn next_part(&mut self, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
+        self.replicated.as_mut()?.next(self.now_ns, datagram)
+    }
+
+    fn send_part(&mut self, _: NodeIndex, buffer: &mut [u8], bytes: usize) {
+        self.sent.last_mut().unwrap().push(true);
+        if self.replicated.as_mut().unwrap().send(self.now_ns, &buffer[..bytes]) {
+            self.end.queue(self.now_ns, head(module(100, 1), module(100, 0), 90), &[0; 900]);
+        }
+    }
+
     fn publish(&mut self, _: &SlotScheduler, log: &WindowLog) {
         self.log = *log;
     }
@@ -153,7 +171,10 @@ impl Platform for Computer {
 
     fn happened(&mut self, event: SlotEvent<'_>) {
         match event {
-            SlotEvent::Decided(_, verdict) => self.is_in_window = matches!(verdict, WindowVerdict::Send(_)),
+            SlotEvent::Decided(_, verdict) => {
+                self.is_in_window = matches!(verdict, WindowVerdict::Send(_));
+                self.sent.push(Vec::new());
+            }
             SlotEvent::Closed(_) => self.is_in_window = false,
             SlotEvent::Made => self.comes_to(Moment::Made),
             _ => {}
@@ -193,7 +214,17 @@ impl Router {
         let scheduler = SlotScheduler::new(table, spin_ns(CYCLE.as_nanos() as u64));
         let driver = SlotDriver::new(&Arc::new(end.settings.clone()), None, scheduler, START);
         let log = WindowLog::default();
-        let on = Computer { end, clock, now_ns: START, still: None, is_in_window: false, answer: None, log };
+        let on = Computer {
+            end,
+            clock,
+            now_ns: START,
+            still: None,
+            is_in_window: false,
+            answer: None,
+            log,
+            replicated: None,
+            sent: Vec::new(),
+        };
         let mut router = Self { driver, on };
         router.run_for(5 * S);
         assert_eq!(router.driver.scheduler().silent(), None, "it sends");

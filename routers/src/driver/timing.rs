@@ -23,6 +23,21 @@ pub(super) const LOOK_BURST: usize = 16;
 /// Handling what waits takes less than this, unless much waits.
 pub(super) const TIDY_NS: u64 = 250_000;
 
+/// What a slot driver does until the next poll.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SlotStep {
+    /// Sleep, ns from now on.
+    Sleep {
+        /// For so long.
+        for_ns: u64,
+    },
+    /// Spin: packages that come meanwhile are taken. Nothing else is due before then, local ns.
+    Spin {
+        /// Until when.
+        until_ns: u64,
+    },
+}
+
 /// How long before the call the thread that sends in time slots is to wake up, ns; then it spins.
 pub fn spin_ns(cycle_ns: u64) -> u64 {
     SPIN_NS_MAX.min(cycle_ns / SPIN_CYCLES)

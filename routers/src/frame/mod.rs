@@ -23,12 +23,11 @@ use fields::long;
 pub use fields::{BadFrame, VERSION};
 pub use part_request::{ASKED_PARTS_MAX, PART_REQUEST_BYTES_MAX, PartRequest};
 pub use refusal::{Refusal, RefusalReason};
-pub use replica::{
-    DESCRIPTION_BYTES_MAX, DESCRIPTION_PART_HEAD_BYTES, DescriptionPart, RECORD_PART_HEAD_BYTES, RecordPart,
-    ReplicaFrame,
-};
+pub use replica::{DESCRIPTION_BYTES_MAX, DESCRIPTION_PART_HEAD_BYTES, DescriptionPart, RecordPart, ReplicaFrame};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
-pub use rohrpost_network::{ALIVE_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES as HEAD_BYTES, REFUSAL_BYTES};
+pub use rohrpost_network::{
+    ALIVE_BYTES, FRAGMENT_HEAD_BYTES, FRAME_HEAD_BYTES as HEAD_BYTES, RECORD_PART_HEAD_BYTES, REFUSAL_BYTES,
+};
 
 /// Fragments of a package, at most: one of 64 KiB in the smallest datagrams has fewer.
 pub const PARTS_MAX: u16 = 256;

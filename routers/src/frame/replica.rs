@@ -3,9 +3,8 @@
 
 use super::fields::{BadFrame, half, long, word};
 use super::part_request::PartRequest;
+use rohrpost_network::RECORD_PART_HEAD_BYTES;
 
-/// Bytes between the head of the datagram and a record's bytes.
-pub const RECORD_PART_HEAD_BYTES: usize = 60;
 /// Bytes between the head of the datagram and a description's bytes.
 pub const DESCRIPTION_PART_HEAD_BYTES: usize = 24;
 /// Longest description that is carried.

@@ -135,13 +135,13 @@ impl Inbound {
         deliver: &mut impl Deliver,
     ) {
         match Frame::read(head.kind, VERSION, text) {
-            Ok(frame @ (Frame::Packages(_) | Frame::Fragment(_) | Frame::Alive(_))) => {
+            Ok(frame @ (Frame::Packages(_) | Frame::Fragment(_) | Frame::Alive(_) | Frame::Replica(_))) => {
                 match self.mismatch(came.source, head) {
                     None => self.take(now_ns, came, (head, Some(first)), frame, deliver),
                     Some(mismatch) => self.refuse(now_ns, came.source, mismatch, deliver),
                 }
             }
-            Ok(Frame::Refusal(_) | Frame::Replica(_) | Frame::Time(_)) | Err(_) => self.damaged(came.source),
+            Ok(Frame::Refusal(_) | Frame::Time(_)) | Err(_) => self.damaged(came.source),
         }
     }
 

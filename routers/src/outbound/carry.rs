@@ -14,20 +14,27 @@ impl Outbound {
         self
     }
 
-    /// From now on it sends to these peers alone, one bit each; for a router that seals nothing.
+    /// From now on it sends to these peers alone, one bit each.
     #[must_use]
     pub(crate) fn only_to(self, peers: u64) -> Self {
-        Self { reached: peers, ..self }
+        Self { only: peers, reached: self.reached & peers, ..self }
     }
 
-    /// Whether a datagram of this level may leave now; else when.
+    /// Whether a datagram of this level may leave now; else when. In time slots the window says it.
     pub(crate) fn may_leave(&self, now_ns: u64, level: u8) -> Result<(), u64> {
-        self.pace.may_leave(now_ns, level)
+        if self.in_slots { Ok(()) } else { self.pace.may_leave(now_ns, level) }
+    }
+
+    /// Notes which peers hear this node: for time slots, in which nothing is polled here.
+    pub(crate) fn look_at_peers(&mut self, now_ns: u64) {
+        self.look_at_what_is_real_time(now_ns);
     }
 
     /// Peers to which something may leave now, one bit each.
     pub(crate) fn ready_peers(&self) -> u64 {
-        self.open()
+        // Sessions as they are now: in time slots nothing is polled here that would look at them.
+        let reached = self.peer_sessions.as_ref().map_or(self.reached, |all| all.reached() & self.only);
+        reached & !self.full & self.hearing
     }
 
     /// Whether a peer is there, as far as is known: what is not sent to it now waits for nothing.

@@ -101,7 +101,9 @@ pub struct Outbound {
     aboard: Aboard,
     /// Where datagrams are sealed: the peers with a session. Packages to others wait.
     peer_sessions: Option<Arc<PeerSessions>>,
-    /// Peers that it sends to, one bit each.
+    /// The only peers that it sends to, one bit each.
+    only: u64,
+    /// Those of them that it reaches.
     reached: u64,
     /// Peers with no socket room at present, one bit each: they are passed over.
     full: u64,
@@ -143,6 +145,7 @@ impl Outbound {
             datagram_bytes: settings.datagram_bytes(),
             aboard: Aboard::new(settings.datagram_bytes()),
             peer_sessions: None,
+            only: u64::MAX,
             reached: u64::MAX,
             full: 0,
             hearing: u64::MAX,
@@ -329,7 +332,7 @@ impl Outbound {
     /// A peer with a new session gets a keep-alive at once.
     fn announce_to_new_sessions(&mut self) {
         let Some(all) = &self.peer_sessions else { return };
-        let reached = all.reached();
+        let reached = all.reached() & self.only;
         if reached != self.reached {
             (self.reached, self.alive_ns) = (reached, 0);
         }

@@ -2,11 +2,15 @@
 
 use super::again::Again;
 use super::counts::{ReplicaLoss, SentReplica};
+use super::fingerprint::{Fingerprint, Fingerprints};
 use crate::frame::{NodeIndex, PartRequest};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{RecordInfo, StreamReader};
 use std::sync::Arc;
 
+/// Where only changes are sent, a record like the last one goes after this time nevertheless: that one may have been
+/// lost on its way, and nobody says so.
+pub(super) const UNCHANGED_EVERY_NS: u64 = 10_000_000_000;
 /// Parts of so many records, the last that were begun, may be asked for. Only of two at a time something is missing
 /// there; the others are on their way.
 const ASKED_MAX: usize = 32;
@@ -19,6 +23,10 @@ pub(super) struct Destination {
     pub(super) incarnation: u64,
     /// Sequence of its next record; none: the newest.
     pub(super) next: Option<u64>,
+    /// It was not there when it was looked for last.
+    pub(super) is_absent: bool,
+    /// Its next record goes whatever the sampling: it may have none.
+    pub(super) has_none: bool,
     /// The record that is under way, and where its next part begins.
     pub(super) under_way: Option<(RecordInfo, usize)>,
     /// Sequence of the record of which all parts left last.
@@ -29,6 +37,9 @@ pub(super) struct Destination {
     begins: usize,
     /// What it has asked for: of the record that arrives there, and of the one before.
     again: [Again; 2],
+    /// Where only changes are sent: the record that went last, or is under way, and when it was chosen, ns. None: the
+    /// next one goes, whatever its bytes.
+    pub(super) sent: Option<(Fingerprint, u64)>,
     /// No further record is chosen before, ns.
     pub(super) sample_ns: u64,
     /// When the description is due, ns.
@@ -45,35 +56,45 @@ impl Destination {
             counts: Arc::new(SentReplica::new(place, peer)),
             incarnation: 0,
             next: None,
+            is_absent: true,
+            has_none: true,
             under_way: None,
             before: None,
             begun: [None; ASKED_MAX],
             begins: 0,
             again: std::array::from_fn(|_| Again::new(parts)),
+            sent: None,
             sample_ns: 0,
             describe_ns: 0,
             describing: None,
         }
     }
 
-    /// Whether a record is under way; if none is, takes the next.
+    /// Whether a record is under way; if none is, takes the next. `fingerprints`: only of those that changed.
     pub(super) fn begin(
         &mut self,
         now_ns: u64,
         reader: &mut StreamReader,
         newest: &RecordInfo,
-        sampling: Sampling,
+        (sampling, mut fingerprints): (Sampling, Option<&mut Fingerprints>),
     ) -> bool {
-        let keep = reader.shape().map_or(0, |shape| u64::from(shape.keep));
+        let Some(keep) = reader.shape().map(|shape| u64::from(shape.keep)) else { return false };
         let (lost, mut next) = (&self.counts.lost, self.next.unwrap_or(newest.sequence));
         if self.under_way.is_none() && newest.sequence.saturating_sub(next) >= keep / 2 {
-            lost.add(ReplicaLoss::Passed, newest.sequence.saturating_sub(next));
-            next = newest.sequence;
+            // Of one in so many: the newest of them.
+            let behind = match sampling {
+                Sampling::Every(every) if !self.has_none => newest.sequence % u64::from(every.max(1)),
+                _ => 0,
+            };
+            let newest = (newest.sequence - behind).max(next);
+            lost.add(ReplicaLoss::Passed, newest - next);
+            next = newest;
         }
         while self.under_way.is_none() && next <= newest.sequence {
             let sequence = next;
             next += 1;
             let is_chosen = match sampling {
+                _ if self.has_none => true,
                 Sampling::Each => true,
                 Sampling::Every(every) => sequence.is_multiple_of(u64::from(every.max(1))),
                 Sampling::Rate(_) => now_ns >= self.sample_ns,
@@ -86,7 +107,18 @@ impl Destination {
                 lost.add(ReplicaLoss::Passed, 1);
                 continue;
             };
-            self.under_way = Some((record.info(), 0));
+            if let Some(fingerprints) = &mut fingerprints {
+                let fingerprint = fingerprints.of(&record);
+                let is_sent = |(sent, at_ns): (Fingerprint, u64)| {
+                    sent == fingerprint && now_ns.saturating_sub(at_ns) < UNCHANGED_EVERY_NS
+                };
+                if !self.has_none && self.sent.is_some_and(is_sent) {
+                    lost.add(ReplicaLoss::Sampled, 1);
+                    continue;
+                }
+                self.sent = Some((fingerprint, now_ns));
+            }
+            (self.under_way, self.has_none) = (Some((record.info(), 0)), false);
             self.begun[self.begins % ASKED_MAX] = Some(sequence);
             self.begins = self.begins.wrapping_add(1);
             if let Sampling::Rate(rate_hz) = sampling {
@@ -99,7 +131,7 @@ impl Destination {
 
     /// Nothing that was sent counts any more: its records are others, or the node has none of them.
     pub(super) fn begin_anew(&mut self) {
-        (self.under_way, self.before, self.begun) = (None, None, [None; ASKED_MAX]);
+        (self.under_way, self.sent, self.before, self.begun) = (None, None, None, [None; ASKED_MAX]);
         self.again.iter_mut().for_each(Again::clear);
     }
 
@@ -173,7 +205,7 @@ impl Destination {
                 ReplicaLoss::Overwritten
             }
             None => {
-                self.under_way = None;
+                (self.under_way, self.sent) = (None, None);
                 ReplicaLoss::Passed
             }
         };
@@ -184,13 +216,21 @@ impl Destination {
         self.again.iter_mut().find(|again| again.record().is_some_and(|record| record.sequence == sequence))
     }
 
-    /// It is not there, so nothing waits for it. Records from its first one on are counted.
+    /// It is there; after an absence it may have missed anything, so the description and the newest record are for it.
+    pub(super) fn come(&mut self) {
+        if std::mem::replace(&mut self.is_absent, false) {
+            (self.has_none, self.describe_ns) = (true, 0);
+        }
+    }
+
+    /// It is not there, so nothing waits for it but the newest record. Older ones, from its first one on, are counted.
     pub(super) fn pass_over(&mut self, newest: Option<&RecordInfo>) {
-        self.describing = None;
+        (self.describing, self.is_absent) = (None, true);
         self.again.iter_mut().for_each(Again::drop_wanted);
         let (Some(newest), Some(next)) = (newest, self.next) else { return };
-        let missed = (newest.sequence + 1).saturating_sub(next) + u64::from(self.under_way.take().is_some());
-        self.next = Some(next.max(newest.sequence + 1));
+        let given_up = self.under_way.take().is_some_and(|(record, _)| record.sequence < newest.sequence);
+        let missed = newest.sequence.saturating_sub(next) + u64::from(given_up);
+        self.next = Some(newest.sequence);
         if missed > 0 {
             self.counts.lost.add(ReplicaLoss::Absent, missed);
         }

@@ -8,6 +8,7 @@
 //!
 //! It ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
 
+use super::lives::Life;
 use super::settings::ReplicaSettings;
 use crate::frame::{ASKED_PARTS_MAX, RecordPart};
 use rohrpost_mailbox::{OriginRecord, RecordInfo, Stamp};
@@ -15,15 +16,6 @@ use rohrpost_mailbox::{OriginRecord, RecordInfo, Stamp};
 /// A record is asked for this often at most: a fifth of all datagrams may be lost, and the rest comes.
 pub(super) const ROUNDS_MAX: u32 = 32;
 const WORDS: usize = ASKED_PARTS_MAX / 64;
-
-/// What the sender of parts may count sequences from anew.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(super) struct Life {
-    /// Incarnation of the router.
-    pub(super) router: u64,
-    /// How often that has seen the stream made anew.
-    pub(super) generation: u16,
-}
 
 /// What the parts of a record say of it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -14,7 +14,8 @@
 use super::counts::{ReceivedReplica, ReplicaLoss};
 use super::delay::DelayAlarm;
 use super::description::{DescriptionAssembly, KnownOrigin};
-use super::gathering::{Arriving, Gathering, Life};
+use super::gathering::{Arriving, Gathering};
+use super::lives::{Life, Lives};
 use super::patience::Patience;
 use super::requests::{OutgoingRequest, PartRequests};
 use super::settings::ReplicaSettings;
@@ -24,6 +25,8 @@ use rohrpost_mailbox::{
 };
 use std::sync::Arc;
 
+/// A ring that cannot be made is tried again after this, ns.
+const RETRY_NS: u64 = 1_000_000_000;
 /// Places of open records. There is an older one only beside a newer one.
 const OLDER: usize = 0;
 const NEWER: usize = 1;
@@ -44,11 +47,12 @@ pub(super) struct IncomingReplica {
     pub(super) counts: Arc<ReceivedReplica>,
     pub(super) assembly: DescriptionAssembly,
     pub(super) known: Option<KnownOrigin>,
-    /// What the description that came last says: of which life, and how many records were written.
-    pub(super) announced: Option<(Life, u64)>,
+    pub(super) lives: Lives,
     writer: Option<ReplicaWriter>,
-    /// Of the newest record; none: it was written before this router began.
-    life: Option<Life>,
+    /// The ring could not be opened or made.
+    is_unopened: bool,
+    /// It is not tried again before, ns.
+    retry_ns: u64,
     open: [Gathering; 2],
     /// The newest record that was given up: what still comes of it, or of older ones, is late.
     given_up: Option<(Life, u64)>,
@@ -73,9 +77,10 @@ impl IncomingReplica {
             counts: Arc::new(ReceivedReplica::new(place)),
             assembly: DescriptionAssembly::default(),
             known: None,
-            announced: None,
+            lives: Lives::default(),
             writer: None,
-            life: None,
+            is_unopened: false,
+            retry_ns: 0,
             open: std::array::from_fn(|_| Gathering::new(replica, part_bytes)),
             given_up: None,
             whole_ns: 0,
@@ -121,6 +126,9 @@ impl IncomingReplica {
 
     /// Takes a part.
     pub(super) fn take(&mut self, now: Now<'_>, life: Life, part: &RecordPart<'_>) {
+        if now.ns < self.retry_ns {
+            return self.lose(ReplicaLoss::Unwritable);
+        }
         let Some(known) = self.known.filter(|known| known.check == part.description) else {
             return self.lose(ReplicaLoss::Undescribed);
         };
@@ -136,6 +144,9 @@ impl IncomingReplica {
         {
             return self.lose(ReplicaLoss::Unsound);
         }
+        if self.is_over(life) {
+            return self.lose(ReplicaLoss::Late);
+        }
         let arriving = Arriving::of(part);
         let open = self.open.iter().position(|open| open.is_of(&arriving.record, life));
         let opened = open.or_else(|| self.begin(now, known.id, life, (arriving, part.step)));
@@ -145,28 +156,29 @@ impl IncomingReplica {
         [OLDER, NEWER].into_iter().for_each(|at| self.ask_if_due(now.ns, at));
     }
 
+    /// Whether the stream was made anew since, as its router has said.
+    pub(super) fn is_over(&self, life: Life) -> bool {
+        let open = self.open.iter().filter(|open| open.is_open());
+        self.lives.is_over(life, open.map(|open| open.life))
+    }
+
     /// Opens a record, if it may still be published; at which place. `step`: see [`RecordPart::step`].
     fn begin(&mut self, now: Now<'_>, id: StreamId, life: Life, (arriving, step): (Arriving, u32)) -> Option<usize> {
         let record = arriving.record;
         let newer = &self.open[NEWER];
         let is_behind = newer.is_open() && newer.life == life && record.sequence <= newer.sequence;
+        let there = || now.participant.node().inspect_stream(id).ok().flatten();
         let (next, newest) = match &self.writer {
             Some(writer) => (writer.next(), writer.newest()),
-            None => now
-                .participant
-                .node()
-                .inspect_stream(id)
-                .ok()
-                .flatten()
-                .map_or((0, None), |there| (there.written, there.newest)),
+            None => there().map_or((0, None), |there| (there.written, there.newest)),
         };
         if record.sequence < next {
             if newest.is_some_and(|newest| arriving.is(&newest)) {
-                self.life = Some(life);
+                self.lives.newest = Some(life);
                 self.lose(ReplicaLoss::Duplicate);
                 return None;
             }
-            if is_behind || !self.is_anew(life, record.sequence, next) {
+            if is_behind || !self.lives.is_anew(life, record.sequence, next) {
                 self.lose(ReplicaLoss::Late);
                 return None;
             }
@@ -186,13 +198,16 @@ impl IncomingReplica {
             self.writer = None;
         }
         let mut written = self.write(now.participant, id, record);
-        if written.is_err() && self.life != Some(life) {
+        if written.is_err() && !self.is_unopened && self.lives.newest != Some(life) {
             // Its time may have begun anew, too: what is there then fits no more.
             self.writer = None;
             let _ = now.participant.node().remove_orphan_stream(id);
             written = self.write(now.participant, id, record);
         }
         if let Err(why) = written {
+            if std::mem::take(&mut self.is_unopened) {
+                self.retry_ns = now.ns + RETRY_NS;
+            }
             // The older one is behind nothing now.
             self.settle(now);
             return self.refuse(why);
@@ -263,6 +278,7 @@ impl IncomingReplica {
             Some(writer) => writer,
             None => {
                 let opened = participant.replica_writer(id, self.settings.shape, record.sequence);
+                self.is_unopened = opened.is_err();
                 opened.map_err(|error| Some(error.to_string()))?
             }
         };
@@ -277,21 +293,6 @@ impl IncomingReplica {
         }
         self.writer = Some(writer);
         begun.map_err(|why| if matches!(why, ReplicaError::Begun(_)) { None } else { Some(why.to_string()) })
-    }
-
-    /// Whether a record that is not newer says that its stream was made anew.
-    fn is_anew(&self, life: Life, sequence: u64, next: u64) -> bool {
-        match self.life {
-            Some(newest) if newest.router == life.router => {
-                // As it wraps: later by less than half of all numbers.
-                (life.generation.wrapping_sub(newest.generation) as i16) > 0
-            }
-            Some(_) => true,
-            None => {
-                let written = self.announced.filter(|(announced, _)| *announced == life).map(|(_, written)| written);
-                sequence + 1 == next || written.is_some_and(|written| sequence < written && written < next)
-            }
-        }
     }
 
     /// Puts a part into an open record, and publishes what is whole by it.
@@ -330,7 +331,7 @@ impl IncomingReplica {
         counts.records.add(1);
         counts.bytes.add(record.len_bytes as u64);
         counts.completed.add(open.was_asked().into());
-        self.life = Some(open.life);
+        self.lives.newest = Some(open.life);
         self.delays.note(now.ns, &(now.system)(), &arriving, (&self.settings, counts));
     }
 

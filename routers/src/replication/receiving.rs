@@ -5,8 +5,8 @@
 
 use super::counts::{ReceivedReplica, ReplicaLoss};
 use super::description::KnownOrigin;
-use super::gathering::Life;
 use super::incoming::{IncomingReplica, Now};
+use super::lives::Life;
 use super::requests::PartRequests;
 use super::settings::ReplicaSettings;
 use super::{Describe, part_bytes};
@@ -119,7 +119,11 @@ impl ReplicaReceiver {
 
     fn describe(&mut self, router: u64, part: &DescriptionPart<'_>) {
         let Some(Some(stream)) = self.streams.get_mut(usize::from(part.place)) else { return };
-        stream.announced = Some((Life { router, generation: part.generation }, part.written));
+        let life = Life { router, generation: part.generation };
+        if stream.is_over(life) {
+            return;
+        }
+        stream.lives.announced = Some((life, part.written));
         if stream.known.is_some_and(|known| known.check == part.check) {
             return;
         }

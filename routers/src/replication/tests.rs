@@ -1,10 +1,12 @@
 //! Both halves, over a wire in memory: with the outbound and the inbound that ship, and rings of two nodes.
 
 mod asked;
+mod changed;
 mod hostile;
 mod joining;
 mod lossy;
 mod requests;
+mod sealed;
 
 use super::{Describe, ReceivedReplica, ReplicaLoss, ReplicaReceiver, ReplicaSender, ReplicaSettings, ReplicaStep};
 use crate::frame::{FrameHead, NodeIndex, ReplicaFrame};
@@ -52,6 +54,7 @@ fn image() -> ReplicaSettings {
         node: ORIGIN,
         to: 1 << HOLDER,
         sampling: Sampling::Each,
+        changed: false,
         delay_alarm_ns: 5 * MS,
         deadline_ns: 200 * MS,
         level: 18,

@@ -67,9 +67,9 @@ impl Gate {
         Self::of(all, Port::Packages, Some(Handshake::new(all, seed)))
     }
 
-    /// A gate at the port of what is not real time, in the thread that receives there.
-    pub fn of_rest(all: &Arc<PeerSessions>) -> Self {
-        Self::of(all, Port::Rest, None)
+    /// A gate at a port where no hello comes, in the thread that receives there.
+    pub fn without_hellos(all: &Arc<PeerSessions>, port: Port) -> Self {
+        Self::of(all, port, None)
     }
 
     fn of(all: &Arc<PeerSessions>, port: Port, handshake: Option<Handshake>) -> Self {

@@ -109,6 +109,8 @@ pub(super) enum Purpose {
     Time = 3,
     /// Packages that are not real time.
     Rest = 4,
+    /// What the two ends of a replica send to each other.
+    Replicas = 5,
 }
 
 /// One end of a direction.

@@ -18,9 +18,21 @@
 //! incarnation will be heard, so nothing that an incarnation had sent before is taken either.
 //!
 //! ```text
-//!  rx_thread:  Gate: Opening (packages), Handshake ───── PeerSessions ──────▶ tx_thread: Sealing (packages)
-//!                                                                        └────▶ clock:     Sealing, Opening (time)
+//!  rx_thread:    Gate: Opening (packages), Handshake ──▶ PeerSessions ─┬─▶ tx_thread:    Sealing (packages)
+//!  rest-in:      Gate: Opening (rest) ◀────────────────────────────────┼─▶ rest-out:     Sealing (rest)
+//!  replicas-in:  Gate: Opening (replicas) ◀────────────────────────────┼─▶ replicas-out: Sealing (replicas)
+//!                                                                      └─▶ clock:        Sealing, Opening (time)
 //! ```
+//!
+//! No nonce serves twice with one key, and nothing opens twice:
+//!
+//! - A key is for one port, one direction, and one incarnation of each end ([`Port`]); so ports may count alike.
+//! - At a port one thread writes heads, from the counters of that port; their sequence is the nonce, and the same
+//!   thread seals. Should two do so: a sequence is used up by one atomic operation, and a thread that meets a used one
+//!   panics before it seals.
+//! - At a port one thread opens, with a window for each peer's incarnation. Hellos say where those of packages and time
+//!   begin. What else is sealed, is sealed to a present incarnation, so its window begins with the first datagram; and
+//!   an incarnation that is taken for the present one again goes on behind what was opened of it.
 //!
 //! No sockets, threads or clocks here. Sealing and opening use no heap and no lock. Keys are derived when an
 //! incarnation begins, and only holders of a key can cause that.

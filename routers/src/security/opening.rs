@@ -40,12 +40,12 @@ pub struct Opening {
     past: Box<[[Past; PAST]]>,
 }
 
-/// Incarnations of a peer that took turns: so many are remembered, each with what was opened of it at the port of what
-/// is not real time.
+/// Incarnations of a peer that took turns: so many are remembered, each with what was opened of it, at a port that is
+/// not in hellos.
 const PAST: usize = 4;
 
-/// An incarnation that was heard at that port, and from which sequence on it is heard when it is taken for the present
-/// one again.
+/// An incarnation that was heard at such a port, and from which sequence on it is heard when it is taken for the
+/// present one again.
 #[derive(Clone, Copy, Default)]
 struct Past {
     incarnation: u64,
@@ -57,8 +57,7 @@ struct HeardIncarnation {
     incarnation: u64,
     /// By the place of the key: which of two the peer seals with is its choice.
     seals: Vec<Seal>,
-    /// From this sequence on it is heard. At the port of what is not real time no hello says it: then it is that of
-    /// what is opened first.
+    /// From this sequence on it is heard. Where no hello says it, it is that of what is opened first.
     first: Option<u64>,
     window: SequenceWindow,
 }
@@ -119,7 +118,7 @@ impl Opening {
         let arrival = heard.window.arrive(head.sequence, &mut 0);
         debug_assert!(arrival != Arrival::Duplicate);
         heard.first.get_or_insert(head.sequence);
-        if self.port == Port::Rest {
+        if !self.port.is_in_hellos() {
             past[0].next = heard.window.next();
         }
         Ok(Opened::Frame(head, text))
@@ -210,18 +209,17 @@ impl Opening {
     ) -> Option<&'a mut HeardIncarnation> {
         peers[usize::from(from)].of(all, from, |session| {
             let peer = Endpoint { node: from, incarnation: session.incarnation };
-            let from = match port {
-                // What is sealed there is sealed to this incarnation of ours: all of it may be opened, and once.
-                Port::Rest => remembered(past, session.incarnation),
+            let from = if port.is_in_hellos() {
                 // What was overheard is not proven a second time.
-                Port::Packages | Port::Time => {
-                    session.next[port as usize].max(overheard[usize::from(from)].next(session.incarnation))
-                }
+                session.next[port as usize].max(overheard[usize::from(from)].next(session.incarnation))
+            } else {
+                // What is sealed there is sealed to this incarnation of ours: all of it may be opened, and once.
+                remembered(past, session.incarnation)
             };
             HeardIncarnation {
                 incarnation: session.incarnation,
                 seals: all.keys.derive_all(&all.binding(port, peer, all.own())),
-                first: (port != Port::Rest).then_some(from),
+                first: port.is_in_hellos().then_some(from),
                 window: SequenceWindow::going_on(from),
             }
         })

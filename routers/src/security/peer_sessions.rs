@@ -22,18 +22,27 @@ pub enum Port {
     Time = 1,
     /// Packages that are not real time.
     Rest = 2,
+    /// What the two ends of a replica send to each other.
+    Replicas = 3,
 }
 
 impl Port {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Packages, Self::Time, Self::Rest];
+    pub const ALL: [Self; 4] = [Self::Packages, Self::Time, Self::Rest, Self::Replicas];
 
     pub(super) fn purpose(self) -> Purpose {
         match self {
             Self::Packages => Purpose::Packages,
             Self::Time => Purpose::Time,
             Self::Rest => Purpose::Rest,
+            Self::Replicas => Purpose::Replicas,
         }
+    }
+
+    /// Whether a hello says from which sequence on its incarnation is heard there. Where none does, all that is sealed
+    /// to a present incarnation may be opened, and once.
+    pub(super) const fn is_in_hellos(self) -> bool {
+        matches!(self, Self::Packages | Self::Time)
     }
 }
 
@@ -214,15 +223,14 @@ impl PeerSessions {
         self.peer(peer).challenge.store(challenge, Ordering::Relaxed);
     }
 
-    /// Uses up a sequence. Each is used once: a second datagram with the nonce of a first would give away what is in
-    /// both.
+    /// Uses up a sequence. Each is used once, whichever threads call this: a second datagram with the nonce of a first
+    /// would give away what is in both.
     ///
     /// # Panics
     /// If it was used before.
     pub(super) fn use_up(&self, port: Port, peer: NodeIndex, sequence: u64) {
-        let next = &self.peer(peer).sealed[port as usize];
-        assert!(sequence >= next.load(Ordering::Relaxed), "sequence {sequence} is sealed a second time");
-        next.store(sequence + 1, Ordering::Relaxed);
+        let next = self.peer(peer).sealed[port as usize].fetch_max(sequence + 1, Ordering::Relaxed);
+        assert!(sequence >= next, "sequence {sequence} is sealed a second time");
     }
 
     /// Key between two incarnations. Time is sealed to the node instead, since a joining node must read it before it is

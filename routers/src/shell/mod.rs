@@ -60,7 +60,7 @@ use rohrpost_mailbox::{CreateError, Name, Node, NodeError, Participant, monotoni
 use rx_thread::{PackageDelivery, RxSystem, RxThread};
 use sender_cache::SenderCache;
 use sending::Sending;
-use slots::SlotThread;
+use slots::{SlotParts, SlotThread};
 use socket::InSocket;
 use std::io;
 use std::os::fd::OwnedFd;
@@ -98,9 +98,6 @@ pub enum ShellError {
     /// No unused incarnation number was found.
     #[error(transparent)]
     Random(#[from] NoRandom),
-    /// Replicas with time slots, or sealed.
-    #[error("replicas are carried by networks without time slots and without seals only")]
-    Replicas,
     /// The system has no thread for it.
     #[error("a thread of the router: {0}; is the limit of processes reached (ulimit -u)?")]
     Thread(io::Error),
@@ -137,8 +134,12 @@ pub struct Shell {
     sockets: Vec<Arc<InSocket>>,
     clock: Option<Arc<ClockState>>,
     slots: Option<Arc<slots::SlotStatus>>,
+    /// With time slots: to the thread that sends in them.
+    slot_parts: Option<SyncSender<SlotParts>>,
     tunnel: Option<Arc<tunnel::Passed>>,
     replicas: ReplicaCounts,
+    /// Datagrams of replicas, where there are any.
+    replica_stats: Option<Arc<Stats>>,
     /// Where datagrams are sealed.
     peer_sessions: Option<Arc<PeerSessions>>,
     /// The clock's own thread.
@@ -240,8 +241,10 @@ impl Shell {
             sockets: vec![socket],
             clock: None,
             slots: None,
+            slot_parts: None,
             tunnel: None,
             replicas: ReplicaCounts::default(),
+            replica_stats: None,
             service: None,
             threads: Vec::new(),
             peer_sessions: all,
@@ -291,17 +294,18 @@ impl Shell {
         let table = SlotTable::new(tdma, &clock.settings.masters, settings.own, nodes, heads_bytes);
         let runtime = ClockRuntime::new(clock)?.sealed(self.peer_sessions.as_ref(), true).in_slots(table.for_clock());
         let spin_ns = spin_ns(table.cycle_ns());
-        let (answers, waiting) = sync_channel(ANSWERS);
+        let ((answers, waiting), (slot_parts, parts)) = (sync_channel(ANSWERS), sync_channel(1));
         let scheduler = SlotScheduler::new(table, spin_ns);
         let own = slots::Own {
             router: name,
             settings,
             peer_sessions: self.peer_sessions.clone(),
             answers: (waiting, self.sockets[0].clone()),
+            parts,
         };
         let counted = (self.shared.clone(), self.stats.clone());
         let slots = SlotThread::new(own, counted, inlet, runtime, scheduler);
-        (self.clock, self.slots) = (Some(slots.clock_state()), Some(slots.state()));
+        (self.clock, self.slots, self.slot_parts) = (Some(slots.clock_state()), Some(slots.state()), Some(slot_parts));
         self.begin("slots", move || slots.run())?;
         Ok(answers)
     }

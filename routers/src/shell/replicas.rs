@@ -3,11 +3,17 @@
 //! thread that receives to the one that sends through queues, and wake it.
 //!
 //! They have sockets and a port of their own, so a flood of parts takes no room in a socket, and no time of a thread,
-//! from packages. Both are scheduled like modules that are not real time. What is sent, and when, says the
+//! from packages; where datagrams are sealed, they have keys and sequences of their own ([`Port::Replicas`]). One
+//! thread seals and sends whatever leaves by that port, the other opens whatever comes: so parts may go either way, and
+//! an answer to one back. Both are scheduled like modules that are not real time. What is sent, and when, says the
 //! [driver](crate::driver); what becomes a record says [`replication`](crate::replication).
+//!
+//! With time slots the thread of the slots sends the parts, by the same port, and the first thread here only looks for
+//! the streams: that takes system calls, for which a slot has no time.
 
 use super::rx_thread::{RxSystem, RxThread};
-use super::sending::Sending;
+use super::sending::{NoPackages, Sending};
+use super::slots::SlotParts;
 use super::socket::{InSocket, REPLICA_BYTES};
 use super::threads::{Awake, Shared, schedule_below};
 use super::wire::PeerSockets;
@@ -19,15 +25,18 @@ use crate::impair;
 use crate::outbound::Outbound;
 use crate::replication::{Describe, ReplicaCounts, ReplicaReceiver, ReplicaSender, ReplicaSettings};
 use crate::report::{Deliver, NotDelivered, Report, RouterEvent};
+use crate::security::{Gate, Port, Sealing};
 use crate::settings::Settings;
 use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Name, Node, Participant, SystemClock, monotonic_ns, wait_any};
 use std::os::fd::OwnedFd;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Modules that have begun are looked for this often, ns.
 const LOOK_EVERY_NS: u64 = 500_000_000;
+/// With time slots, the end of the router is looked at this often.
+const END_EVERY: Duration = Duration::from_millis(50);
 
 /// What replicas need.
 pub struct ReplicaParts<'a> {
@@ -39,13 +48,6 @@ pub struct ReplicaParts<'a> {
     pub socket: Option<OwnedFd>,
     /// A bad network between it and its sockets.
     pub impair: Option<impair::ImpairmentSettings>,
-}
-
-/// No package goes here, so none is lost.
-pub(super) struct NoPackages;
-
-impl Report for NoPackages {
-    fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
 }
 
 /// Writes parts that come.
@@ -131,17 +133,39 @@ impl ReplicaTx {
     }
 }
 
+/// State of the thread in its place where there are time slots.
+struct StreamFinder {
+    shared: Arc<Shared>,
+    participant: Arc<Participant>,
+    describe: Arc<dyn Describe>,
+    /// The thread of the slots has it, too.
+    sender: Arc<Mutex<ReplicaSender>>,
+}
+
+impl StreamFinder {
+    /// Runs until the router ends.
+    fn run(self) {
+        let mut look_ns = 0;
+        while !self.shared.ends() {
+            // If it waited for the lock, the other would have to wake it in a slot.
+            if monotonic_ns() >= look_ns
+                && let Ok(mut sender) = self.sender.try_lock()
+            {
+                sender.look(&self.participant, &*self.describe);
+                look_ns = monotonic_ns() + LOOK_EVERY_NS;
+            }
+            std::thread::sleep(END_EVERY);
+        }
+    }
+}
+
 impl Shell {
-    /// Starts the two threads, if this node writes or has a replica. Datagrams are not sealed, and there are no time
-    /// slots: configuration checks that.
+    /// Starts the two threads, if this node writes or has a replica.
     ///
     /// # Errors
     /// [`ShellError`]
     pub fn replicate(&mut self, node: &Arc<Node>, parts: ReplicaParts<'_>) -> Result<(), ShellError> {
         let (settings, shared) = (self.settings.clone(), self.shared.clone());
-        if self.peer_sessions.is_some() || settings.tdma.is_some() {
-            return Err(ShellError::Replicas);
-        }
         let [sending, receiving] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         let sender = ReplicaSender::new(&settings, parts.replicas);
         let receiver = ReplicaReceiver::new(&settings, parts.replicas, receiving, parts.describe.clone());
@@ -151,6 +175,7 @@ impl Shell {
             return Ok(());
         }
         let stats = Stats::of_rest(&settings, &self.stats);
+        self.replica_stats = Some(stats.clone());
         let delivery = ReplicaDelivery { receiver, clock: SystemClock::open(node), sending: sending.clone() };
         self.receive_replicas(delivery, &stats, parts.socket)?;
         // No package waits in it, so it needs no room for those of modules.
@@ -159,17 +184,26 @@ impl Shell {
         if let Some(rest) = &self.rest_stats {
             outbound = outbound.yielding_to(rest);
         }
+        if let Some(all) = &self.peer_sessions {
+            outbound = outbound.sealed(all.clone());
+        }
+        let sealing = self.peer_sessions.as_ref().map(|all| Sealing::new(all, Port::Replicas));
         let port = settings.network.replica_port();
-        let wire = PeerSockets::new(&settings, port, None, parts.impair, &self.failures);
-        let tx_thread = ReplicaTx {
-            participant: sending,
-            describe: parts.describe,
-            driver: ReplicaDriver::new(&settings),
-            sender,
-            sending: Sending { outbound, answers: NoPackages, wire, rest: None },
-            clock: SystemClock::open(node),
-            shared,
-        };
+        let wire = PeerSockets::new(&settings, port, sealing, parts.impair, &self.failures);
+        let (participant, describe, clock) = (sending, parts.describe, SystemClock::open(node));
+        let sending = Sending { outbound, answers: NoPackages, wire, rest: None };
+        if let Some(slots) = self.slot_parts.take() {
+            let sender = Arc::new(Mutex::new(sender));
+            // It has room for one. If that thread has ended, the router is about to.
+            let _ = slots.try_send(SlotParts { sender: sender.clone(), sending, clock });
+            let finder = StreamFinder { shared, participant, describe, sender };
+            return self.begin("replicas-out", move || {
+                schedule_below();
+                finder.run();
+            });
+        }
+        let driver = ReplicaDriver::new(&settings);
+        let tx_thread = ReplicaTx { participant, describe, driver, sender, sending, clock, shared };
         self.begin("replicas-out", move || {
             schedule_below();
             tx_thread.run();
@@ -187,8 +221,9 @@ impl Shell {
         let own = (settings.nodes[usize::from(settings.own)].address, settings.network.replica_port()).into();
         let socket = Arc::new(InSocket::kept(kept, own, &settings.peer_addresses(), REPLICA_BYTES)?);
         self.sockets.push(socket.clone());
+        let gate = self.peer_sessions.as_ref().map(|all| Gate::without_hellos(all, Port::Replicas));
         let rx_thread = RxThread {
-            driver: RxDriver::new(&settings, stats, None).of_rest(),
+            driver: RxDriver::new(&settings, stats, gate).of_rest(),
             stats: stats.clone(),
             system: RxSystem { shared: self.shared.clone(), socket, delivery, settings, answers: None },
         };
@@ -196,6 +231,12 @@ impl Shell {
             schedule_below();
             rx_thread.run();
         })
+    }
+
+    /// Counters of datagrams, as [`stats`](Shell::stats), for replicas, which have threads and a port of their own; no
+    /// package is among them.
+    pub fn replica_stats(&self) -> Option<&Arc<Stats>> {
+        self.replica_stats.as_ref()
     }
 
     /// Counters of the replicas of this node.

@@ -114,7 +114,7 @@ impl Shell {
             settings: settings.clone(),
             answers: None,
         };
-        let driver = RxDriver::new(&settings, &stats, all.map(Gate::of_rest)).of_rest();
+        let driver = RxDriver::new(&settings, &stats, all.map(|all| Gate::without_hellos(all, Port::Rest))).of_rest();
         let rx_thread = RxThread { driver, system, stats: stats.clone() };
         self.sockets.push(socket);
         self.rest_stats = Some(stats);

@@ -21,6 +21,13 @@ pub(super) struct Sending<R = ErrorReplier> {
     pub(super) rest: Option<BatchSender>,
 }
 
+/// In the place of a replier where no package goes, so none is lost.
+pub(super) struct NoPackages;
+
+impl Report for NoPackages {
+    fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
+}
+
 impl Report for ErrorReplier {
     fn lost(&mut self, peer: Option<NodeIndex>, head: &Head, body: &[u8], cause: Cause) {
         self.answer(peer, head, body, cause, None);

@@ -35,6 +35,8 @@ pub struct TransmitWindow {
     free_ns: u64,
     /// How long the bounds assume the window busy with what was handed over, ns.
     planned_ns: u64,
+    /// What bounds do not count was handed over.
+    has_others: bool,
     datagrams: u64,
     wire_bytes: u64,
     /// When the last send call came back, local ns; 0: there was none.
@@ -54,6 +56,7 @@ impl TransmitWindow {
             wire,
             free_ns: begin_ns,
             planned_ns: 0,
+            has_others: false,
             datagrams: 0,
             wire_bytes: 0,
             returned_ns: 0,
@@ -82,6 +85,13 @@ impl TransmitWindow {
         self.wire_bytes += self.wire.bytes(datagram_bytes) as u64;
     }
 
+    /// The same for one that bounds do not count, since it leaves behind all that they promised this window. What comes
+    /// later is promised the next one, and cannot be late in this one.
+    pub(crate) fn takes_beside(&mut self, now_ns: u64, datagram_bytes: usize) {
+        self.takes(now_ns, datagram_bytes);
+        self.has_others = true;
+    }
+
     /// The send call of a datagram came back now.
     pub fn returns(&mut self, now_ns: u64) {
         self.returned_ns = now_ns;
@@ -107,7 +117,8 @@ impl TransmitWindow {
     /// late, or the thread was stalled.
     pub fn is_late(&self, now_ns: u64, datagram_bytes: usize) -> bool {
         let wire_ns = self.wire.ns(datagram_bytes);
-        self.starts_ns(now_ns).saturating_add(wire_ns) > self.reckoned_ns().saturating_add(reckoned_ns(wire_ns))
+        let reckoned_ns = self.reckoned_ns().saturating_add(reckoned_ns(wire_ns));
+        !self.has_others && self.starts_ns(now_ns).saturating_add(wire_ns) > reckoned_ns
     }
 
     /// Whether the window has less room left now than the bounds assume.

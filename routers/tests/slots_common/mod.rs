@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "each test uses a part")]
 
 pub(crate) mod capture;
+pub(crate) mod declared;
 pub(crate) mod hog;
 pub(crate) mod kept;
 pub(crate) mod own_log;

@@ -11,9 +11,11 @@ import struct
 import time
 import zlib
 
-PACKAGES, FRAGMENT, ALIVE, HELLO = 1, 2, 3, 5
+PACKAGES, FRAGMENT, ALIVE, HELLO, RECORD_PART, DESCRIPTION = 1, 2, 3, 5, 6, 7
 SALT = b"rohrpost datagrams, version 1"
-FOR_HELLO, FOR_PACKAGES = 1, 2
+# What a key is for. Ports are counted from that of packages.
+FOR_HELLO, FOR_PACKAGES, FOR_REPLICAS = 1, 2, 5
+TIME_PORT, REPLICA_PORT = 1, 3
 WORD = 0xFFFFFFFF
 
 
@@ -79,7 +81,11 @@ def derived(secret, purpose, system, sender, receiver, of_sender=0, of_receiver=
 
 class Peer:
     def __init__(self):
-        self.challenge, self.incarnation, self.key, self.hellos, self.sequence = 1, 0, b"", 0, 0
+        self.challenge, self.incarnation, self.hellos = 1, 0, 0
+        self.begin(0, {FOR_PACKAGES: b"", FOR_REPLICAS: b""})
+
+    def begin(self, incarnation, keys):
+        self.incarnation, self.keys, self.sequences = incarnation, keys, dict.fromkeys(keys, 0)
 
 
 class Node:
@@ -102,11 +108,16 @@ class Node:
         )  # fmt: skip
         sealed = cipher(key, nonce, rest)
         sealed += tag(key, nonce, head, sealed)
+        return self.checked(head + bytes(4) + sealed)
+
+    def checked(self, datagram):
+        """The same with the check that belongs to it."""
+        head, sealed = bytes(datagram[:32]), bytes(datagram[36:])
         return head + struct.pack("<I", zlib.crc32(head + sealed)) + sealed
 
-    def emit(self, to, datagram, time_port=False):
+    def emit(self, to, datagram, port=0):
         try:
-            self.socket.sendto(datagram, (self.addresses[to], self.port + time_port))
+            self.socket.sendto(datagram, (self.addresses[to], self.port + port))
         except (BlockingIOError, TimeoutError):
             pass
 
@@ -115,15 +126,15 @@ class Node:
         peer.hellos += 1
         key = derived(self.secret, FOR_HELLO, self.system, self.own, to)
         nonce = struct.pack("<QI", self.incarnation, peer.hellos)
-        rest = struct.pack("<QQQQ", challenge, answer, peer.sequence, 0)
+        rest = struct.pack("<QQQQ", challenge, answer, peer.sequences[FOR_PACKAGES], 0)
         self.emit(to, self.datagram(HELLO, to, peer.hellos, rest, key, nonce))
 
-    def seal(self, to, kind, rest):
+    def seal(self, to, kind, rest, purpose=FOR_PACKAGES):
         """A datagram that this incarnation seals to the peer's."""
         peer = self.peers[to]
-        peer.sequence += 1
-        sequence = peer.sequence - 1
-        return self.datagram(kind, to, sequence, rest, peer.key, bytes(4) + struct.pack("<Q", sequence))
+        sequence = peer.sequences[purpose]
+        peer.sequences[purpose] += 1
+        return self.datagram(kind, to, sequence, rest, peer.keys[purpose], bytes(4) + struct.pack("<Q", sequence))
 
     def send(self, to, *packages):
         self.emit(to, self.seal(to, PACKAGES, b"".join(packages)))
@@ -150,9 +161,8 @@ class Node:
         if answer == peer.challenge:
             peer.challenge = int.from_bytes(os.urandom(8), "little") | 1
             if peer.incarnation != incarnation:
-                peer.incarnation, peer.sequence = incarnation, 0
-                ends = self.system, self.own, sender
-                peer.key = derived(self.secret, FOR_PACKAGES, *ends, self.incarnation, incarnation)
+                ends = self.system, self.own, sender, self.incarnation, incarnation
+                peer.begin(incarnation, {purpose: derived(self.secret, purpose, *ends) for purpose in peer.keys})
         if challenge:
             self.hello(sender, 0 if answer else peer.challenge, challenge)
 

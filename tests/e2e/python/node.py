@@ -13,7 +13,7 @@ import time
 import zlib
 
 from attacks import Attacks
-from lan import FRAGMENT, Node
+from lan import FOR_PACKAGES, FRAGMENT, TIME_PORT, Node
 from wire import name, package
 
 
@@ -26,7 +26,7 @@ def junk(node, to):
     check = struct.pack("<I", zlib.crc32(head + body))
     for datagram in (os.urandom(200), head + bytes(4) + body, head + check + body):
         node.emit(to, datagram)
-        node.emit(to, datagram, time_port=True)
+        node.emit(to, datagram, TIME_PORT)
     return 6
 
 
@@ -48,7 +48,7 @@ def part(node, to):
     """The first of many parts of a package that never becomes whole."""
     head = package(name("1.96.0.2"), name("1.16.64.0"), -16385, 0, b"", 255)
     whole = head[:8] + struct.pack("<H", 60_000) + head[10:]
-    first = node.peers[to].sequence
+    first = node.peers[to].sequences[FOR_PACKAGES]
     node.emit(to, node.seal(to, FRAGMENT, struct.pack("<QHHI", first, 0, 50, 0) + whole + bytes(1200)))
 
 

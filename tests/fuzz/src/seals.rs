@@ -14,7 +14,6 @@ use std::sync::Arc;
 
 /// Steps of one program.
 const STEPS_MAX: usize = 300;
-const PORTS: [Port; 2] = [Port::Packages, Port::Time];
 
 pub(crate) fn run(data: &[u8]) {
     let mut bytes = Bytes(data);
@@ -31,9 +30,9 @@ struct Router {
     incarnation: u64,
     all: Arc<PeerSessions>,
     handshake: Handshake,
-    sealing: [Sealing; 2],
-    opening: [Opening; 2],
-    next: [u64; 2],
+    sealing: [Sealing; Port::ALL.len()],
+    opening: [Opening; Port::ALL.len()],
+    next: [u64; Port::ALL.len()],
     /// The step at which the peer's last incarnation began: the challenge is no older.
     drawn: usize,
     /// Places on the wire of the datagrams that it has opened.
@@ -52,10 +51,10 @@ impl Router {
             own,
             incarnation,
             handshake: Handshake::new(&all, seed),
-            sealing: PORTS.map(|port| Sealing::new(&all, port)),
-            opening: PORTS.map(|port| Opening::new(&all, port)),
+            sealing: Port::ALL.map(|port| Sealing::new(&all, port)),
+            opening: Port::ALL.map(|port| Opening::new(&all, port)),
             all,
-            next: [0; 2],
+            next: [0; Port::ALL.len()],
             drawn: step,
             opened: Vec::new(),
         }
@@ -66,7 +65,7 @@ impl Router {
 struct Sent {
     datagram: Vec<u8>,
     from: NodeIndex,
-    port: usize,
+    port: Port,
     /// Incarnations of the sender, and of the receiver that it sealed to; 0 in a hello.
     lives: (u64, u64),
     text: Vec<u8>,
@@ -107,21 +106,33 @@ impl World {
 
     fn hello(&mut self, from: NodeIndex, datagram: &[u8]) {
         let lives = (self.routers[usize::from(from)].incarnation, 0);
-        self.wire.push(Sent { datagram: datagram.to_vec(), from, port: 0, lives, text: Vec::new(), step: self.step });
+        self.wire.push(Sent {
+            datagram: datagram.to_vec(),
+            from,
+            port: Port::Packages,
+            lives,
+            text: Vec::new(),
+            step: self.step,
+        });
     }
 
     fn seal(&mut self, bytes: &mut Bytes<'_>) {
-        let (from, port, len) = (bytes.byte() % 2, usize::from(bytes.byte() % 2), usize::from(bytes.byte()));
+        let (from, at) = (bytes.byte() % 2, usize::from(bytes.byte()) % Port::ALL.len());
+        let (port, len) = (Port::ALL[at], usize::from(bytes.byte()));
         let router = &mut self.routers[usize::from(from)];
-        let kind = [FrameKind::Packages, FrameKind::Sync][port];
-        let (incarnation, sequence) = (router.incarnation, router.next[port]);
+        let kind = match port {
+            Port::Packages | Port::Rest => FrameKind::Packages,
+            Port::Time => FrameKind::Sync,
+            Port::Replicas => FrameKind::RecordPart,
+        };
+        let (incarnation, sequence) = (router.incarnation, router.next[at]);
         let head = FrameHead { kind, system: 1, from, to: 1 - from, digest: 7, incarnation, sequence };
         let text = vec![bytes.byte(); len];
         let mut datagram = [&[0; HEAD_BYTES], &text[..], &[0; TAG_BYTES]].concat();
         // Gaps, too.
-        router.next[port] += 1 + u64::from(bytes.byte() / 64) * 400;
+        router.next[at] += 1 + u64::from(bytes.byte() / 64) * 400;
         let known = router.all.incarnation(1 - from);
-        assert_eq!(router.sealing[port].seal(&head, &mut datagram).is_ok(), known.is_some());
+        assert_eq!(router.sealing[at].seal(&head, &mut datagram).is_ok(), known.is_some());
         if let Some(to) = known {
             let lives = (router.incarnation, to);
             self.wire.push(Sent { datagram, from, port, lives, text, step: self.step });
@@ -135,11 +146,11 @@ impl World {
         let known = router.all.incarnation(sent.from);
         let mut datagram = sent.datagram.clone();
         let mut room = [0; HELLO_DATAGRAM_BYTES];
-        let answer = match router.opening[sent.port].open(&mut datagram) {
+        let answer = match router.opening[sent.port as usize].open(&mut datagram) {
             Ok(Opened::Frame(head, text)) => {
                 assert_eq!(sent.lives.0, head.incarnation, "of this incarnation");
                 // Time is sealed to a node, so any incarnation of it opens it.
-                assert!(sent.port == 1 || sent.lives.1 == router.incarnation, "to this incarnation");
+                assert!(sent.port == Port::Time || sent.lives.1 == router.incarnation, "to this incarnation");
                 assert_eq!((known, text), (Some(head.incarnation), &sent.text[..]));
                 assert!(!router.opened.contains(&place), "it was opened before");
                 router.opened.push(place);

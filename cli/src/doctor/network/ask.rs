@@ -24,11 +24,15 @@ const ATF_COM: u32 = 0x2;
 pub(in crate::doctor) fn ask(installation: &Installation, node: &NodeConfig) -> Option<LanView> {
     let (network, address) = (installation.network?, node.address?);
     let is_here = UdpSocket::bind((address, 0)).is_ok();
-    let more = [installation.rest_port(), installation.replica_port()];
-    let ports = [network.port, network.time_port()].into_iter().chain(more.into_iter().flatten());
-    let ports = ports
-        .map(|number| Port { number, state: if is_here { try_port(address, number) } else { PortState::Unknown } })
-        .collect();
+    let ports = [
+        ("port of packages", Some(network.port)),
+        ("port of time", Some(network.time_port())),
+        ("port of the rest", installation.rest_port()),
+        ("port of replicas", installation.replica_port()),
+    ];
+    let state = |number| if is_here { try_port(address, number) } else { PortState::Unknown };
+    let port = |(what, number): (_, Option<u16>)| number.map(|number| Port { what, number, state: state(number) });
+    let ports = ports.into_iter().filter_map(port).collect();
     let launched =
         Node::open(&node_directory(&installation.name, &node.name)).is_ok_and(|node| node.launcher().is_some());
     let others = installation.nodes.iter().filter(|other| other.name != node.name);

@@ -50,11 +50,7 @@ fn address(lan: &LanView, from: &str) -> Finding {
 }
 
 fn port(lan: &LanView, port: &Port, from: &str) -> Finding {
-    let what = match lan.ports.iter().position(|known| known.number == port.number) {
-        Some(0) => "port of packages",
-        Some(1) => "port of time",
-        _ => "port of the rest",
-    };
+    let what = port.what;
     let why = "the node's router takes datagrams there; a firewall must let them in from all nodes";
     let number = port.number;
     match &port.state {

@@ -50,10 +50,12 @@ mod switch {
         SaysNothing,
         /// Slot time and the computers' clocks have the same rate.
         ForgetsBend,
+        /// What slots leave for parts of replicas is what they carry in all.
+        ForgetsFlows,
     }
 
     impl Mistake {
-        pub(crate) const ALL: [Self; 9] = [
+        pub(crate) const ALL: [Self; 10] = [
             Self::CatchesTheSlot,
             Self::WastesNothing,
             Self::ForgetsOwn,
@@ -63,6 +65,7 @@ mod switch {
             Self::OneSlotFirst,
             Self::SaysNothing,
             Self::ForgetsBend,
+            Self::ForgetsFlows,
         ];
     }
 

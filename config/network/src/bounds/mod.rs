@@ -2,7 +2,8 @@
 //! bounds" derives them.
 //!
 //! A bound covers the time from publishing, into the mailbox of the node's router, to the arrival of the last bit at
-//! the other computer. It holds under these conditions: flows send no more than they declare; nothing else is sent at
+//! the other computer. Parts of replicas leave behind all packages, and so are in no bound; what slots leave for them is
+//! reckoned with the same work and the same room. A bound holds under these conditions: flows send no more than they declare; nothing else is sent at
 //! their priority or above (tools, calls and replies included); no slot is left out; nothing is lost; every slot begins
 //! at most [`LATE`] late. The time in which a process wakes up and reads is not included.
 
@@ -14,7 +15,7 @@ mod simulation;
 mod tests;
 
 use crate::link::Link;
-use crate::plan::{Plan, PlannedFlow};
+use crate::plan::{Plan, PlannedFlow, PlannedReplica};
 use crate::setup::LEVEL_NOT_REAL_TIME;
 use crate::sizes::{BEND_MAX_PER, RATE_MAX_PER};
 use crate::table::{LATE, Tdma, TimeSlot, cycles};
@@ -111,6 +112,20 @@ impl Plan {
             worst(tdma, &self.link, &own, &others)
         };
         Some(FlowBound { flow, level, latency })
+    }
+
+    /// Parts of replicas, of full length, that the slots of a node carry in a second behind all of its flows, for sure,
+    /// in thousandths.
+    pub fn parts_left(&self, tdma: &Tdma, node: u8) -> u64 {
+        let own = self.flows.iter().flatten().filter(|flow| flow.node == node);
+        let streams: Vec<_> = own.map(|flow| flow.stream(&self.link)).collect();
+        supply(tdma, &self.link, node).leaves(&streams, self.link.largest_ns())
+    }
+
+    /// The least time in which a record of full size leaves, to all nodes that have the replica.
+    pub fn record_least(&self, tdma: &Tdma, replica: &PlannedReplica) -> Duration {
+        let supply = supply(tdma, &self.link, replica.node);
+        Duration::from_nanos(supply.least_ns(replica.parts(&self.link), self.link.largest_ns()))
     }
 }
 

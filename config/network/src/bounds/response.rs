@@ -165,6 +165,36 @@ impl Supply {
         let said_ns = if mistake!(SaysNothing) { 0 } else { self.said_ns + self.late_ns };
         self.sends_ns(index).saturating_sub(said_ns)
     }
+
+    /// The least that a slot carries while something waits. No datagram takes longer than `largest_ns`.
+    fn carries(&self, index: usize, largest_ns: u64) -> Work {
+        let room_ns = self.room_ns(index);
+        let wasted_ns = if mistake!(WastesNothing) { 0 } else { largest_ns - 1 };
+        Work { ns: room_ns.saturating_sub(wasted_ns), datagrams: room_ns / largest_ns }
+    }
+
+    /// The same of all slots in a second, in thousandths.
+    fn carries_a_second(&self, largest_ns: u64) -> Work {
+        let carried = (0..self.windows.len()).map(|index| self.carries(index, largest_ns)).sum();
+        a_second(carried, self.repeats_ns + self.bent_by_ns(self.repeats_ns), std::ops::Div::div)
+    }
+
+    /// Datagrams of the largest size that the slots carry in a second behind all packages of these streams, in
+    /// thousandths: as many as their time or their number leaves for sure.
+    pub(crate) fn leaves(&self, streams: &[Stream], largest_ns: u64) -> u64 {
+        let carried = self.carries_a_second(largest_ns);
+        let asked = if mistake!(ForgetsFlows) { Work::default() } else { asked_a_second(streams.iter()) };
+        let by_time = carried.ns.saturating_sub(asked.ns) / largest_ns;
+        by_time.max(carried.datagrams.saturating_sub(asked.datagrams))
+    }
+
+    /// The least time in which so many datagrams of the largest size leave, if nothing else does, ns.
+    pub(crate) fn least_ns(&self, datagrams: u64, largest_ns: u64) -> u64 {
+        let a_round: u64 = (0..self.windows.len()).map(|index| self.ends_ns(index) / largest_ns).sum();
+        let rounds = datagrams.saturating_sub(1) / a_round.max(1);
+        let left = datagrams - rounds * a_round;
+        rounds * (self.repeats_ns - self.bent_by_ns(self.repeats_ns)) + left * largest_ns
+    }
 }
 
 impl Stream {
@@ -204,6 +234,11 @@ fn a_second(work: Work, period_ns: u64, divide: impl Fn(u128, u128) -> u128) -> 
     Work { ns: thousandths(work.ns), datagrams: thousandths(work.datagrams) }
 }
 
+/// What streams ask for in a second, in thousandths.
+fn asked_a_second<'s>(streams: impl Iterator<Item = &'s Stream>) -> Work {
+    streams.map(|stream| a_second(stream.work(1), stream.period_ns, u128::div_ceil)).sum()
+}
+
 struct Analysis<'a> {
     supply: &'a Supply,
     own: &'a Stream,
@@ -231,9 +266,7 @@ impl Analysis<'_> {
 
     /// The least that a slot of a chain carries.
     fn carries(&self, index: usize) -> Work {
-        let room_ns = self.supply.room_ns(index);
-        let wasted_ns = if mistake!(WastesNothing) { 0 } else { self.largest_ns - 1 };
-        Work { ns: room_ns.saturating_sub(wasted_ns), datagrams: room_ns / self.largest_ns }
+        self.supply.carries(index, self.largest_ns)
     }
 
     /// The most that may be left of work after some was carried, ns.
@@ -244,15 +277,11 @@ impl Analysis<'_> {
 
     /// Whether the capacity suffices in the long run.
     fn validate(&self) -> Result<(), Never> {
-        let count = self.supply.windows.len();
-        let carried: Work = (0..count).map(|index| self.carries(index)).sum();
+        let carried = self.supply.carries_a_second(self.largest_ns);
         if carried.datagrams == 0 {
             return Err(Never::NoRoom);
         }
-        let asked = self.streams().map(|stream| a_second(stream.work(1), stream.period_ns, u128::div_ceil));
-        let asked: Work = asked.sum();
-        let repeats_ns = self.supply.repeats_ns + self.supply.bent_by_ns(self.supply.repeats_ns);
-        let carried = a_second(carried, repeats_ns, std::ops::Div::div);
+        let asked = asked_a_second(self.streams());
         if asked.ns >= carried.ns && asked.datagrams >= carried.datagrams {
             return Err(Never::Overload { asked_ns_s: asked.ns / 1000, carried_ns_s: carried.ns / 1000 });
         }

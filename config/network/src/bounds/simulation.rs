@@ -35,6 +35,8 @@ pub(super) struct Play {
     pub(super) seed: u64,
     /// Packages that come during a slot may leave in it.
     pub(super) looks_again: bool,
+    /// Behind the packages parts of replicas leave, of the longest datagrams; there are always some.
+    pub(super) replicas: bool,
     /// Rounds of the table.
     pub(super) rounds: u64,
 }
@@ -49,6 +51,14 @@ impl Play {
             _ => system_ns,
         }
     }
+}
+
+/// What happened in a run.
+pub(super) struct Played {
+    /// The longest time from publishing to the end of the last datagram, by stream.
+    pub(super) worst: Vec<u64>,
+    /// Parts of replicas that left.
+    pub(super) parts: u64,
 }
 
 struct Waiting {
@@ -86,12 +96,12 @@ impl System {
         datagrams
     }
 
-    /// The longest time from publishing to the end of the last datagram, by stream.
-    pub(super) fn play(&self, play: Play) -> Vec<u64> {
+    /// Runs.
+    pub(super) fn play(&self, play: Play) -> Played {
         let mut draw = Draw(play.seed);
         let mut published = self.published(play, &mut draw);
         published.reverse();
-        let (mut waiting, mut worst) = (Vec::<Waiting>::new(), vec![0; self.flows.len()]);
+        let (mut waiting, mut worst, mut parts) = (Vec::<Waiting>::new(), vec![0; self.flows.len()], 0);
         // The first round has begun when the first packages come.
         for round in 0..play.rounds {
             for window in &self.supply.windows {
@@ -99,14 +109,14 @@ impl System {
                 let local_ns = |system_ns| play.local_ns(&self.supply, system_ns);
                 let sends_ns = local_ns(begin_ns + window.sends_ns) - local_ns(begin_ns);
                 let here = Window { begin_ns: local_ns(begin_ns), sends_ns, ..*window };
-                self.slot(play, &here, &mut draw, &mut published, &mut waiting, &mut worst);
+                parts += self.slot(play, &here, &mut draw, &mut published, &mut waiting, &mut worst);
             }
         }
         let end_ns = play.local_ns(&self.supply, play.rounds * self.supply.repeats_ns);
         for late in waiting {
             worst[late.flow] = worst[late.flow].max(end_ns - late.published_ns);
         }
-        worst
+        Played { worst, parts }
     }
 
     /// All packages by time; of those at one time the last stream's first, so that the first stream has all others
@@ -127,6 +137,7 @@ impl System {
         all
     }
 
+    /// How many parts of replicas leave in it.
     fn slot(
         &self,
         play: Play,
@@ -135,7 +146,8 @@ impl System {
         published: &mut Vec<(u64, usize)>,
         waiting: &mut Vec<Waiting>,
         worst: &mut [u64],
-    ) {
+    ) -> u64 {
+        let mut replicated = 0;
         let mut now_ns = begin_ns + draw.most(self.supply.late_ns) + draw.most(self.supply.said_ns);
         let guard_ns = begin_ns + sends_ns;
         let mut takes_until_ns = begin_ns.saturating_sub(draw.most(self.supply.taken_before_ns));
@@ -146,17 +158,26 @@ impl System {
                 waiting.push(Waiting { flow, published_ns, left_ns: self.flows[flow].size_ns, parts });
                 waiting.sort_by_key(|package| self.flows[package.flow].level);
             }
-            let Some(head) = waiting.first() else { break };
+            let fits = |head: &&Waiting| now_ns + self.datagram_ns(head.left_ns.min(self.part_ns())) <= guard_ns;
+            let Some(head) = waiting.first().filter(fits) else {
+                if !play.replicas || now_ns + self.most_ns > guard_ns {
+                    break;
+                }
+                now_ns += self.most_ns;
+                replicated += 1;
+                if play.looks_again {
+                    takes_until_ns = takes_until_ns.max(now_ns);
+                }
+                continue;
+            };
             let peer = self.flows[head.flow].peer;
             let mut size_ns = head.left_ns.min(self.part_ns());
-            if now_ns + self.datagram_ns(size_ns) > guard_ns {
-                break;
-            }
             let mut inside = vec![0];
             if !head.parts {
                 size_ns = self.company(peer, size_ns, guard_ns - now_ns, waiting, &mut inside);
             }
-            let is_filled = !waiting[0].parts && inside.len() == waiting.len() && draw.below(2) == 0;
+            let is_alone = !play.replicas && !waiting[0].parts;
+            let is_filled = is_alone && inside.len() == waiting.len() && draw.below(2) == 0;
             let filled_ns = if is_filled { self.part_ns() } else { size_ns };
             // Packages of a lower level, if nothing else is to leave.
             let takes_ns = self.datagram_ns(filled_ns).min(guard_ns - now_ns).max(self.datagram_ns(size_ns));
@@ -173,6 +194,7 @@ impl System {
                 takes_until_ns = takes_until_ns.max(now_ns);
             }
         }
+        replicated
     }
 
     /// Packages in the same datagram as the first that waits: to the same peer, and not less important than those that

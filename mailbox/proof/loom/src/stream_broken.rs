@@ -13,6 +13,8 @@ pub(crate) const MODELS: &[(&str, usize)] = &[
     ("a_successor_counts_what_was_finished", 2),
     ("a_successor_goes_round_what_is_held", 3),
     ("no_half_record_is_left", 3),
+    ("the_writer_goes_round_what_is_held_and_left_out", 3),
+    ("a_successor_leaves_out_the_rest", 2),
     ("a_dead_holder_costs_nothing", 2),
     ("no_wake_up_is_lost", 3),
     ("a_final_answer_stays", 2),
@@ -191,9 +193,30 @@ pub(crate) const BROKEN: &[Broken] = &[
     ),
     broken(
         "stream_resume_counts_nothing",
-        &[writing("if let Look::There(_) = ring.look(next) {", "if false {")],
+        &[writing("let next = named_end(ring, counted);", "let next = counted;")],
         "a_successor_counts_what_was_finished",
         LOST,
+    ),
+    broken(
+        "stream_resume_leaves_half_left_out",
+        &[writing("                leave_out(ring, sequence, newest);\n", "                let _ = sequence;\n")],
+        "a_successor_leaves_out_the_rest",
+        "a reader waits for what was left out",
+    ),
+    broken(
+        "stream_no_fence_e_for_what_is_left_out",
+        &[writing(
+            "when one of these frames is claimed.\n        seq_cst_accesses();",
+            "when one of these frames is claimed.",
+        )],
+        "the_writer_goes_round_what_is_held_and_left_out",
+        RACE,
+    ),
+    broken(
+        "stream_leaves_out_and_frees_at_once",
+        &[writing("leave_out(ring, left_out, self.newest)", "ring.entry(left_out).named_frame(ring.frames())")],
+        "the_writer_goes_round_what_is_held_and_left_out",
+        TORN,
     ),
     // ---- sleep ----
     broken(

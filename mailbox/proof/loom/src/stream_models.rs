@@ -264,6 +264,41 @@ pub(crate) fn a_successor_goes_round_what_is_held() {
     a_writer_dies("entry: filled", 2, Bytes::Plain);
 }
 
+/// The writer of a replica leaves out more records than are kept, and then writes into what that made free.
+pub(crate) fn the_writer_goes_round_what_is_held_and_left_out() {
+    let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
+    let writer = {
+        let stream = stream.clone();
+        thread::spawn(move || {
+            progress.skip_to(&stream.ring(), 5);
+            stream.writes(&mut progress, 2, Bytes::Plain);
+        })
+    };
+    stream.read(0, &lines[0], Bytes::Plain);
+    writer.join().unwrap();
+    Reader::new(&stream, 0).settle(7, Bytes::Plain);
+}
+
+/// It dies at the first that it leaves out, and its successor writes in front of a reader that holds what was before.
+pub(crate) fn a_successor_leaves_out_the_rest() {
+    let (stream, mut progress, lines) = looked_at(1, Bytes::Plain);
+    let successor = {
+        let stream = stream.clone();
+        thread::spawn(move || {
+            assert!(dies_at("entry: published", || progress.skip_to(&stream.ring(), 5)));
+            let mut progress = Progress::resume(&stream.ring());
+            assert_eq!(progress.next(), 4, "what was left out is not");
+            let mut reader = Reader::new(&stream, 0);
+            reader.next = 2;
+            assert!(reader.advance(Bytes::Racing), "a reader waits for what was left out");
+            stream.writes(&mut progress, 1, Bytes::Plain);
+        })
+    };
+    stream.read(0, &lines[0], Bytes::Plain);
+    successor.join().unwrap();
+    Reader::new(&stream, 0).settle(5, Bytes::Plain);
+}
+
 /// A reader of a stream with a writer that died in the middle does not see its half entry.
 pub(crate) fn no_half_record_is_left() {
     let stream = Stream::new(2, 1);

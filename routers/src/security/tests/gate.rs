@@ -226,6 +226,38 @@ fn what_is_longer_than_any_of_ours_is_not_opened() {
     assert_eq!((rejected(Rejection::NotOurs), rejected(Rejection::Forged)), (1, 1));
 }
 
+/// Other ports than that of packages, with keys, windows and counters of their own: hellos are neither said nor taken.
+#[test]
+fn another_port_opens_what_is_sealed_for_it_and_counts_the_rest_for_itself() {
+    for port in [Port::Rest, Port::Replicas] {
+        let (mut a, mut b) = (Router::new(0), Router::new(1));
+        acquaint_at(START, &mut a, &mut b);
+        b.gate = Gate::without_hellos(&b.all, port);
+        assert_eq!(b.ask(START + 10 * S), []);
+        let sealed = sealed_alive(&mut Sealing::new(&a.all, port), 0);
+        let for_packages = sealed_alive(&mut Sealing::new(&a.all, Port::Packages), 1);
+        let hello = a.ask(START + S).swap_remove(0).1;
+        let mut unsealed = sealed.clone();
+        unsealed[7] = 0;
+        for (from, datagram, why) in [
+            (2, &sealed, Some(Rejection::Address)),
+            (0, &sealed, None),
+            (0, &sealed, Some(Rejection::Replay)),
+            (0, &for_packages, Some(Rejection::Forged)),
+            (0, &hello, Some(Rejection::NotOurs)),
+            (0, &checked(unsealed), Some(Rejection::Unsealed)),
+        ] {
+            assert_eq!(b.take(START + S, from, datagram), None);
+            let all = Rejection::ALL.map(|why| b.all.rejections(port).of(Some(from), why));
+            assert_eq!(why.map_or(1, |why| all[why as usize]), 1, "{port:?}, {why:?}: {all:?}");
+        }
+        assert_eq!(b.end.stats.peer(0).received.datagrams.get(), 1, "{port:?}");
+        let elsewhere = Port::ALL.into_iter().filter(|other| *other != port);
+        let counted = elsewhere.flat_map(|other| Rejection::ALL.map(|why| b.all.rejections(other).of(Some(0), why)));
+        assert_eq!(counted.sum::<u64>(), 0);
+    }
+}
+
 /// An attacker that reads all datagrams, and is faster than the peers.
 #[test]
 fn what_is_brought_from_a_wrong_address_is_not_used_up_by_that() {

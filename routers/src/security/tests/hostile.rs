@@ -26,8 +26,8 @@ impl Hostile {
         match self.below(8) {
             // As it was.
             0 => return (port, datagram),
-            // At the other port.
-            1 => return (if port == Port::Time { Port::Packages } else { Port::Time }, datagram),
+            // At another port.
+            1 => return (Port::ALL[(port as usize + 1 + self.below(Port::ALL.len() - 1)) % Port::ALL.len()], datagram),
             // Some bits flipped.
             2 => {
                 for _ in 0..=self.below(3) {
@@ -80,7 +80,7 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
         hostile.recorded.extend(acquaint(&mut a, &mut b).into_iter().map(|hello| (Port::Packages, hello)));
         hostile.recorded.push((Port::Packages, a.ask(1)));
         for n in 0..50 {
-            let port = [Port::Packages, Port::Time][n % 2];
+            let port = Port::ALL[n % Port::ALL.len()];
             hostile.recorded.push((port, a.seal(port, 1, &[n as u8; 70]).unwrap()));
             hostile.recorded.push((port, b.seal(port, 0, &[n as u8; 72]).unwrap()));
         }
@@ -108,7 +108,7 @@ fn of_what_was_recorded_and_altered_nothing_is_taken() {
         }
         if number % TRUTH_EVERY == 0 {
             assert_eq!([&a, &b].map(beliefs), before, "after datagram {number}");
-            for port in [Port::Packages, Port::Time] {
+            for port in Port::ALL {
                 let (there, back) = (a.seal(port, 1, b"there").unwrap(), b.seal(port, 0, b"back").unwrap());
                 assert!(b.open(port, &there).is_ok() && a.open(port, &back).is_ok(), "after datagram {number}");
                 hostile.recorded.extend([(port, there), (port, back)]);

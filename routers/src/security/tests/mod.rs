@@ -35,9 +35,9 @@ pub(super) struct Router {
     pub(super) all: Arc<PeerSessions>,
     pub(super) handshake: Handshake,
     /// By port.
-    pub(super) sealing: [Sealing; 3],
-    pub(super) opening: [Opening; 3],
-    pub(super) next: [u64; 3],
+    pub(super) sealing: [Sealing; Port::ALL.len()],
+    pub(super) opening: [Opening; Port::ALL.len()],
+    pub(super) next: [u64; Port::ALL.len()],
 }
 
 impl Router {
@@ -56,7 +56,7 @@ impl Router {
             handshake: Handshake::new(&all, seed),
             sealing: Port::ALL.map(|port| Sealing::new(&all, port)),
             opening: Port::ALL.map(|port| Opening::new(&all, port)),
-            next: [0; 3],
+            next: [0; Port::ALL.len()],
             all,
         }
     }
@@ -68,7 +68,11 @@ impl Router {
     }
 
     pub(super) fn head(&self, port: Port, to: NodeIndex, sequence: u64) -> FrameHead {
-        let kind = if port == Port::Time { FrameKind::Sync } else { FrameKind::Packages };
+        let kind = match port {
+            Port::Packages | Port::Rest => FrameKind::Packages,
+            Port::Time => FrameKind::Sync,
+            Port::Replicas => FrameKind::RecordPart,
+        };
         FrameHead { kind, system: SYSTEM, from: self.own, to, digest: DIGEST, incarnation: self.incarnation, sequence }
     }
 

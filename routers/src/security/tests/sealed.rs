@@ -53,7 +53,7 @@ fn each_opens_once_in_whatever_order_within_the_window() {
 }
 
 #[test]
-fn what_is_for_another_node_port_or_incarnation_does_not_open() {
+fn what_is_for_another_node_or_incarnation_does_not_open() {
     let (mut a, mut b) = pair();
     let mut c = Router::new(2, 300);
     acquaint(&mut c, &mut a);
@@ -64,9 +64,6 @@ fn what_is_for_another_node_port_or_incarnation_does_not_open() {
     let mut readdressed = for_b.clone();
     readdressed[6] = 2;
     assert_eq!(c.open(Port::Packages, &checked(readdressed)), rejected(Rejection::Forged));
-    for port in [Port::Time, Port::Rest] {
-        assert_eq!(b.open(port, &for_b), rejected(Rejection::Forged), "at another port");
-    }
     let mut later = Router::new(1, 201);
     acquaint(&mut a, &mut later);
     assert_eq!(
@@ -104,7 +101,7 @@ fn no_two_derived_keys_are_the_same() {
     let mut seen = BTreeSet::new();
     let mut number = 0;
     for place in [0, 1] {
-        for purpose in [Purpose::Hello, Purpose::Packages, Purpose::Time, Purpose::Rest] {
+        for purpose in [Purpose::Hello].into_iter().chain(Port::ALL.map(Port::purpose)) {
             for (system, from, from_incarnation, to, to_incarnation) in [
                 (1, 0, 5, 1, 6),
                 (2, 0, 5, 1, 6),
@@ -139,6 +136,40 @@ fn a_sequence_is_never_sealed_twice() {
 }
 
 #[test]
+fn what_is_sealed_for_a_port_opens_there_and_at_no_other() {
+    for port in Port::ALL {
+        let (mut a, mut b) = pair();
+        let [there, back] = [a.seal(port, 1, b"text").unwrap(), b.seal(port, 0, b"text").unwrap()];
+        for (router, sealed) in [(&mut b, &there), (&mut a, &back)] {
+            for other in Port::ALL.into_iter().filter(|other| *other != port) {
+                let opened = router.open(other, sealed);
+                assert_eq!(opened, Err(Rejection::Forged.into()), "sealed for {port:?}, brought to {other:?}");
+            }
+            assert_eq!(router.open(port, sealed).unwrap().1, b"text");
+            assert_eq!(router.open(port, sealed), Err(Rejection::Replay.into()));
+        }
+    }
+}
+
+/// Each port has one thread that seals. If it had two, one would end, and no nonce would serve twice.
+#[test]
+fn of_two_threads_that_seal_at_a_port_none_uses_a_sequence_of_the_other() {
+    let (a, _) = pair();
+    let begin = std::sync::Barrier::new(2);
+    let used = || {
+        begin.wait();
+        let uses = |sequence: &u64| {
+            let use_up = || a.all.use_up(Port::Replicas, 1, *sequence);
+            std::panic::catch_unwind(std::panic::AssertUnwindSafe(use_up)).is_ok()
+        };
+        (0..2000).filter(uses).collect::<BTreeSet<u64>>()
+    };
+    let [one, other] = std::thread::scope(|scope| [scope.spawn(used), scope.spawn(used)].map(|it| it.join().unwrap()));
+    assert!(one.is_disjoint(&other));
+    assert_eq!(one.union(&other).max(), Some(&1999), "the last is used by one of them");
+}
+
+#[test]
 fn what_is_not_taken_is_counted_by_cause_and_told_once_a_second() {
     let (a, _) = pair();
     let counts = a.all.rejections(Port::Packages);
@@ -160,33 +191,35 @@ fn what_could_not_be_sent_can_be_read_again_in_any_later_incarnation() {
     assert_eq!(&datagram[HEAD_BYTES..][..9], b"a package");
 }
 
-/// At the port of what is not real time no hello says what comes first; still nothing is opened twice, also when an
-/// incarnation begins again, and when another was taken for its successor meanwhile.
+/// At some ports no hello says what comes first; still nothing is opened twice there, also when an incarnation begins
+/// again, and when another was taken for its successor meanwhile.
 #[test]
-fn what_is_not_real_time_opens_once_however_often_its_incarnation_begins() {
-    let (mut a, mut b) = pair();
-    let seal = |a: &mut Router| a.seal(Port::Rest, 1, b"text").unwrap();
-    let early = seal(&mut a);
-    let datagrams: Vec<_> = (0..5).map(|_| seal(&mut a)).collect();
-    for datagram in &datagrams {
-        assert!(b.open(Port::Rest, datagram).is_ok());
-    }
-    assert_eq!(b.opening[Port::Rest as usize].first(0), 1, "what it sent before is not missed");
-    assert!(b.open(Port::Rest, &early).is_ok(), "it was reordered");
-    let again = |a: &mut Router, b: &mut Router, why: &str| {
-        for datagram in datagrams.iter().chain([&early]) {
-            assert_eq!(b.open(Port::Rest, datagram), Err(Rejection::Replay.into()), "{why}");
+fn where_no_hello_says_what_comes_first_all_opens_once_however_often_its_incarnation_begins() {
+    for port in [Port::Rest, Port::Replicas] {
+        let (mut a, mut b) = pair();
+        let seal = |a: &mut Router| a.seal(port, 1, b"text").unwrap();
+        let early = seal(&mut a);
+        let datagrams: Vec<_> = (0..5).map(|_| seal(&mut a)).collect();
+        for datagram in &datagrams {
+            assert!(b.open(port, datagram).is_ok());
         }
-        let next = a.seal(Port::Rest, 1, b"text").unwrap();
-        assert!(b.open(Port::Rest, &next).is_ok(), "{why}");
-    };
-    again(&mut a, &mut b, "the same incarnation");
-    acquaint(&mut a, &mut b);
-    again(&mut a, &mut b, "it is greeted again");
-    let mut other = Router::new(0, 101);
-    acquaint(&mut other, &mut b);
-    let of_other = other.seal(Port::Rest, 1, b"text").unwrap();
-    assert!(b.open(Port::Rest, &of_other).is_ok());
-    acquaint(&mut a, &mut b);
-    again(&mut a, &mut b, "another was taken for its successor");
+        assert_eq!(b.opening[port as usize].first(0), 1, "what it sent before is not missed");
+        assert!(b.open(port, &early).is_ok(), "it was reordered");
+        let again = |a: &mut Router, b: &mut Router, why: &str| {
+            for datagram in datagrams.iter().chain([&early]) {
+                assert_eq!(b.open(port, datagram), Err(Rejection::Replay.into()), "{port:?}: {why}");
+            }
+            let next = a.seal(port, 1, b"text").unwrap();
+            assert!(b.open(port, &next).is_ok(), "{port:?}: {why}");
+        };
+        again(&mut a, &mut b, "the same incarnation");
+        acquaint(&mut a, &mut b);
+        again(&mut a, &mut b, "it is greeted again");
+        let mut other = Router::new(0, 101);
+        acquaint(&mut other, &mut b);
+        let of_other = other.seal(port, 1, b"text").unwrap();
+        assert!(b.open(port, &of_other).is_ok());
+        acquaint(&mut a, &mut b);
+        again(&mut a, &mut b, "another was taken for its successor");
+    }
 }

@@ -6,10 +6,12 @@
 
 mod intake;
 mod messages;
+mod parts;
 mod scheduling;
 mod sleep;
 mod state;
 
+pub(super) use parts::SlotParts;
 pub use scheduling::ActualScheduling;
 pub use state::{SlotSnapshot, SlotStatus};
 
@@ -42,6 +44,8 @@ pub(super) struct Own {
     pub(super) peer_sessions: Option<Arc<PeerSessions>>,
     /// What the thread that receives wants to have sent, and the socket by which it leaves.
     pub(super) answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
+    /// Where parts of replicas come from, if the node writes any: that is said once this thread runs.
+    pub(super) parts: mpsc::Receiver<SlotParts>,
 }
 
 /// State of the thread.
@@ -59,6 +63,8 @@ struct System {
     transit: Receiver,
     sending: Sending,
     answers: (mpsc::Receiver<Answer>, Arc<InSocket>),
+    parts: Option<SlotParts>,
+    parts_come: mpsc::Receiver<SlotParts>,
     settings: Arc<Settings>,
     router: Name,
     snapshot: SlotSnapshot,
@@ -77,9 +83,22 @@ impl SlotThread {
         let TransitInlet { transit, sending } = inlet;
         let snapshot = SlotSnapshot::new(scheduler.silent());
         let state = Arc::new(SlotStatus::new(snapshot));
-        let Own { router, settings, peer_sessions, answers } = own;
+        let Own { router, settings, peer_sessions, answers, parts: parts_come } = own;
         let driver = SlotDriver::new(&settings, peer_sessions.as_ref(), scheduler, monotonic_ns());
-        let system = System { shared, stats, clock, transit, sending, answers, settings, router, snapshot, state };
+        let system = System {
+            shared,
+            stats,
+            clock,
+            transit,
+            sending,
+            answers,
+            parts: None,
+            parts_come,
+            settings,
+            router,
+            snapshot,
+            state,
+        };
         Self { driver, system }
     }
 
@@ -160,6 +179,18 @@ impl Platform for System {
 
     fn tidy(&mut self, now_ns: u64) {
         self.sending.deliver(now_ns);
+        if self.parts.is_none() {
+            self.parts = self.parts_come.try_recv().ok();
+        }
+        self.parts.iter_mut().for_each(|parts| _ = parts.sending.deliver(now_ns));
+    }
+
+    fn next_part(&mut self, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
+        self.parts.as_mut()?.next(datagram)
+    }
+
+    fn send_part(&mut self, to: NodeIndex, buffer: &mut [u8], bytes: usize) {
+        self.parts.iter_mut().for_each(|parts| parts.send(to, buffer, bytes));
     }
 
     fn publish(&mut self, scheduler: &SlotScheduler, log: &WindowLog) {

@@ -26,7 +26,8 @@ const LARGE_BYTES_MAX: u64 = 12_000;
 const HEADS_BYTES: u64 = 100;
 
 impl Plan {
-    /// The declared flows come first; behind them one flood for each node, of the lowest level.
+    /// The declared flows come first; behind them one flood for each node, of the lowest level, and in every other
+    /// network a replica without end.
     pub fn declared(seed: u64) -> Self {
         let mut plan = Self::small_slotted(seed);
         let mut chance = Chance::new(seed ^ 0xf10);
@@ -50,6 +51,7 @@ impl Plan {
         if let Some(slots) = &mut plan.slots {
             (slots.late_ppm, slots.still_ppm, slots.divisions) = (0, 0, Divisions::default());
             slots.oversleeps_percent = chance.pick(&[0, 20, 100]);
+            slots.replicates = seed % 2 == 1;
         }
         plan
     }

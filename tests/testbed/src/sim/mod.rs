@@ -17,6 +17,7 @@ mod edited;
 pub mod events;
 pub mod fault;
 mod faults;
+pub mod flood;
 pub mod host;
 pub mod link;
 pub mod lives;

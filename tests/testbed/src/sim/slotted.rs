@@ -2,6 +2,7 @@
 //! thread, on a simulated platform, and watched.
 
 use super::clock::Now;
+use super::flood::{self, PartFlood};
 use super::packages::{Packages, TransitAdapter};
 use super::promise::Promise;
 use super::spans::RECOVERY_NS;
@@ -27,6 +28,7 @@ pub struct Slotted {
     packages: Packages,
     time: Ticking,
     driver: SlotDriver,
+    flood: PartFlood,
     watch: WindowWatch,
     /// It does nothing before, ns of its monotonic clock: it sleeps or is busy.
     wake_ns: u64,
@@ -53,6 +55,7 @@ struct WindowWatch {
 struct Ground<'a, 'b> {
     packages: &'a mut Packages,
     time: &'a mut Ticking,
+    flood: &'a mut PartFlood,
     watch: &'a mut WindowWatch,
     io: &'a mut Io<'b>,
 }
@@ -107,6 +110,16 @@ impl Platform for Ground<'_, '_> {
     }
 
     fn tidy(&mut self, _: u64) {}
+
+    fn next_part(&mut self, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
+        self.io.plan.slots.as_ref().filter(|slots| slots.replicates)?;
+        self.io.works(MAKING_NS);
+        self.flood.next(datagram)
+    }
+
+    fn send_part(&mut self, to: NodeIndex, buffer: &mut [u8], bytes: usize) {
+        flood::send(self.io, to, &buffer[..bytes]);
+    }
 
     fn publish(&mut self, _: &SlotScheduler, _: &WindowLog) {
         self.time.publish(self.io);
@@ -258,17 +271,18 @@ impl Slotted {
         };
         let (scheduler, settings) = (SlotScheduler::new(table, spin_ns), Arc::new(settings.clone()));
         let driver = SlotDriver::new(&settings, packages.peer_sessions(), scheduler, now.monotonic_ns);
-        Self { packages, time, driver, watch, wake_ns: 0, due_ns: 0 }
+        let flood = PartFlood::new(&settings);
+        Self { packages, time, driver, flood, watch, wake_ns: 0, due_ns: 0 }
     }
 
     /// The thread runs until it sleeps, or spins for what only time brings.
     fn run(&mut self, io: &mut Io<'_>) {
-        let Self { packages, time, driver, watch, .. } = self;
+        let Self { packages, time, driver, flood, watch, .. } = self;
         if std::mem::take(&mut watch.stood_still) {
             // What came of that is seen now.
             time.publish(io);
         }
-        let step = driver.poll(&mut Ground { packages, time, watch, io });
+        let step = driver.poll(&mut Ground { packages, time, flood, watch, io });
         let now_ns = io.now.monotonic_ns;
         self.watch.stood_still = io.stood_still();
         (self.wake_ns, self.due_ns) = match step {
@@ -295,10 +309,10 @@ impl Slotted {
 
 impl Layer for Slotted {
     fn handle(&mut self, io: &mut Io<'_>, arrived: &Arrived) {
-        if arrived.port == ticking::PORT {
-            self.time.handle(io, arrived);
-        } else {
-            self.packages.handle(io, arrived);
+        match arrived.port {
+            ticking::PORT => self.time.handle(io, arrived),
+            flood::PORT => {}
+            _ => self.packages.handle(io, arrived),
         }
     }
 

@@ -20,7 +20,7 @@ pub type Port = usize;
 /// An address that no node has.
 pub const STRANGER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 255, 254));
 /// Sockets of a router.
-pub const PORTS: usize = 2;
+pub const PORTS: usize = 3;
 /// A thread that is busy works for less at a time.
 const STILL_NS: u64 = 2 * super::spans::MS;
 /// Bytes that a socket holds for a router that does not read.

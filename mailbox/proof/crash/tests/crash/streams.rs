@@ -13,9 +13,8 @@ const RACING: StreamShape = StreamShape { record_bytes: 64, keep: 4, readers: 2,
 const PLAIN: StreamShape = StreamShape { record_bytes: 8192, ..RACING };
 /// Records that the scenes write: more than are kept.
 const WRITTEN: u64 = 5;
-
-/// Records that a replica leaves out before the one that it writes.
-const LEFT_OUT: u64 = 2;
+/// Records that a replica leaves out before the one that it writes: less than are kept, as many, and more.
+const LEFT_OUT: [u64; 4] = [2, 4, 5, 12];
 
 /// What the victims do. Those with records of plain memory say so.
 pub(crate) fn act(role: &str, ground: &Ground, arm: impl Fn()) {
@@ -44,10 +43,11 @@ pub(crate) fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             open.finish(16).unwrap();
             die_with(writer);
         }
-        "leave out" => {
+        leaving if leaving.starts_with("leave out ") => {
+            let left_out: u64 = leaving["leave out ".len()..].parse().unwrap();
             let mut replica = ground.join().replica_writer(ID, shape, WRITTEN).unwrap();
             arm();
-            let sequence = WRITTEN + LEFT_OUT;
+            let sequence = WRITTEN + left_out;
             let record = OriginRecord { sequence, incarnation: 1, stamp: stamp(sequence), len_bytes: 16 };
             // An older one is begun as well, and never whole.
             let older = OriginRecord { sequence: WRITTEN, stamp: stamp(WRITTEN), ..record };
@@ -183,26 +183,39 @@ fn a_writer_dies_writing() {
     }
 }
 
-/// What it had left out by then was never written: its successor writes it, or goes on behind the record.
+/// Its successor goes on behind what it had left out by then, or behind the record; a reader that holds what the dead
+/// one left keeps it, whatever is written.
 #[test]
 fn a_writer_of_a_replica_dies_leaving_records_out() {
-    for (role, shape) in [("stream: leave out", RACING), ("stream: plain: leave out", PLAIN)] {
-        each_step(
-            role,
-            6,
-            |ground| orphan(ground, shape),
-            |ground, reader, death| {
-                let writer = writer(ground, shape);
-                // Entries of what is left out are published as well.
-                let may_be = |death: &Death| death.step == "entry: published";
-                let (written, finished) = (writer.written(), WRITTEN + LEFT_OUT + 1);
-                let is_either = written == WRITTEN || written == finished;
-                let is_right =
-                    if death.is_some_and(may_be) { is_either } else { is_finished(death) == (written == finished) };
-                assert!(is_right && is_either, "{written}: {death:?}");
-                all_usable(ground, writer, reader, WRITTEN);
-            },
-        );
+    for (bytes, shape) in [("", RACING), ("plain: ", PLAIN)] {
+        for left_out in LEFT_OUT {
+            each_step(
+                &format!("stream: {bytes}leave out {left_out}"),
+                6,
+                |ground| orphan(ground, shape),
+                |ground, mut reader, death| {
+                    let mut holder = ground.join().stream_reader(ID).unwrap();
+                    let mut writer = writer(ground, shape);
+                    let (written, finished) = (writer.written(), WRITTEN + left_out + 1);
+                    // Entries of what is left out are published as well.
+                    let may_be = death.is_some_and(|death| death.step == "entry: published");
+                    assert!((WRITTEN..=finished).contains(&written), "{written}: {death:?}");
+                    assert!(may_be || is_finished(death) == (written == finished), "{written}: {death:?}");
+                    read_on(&mut reader);
+                    assert_eq!(reader.position(), written, "a reader waits for what was left out: {death:?}");
+                    let last = (0..written).rev().find(|sequence| holder.record(*sequence).is_some());
+                    let held = last.and_then(|last| holder.record(last));
+                    assert!(held.is_some() || left_out >= u64::from(shape.keep), "{death:?}");
+                    for _ in 0..3 * shape.keep {
+                        write(&mut writer);
+                        assert_eq!(held.as_ref().map(|held| number(held.body())), last, "{death:?}");
+                    }
+                    drop(held);
+                    drop(holder);
+                    all_usable(ground, writer, reader, WRITTEN);
+                },
+            );
+        }
     }
 }
 

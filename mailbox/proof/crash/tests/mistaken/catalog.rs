@@ -232,10 +232,8 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "a_finished_record_is_forgotten",
         edits: &[edit(
             "stream/writing",
-            "if let Look::There(_) = ring.look(next) {",
-            "if let Look::There(_) = ring.look(next)
-            && !broken!(a_finished_record_is_forgotten)
-        {",
+            "let next = named_end(ring, counted);",
+            "let next = if broken!(a_finished_record_is_forgotten) { counted } else { named_end(ring, counted) };",
         )],
         scene: "streams::a_writer_dies_writing",
         says: "a finished record",
@@ -244,10 +242,22 @@ pub(crate) const MISTAKES: &[Mistake] = &[
         name: "the_sequence_begins_anew",
         edits: &[edit(
             "stream/segment",
-            "segment.first = old.map_or(0, ",
-            "segment.first = old.filter(|_| !broken!(the_sequence_begins_anew)).map_or(0, ",
+            "unwrap_or_else(|| old.map_or(0, ",
+            "unwrap_or_else(|| old.filter(|_| !broken!(the_sequence_begins_anew)).map_or(0, ",
         )],
         scene: "streams::a_writer_dies_replacing_a_stream_of_another_shape",
         says: "the sequence goes on",
+    },
+    Mistake {
+        name: "half_of_what_is_left_out_stays",
+        edits: &[edit(
+            "stream/writing",
+            "                leave_out(ring, sequence, newest);",
+            "                if !broken!(half_of_what_is_left_out_stays) {
+                    leave_out(ring, sequence, newest);
+                }",
+        )],
+        scene: "streams::a_writer_of_a_replica_dies_leaving_records_out",
+        says: "waits for what was left out",
     },
 ];

@@ -4,6 +4,7 @@ mod carrying;
 mod lan;
 pub mod planted;
 mod rejecting;
+mod replicas;
 mod session;
 mod slots;
 mod time;
@@ -18,6 +19,7 @@ pub const GROUPS: &[Group] = &[
     lan::FORGED,
     lan::LAN,
     rejecting::REJECTING,
+    replicas::REPLICAS,
     session::SESSION,
     slots::IN_SLOT,
     slots::SLOTS,

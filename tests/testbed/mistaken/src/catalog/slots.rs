@@ -49,6 +49,27 @@ pub(crate) const IN_SLOT: Group = Group {
                 "let behind = behind.filter(|_| !broken!(ForgetsMailbox)).map_or(LEVELS as u8, |first| self.level(first));",
             )],
         },
+        Planted {
+            name: "OverrunsWithPart",
+            text: "Driver: a part of a replica leaves although the window is too short for it.",
+            shows_in: "driver::tests::parts::records_cross_in_slots_behind_packages_and_inside_of_windows",
+            edits: &[edit(
+                "driver/parts.rs",
+                "if !tx_window.fits(now_ns, bytes) {",
+                "if !tx_window.fits(now_ns, bytes) && !broken!(OverrunsWithPart) {",
+            )],
+        },
+        Planted {
+            name: "PartsFirst",
+            text: "Driver: parts of replicas leave before packages.",
+            shows_in: "driver::tests::parts::records_cross_in_slots_behind_packages_and_inside_of_windows",
+            edits: &[edit(
+                "driver/slots.rs",
+                "let goes_on = self.send_packages(on, tx_window);",
+                r"while broken!(PartsFirst) && self.parts.send_next(on, tx_window) {}
+        let goes_on = self.send_packages(on, tx_window);",
+            )],
+        },
     ],
 };
 

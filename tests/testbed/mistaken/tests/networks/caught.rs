@@ -120,6 +120,7 @@ pub(crate) const CAUGHT: &[Caught] = &[
     caught(Mistake::OverrunsSlot, Promise::Recovery, Network::Slotted, 2),
     caught(Mistake::AnyCompany, Promise::Urgency, Network::Slotted, 0),
     caught(Mistake::ForgetsMailbox, Promise::Urgency, Network::Declared, 0),
+    caught(Mistake::OverrunsWithPart, Promise::InWindow, Network::Declared, 1),
     // Time slots.
     caught(Mistake::NoLateGate, Promise::InWindow, Network::Slotted, 1),
     caught(Mistake::SendsWhenUnsure, Promise::SilentWhenUnsure, Network::Slotted, 1),
@@ -149,6 +150,7 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
     (Mistake::MixesPackages, "no two heads of this simulation are the same"),
     (Mistake::CountsPartsTwice, "a duplicate of a fragment is dropped as a datagram"),
     (Mistake::NeverInAdvance, "an urgent package that waits for the pace breaks no promise but that of speed"),
+    (Mistake::PartsFirst, "packages are later than their bounds, which no promise here is about"),
     (Mistake::WaitsForOne, "no socket is ever without room here"),
     (Mistake::OpensTwice, "120 networks kept all promises: what is opened twice is a duplicate behind it"),
     (Mistake::BeginsUnproven, "120 networks kept all promises"),
@@ -158,5 +160,5 @@ pub(crate) const UNSEEN: &[(Mistake, &str)] = &[
     (Mistake::BelievesUnopened, "120 networks kept all promises: a belief changes what callers are told"),
 ];
 
-/// Groups of mistakes of sessions, which no simulated network has.
-pub(crate) const UNSEEN_GROUPS: [&str; 2] = ["SESSION", "FOLLOWER"];
+/// Groups of mistakes of sessions and of replicas, which no simulated network has.
+pub(crate) const UNSEEN_GROUPS: [&str; 3] = ["SESSION", "FOLLOWER", "REPLICAS"];

@@ -1,0 +1,135 @@
+//! Only what has changed is sent: what is left out has the bytes of what is there.
+
+use super::super::destination::UNCHANGED_EVERY_NS;
+use super::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn changes(sampling: Sampling) -> ReplicaSettings {
+    ReplicaSettings { sampling, changed: true, deadline_ns: 0, ..image() }
+}
+
+/// Sequences that arrive when each of these bodies is written a millisecond after the other, and how many are left out.
+fn arrive(replica: ReplicaSettings, bodies: &[&[u8]]) -> (Vec<u64>, u64) {
+    let replicas = [replica];
+    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
+    let (mut writer, mut reader) = (origin.writer(ID, SHAPE), holder.reader());
+    for (step, body) in (0..).zip(bodies) {
+        let mut now_ns = START + step * MS;
+        writer.write(at(100 + step), body).unwrap();
+        holder.take_all(now_ns, &origin.leave(&mut now_ns));
+    }
+    let (all, _) = read(&mut reader);
+    (all.into_iter().map(|(sequence, _)| sequence).collect(), origin.lost(ReplicaLoss::Sampled))
+}
+
+#[test]
+fn a_record_like_the_last_one_sent_is_left_out() {
+    let (long, other) = (vec![7; 5000], [&[7; 4999][..], &[8]].concat());
+    let [a, b, none, one, two]: [&[u8]; 5] = [b"a", b"b", b"", b"\0", b"\0\0"];
+    let (long, other) = (&long[..], &other[..]);
+    for (sampling, bodies, arrives, why) in [
+        (Sampling::Each, vec![a, a, b, b, b, a], vec![0, 2, 5], "one that was there before counts as a change"),
+        (Sampling::Each, vec![a, b, a, b], vec![0, 1, 2, 3], "all have changed"),
+        (Sampling::Each, vec![none, none, one, two], vec![0, 2, 3], "the length is a change"),
+        (Sampling::Each, vec![long, long, other, long], vec![0, 2, 3], "so is the last of many bytes"),
+        (Sampling::Every(2), vec![a, b, a, b, b, a, a], vec![0, 4, 6], "what is sent counts, not what is written"),
+        (Sampling::Rate(500.0), vec![a, a, a, b, b, b, a], vec![0, 3, 6], "what is left out takes no turn"),
+    ] {
+        let left_out = (bodies.len() - arrives.len()) as u64;
+        assert_eq!(arrive(changes(sampling), &bodies), (arrives, left_out), "{sampling}: {why}");
+    }
+    assert_eq!(arrive(image(), &[a, a, a]), (vec![0, 1, 2], 0), "unless the file says so, each is sent");
+}
+
+#[test]
+fn what_may_not_have_arrived_goes_again() {
+    let replicas = [changes(Sampling::Each)];
+    let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
+    let (mut now_ns, mut writer) = (START, origin.writer(ID, SHAPE));
+    let mut write = |origin: &mut Origin, holder: &mut Holder, now_ns: &mut u64| {
+        *now_ns += 1;
+        writer.write(at(*now_ns), b"a map").unwrap();
+        // What it has already is not a record once more.
+        let came = |holder: &Holder| holder.records() + holder.lost(ReplicaLoss::Duplicate);
+        let before = came(holder);
+        holder.take_all(*now_ns, &origin.leave(now_ns));
+        came(holder) - before
+    };
+    let mut arrives = |why: &str, now_ns: &mut u64, records: [u64; 3], change: &dyn Fn(&mut Origin, &mut Holder)| {
+        change(&mut origin, &mut holder);
+        let arrived = [(); 3].map(|()| write(&mut origin, &mut holder, now_ns));
+        assert_eq!(arrived, records, "{why}");
+    };
+    arrives("it is there then", &mut now_ns, [1, 0, 0], &|_, _| {});
+    now_ns += UNCHANGED_EVERY_NS / 2;
+    arrives("nothing has happened", &mut now_ns, [0, 0, 0], &|_, _| {});
+    now_ns += UNCHANGED_EVERY_NS;
+    arrives("it is long ago", &mut now_ns, [1, 0, 0], &|_, _| {});
+    let anew = |origin: &mut Origin, _: &mut Holder| origin.router.stats.peer(HOLDER).link.incarnation.set(5);
+    arrives("its router began anew", &mut now_ns, [1, 0, 0], &anew);
+    let silent_ns = now_ns + 2000 * MS;
+    let away = |origin: &mut Origin, _: &mut Holder| {
+        let Router { sender, outbound, .. } = &mut origin.router;
+        let waits = sender.poll(silent_ns, time, outbound, &mut [0; 1472]);
+        assert!(matches!(waits, ReplicaStep::Idle { .. }), "{waits:?}");
+    };
+    now_ns = silent_ns;
+    arrives("it was silent", &mut now_ns, [1, 0, 0], &away);
+    let described = |origin: &mut Origin, _: &mut Holder| {
+        origin.ground.join().describe_replicas(CAMERA, &words(2)).unwrap();
+        origin.look();
+    };
+    arrives("there is another interface, so its ring is made anew", &mut now_ns, [1, 0, 0], &described);
+}
+
+/// Whatever is left out for whichever node, each has the bytes of the newest.
+#[test]
+fn each_node_has_what_the_newest_says() {
+    for seed in 0..20 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let sampling = if rng.random_bool(0.5) { Sampling::Each } else { Sampling::Rate(300.0) };
+        let replicas = [changes(sampling)];
+        let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
+        let (mut writer, mut incarnation, mut body) = (origin.writer(ID, SHAPE), 200, vec![0; 16]);
+        let (mut now_ns, mut written) = (START, 0);
+        let loss = if seed % 2 == 0 { 0.0 } else { 0.05 };
+        for step in 0..400 {
+            now_ns += MS;
+            if rng.random_bool(0.2) {
+                body = vec![rng.random_range(0..3); rng.random_range(1..4) * 1400];
+            }
+            writer.write(at(now_ns), &body).unwrap();
+            written += 1;
+            if rng.random_bool(0.02) {
+                incarnation += 1;
+                holder = Holder::on(holder.ground, incarnation, &replicas);
+                origin.router.stats.peer(HOLDER).link.incarnation.set(incarnation);
+            }
+            let left = origin.leave(&mut now_ns);
+            left.iter().filter(|_| !rng.random_bool(loss)).for_each(|datagram| holder.take(now_ns, datagram));
+            if loss == 0.0 && sampling == Sampling::Each {
+                assert_eq!(there(&holder), body, "seed {seed}, step {step}");
+            }
+        }
+        // What was lost goes again; of what is due by its rate the next one does.
+        for pause_ns in [UNCHANGED_EVERY_NS, 10 * MS] {
+            now_ns += pause_ns;
+            writer.write(at(now_ns), &body).unwrap();
+            written += 1;
+            holder.take_all(now_ns, &origin.leave(&mut now_ns));
+        }
+        assert_eq!(there(&holder), body, "seed {seed}");
+        let counts = &origin.router.sender.counts()[0];
+        let sampled = counts.lost.of(ReplicaLoss::Sampled);
+        assert!(sampled > 100 && counts.records.get() > 20, "seed {seed}: {sampled}, {}", counts.records.get());
+        assert!(sampled + counts.records.get() >= written, "seed {seed}: each is sent or counted");
+    }
+}
+
+/// The newest record of the replica.
+fn there(holder: &Holder) -> Vec<u8> {
+    let mut reader = holder.reader();
+    let newest = reader.newest().unwrap();
+    newest.map(|record| record.body().to_vec()).unwrap_or_default()
+}

@@ -1,0 +1,37 @@
+//! Parts of replicas, as the thread of the time slots has them.
+
+use super::super::sending::{NoPackages, Sending};
+use crate::driver::{NotSent, Outlet};
+use crate::frame::NodeIndex;
+use crate::replication::{ReplicaSender, ReplicaStep};
+use rohrpost_mailbox::{SystemClock, monotonic_ns};
+use std::sync::{Arc, Mutex};
+
+/// Streams of this node that others have, and the sockets to these.
+pub(in crate::shell) struct SlotParts {
+    /// Another thread looks for streams meanwhile: this one never waits for it.
+    pub(in crate::shell) sender: Arc<Mutex<ReplicaSender>>,
+    pub(in crate::shell) sending: Sending<NoPackages>,
+    pub(in crate::shell) clock: SystemClock,
+}
+
+impl SlotParts {
+    /// Writes the next part; its receiver and its length.
+    pub(super) fn next(&mut self, datagram: &mut [u8]) -> Option<(NodeIndex, usize)> {
+        let Self { sender, sending: Sending { outbound, .. }, clock } = self;
+        let (mut sender, now_ns) = (sender.try_lock().ok()?, monotonic_ns());
+        outbound.look_at_peers(now_ns);
+        match sender.poll(now_ns, |ns| clock.at(ns), outbound, datagram) {
+            ReplicaStep::Send { to, bytes } => Some((to, bytes)),
+            ReplicaStep::Wait { .. } | ReplicaStep::Idle { .. } => None,
+        }
+    }
+
+    /// Hands it to the kernel.
+    pub(super) fn send(&mut self, to: NodeIndex, buffer: &mut [u8], bytes: usize) {
+        let Self { sending, .. } = self;
+        if let Err(NotSent) = sending.send(monotonic_ns(), to, buffer, bytes) {
+            sending.outbound.unsent(&buffer[..bytes], &[], &mut NoPackages);
+        }
+    }
+}
