@@ -111,6 +111,11 @@ pub fn size_text(bytes: u64) -> String {
     if bytes == 0 { "0 B".into() } else { whole(bytes, &SIZE) }
 }
 
+/// Writes a size that need not be exact: down to whole KiB.
+pub(crate) fn size_about(bytes: u64) -> String {
+    size_text(bytes / 1024 * 1024)
+}
+
 /// Writes a rate as [`parse_rate`] reads it, in the largest unit that keeps it whole.
 pub fn rate_text(bits_s: u64) -> String {
     if bits_s == 0 { "0 bit/s".into() } else { whole(bits_s, &RATE) }

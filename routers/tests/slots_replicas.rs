@@ -10,7 +10,9 @@ use common::declared::{flows_keep_their_bounds, segment};
 use common::{PATIENCE, Segment, Station, module, name};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{Name, Next, Participant, Stamp, StreamId, StreamReader, StreamShape, StreamWriter};
+use rohrpost_network::Security;
 use rohrpost_routers::replication::{Describe, ReplicaLoss, ReplicaSettings};
+use rohrpost_routers::security::{Port, Rejection};
 use rohrpost_routers::shell::ReplicaParts;
 use rohrpost_testbed::stalls::unless_stalled;
 use std::sync::Arc;
@@ -36,8 +38,8 @@ fn id() -> StreamId {
     StreamId { name: module(0), number: NUMBER }
 }
 
-/// Node 0 writes, both others have it.
-fn replicate(segment: &mut Segment) {
+/// Node 0 writes, both others have it. Returns when all send.
+fn replicate(segment: &mut Segment) -> (Writing, [Reading; 2]) {
     let replica = ReplicaSettings {
         from: module(0),
         item: "image".into(),
@@ -58,6 +60,14 @@ fn replicate(segment: &mut Segment) {
         let parts = ReplicaParts { replicas: &replicas, describe: Arc::new(Always), socket: None, impair };
         station.shell.as_mut().unwrap().replicate(&station.node, parts).unwrap();
     }
+    segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
+    join(&segment.stations[0]).describe_replicas(module(0), b"of a camera").unwrap();
+    let writer = join(&segment.stations[0]).stream_writer(id(), SHAPE).unwrap();
+    let reading = |node: usize| {
+        let reader = join(&segment.stations[node]).stream_reader(id()).unwrap();
+        Reading { reader, next: 0, whole: 0, lost: 0 }
+    };
+    (Writing { writer, last: Instant::now() }, [reading(1), reading(2)])
 }
 
 fn join(station: &Station) -> Arc<Participant> {
@@ -114,16 +124,7 @@ impl Writing {
 fn records_cross_in_slots_and_declared_flows_keep_their_bounds() {
     unless_stalled(|stalls| {
         let Some(mut segment) = segment(None) else { return Ok(()) };
-        replicate(&mut segment);
-        segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
-        join(&segment.stations[0]).describe_replicas(module(0), b"of a camera").unwrap();
-        let writer = join(&segment.stations[0]).stream_writer(id(), SHAPE).unwrap();
-        let mut writing = Writing { writer, last: Instant::now() };
-        let reading = |node: usize| {
-            let reader = join(&segment.stations[node]).stream_reader(id()).unwrap();
-            Reading { reader, next: 0, whole: 0, lost: 0 }
-        };
-        let mut readings = [reading(1), reading(2)];
+        let (mut writing, mut readings) = replicate(&mut segment);
         let began = Instant::now();
         let kept = flows_keep_their_bounds(&segment, stalls, "beside replicas", || {
             readings.iter_mut().for_each(Reading::read);
@@ -146,4 +147,29 @@ fn records_cross_in_slots_and_declared_flows_keep_their_bounds() {
         assert!(sent.iter().all(|sent| sent.records.get() >= RECORDS), "{sent:?}");
         kept
     });
+}
+
+/// Parts and requests are sealed by the thread of the slots, with keys of their own port, and opened at the others.
+#[test]
+fn records_cross_in_slots_where_datagrams_are_sealed() {
+    let Some(mut segment) = Segment::at_rest(None) else { return };
+    for station in &mut segment.stations {
+        station.settings.network.security = Security::Keys;
+        station.settings.network.datagram_bytes_max -= Security::Keys.tag_bytes();
+        station.start(&segment.lab);
+    }
+    let (mut writing, mut readings) = replicate(&mut segment);
+    segment.wait_until("records are read on both other nodes", |_| {
+        readings.iter_mut().for_each(Reading::read);
+        writing.write(&readings);
+        readings.iter().all(|reading| reading.whole >= RECORDS / 3)
+    });
+    for node in [1, 2] {
+        let shell = segment.stations[node].shell();
+        let counts = &shell.replicas().received[0];
+        assert_eq!(counts.lost.of(ReplicaLoss::Unsound) + counts.lost.of(ReplicaLoss::Foreign), 0, "{counts:?}");
+        assert!(counts.completed.get() > 0, "{counts:?}");
+        let rejections = shell.rejections(Port::Replicas).unwrap();
+        assert_eq!(rejections.of(Some(0), Rejection::Forged) + rejections.of(Some(0), Rejection::Unsealed), 0);
+    }
 }

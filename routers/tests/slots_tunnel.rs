@@ -1,8 +1,8 @@
 //! Ordinary traffic between nodes in time slots: somebody types, and a file is copied, through the tunnel, while
 //! declared flows keep what was computed for them.
 //!
-//! If the tunnel's traffic went before packages, a third of them would be later than their bounds (it fills the slots of
-//! one node at a time).
+//! If the tunnel's traffic went before packages, a third of them would be later than their bounds (it fills the slots
+//! of one node at a time).
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 

@@ -4,6 +4,10 @@ use crate::installation::Installation;
 use crate::node::Reach;
 use crate::reader::Reader;
 use crate::replica::{REPLICAS_MAX, Replica};
+use crate::units::size_text;
+
+/// With time slots records are compared in the slot of their node: a larger one would take a part of it.
+const COMPARED_IN_SLOT_BYTES_MAX: u32 = 16 << 10;
 
 /// Rules across replicas and modules.
 pub(super) fn validate(installation: &Installation, reader: &Reader<'_>) {
@@ -23,6 +27,15 @@ pub(super) fn validate(installation: &Installation, reader: &Reader<'_>) {
                 "node {}, which writes it, has `network = \"tcp\"`, and replicas are not carried by TCP yet; drop the \
                  replica",
                 writer.node
+            ));
+        }
+        let record_bytes = replica.spec(installation).record_bytes;
+        if replica.changed && installation.tdma.is_some() && record_bytes > COMPARED_IN_SLOT_BYTES_MAX {
+            report(format!(
+                "with time slots records are compared in the slot of their node, and those of {} take too long; drop \
+                 `changed`, or give the stream a `record` of at most {}",
+                size_text(record_bytes.into()),
+                size_text(COMPARED_IN_SLOT_BYTES_MAX.into())
             ));
         }
         let is_it = |other: &&Replica| (other.from, &other.item) == (replica.from, &replica.item);

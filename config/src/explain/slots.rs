@@ -2,7 +2,7 @@
 
 use super::{Page, timeline};
 use crate::plan::{bounds, plan};
-use crate::units::{duration_decimal, duration_text, rate_text, size_text};
+use crate::units::{duration_decimal, duration_text, rate_text, size_about, size_text};
 use rohrpost_network::{Bound, GATE, LATE, Tdma, TimeSlot, round_up};
 use std::time::Duration;
 
@@ -119,7 +119,7 @@ impl Page<'_> {
         self.line(format!("  {:width$}  {columns}", "replica", width = width.max(7)));
         for ((planned, _), name) in all.into_iter().zip(names) {
             let (left, parts) = (plan.parts_left(tdma, planned.node), planned.parts(&plan.link));
-            let bytes = size_text(left / 1000 * plan.link.part_bytes() as u64 >> 10 << 10);
+            let bytes = size_about(left / 1000 * plan.link.part_bytes() as u64);
             let record = size_text(planned.record_bytes.into());
             let least = long(plan.record_least(tdma, &planned));
             let (node, receivers) = (self.node_name(planned.node), planned.receivers);

@@ -19,7 +19,7 @@ use mirrored::MIRRORED;
 
 const MAILBOX: &str = "../../src";
 /// Files of this crate; the others are the mailbox's.
-const OURS: [&str; 4] = ["rig", "models", "cell_models", "stream_models"];
+const OURS: [&str; 5] = ["rig", "models", "cell_models", "stream_rig", "stream_models"];
 
 /// A part of the mailbox that is proved by itself.
 struct Proof {
@@ -48,7 +48,7 @@ const PROOFS: [Proof; 3] = [
     },
     Proof {
         real: "real_stream",
-        parts: &["stream/ring", "stream/writing", "stream/lookup", "stream_models"],
+        parts: &["stream/ring", "stream/writing", "stream/lookup", "stream_rig", "stream_models"],
         models: stream_broken::MODELS,
         broken: &[stream_broken::BROKEN],
     },

@@ -23,6 +23,7 @@ use rohrpost_routers::counts::Cause;
 use rohrpost_routers::frame::{Alive, FrameHead, FrameKind};
 use rohrpost_routers::impair;
 use rohrpost_routers::lab::{Lab, LabError, NodeSpec};
+use rohrpost_routers::security::{InstallationKey, KEY_BYTES, KeyId, KeyRing};
 use rohrpost_routers::settings::{NodeSettings, Settings};
 use rohrpost_routers::shell::clock::{ClockParts, Skew};
 use rohrpost_routers::shell::{Faults, Parts, Shell, Undelivered, slots};
@@ -32,6 +33,7 @@ use rohrpost_testbed::report;
 use rohrpost_testbed::stalls::Late;
 use std::cell::RefCell;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::num::NonZeroU8;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -165,7 +167,12 @@ impl Station {
             impair: None,
             clock: Some(clock),
         };
-        let shell = Shell::start(parts).unwrap();
+        let shell = if self.settings.is_sealed() {
+            let key = InstallationKey::new(KeyId(NonZeroU8::MIN), &[9; KEY_BYTES]);
+            Shell::start_sealed(parts, KeyRing::new(key, None)).unwrap()
+        } else {
+            Shell::start(parts).unwrap()
+        };
         self.recorder = Some(Recorder::start(self.node.path().parent().unwrap(), self.own, &shell));
         self.shell = Some(shell);
     }
@@ -300,7 +307,7 @@ impl Segment {
         running.flat_map(|(own, stats)| of((own, stats))).collect()
     }
 
-    pub(crate) fn wait_until(&self, what: &str, done: impl Fn(&Self) -> bool) {
+    pub(crate) fn wait_until(&self, what: &str, mut done: impl FnMut(&Self) -> bool) {
         let began = Instant::now();
         while !done(self) {
             let running = self.stations.iter().filter(|station| station.shell.is_some());

@@ -2,10 +2,11 @@
 //! bounds" derives them.
 //!
 //! A bound covers the time from publishing, into the mailbox of the node's router, to the arrival of the last bit at
-//! the other computer. Parts of replicas leave behind all packages, and so are in no bound; what slots leave for them is
-//! reckoned with the same work and the same room. A bound holds under these conditions: flows send no more than they declare; nothing else is sent at
-//! their priority or above (tools, calls and replies included); no slot is left out; nothing is lost; every slot begins
-//! at most [`LATE`] late. The time in which a process wakes up and reads is not included.
+//! the other computer. Parts of replicas leave behind all packages, and so are in no bound; what slots leave for them
+//! is reckoned with the same work and the same room. A bound holds under these conditions: flows send no more than they
+//! declare; nothing else is sent at their priority or above (tools, calls and replies included); no slot is left out;
+//! nothing is lost; every slot begins at most [`LATE`] late. The time in which a process wakes up and reads is not
+//! included.
 
 mod mistakes;
 mod response;

@@ -2,7 +2,7 @@
 
 use super::Validator;
 use crate::replica::Replica;
-use crate::units::{count_text, duration_decimal, size_text};
+use crate::units::{count_text, duration_decimal, size_about, size_text};
 use rohrpost_network::PlannedReplica;
 
 /// Parts in a second are counted in thousandths.
@@ -56,7 +56,7 @@ impl Validator<'_> {
             asks.div_ceil(THOUSANDTHS)
         );
         let (whole, name) = (left / THOUSANDTHS, self.node_name(node));
-        let bytes = size_text(whole * link.part_bytes() as u64 >> 10 << 10);
+        let bytes = size_about(whole * link.part_bytes() as u64);
         let before = if asked > *asks { " and more important replicas" } else { "" };
         let slower = format!("{:?}", (left / parts) as f64 / THOUSANDTHS as f64);
         let slower = (left >= parts).then(|| format!("write `rate = {slower}` or less"));
@@ -71,8 +71,8 @@ impl Validator<'_> {
         self.reader.report(
             replica.line,
             format!(
-                "[[replica]] of `{text}`: {load}, and slots of `{name}` leave {whole} of them ({bytes}) for sure behind \
-                 flows{before}; {right}"
+                "[[replica]] of `{text}`: {load}, and slots of `{name}` leave {whole} of them ({bytes}) for sure \
+                 behind flows{before}; {right}"
             ),
         );
     }

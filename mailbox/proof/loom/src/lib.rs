@@ -68,6 +68,8 @@ mod cell_models;
 mod models;
 #[cfg(any())]
 mod stream_models;
+#[cfg(any())]
+mod stream_rig;
 
 use std::cell::Cell;
 use std::panic::{catch_unwind, set_hook, take_hook};

@@ -1,5 +1,5 @@
-//! A replica that never ends: in each slot there are parts of full length behind all packages, to each peer in turn. Its
-//! content says nothing, and nobody reads it: it takes time on the wire.
+//! A replica that never ends: in each slot there are parts of full length behind all packages, to each peer in turn.
+//! Its content says nothing, and nobody reads it: it takes time on the wire.
 
 use super::station::{Io, Port, Sent};
 use rohrpost_routers::frame::{self, FrameHead, FrameKind, NodeIndex, RecordPart};
