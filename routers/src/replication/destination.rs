@@ -208,8 +208,8 @@ impl Destination {
         }
     }
 
-    /// The record that is under way was overwritten, or one of which parts are to be sent again. Either way the node may
-    /// not have what was sent last.
+    /// The record that is under way was overwritten, or one of which parts are to be sent again. Either way the node
+    /// may not have what was sent last.
     pub(super) fn is_overwritten(&mut self, again: Option<u64>) {
         self.sent = None;
         let cause = match again {

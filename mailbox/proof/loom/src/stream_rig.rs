@@ -1,4 +1,4 @@
-//! A stream as the models see it: records of one number each, a writer's steps and a reader's. Compiled beside the models.
+//! A stream as the models see it: records of one number each, a writer's steps and a reader's. Compiled beside them.
 
 use crate::step::reached;
 use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};
