@@ -25,7 +25,8 @@ fn every_contender_records_all_and_every_line_is_complete() {
     assert_eq!(beside.len(), 2, "{beside:?}");
     assert!(beside[0]["contender"] == "rohrpost" && beside[0]["vs"] == "without recorder", "{beside:?}");
     for (case, beside, is_median) in [
-        ("event with journal", "without journal", true),
+        ("event with journal, on one processor", "without journal", true),
+        ("event with journal, on two processors", "without journal", true),
         ("exact replay of the demo", "real time", true),
         ("replay, error of spacing", "1 ms", false),
     ] {

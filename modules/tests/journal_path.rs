@@ -100,18 +100,12 @@ impl Motor for Wheels {
     }
 }
 
-const RECORD: &str = r#"
-[[module]]
-name = "logd.0"
-builtin = "logd"
-[record]
-directory = "."
-exact = ["motor.0"]
-"#;
+/// It has a journal.
+const RECORD: &str = include_str!("../../tests/testbed/journal.toml");
 
 #[test]
 fn a_journal_does_not_touch_the_heap() {
-    let hosted = host::<Wheels>("journal", RECORD);
+    let hosted = host::<Wheels>("journal", &RECORD.replace("MODULE", "motor.0"));
     let before = work(&hosted.motor, 1000, 1000, |_| ());
     let id = StreamId { name: MOTOR, number: JOURNAL_NUMBER };
     let node = Node::open(&hosted.path).unwrap();

@@ -100,15 +100,7 @@ optional = true
 "#;
 
     /// With a journal.
-    const EXACT: &str = r#"
-[[module]]
-name = "logd.0"
-builtin = "logd"
-optional = true
-[record]
-directory = "."
-exact = ["crane.0"]
-"#;
+    const EXACT: &str = include_str!("../../tests/testbed/journal.toml");
 
     /// The system calls within each step, of each time that it was done.
     fn follow(pid: Pid) -> Vec<(usize, Vec<u64>)> {
@@ -152,7 +144,7 @@ exact = ["crane.0"]
             return run_started::<Hook>(Start::from_arguments(words.into_iter()).unwrap()).unwrap();
         }
         for more in ["", EXACT] {
-            traced(&format!("{CONFIG}{more}"));
+            traced(&format!("{CONFIG}{}", more.replace("MODULE", "crane.0")));
         }
     }
 

@@ -1,21 +1,9 @@
 //! `rohrpost check`, for people and programs.
 
-use crate::harness::Place;
+use crate::harness::{Place, RECORDED_CLASSES};
 
 /// Built-in modules with a mistake in each.
-const WRONG: &str = r#"installation = "wrong"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-pilot = { id = 140 }
-mapper = { id = 96 }
-tool = { id = 16 }
-[nodes.main]
-[[module]]
+const WRONG: &str = r#"[[module]]
 name = "motor.0"
 builtin = "sim"
 aliases = ["laser.0", "odometry.0", "mapper.1"]
@@ -56,29 +44,46 @@ show = [
 ]
 "#;
 
-const SAID: [&str; 12] = [
-    "13: module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, \
+/// Lines of it, and what is told of them.
+const SAID: [(usize, &str); 12] = [
+    (
+        1,
+        "module `motor.0`: alias `mapper.1`: the builtin has no interface of class `mapper`; it has motor, odometry, \
      laser, camera, depth",
-    "17: module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
+    ),
+    (
+        5,
+        "module `motor.0`: settings: unknown field `beems`, expected one of `map`, `cell-m`, `seed`, `laser-rate-hz`, \
      `laser-noise-m`, `odometry-rate-hz`, `camera-rate-hz`, `depth-rate-hz`, `beams`, `range-max-m`, `dead-man-ms`",
-    "21: module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz",
-    "28: module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`",
-    "34: module `pilot.1`: settings: `laser` is `odometry.0`, but this module calls functions of class `laser`",
-    "35: module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean \
+    ),
+    (9, "module `laser.1`: settings: `laser-rate-hz` is 1000 Hz, out of range: 0.01..=100 Hz"),
+    (16, "module `pilot.0`: settings: `motor` is `motor.0`, which `calls` does not name; add \"motor.0\" to `calls`"),
+    (22, "module `pilot.1`: settings: `laser` is `odometry.0`, but this module calls functions of class `laser`"),
+    (
+        23,
+        "module `pilot.1`: settings: `motor` names no module: `moter.0`: there is no class `moter`; did you mean \
      `motor`?",
-    "40: module `mapper.0`: settings: `resolution-m` is 5; use 0.005 to 1",
-    "40: module `mapper.0`: settings: `laser` is `laser.7`, which no [[module]] defines; add one, or name another",
-    "44: module `pilot.2`: settings: missing field `laser`",
-    "45: module `pilot.2`: the builtin has no stream `picture`; it has none; drop the section",
-    "49: [gui] show: `laser.0` has no data `scam`; did you mean `scan`?",
-    "50: [gui] show: `mapper.0` has no data `grid`; it has map, pose",
+    ),
+    (28, "module `mapper.0`: settings: `resolution-m` is 5; use 0.005 to 1"),
+    (28, "module `mapper.0`: settings: `laser` is `laser.7`, which no [[module]] defines; add one, or name another"),
+    (32, "module `pilot.2`: settings: missing field `laser`"),
+    (33, "module `pilot.2`: the builtin has no stream `picture`; it has none; drop the section"),
+    (37, "[gui] show: `laser.0` has no data `scam`; did you mean `scan`?"),
+    (38, "[gui] show: `mapper.0` has no data `grid`; it has map, pose"),
 ];
+
+/// Writes `wrong.toml` with these modules; what is to be told of their lines.
+fn wrong(place: &Place, modules: &str, told: &[(usize, &str)]) -> Vec<String> {
+    let file = place.config_of("wrong", "[nodes.main]", &[RECORDED_CLASSES, modules]);
+    let text = std::fs::read_to_string(file).unwrap();
+    let before = text.strip_suffix(modules).unwrap().lines().count();
+    told.iter().map(|(line, said)| format!("wrong.toml:{}: {said}", before + line)).collect()
+}
 
 #[test]
 fn settings_of_builtin_modules_are_checked_before_anything_runs() {
     let place = Place::new();
-    std::fs::write(place.path("wrong.toml"), WRONG).unwrap();
-    let expected: Vec<String> = SAID.iter().map(|line| format!("wrong.toml:{line}")).collect();
+    let expected = wrong(&place, WRONG, &SAID);
     let told = place.say(&["check", "wrong.toml"]).fails();
     assert_eq!(told.trim_end().lines().collect::<Vec<_>>(), expected);
     // Launch reports the same, and starts nothing.
@@ -99,7 +104,6 @@ fn settings_of_builtin_modules_are_checked_before_anything_runs() {
 #[test]
 fn what_is_to_be_recorded_of_builtin_modules_is_checked_before_anything_runs() {
     let place = Place::new();
-    let head = WRONG.split_once("[[module]]").unwrap().0.replace("mapper =", "logd = { id = 24 }\nmapper =");
     let modules = r#"[[module]]
 name = "laser.0"
 builtin = "sim"
@@ -121,15 +125,15 @@ directory = "recordings"
 streams = ["laser.0/scna", "mapper.0/pose", "odometry.0/anything", "mapper.0/*"]
 data = ["mapper.0/grid", "laser.0/scan"]
 "#;
-    std::fs::write(place.path("wrong.toml"), head + modules).unwrap();
-    let expected = [
-        "29: module `logd.0`: it has no settings; write `folder` into [record]",
-        "32: [record]: `laser.0` has no stream `scna`; did you mean `scan`?",
-        "32: [record]: `mapper.0` has no stream `pose`; these are data, name them in `data`",
-        "33: [record]: `mapper.0` has no data `grid`; it has map, pose",
+    let said = [
+        (16, "module `logd.0`: it has no settings; write `folder` into [record]"),
+        (19, "[record]: `laser.0` has no stream `scna`; did you mean `scan`?"),
+        (19, "[record]: `mapper.0` has no stream `pose`; these are data, name them in `data`"),
+        (20, "[record]: `mapper.0` has no data `grid`; it has map, pose"),
     ];
+    let expected = wrong(&place, modules, &said);
     let told = place.say(&["check", "wrong.toml"]).fails();
-    assert_eq!(told.trim_end().lines().collect::<Vec<_>>(), expected.map(|line| format!("wrong.toml:{line}")));
+    assert_eq!(told.trim_end().lines().collect::<Vec<_>>(), expected);
 }
 
 #[test]

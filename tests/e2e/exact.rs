@@ -291,7 +291,7 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     assert_eq!(said.code, Some(1));
     let run: Value = serde_json::from_str(&said.out).unwrap();
     assert_eq!((&run["result"], &run["events"], &run["outputs"]), (&"differs".into(), &3.into(), &0.into()), "{run:#}");
-    let said = replay(&place, &file, &["seer.0"], &[(OTHER_QUESTIONS, "1")]);
+    let said = replay(&place, &file, &["seer.0"], &[(OTHER_QUESTIONS, "tick")]);
     let run: Value = serde_json::from_str(&said.out).unwrap();
     assert_eq!(
         (&run["result"], &run["events"], &run["why"]["event"]),
@@ -300,6 +300,35 @@ fn another_build_is_told_by_the_first_thing_that_it_does_otherwise() {
     let [recorded, replayed] = ["recorded", "replayed"].map(|side| run["why"][side].as_str().unwrap());
     assert_eq!(recorded, "it wants to tick: once in 5000000 ns");
     assert_eq!(replayed, "it wants to tick: once in 6000000 ns");
+}
+
+#[test]
+fn a_build_that_asks_for_another_mailbox_or_for_other_records_is_told_with_both_questions() {
+    let place = Place::new();
+    let (mut launch, robot) = seers(&place, &["asking"]);
+    let file = recording(&place, 1);
+    wait_journaled(&file, "seer.0", 2);
+    drop(robot);
+    launch.stop();
+
+    let run = &replayed(&place, &file, &[])[0];
+    assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
+    for (otherwise, question, recorded, replayed) in [
+        (
+            "mailbox",
+            "it makes a mailbox: mailbox 3, ",
+            "4 slots of 100 bytes, for data",
+            "5 slots of 100 bytes, for data",
+        ),
+        ("rewind", "it goes back in a followed stream: followed stream ", "0", "1"),
+        ("rewind-to", "it goes back in a followed stream: followed stream 1, to sequence ", "7", "8"),
+    ] {
+        let said = replay(&place, &file, &["seer.0"], &[(OTHER_QUESTIONS, otherwise)]);
+        let run: Value = serde_json::from_str(&said.out).unwrap();
+        assert_eq!((&run["result"], &run["why"]["event"]), (&"differs".into(), &"is made".into()), "{run:#}");
+        let told = ["recorded", "replayed"].map(|side| run["why"][side].as_str().unwrap());
+        assert_eq!(told, [recorded, replayed].map(|its| format!("{question}{its}")));
+    }
 }
 
 #[test]

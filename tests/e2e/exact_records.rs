@@ -1,9 +1,11 @@
 //! Exact replay of a module that reads long records which are recorded anyhow: its journal has their sums.
 
 use crate::exact::{recording, replayed, seers_recorded, wait_journaled};
-use crate::harness::{Place, wait};
+use crate::harness::{Place, Robot, halt, signal, wait};
 use crate::seer::PICTURE_BYTES;
-use std::path::Path;
+use nix::sys::signal::Signal;
+use rohrpost_mailbox::StreamId;
+use std::path::{Path, PathBuf};
 
 /// Messages of a topic, and their bytes.
 fn recorded(file: &Path, topic: &str) -> (usize, usize) {
@@ -15,6 +17,26 @@ fn recorded(file: &Path, topic: &str) -> (usize, usize) {
         }
     }
     (count, bytes)
+}
+
+/// Sequences of pictures in files, in their order.
+fn pictures(files: &[PathBuf]) -> Vec<u32> {
+    let mut sequences = Vec::new();
+    for file in files {
+        let mut reader = rohrpost_recording::Reader::open(file).unwrap();
+        while let Some((channel, message)) = reader.next().unwrap() {
+            if channel.topic == "seer.0/picture" && !channel.is_repeated() {
+                sequences.push(message.sequence);
+            }
+        }
+    }
+    sequences
+}
+
+/// Pictures that were ever written.
+fn written(robot: &Robot) -> u64 {
+    let id = StreamId { name: robot.name("seer.0"), number: 2 };
+    robot.node.inspect_stream(id).unwrap().unwrap().written
 }
 
 #[test]
@@ -47,4 +69,46 @@ fn long_records_are_taken_out_of_the_recording_and_a_missing_one_is_refused() {
     assert!(run["events"].as_u64() > Some(2), "{run:#}");
     let why = run["why"].as_str().unwrap();
     assert!(why.starts_with("record 0 of stream 2 of 1.110.0.0, ") && why.contains("is not in the recording"), "{why}");
+}
+
+#[test]
+fn a_recorder_that_starts_again_goes_on_behind_what_is_in_a_file() {
+    let place = Place::new();
+    let (mut launch, robot) = seers_recorded(&place, &["pictures"], "streams = [\"seer.0/picture\"]\n");
+    let [first, second, third] = [1, 2, 3].map(|number| recording(&place, number));
+    let is_recorded = || place.say(&["call", "logd.0", "channels", "0"]).ok().contains("seer.0/picture");
+    wait("its pictures are recorded", || is_recorded().then_some(()));
+    place.say(&["call", "seer.0", "add", "1"]).ok();
+    wait_journaled(&first, "seer.0", 20);
+
+    // Pictures come while there is no recorder, and no more than the stream keeps.
+    let (killed, seer) = (robot.pid("logd.0"), robot.pid("seer.0"));
+    signal(killed, Signal::SIGKILL);
+    let before = written(&robot);
+    wait("pictures that nobody records", || (written(&robot) > before + 5).then_some(()));
+    halt(seer);
+    robot.wait_restarted("logd.0", killed);
+    wait("its pictures are recorded again", || is_recorded().then_some(()));
+    signal(seer, Signal::SIGCONT);
+    wait_journaled(&second, "seer.0", 20);
+    let recovered = rohrpost_recording::recovered_path(&first);
+    wait("what was killed is made whole", || recovered.exists().then_some(()));
+    halt(seer);
+    place.say(&["restart", "logd.0"]).ok();
+    wait("its pictures are recorded by the third", || is_recorded().then_some(()));
+    signal(seer, Signal::SIGCONT);
+    wait_journaled(&third, "seer.0", 20);
+    drop(robot);
+    launch.stop();
+
+    let files = [recovered, second, third];
+    let sequences = pictures(&files);
+    assert!(sequences.len() > 15, "{sequences:?}");
+    assert_eq!(sequences, (0..sequences.len() as u32).collect::<Vec<_>>(), "nothing twice, and nothing missing");
+    let all = place.path("all.mcap");
+    let merged = files.iter().map(|file| file.to_str().unwrap());
+    let command: Vec<&str> = ["record", "merge", all.to_str().unwrap()].into_iter().chain(merged).collect();
+    place.say(&command).ok();
+    let run = &replayed(&place, &all, &[])[0];
+    assert_eq!((&run["result"], &run["is_whole"]), (&"identical".into(), &true.into()), "{run:#}");
 }

@@ -1,26 +1,12 @@
 //! Commands to modules that are played: they get the answers that the modules' journals have, or a fault that says why
 //! not.
 
-use crate::harness::{Place, wait};
+use crate::harness::{Place, RECORDED_CLASSES, wait};
 use crate::replayed::{call, position, replay};
 use rohrpost_recording::{Reader, info};
 use std::path::Path;
 
-const CONFIG: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-mapper = { id = 96 }
-logd = { id = 24 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
+const MODULES: &str = r#"
 [time]
 source = "simulation"
 speed = 4.0
@@ -64,12 +50,8 @@ fn a_command_to_a_played_module_gets_the_answer_that_was_recorded_for_it() {
     let place = Place::new();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     std::fs::copy(root.join("config/building.map"), place.path("building.map")).unwrap();
-    let config = place.path("test.toml");
-    std::fs::write(&config, CONFIG).unwrap();
     let file = place.path("recordings/main-0001.mcap");
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
+    let (mut launch, robot) = place.launched(&[RECORDED_CLASSES, MODULES]);
     let journaled = || ["motor.0/journal", "mapper.0/journal"].map(|topic| count(&file, topic));
     wait("journals are recorded", || journaled().iter().all(|count| *count > 0).then_some(()));
     let drive = ["call", "motor.0", "drive", "0.25", "0.125"];

@@ -5,6 +5,7 @@
 use rohrpost::schema::Bytes;
 use rohrpost::serde::Deserialize;
 use rohrpost::{Context, Interest, Module, ModuleClock, ModuleError, Ready, Received, Stream, StreamSubscription};
+use rohrpost_mailbox::Shape;
 use std::collections::HashMap;
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -13,7 +14,7 @@ use std::time::Duration;
 /// It is another build if it finds this in its environment.
 pub(crate) const OTHER_BUILD: &str = "ROHRPOST_E2E_SEER_BIAS";
 
-/// It asks for other things if it finds this.
+/// It asks for something else if it finds here for what: `tick`, `mailbox`, `rewind` or `rewind-to`.
 pub(crate) const OTHER_QUESTIONS: &str = "ROHRPOST_E2E_SEER_ASKS";
 
 /// Bytes of a picture.
@@ -90,6 +91,8 @@ enum Sight {
     Link,
     /// Pictures that it writes itself, once something was added.
     Pictures,
+    /// The clock; and it asks for a mailbox, and to go back in streams.
+    Asking,
 }
 
 #[derive(Deserialize)]
@@ -113,8 +116,8 @@ impl Module for Seer {
     type Interfaces = SeeingInterface;
 
     fn new(settings: SeerSettings, context: &mut Context) -> Result<Self, ModuleError> {
-        let asks_otherwise = std::env::var_os(OTHER_QUESTIONS).is_some();
-        context.set_period(Duration::from_millis(if asks_otherwise { 6 } else { 5 }));
+        let otherwise = std::env::var(OTHER_QUESTIONS).unwrap_or_default();
+        context.set_period(Duration::from_millis(if otherwise == "tick" { 6 } else { 5 }));
         let source = settings.source;
         let map = (source == Sight::Map).then(|| std::fs::read(context.path("vision.map"))).transpose()?;
         if map.as_ref().is_some_and(|map| map == NOTHING) {
@@ -127,6 +130,7 @@ impl Module for Seer {
                 let clock = context.clock().clone();
                 drop(std::thread::spawn(move || clock.now()).join());
             }
+            Sight::Asking => ask(context, &otherwise)?,
             _ => {}
         }
         let port = matches!(source, Sight::Port | Sight::Beside).then(|| open(context)).transpose()?;
@@ -217,6 +221,18 @@ fn own_pictures(context: &mut Context) -> Result<(Stream<Bytes>, StreamSubscript
     let own = context.installation().classes.format(context.me());
     let newest = context.stream(SeeingInterface::PICTURE, &own)?;
     Ok((newest, context.subscribe_stream(SeeingInterface::PICTURE, &own)?))
+}
+
+/// Makes a mailbox, follows a seer's own pictures twice, and goes back in both; one of these `otherwise`.
+fn ask(context: &mut Context, otherwise: &str) -> Result<(), ModuleError> {
+    let slots = if otherwise == "mailbox" { 5 } else { 4 };
+    context.open_mailbox(3, Shape { slots, body_bytes_max: 100, ..Shape::default() })?;
+    let own = context.installation().classes.format(context.me());
+    let mut follow = || context.subscribe_stream(SeeingInterface::PICTURE, &own);
+    let (first, second) = (follow()?, follow()?);
+    context.rewind(if otherwise == "rewind" { &second } else { &first });
+    context.rewind_to(&second, if otherwise == "rewind-to" { 8 } else { 7 });
+    Ok(())
 }
 
 /// Opens a seer's port.

@@ -2,7 +2,7 @@
 //! at a time.
 
 use crate::completions::offered;
-use crate::harness::{OUTPUT, Place, Robot, wait};
+use crate::harness::{OUTPUT, Place, RECORDED_CLASSES, Robot, wait};
 use crate::process::{Running, Said};
 use rohrpost::interfaces::WheelsInterface;
 use rohrpost::serde::Deserialize;
@@ -54,24 +54,12 @@ impl Reading for Reader {
 
 /// A robot that drives about, and a module that reads its odometry.
 const ROBOT: &str = r#"
-installation = "test"
-[system]
-name = "robot"
-id = 1
-[classes]
-motor = { id = 200 }
-odometry = { id = 160 }
-laser = { id = 150 }
-pilot = { id = 140 }
-camera = { id = 112 }
-depth = { id = 104 }
-reader = { id = 96 }
-output = { id = 32 }
-tool = { id = 16 }
-[scheduling]
-real-time-from = 256
-[nodes.main]
-
+[classes.camera]
+id = 112
+[classes.depth]
+id = 104
+[classes.reader]
+id = 94
 [[module]]
 name = "motor.0"
 aliases = ["odometry.0", "laser.0", "camera.0", "depth.0"]
@@ -102,14 +90,9 @@ const ODOMETRY: [&str; 2] = ["odometry.0", "odometry"];
 
 fn launched(place: &Place) -> (Running, Robot) {
     let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/building.map");
-    let config = place.path("test.toml");
     let program = format!("{:?}", std::env::current_exe().unwrap());
     let text = ROBOT.replace("MAP", map).replace("PROGRAM", &program);
-    std::fs::write(&config, text + OUTPUT).unwrap();
-    let mut launch = place.launch(&config);
-    let robot = place.robot(&config, "main", &mut launch);
-    robot.wait_on(&mut launch);
-    (launch, robot)
+    place.launched(&[RECORDED_CLASSES, &text, OUTPUT])
 }
 
 fn interp(place: &Place, stream: &[&str], more: &[&str]) -> Said {

@@ -1,6 +1,7 @@
 //! Two processes that send to each other: forked, pinned, scheduled, timed, and never left behind.
 
 mod alone;
+mod asleep;
 mod child;
 mod cycles;
 mod interrupt;
@@ -12,6 +13,7 @@ mod scratch;
 mod shared;
 
 pub use alone::{Alone, alone};
+pub use asleep::{given_away, require_asleep};
 pub use child::Child;
 pub use cycles::CycleCounter;
 pub use interrupt::{heed, interrupted, rest};

@@ -166,6 +166,11 @@ impl RecordedRun {
         ExactRun { folder: None, report: String::new(), ends: self.ends.clone(), journal, records: None }
     }
 
+    /// The same of a journal that is there from its beginning on; else why it is not.
+    pub(super) fn readable(&self, exact: &ExactRun) -> Result<(Installation, Name), String> {
+        self.begins_late.clone().map_or_else(|| self.installation(exact), Err)
+    }
+
     /// The configuration as it was then, and the module: that of the channel.
     pub(super) fn installation(&self, exact: &ExactRun) -> Result<(Installation, Name), String> {
         let (installation, name) = exact.installation().map_err(|error| error.to_string())?;
@@ -209,7 +214,6 @@ mod tests {
             message_encoding: String::new(),
             schema_encoding: String::new(),
             texts: texts.into_iter().collect(),
-            is_ours: true,
         }
     }
 

@@ -67,12 +67,13 @@ pub(super) fn run(arguments: &ExactArguments) -> Result<ExitCode, Failure> {
 
 fn list(run: &RecordedRun) -> Result<(), Failure> {
     say(format_args!("{}:", plain::line(&run.module)));
-    if let Some(why) = &run.begins_late {
-        say(format_args!("  ({why})"));
+    let exact = run.exact();
+    if let Err(why) = run.readable(&exact) {
+        say(format_args!("  ({})", plain::line(&why)));
         return Ok(());
     }
     // The reader may have seen enough.
-    Ok(run.exact().each_entry(|entry| say(plain::line(entry)))?)
+    Ok(exact.each_entry(|entry| say(plain::line(entry)))?)
 }
 
 fn tell(is_json: bool, run: &RecordedRun, number: usize, report: &ReplayReport, took: Duration) {

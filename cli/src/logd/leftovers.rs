@@ -27,7 +27,7 @@ pub(super) fn recover(directory: &Path, stem: &str, leave_bytes: u64) -> io::Res
 
 /// Files of recordings of a stem, in order, also in folders that log control led to; none of a folder that cannot be
 /// read, which the writer will tell.
-fn files(directory: &Path, stem: &str) -> Vec<PathBuf> {
+pub(super) fn files(directory: &Path, stem: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
     collect(directory, stem, FOLDERS_DEEP, &mut files);
     files.sort();

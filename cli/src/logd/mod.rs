@@ -12,6 +12,7 @@
 //! The module's thread copies each value once, from the ring or the mailbox into memory, and never waits for the disk.
 
 mod control;
+mod earlier;
 mod folder;
 mod health;
 mod leftovers;
@@ -22,6 +23,7 @@ mod taps;
 use crate::router::NoSettings;
 use crate::version;
 use control::{ControlServer, Orders, Told};
+use earlier::EarlierFiles;
 use health::Health;
 use rohrpost::interfaces::{ChannelPage, RecordedMessages, Recorder, RecorderInterface, RecordingState};
 use rohrpost::output::errno_of;
@@ -82,7 +84,8 @@ impl Module for Logd {
         leftovers::recover(&recording.directory, &node, recording.leave_free)?;
         let options = options(recording, installation, &node);
         let session = session(installation, &node);
-        let taps = Taps::new(installation, recording.clone(), context.me(), &node);
+        let earlier = EarlierFiles::find(&recording.directory, &node);
+        let taps = Taps::new(installation, recording.clone(), (context.me(), &node), earlier);
         if let Some(note) = recording.control_note() {
             tracing::warn!("{note}");
         }

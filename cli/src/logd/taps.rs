@@ -1,5 +1,6 @@
 //! What is recorded of which module: wanted by the configuration, described by the module, subscribed to.
 
+use super::earlier::EarlierFiles;
 use super::sampler::{Numbering, Sampler};
 use rohrpost::common::OutputLevel;
 use rohrpost::description::{DescriptionRequest, noted};
@@ -15,6 +16,7 @@ use rohrpost::{
 use rohrpost_config::{Installation, RecordedItems, Recording, Sampling};
 use rohrpost_mailbox::{StreamId, local};
 use rohrpost_modules::journal::{JOURNAL_NAME, JOURNAL_NUMBER, WHOLE_BYTES_MAX};
+use rohrpost_recording::format::topic;
 use rohrpost_recording::{ChannelId, ChannelSpec, Earlier, Message, WriteError, Writer};
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -27,6 +29,8 @@ pub(super) struct Taps {
     recording: Recording,
     sources: Vec<SourceModule>,
     taps: Vec<Tap>,
+    /// Recorded before this process.
+    earlier: EarlierFiles,
 }
 
 /// A module of which something is wanted.
@@ -71,8 +75,13 @@ enum Source {
 }
 
 impl Taps {
-    /// What the configuration names, as seen from module `own` on its node.
-    pub(super) fn new(installation: &Installation, recording: Recording, own: Name, node: &str) -> Self {
+    /// What the configuration names, as seen from module `own` on its node, where there are files of `earlier`.
+    pub(super) fn new(
+        installation: &Installation,
+        recording: Recording,
+        (own, node): (Name, &str),
+        earlier: EarlierFiles,
+    ) -> Self {
         let replicas = |from: Name| {
             let here = installation.replicas.iter().filter(|replica| replica.from == from);
             here.filter(|replica| replica.to.iter().any(|to| to == node)).map(|replica| replica.item.clone()).collect()
@@ -99,7 +108,7 @@ impl Taps {
                 || entries().any(|entry| entry.from.map_or(*is_in_file, |from| from == *name))
         };
         let sources = names.filter(is_wanted).map(|(name, _)| source(name)).collect();
-        Self { recording, sources, taps: Vec::new() }
+        Self { recording, sources, taps: Vec::new(), earlier }
     }
 
     /// A recording begins: what is known already has its channels from the first file on.
@@ -128,9 +137,8 @@ impl Taps {
             taps.iter_mut().for_each(|tap| tap.open_channel(writer));
             self.taps.extend(taps);
         }
-        let may_name = !self.recording.exact.is_empty() && is_first(&node, context.me());
-        let node = may_name.then_some(&*node);
-        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, node))
+        let named = Some(&self.earlier).filter(|_| !self.recording.exact.is_empty());
+        self.taps.iter_mut().filter(|tap| tap.source.is_none()).try_for_each(|tap| tap.open(context, named))
     }
 
     /// Records a value that came, if it is to be.
@@ -267,9 +275,9 @@ impl Tap {
         self.channel = opened.ok();
     }
 
-    /// Subscribes. A stream that has no seat left is tried again. `journals`: the node, if journals may name long
-    /// records, also those that were written before the recorder came.
-    fn open(&mut self, context: &mut Context, journals: Option<&Node>) -> Result<(), ModuleError> {
+    /// Subscribes. A stream that has no seat left is tried again. `named`: what is recorded already, if journals may
+    /// name long records: then also those are recorded that were written before the recorder came, and are in no file.
+    fn open(&mut self, context: &mut Context, named: Option<&EarlierFiles>) -> Result<(), ModuleError> {
         let opened = match (self.sampler.numbering(), self.sampling) {
             (Numbering::Records, _) => {
                 context.subscribe_stream_untyped(self.from, &self.item, self.interface).map(Source::Stream)
@@ -285,11 +293,8 @@ impl Tap {
         };
         match opened {
             Ok(source) => {
-                let may_be_named = self.sampling == Sampling::Each && journals.is_some_and(|node| self.is_long(node));
-                if let Source::Stream(subscription) = &source
-                    && may_be_named
-                {
-                    context.rewind(subscription);
+                if let (Source::Stream(subscription), Some(earlier), Sampling::Each) = (&source, named, self.sampling) {
+                    self.go_back(context, subscription, earlier);
                 }
                 self.source = Some(source);
                 self.refusal.clear();
@@ -306,11 +311,23 @@ impl Tap {
         Ok(())
     }
 
-    /// Whether it is a stream of records that a journal may name.
-    fn is_long(&self, node: &Node) -> bool {
+    /// A journal, and a stream of records that journals may name, are recorded from behind the last record in a file
+    /// on, or from the oldest one that is kept.
+    fn go_back(&self, context: &mut Context, subscription: &StreamSubscription<()>, earlier: &EarlierFiles) {
         let id = StreamId { name: self.from, number: self.item.number };
-        let info = node.inspect_stream(id).ok().flatten();
-        info.is_some_and(|info| info.shape.record_bytes as usize > WHOLE_BYTES_MAX)
+        let participant = context.link().borrow().participant().clone();
+        let info = participant.node().inspect_stream(id).ok().flatten();
+        let is_long = info.is_some_and(|info| info.shape.record_bytes as usize > WHOLE_BYTES_MAX);
+        // It begins with the oldest one by itself.
+        let is_journal = id.number == JOURNAL_NUMBER;
+        if !is_long && !is_journal {
+            return;
+        }
+        match earlier.behind(&topic(&self.module, &self.item.field.name), &participant, id) {
+            Some(sequence) => context.rewind_to(subscription, sequence),
+            None if is_journal => {}
+            None => context.rewind(subscription),
+        }
     }
 
     fn has_brought(&self, data: &Received<'_>) -> bool {
@@ -327,11 +344,6 @@ impl Tap {
         let Some(least) = self.least else { return true };
         from_bytes::<OutputLine>(data.value).map_or(true, |line| line.level <= least)
     }
-}
-
-/// Whether no recorder ran before this one since launch began: what that has recorded is not taken again.
-fn is_first(node: &Node, me: Name) -> bool {
-    node.participants().iter().all(|process| process.module != me || process.restarts == 0)
 }
 
 /// A value that came, as it is recorded.

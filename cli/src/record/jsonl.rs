@@ -160,7 +160,6 @@ mod tests {
             message_encoding: encoding.into(),
             schema_encoding: String::new(),
             texts: BTreeMap::new(),
-            is_ours: true,
         }
     }
 

@@ -15,6 +15,8 @@ type CommandKey = (String, u16, Vec<u8>);
 pub(super) struct PlayedAnswers {
     /// Names of modules that have a journal.
     names: BTreeSet<String>,
+    /// Names of those of which it cannot be read, and why.
+    unreadable: BTreeMap<String, String>,
     by_command: BTreeMap<CommandKey, Vec<(u64, NotedOutcome)>>,
 }
 
@@ -24,7 +26,7 @@ impl PlayedAnswers {
         for (name, NotedAnswer { function, arguments, at_ns, outcome, .. }) in recorded.answers {
             by_command.entry((name, function, arguments.0)).or_default().push((at_ns, outcome));
         }
-        Self { names: recorded.names, by_command }
+        Self { names: recorded.names, unreadable: recorded.unreadable, by_command }
     }
 
     /// What the module of this name answered to the same command at the time that is nearest to this one: postcard of
@@ -47,7 +49,13 @@ impl PlayedAnswers {
             None if self.names.contains(name) => {
                 Err(refused("has no answer: its journal has no such command with these arguments"))
             }
-            None => Err(refused("takes no commands: the journal that would have its answers is not recorded")),
+            None => Err(match self.unreadable.get(name) {
+                Some(why) => refused(&format!("takes no commands: {}", line(why))),
+                None => refused(
+                    "takes no commands: the journal that would have its answers is not recorded; name it in `exact` \
+                     of [record]",
+                ),
+            }),
         }
     }
 }
@@ -66,6 +74,7 @@ mod tests {
         let result = |text: &str| NotedOutcome::Result(text.as_bytes().to_vec().into());
         let answers = PlayedAnswers::new(JournalAnswers {
             names: ["motor.0".to_owned()].into(),
+            unreadable: [("arm.0".to_owned(), "its journal began late\nFORGED".to_owned())].into(),
             answers: vec![
                 answer(100, b"a", result("early")),
                 answer(200, b"a", result("late")),
@@ -88,7 +97,8 @@ mod tests {
             ("motor.0", 16, b"c", "that of 9000 bytes was more than a journal keeps"),
             ("motor.0", 16, b"d", "motor.0 is played from a recording and has no answer: its journal has no such"),
             ("motor.0", 17, b"a", "motor.0 is played from a recording and has no answer: its journal has no such"),
-            ("laser.0", 16, b"a", "laser.0 is played from a recording and takes no commands"),
+            ("laser.0", 16, b"a", "laser.0 is played from a recording and takes no commands: the journal that would"),
+            ("arm.0", 16, b"a", "arm.0 is played from a recording and takes no commands: its journal began late\\nF"),
         ] {
             let found = find(name, number, arguments, 150);
             assert!(found.contains(told), "{found}");

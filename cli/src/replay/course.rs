@@ -88,11 +88,6 @@ impl Course {
         Ok(course)
     }
 
-    /// Reads what comes next, while there is time.
-    pub(super) fn read_ahead(&mut self) -> Result<(), ReadError> {
-        self.player.read_ahead()
-    }
-
     pub(super) fn is_paused(&self) -> bool {
         self.is_paused
     }

@@ -296,7 +296,7 @@ fn noted_answers(
     }
     let files: Vec<&Path> = recorded.infos.iter().map(|info| info.path.as_path()).collect();
     let mut bytes = Vec::new();
-    append(&mut bytes, &JournalAnswers::read(&files, &modules, folder)?)?;
+    append(&mut bytes, &JournalAnswers::read(&files, (source, &modules), folder)?)?;
     Ok(Some(bytes))
 }
 

@@ -13,7 +13,7 @@
 use super::answers::PlayedAnswers;
 use super::channels::PlayedChannels;
 use super::course::{Course, Move, Part};
-use super::spacing::Spacing;
+use super::spacing::{PlayedAt, ProcessorWaits, Spacing};
 use nix::sys::time::TimeSpec;
 use nix::sys::timer::{Expiration, TimerSetTimeFlags};
 use nix::sys::timerfd::{ClockId, TimerFd, TimerFlags};
@@ -34,8 +34,6 @@ use std::time::{Duration, Instant};
 /// Values played at once at most, and the time after which no further one is begun: commands are heard in between.
 const AT_ONCE_MAX: usize = 64;
 const AT_ONCE_TIME: Duration = Duration::from_millis(2);
-/// Within this time a chunk of a recording is read and unpacked.
-const LEISURE: Duration = Duration::from_millis(5);
 /// Where it is, is published so often.
 const TOLD: Duration = Duration::from_millis(200);
 /// The timer's shortest time; none would switch it off.
@@ -83,6 +81,7 @@ struct RecordingPlayer {
     end_ns: u64,
     rate: f64,
     spacing: Spacing,
+    waits: ProcessorWaits,
     damages: u64,
     /// What was published of its position, and when.
     told: Option<(ReplayPosition, Instant)>,
@@ -124,6 +123,7 @@ impl Module for RecordingPlayer {
             end_ns,
             rate,
             spacing: Spacing::default(),
+            waits: ProcessorWaits::of_this_thread(),
             damages: 0,
             told: None,
         })
@@ -185,12 +185,14 @@ impl RecordingPlayer {
                     if let Some(time_ns) = time_ns {
                         self.time.advance_to(time_ns);
                     } else {
-                        self.spacing.note(message.arrival_ns, self.rate, monotonic_ns());
+                        let late_ns = (now_ns.saturating_sub(message.arrival_ns) as f64 / self.rate) as u64;
+                        let at = PlayedAt { arrival_ns: message.arrival_ns, now_ns: monotonic_ns(), late_ns };
+                        self.spacing.note(at, self.rate, self.waits.waited_ns());
                     }
                     self.channels.play(context, &channel, &message)?;
                 }
                 Move::Advance { time_ns } => drop(self.time.advance_to(time_ns)),
-                Move::Wait { until_ns } => return Ok(Some(self.read_while_waiting(until_ns))),
+                Move::Wait { until_ns } => return Ok(Some(self.left(until_ns))),
                 Move::End if is_paused => {
                     tracing::info!("at the end: `seek`, or `resume` to end the replay")
                 }
@@ -205,14 +207,9 @@ impl RecordingPlayer {
         Ok(Some(Duration::ZERO))
     }
 
-    /// How long until then. If there is time, it reads what comes next.
-    fn read_while_waiting(&mut self, until_ns: u64) -> Duration {
-        let left = || Duration::from_nanos((until_ns.saturating_sub(self.clock.now().ns) as f64 / self.rate) as u64);
-        if left() >= LEISURE {
-            // What is wrong here is told when it is to be played.
-            let _ = self.course.read_ahead();
-        }
-        left()
+    /// How long until then.
+    fn left(&self, until_ns: u64) -> Duration {
+        Duration::from_nanos((until_ns.saturating_sub(self.clock.now().ns) as f64 / self.rate) as u64)
     }
 
     /// Time passes at the rate, or stands still; there is something to look after.
@@ -259,6 +256,7 @@ impl Replay for RecordingPlayer {
         let now = self.clock.now();
         let time_ns = if self.time.has_begun() { now.ns } else { 0 };
         let seconds = |ns: u64| ns as f64 / 1e9;
+        let (all, own) = (self.spacing.all(), self.spacing.own());
         ReplayPosition {
             at_s: seconds(time_ns.min(self.end_ns).saturating_sub(self.begin_ns)),
             length_s: self.length_s(),
@@ -272,9 +270,12 @@ impl Replay for RecordingPlayer {
             channels: self.channels.count(),
             refused: self.channels.refused,
             damages: self.damages,
-            spacing_p50_ns: self.spacing.quantile_ns(0.5),
-            spacing_p99_ns: self.spacing.quantile_ns(0.99),
-            spacing_max_ns: self.spacing.max_ns(),
+            spacing_p50_ns: all.quantile_ns(0.5),
+            spacing_p99_ns: all.quantile_ns(0.99),
+            spacing_max_ns: all.max_ns(),
+            spacing_own_p50_ns: own.quantile_ns(0.5),
+            spacing_own_p99_ns: own.quantile_ns(0.99),
+            spacing_own_max_ns: own.max_ns(),
         }
     }
 

@@ -127,17 +127,20 @@ impl ReplaySession {
             text.push_str(&format!(", to {:.1} s of {:.1} s", position.at_s, position.length_s));
         }
         text.push('\n');
-        let ns = |ns: u64| short(ns as f64 / 1e9);
-        if let (Some(p50), Some(p99), Some(max)) =
-            (position.spacing_p50_ns, position.spacing_p99_ns, position.spacing_max_ns)
-        {
-            text.push_str(&format!(
-                "error of spacing at rate {}: p50 {}, p99 {}, max {}\n",
-                position.rate,
-                ns(p50),
-                ns(p99),
-                ns(max)
-            ));
+        let rate = position.rate;
+        for (what, figures) in [
+            (
+                format!("error of spacing at rate {rate}"),
+                [position.spacing_p50_ns, position.spacing_p99_ns, position.spacing_max_ns],
+            ),
+            (
+                "without waits for a processor".into(),
+                [position.spacing_own_p50_ns, position.spacing_own_p99_ns, position.spacing_own_max_ns],
+            ),
+        ] {
+            if let [Some(p50), Some(p99), Some(max)] = figures.map(|ns| ns.map(|ns| short(ns as f64 / 1e9))) {
+                text.push_str(&format!("{what}: p50 {p50}, p99 {p99}, max {max}\n"));
+            }
         }
         if position.refused > 0 {
             text.push_str(&format!("{} values were too large or too late for their streams\n", position.refused));

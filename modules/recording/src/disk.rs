@@ -45,21 +45,24 @@ pub fn is_being_written(path: &Path) -> bool {
     File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
+/// Takes the lock by which others see that the file is being written, as long as it is open. A reader that looks just
+/// then has it for a moment: it is tried again behind a `rest`. Where there are no locks, it is written all the same.
+fn lock(file: &File, mut rest: impl FnMut()) {
+    for _ in 0..LOCK_TRIES {
+        if !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            break;
+        }
+        rest();
+    }
+}
+
 /// That of the operating system.
 pub(crate) struct RealDisk;
 
 impl Disk for RealDisk {
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
         let file = OpenOptions::new().write(true).create_new(true).open(path)?;
-        // As long as it is open, others see that it is being written. Where there are no locks, it is written all the
-        // same.
-        for _ in 0..LOCK_TRIES {
-            // A reader that looks whether it is being written has it for a moment.
-            if !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-                break;
-            }
-            std::thread::sleep(LOCK_RETRY);
-        }
+        lock(&file, || std::thread::sleep(LOCK_RETRY));
         Ok(Box::new(file))
     }
 
@@ -92,5 +95,34 @@ impl DiskFile for File {
 
     fn has_name(&mut self) -> io::Result<bool> {
         Ok(self.metadata()?.nlink() > 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_writer_has_its_lock_though_a_reader_looks_just_then() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("base-0001.mcap");
+        let file = File::create(&path).unwrap();
+        let looks = || {
+            let reader = File::open(&path).unwrap();
+            reader.try_lock_shared().unwrap();
+            Some(reader)
+        };
+        let (mut reader, mut rests) = (looks(), 0);
+        lock(&file, || {
+            rests += 1;
+            reader = reader.take().filter(|_| rests < 3);
+        });
+        assert_eq!(rests, 3);
+        assert!(is_being_written(&path));
+        file.unlock().unwrap();
+        let _reader = looks();
+        let mut rests = 0;
+        lock(&file, || rests += 1);
+        assert_eq!(rests, LOCK_TRIES, "one that does not let go of it is not waited for");
     }
 }

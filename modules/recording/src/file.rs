@@ -2,7 +2,7 @@
 
 use crate::disk::Disk;
 use crate::error::{DiskError, Shown};
-use crate::format::PROFILE;
+use crate::format::{LIBRARY, PROFILE};
 use crate::output::Output;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, McapError, McapResult, WriteOptions};
@@ -32,7 +32,7 @@ impl OpenFile {
         // readers stop before it if the writer is killed.
         let options = WriteOptions::new()
             .profile(PROFILE)
-            .library(concat!("rohrpost-recording/", env!("CARGO_PKG_VERSION")))
+            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
             .compression_level(ZSTD_LEVEL)
             .compression_threads(0)

@@ -1,9 +1,12 @@
 //! What of MCAP a recording uses, and the names that only recordings of Rohrpost have.
 
+use mcap::records::Header;
 use std::collections::BTreeMap;
 
 /// The header's profile.
 pub const PROFILE: &str = "rohrpost";
+/// Library in the header of each file, before its version.
+pub(crate) const LIBRARY: &str = "rohrpost-recording/";
 /// How messages are encoded.
 pub const MESSAGE_ENCODING: &str = "postcard";
 /// How types are described: bytes of `rohrpost-schema`'s `Type`, by the table in `docs/src/wire.md`.
@@ -54,6 +57,8 @@ pub mod session_key {
 
 /// Keys of a channel's metadata.
 pub mod key {
+    /// All of them.
+    pub(crate) const ALL: [&str; 6] = [NAME, ITEM, EPOCH, REPEATED, DRAWN, REDUCED];
     /// The name of what publishes, as `laser.0`.
     pub const NAME: &str = "name";
     /// What it publishes, as `scan`.
@@ -84,6 +89,20 @@ pub(crate) mod op {
     pub(crate) const STATISTICS: u8 = 11;
     pub(crate) const METADATA: u8 = 12;
     pub(crate) const METADATA_INDEX: u8 = 13;
+    pub(crate) const DATA_END: u8 = 15;
+}
+
+/// What names of our metadata begin with.
+const METADATA: &str = "rohrpost.";
+
+/// Whether metadata of this name are ours to say.
+pub(crate) fn is_our_word(name: &str) -> bool {
+    name.starts_with(METADATA)
+}
+
+/// Whether a file is of another program, by its header. Our words mean nothing there.
+pub(crate) fn is_of_others(header: &Header) -> bool {
+    header.profile != PROFILE && !header.library.starts_with(LIBRARY)
 }
 
 /// The topic of an item.

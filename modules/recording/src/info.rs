@@ -214,8 +214,11 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
         others: Vec::new(),
     };
     let mut lost = BTreeMap::new();
-    for Metadata { name, metadata: mut texts } in about {
+    for its in about {
+        let is_heeded = contents.heeds(&its);
+        let Metadata { name, metadata: mut texts } = its;
         match name.as_str() {
+            _ if !is_heeded => info.others.push((name, texts)),
             metadata::SESSION if info.session.is_empty() => info.session = texts,
             metadata::CONFIGURATION => info.configuration.append(&mut texts),
             metadata::LOST => lost = format::counts(&texts),
@@ -234,21 +237,19 @@ fn build(contents: &Contents, definitions: &Definitions, tallies: &BTreeMap<u16,
     let mut channels: BTreeMap<&str, ChannelInfo> = BTreeMap::new();
     let mut epochs: BTreeMap<u64, Tally> = BTreeMap::new();
     let mut times = None;
-    // Other programs may have the same words for other things.
-    let is_ours = info.profile == format::PROFILE;
     for (id, channel) in definitions.channels() {
         let tally = tallies.get(&id);
         let (messages, its_times) = tally.map_or((0, None), |tally| (tally.messages, tally.times));
         let told = channels.entry(&channel.topic).or_default();
-        describe(told, channel, is_ours);
-        if is_ours && channel.is_repeated() {
+        describe(told, channel);
+        if channel.is_repeated() {
             told.repeated = told.repeated.saturating_add(messages);
             continue;
         }
         told.messages = told.messages.saturating_add(messages);
         (told.first_ns, told.last_ns) = wider(told.first_ns.zip(told.last_ns), its_times).unzip();
         times = wider(times, its_times);
-        if let Some(epoch) = channel.epoch().filter(|_| is_ours && messages > 0) {
+        if let Some(epoch) = channel.epoch().filter(|_| messages > 0) {
             let tally = epochs.entry(epoch).or_default();
             tally.messages = tally.messages.saturating_add(messages);
             tally.widen(its_times);
@@ -278,7 +279,7 @@ fn sum(counts: impl Iterator<Item = u64>) -> u64 {
 }
 
 /// A topic has a channel for each epoch, all with the same description.
-fn describe(info: &mut ChannelInfo, channel: &Definition, is_ours: bool) {
+fn describe(info: &mut ChannelInfo, channel: &Definition) {
     let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
     info.topic.clone_from(&channel.topic);
     (info.name, info.item) = (text(key::NAME), text(key::ITEM));
@@ -286,6 +287,6 @@ fn describe(info: &mut ChannelInfo, channel: &Definition, is_ours: bool) {
     info.ty = channel.schema.ty();
     info.schema_encoding.clone_from(&channel.schema.encoding);
     info.message_encoding.clone_from(&channel.message_encoding);
-    info.drawn_of = channel.texts.get(key::DRAWN).filter(|_| is_ours).cloned();
-    info.is_reduced |= is_ours && channel.texts.contains_key(key::REDUCED);
+    info.drawn_of = channel.texts.get(key::DRAWN).cloned();
+    info.is_reduced |= channel.texts.contains_key(key::REDUCED);
 }

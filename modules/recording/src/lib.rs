@@ -102,6 +102,7 @@ pub use newest::Earlier;
 pub use options::{Options, Session};
 pub use order::{FileChange, MARK_BYTES_MAX, Mark, OrderError, PendingOrder};
 pub use player::{Cue, Player};
+pub use read::last::{LastMessage, last_message};
 pub use reader::{Reader, RecordedChannel, is_closed};
 pub use recover::{RecoverError, Recovered, recover, recovered_path};
 pub use rewrite::{Progress, RewriteError};

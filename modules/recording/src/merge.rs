@@ -150,6 +150,7 @@ impl Source {
                     return Ok(());
                 }
                 Item::Damaged(at, what) => return Err(self.contents.damaged(at, what).into()),
+                Item::Metadata(its) if !self.contents.heeds(&its) => {}
                 Item::Metadata(its) => self.tell(its, new)?,
             }
         }

@@ -43,7 +43,7 @@ pub enum Cue<'a> {
 }
 
 /// Plays recordings: in their order, as far apart as they came. It has no clock: the time is told, so it may pass at
-/// any pace, or stand.
+/// any pace, or stand. A thread reads ahead some megabytes, so that a message is not late for its chunk.
 ///
 /// ```
 /// # use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
@@ -134,15 +134,6 @@ impl Player {
         Ok(Cue::Message(channel, message))
     }
 
-    /// Reads and unpacks the chunk behind the one that is played, if that is not done yet. To be called while there is
-    /// time: it takes milliseconds, which else a message is late.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn read_ahead(&mut self) -> Result<(), ReadError> {
-        self.reader.as_mut().map_or(Ok(()), Reader::read_ahead)
-    }
-
     /// Goes to the first message that arrived at this time or later, in the order of the files; with 0 to the
     /// beginning. Time begins anew there. False if there is none: then it is at the end.
     ///
@@ -155,6 +146,7 @@ impl Player {
             if let Some(reader) = &mut self.reader
                 && reader.seek(arrival_ns)?
             {
+                reader.read_ahead()?;
                 return Ok(true);
             }
         }
@@ -185,6 +177,7 @@ impl Player {
                 if !self.open_next()? {
                     return Ok(Advanced::ToEnd);
                 }
+                self.reader.as_mut().map_or(Ok(()), Reader::read_ahead)?;
                 continue;
             };
             if passed > PASSED_BYTES_MAX {
@@ -214,7 +207,7 @@ enum Advanced {
 fn recording_of(path: &Path) -> Option<String> {
     let mut contents = Contents::open(path).ok()?;
     while let Ok(Some(Item::Metadata(mut its))) = contents.next() {
-        if its.name == metadata::SESSION {
+        if its.name == metadata::SESSION && contents.heeds(&its) {
             return its.metadata.remove(session_key::RECORDING);
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::batch::Message;
 use crate::error::ReadError;
-use crate::format::{PROFILE, key};
+use crate::format::key;
 use crate::read::contents::{Contents, Ending, Found, Item};
 use crate::read::definitions::Definition;
 use crate::read::frames::Frames;
@@ -29,22 +29,21 @@ pub struct RecordedChannel {
     pub message_encoding: String,
     /// How its type is described: `rohrpost-schema` in our files; empty: not at all.
     pub schema_encoding: String,
-    /// What else was said when it was recorded.
+    /// What else was said when it was recorded. In files of other programs without what they say under keys of ours,
+    /// where it means something else.
     pub texts: BTreeMap<String, String>,
-    /// Whether its file is one of ours. Only then texts mean what ours do.
-    pub is_ours: bool,
 }
 
 impl RecordedChannel {
     /// Whether it was drawn of another channel, for other programs: replay leaves it out.
     pub fn is_drawn(&self) -> bool {
-        self.is_ours && self.texts.contains_key(key::DRAWN)
+        self.texts.contains_key(key::DRAWN)
     }
 
     /// Whether its messages came before this file, which begins with them so that it stands alone. They are in an
     /// earlier file, too.
     pub fn is_repeated(&self) -> bool {
-        self.is_ours && self.texts.contains_key(key::REPEATED)
+        self.texts.contains_key(key::REPEATED)
     }
 }
 
@@ -73,8 +72,6 @@ pub struct Reader {
     found: Option<Found>,
     /// The message that was found is still to be read.
     is_ahead: bool,
-    /// By the profile in its header.
-    is_ours: bool,
 }
 
 /// What is read.
@@ -90,7 +87,7 @@ impl Reader {
     /// # Errors
     /// When it is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::of(path, ReaderSource::Whole(Contents::open(path)?))
+        Ok(Self::of(ReaderSource::Whole(Contents::open(path)?)))
     }
 
     /// At the first message of those that are selected of a closed file. Chunks without any of them are not read.
@@ -98,14 +95,11 @@ impl Reader {
     /// # Errors
     /// When it is no MCAP file, was not closed, or has no such name.
     pub fn select(path: &Path, selection: &Selection) -> Result<Self, SelectError> {
-        Ok(Self::of(path, ReaderSource::Part(Selected::open(path, selection)?))?)
+        Ok(Self::of(ReaderSource::Part(Selected::open(path, selection)?)))
     }
 
-    fn of(path: &Path, source: ReaderSource) -> Result<Self, ReadError> {
-        let mut beginning = Contents::open(path)?;
-        beginning.read_header()?;
-        let is_ours = beginning.header().is_some_and(|header| header.profile == PROFILE);
-        Ok(Self { source, channels: BTreeMap::new(), found: None, is_ahead: false, is_ours })
+    fn of(source: ReaderSource) -> Self {
+        Self { source, channels: BTreeMap::new(), found: None, is_ahead: false }
     }
 
     /// The next message; none at the end.
@@ -141,7 +135,8 @@ impl Reader {
         }
     }
 
-    /// Reads and unpacks what comes behind the messages that are in memory.
+    /// From here on a thread reads the file and unpacks its chunks before they are asked for. What is
+    /// [selected](Reader::select) is read when it is asked for.
     pub(crate) fn read_ahead(&mut self) -> Result<(), ReadError> {
         match &mut self.source {
             ReaderSource::Whole(contents) => contents.read_ahead(),
@@ -162,12 +157,11 @@ impl Reader {
     pub(crate) fn present(&mut self) -> Option<(Arc<RecordedChannel>, Message<'_>)> {
         let found = self.found.as_ref()?;
         let Found { header, channel, .. } = found;
-        let recorded =
-            self.channels.entry(header.channel_id).or_insert_with(|| Arc::new(recorded(channel, self.is_ours)));
+        let recorded = self.channels.entry(header.channel_id).or_insert_with(|| Arc::new(recorded(channel)));
         let message = Message {
             arrival_ns: header.log_time,
             stamp_ns: header.publish_time,
-            epoch: channel.epoch().filter(|_| self.is_ours).unwrap_or_default(),
+            epoch: channel.epoch().unwrap_or_default(),
             sequence: header.sequence,
             data: self.source.data(found),
         };
@@ -216,7 +210,7 @@ impl ReaderSource {
     }
 }
 
-fn recorded(channel: &Definition, is_ours: bool) -> RecordedChannel {
+fn recorded(channel: &Definition) -> RecordedChannel {
     let text = |key: &str| channel.texts.get(key).cloned().unwrap_or_default();
     RecordedChannel {
         topic: channel.topic.clone(),
@@ -226,7 +220,6 @@ fn recorded(channel: &Definition, is_ours: bool) -> RecordedChannel {
         message_encoding: channel.message_encoding.clone(),
         schema_encoding: channel.schema.encoding.clone(),
         texts: channel.texts.clone(),
-        is_ours,
     }
 }
 

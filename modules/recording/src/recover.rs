@@ -77,6 +77,7 @@ pub fn recover(path: &Path, to: &Path, progress: &mut Progress<'_>) -> Result<Re
                 unchecked += u64::from(found.is_unchecked);
                 new.message(0, &found.channel, &found.header, contents.data(&found)).map_err(RewriteError::from)?;
             }
+            Item::Metadata(metadata) if !contents.heeds(&metadata) => {}
             Item::Metadata(metadata) => {
                 new.metadata(&metadata.name, metadata.metadata).map_err(RewriteError::from)?;
             }

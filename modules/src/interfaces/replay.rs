@@ -45,6 +45,15 @@ pub struct ReplayPosition {
     /// All of them.
     #[schema(unit = "ns")]
     pub spacing_max_ns: Option<u64>,
+    /// The same without the time for which the player waited for a processor that others had: half of the values,
+    #[schema(unit = "ns")]
+    pub spacing_own_p50_ns: Option<u64>,
+    /// 99 of 100 of them,
+    #[schema(unit = "ns")]
+    pub spacing_own_p99_ns: Option<u64>,
+    /// all of them.
+    #[schema(unit = "ns")]
+    pub spacing_own_max_ns: Option<u64>,
 }
 
 /// Why a replay does not do what it is told.

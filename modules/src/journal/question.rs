@@ -41,6 +41,8 @@ pub(crate) enum Question<'a> {
     Rewound(u16),
     /// A mailbox of its own: slots, bytes of the largest body, and whether it takes data from all.
     Mailbox { local: u8, slots: u16, bytes: u16, is_to_all: bool },
+    /// The followed stream with this number, and the sequence of a record.
+    RewoundTo(u16, u64),
 }
 
 /// What a descriptor is watched for.
@@ -103,6 +105,7 @@ impl Question<'_> {
             Self::Watched(number) => format!("descriptor {number}"),
             Self::Followed(stream, hash) => format!("each record of {stream}, interface {hash:08x}"),
             Self::Rewound(number) => format!("followed stream {number}"),
+            Self::RewoundTo(number, sequence) => format!("followed stream {number}, to sequence {sequence}"),
             Self::Mailbox { local, slots, bytes, is_to_all } => {
                 let of = if is_to_all { " of all" } else { "" };
                 format!("mailbox {local}, {slots} slots of {bytes} bytes, for data{of}")

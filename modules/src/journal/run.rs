@@ -119,12 +119,17 @@ impl ExactRun {
         let why = match entries.look() {
             Ok(Tag::Begin) => match postcard::take_from_bytes::<u32>(entries.content()) {
                 Ok((VERSION, _)) => return Ok(entries.content().to_vec()),
-                Ok((version, _)) => format!("it is of version {version}, and this program has {VERSION}"),
+                Ok((version, _)) => format!(
+                    "it is of version {version}, and this program has {VERSION}; use the version of Rohrpost \
+                     that recorded it (`rohrpost record info` says which)"
+                ),
                 Err(_) => "its beginning is damaged".into(),
             },
             Ok(_) => "its beginning is missing".into(),
             Err(NoEntry::End | NoEntry::Cut) => "it is cut off in its beginning".into(),
-            Err(NoEntry::Sum | NoEntry::Tag(_)) => "its beginning is damaged, or of another version".into(),
+            Err(NoEntry::Sum | NoEntry::Tag(_)) => {
+                "its beginning is damaged, or it is of another version (`rohrpost record info` says of which)".into()
+            }
             Err(NoEntry::Unreadable(kind)) => format!("its file cannot be read: {kind}"),
         };
         Err(RunError(format!("the journal cannot be replayed: {why}")))

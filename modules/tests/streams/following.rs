@@ -154,6 +154,31 @@ fn a_stream_can_be_followed_from_the_oldest_record_of_its_present_writer() {
 }
 
 #[test]
+fn a_stream_can_be_followed_from_any_record_that_is_kept_also_of_earlier_writers() {
+    let place = Place::with("");
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 0..3);
+    camera.crashes();
+    let camera = place.start::<Eye>(CAMERA);
+    shoots(&camera, 3..6);
+    let viewer = place.start::<Watcher>(VIEWER);
+    let seen = Seen::default();
+    let noted = seen.clone();
+    viewer.does(move |part, context| {
+        let images = context.subscribe_stream(CameraInterface::IMAGE, "camera.0").unwrap();
+        context.rewind_to(&images, 2);
+        part.handler = Some(Box::new(move |data| {
+            let image = data.read(&images)?.unwrap();
+            noted.lock().unwrap().push((image.width_px, data.head.sequence, data.head.missed));
+            Ok(())
+        }));
+    });
+    shoots(&camera, 6..7);
+    wait("it sees the last", || (widths(&seen).last() == Some(&6)).then_some(()));
+    assert_eq!(*seen.lock().unwrap(), (2..7).map(|n| (n, n, 0)).collect::<Vec<_>>());
+}
+
+#[test]
 fn what_is_rewound_while_it_is_received_comes_again_and_passes_no_module_by() {
     let place = Place::with("");
     let (camera, viewer) = (place.start::<Eye>(CAMERA), place.start::<Watcher>(VIEWER));

@@ -3,7 +3,8 @@
 use super::super::Case;
 use super::workload::{NAME, Workload};
 use crate::harness::{
-    Cell, Child, Failure, Placement, Scheduling, Scratch, Shared, Zeroable, interrupted, time_two_processes,
+    Cell, Child, End, Failure, Link, Meetings, Placement, Scheduling, Scratch, Shared, Zeroable, given_away,
+    interrupted, require_asleep, time_two_processes,
 };
 use crate::ours::{How, Mailboxes};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
@@ -12,14 +13,16 @@ use rohrpost_recording::{ChannelSpec, Message, Options, Session, Writer};
 use rohrpost_schema::Type;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Of the packages: a speed.
 const BYTES: usize = 64;
 /// Round trips of a turn, and those before them that do not count.
-const MESSAGES: usize = 20_000;
-const WARM_UP: usize = 2_000;
+const MESSAGES: usize = 10_000;
+const WARM_UP: usize = 1_000;
+/// Before each round trip: the other end goes to sleep meanwhile, so that all find it so.
+const PAUSE: Duration = Duration::from_micros(100);
 const CAP: Duration = Duration::from_secs(2);
 /// What is recorded meanwhile: 50 MB in a second, as scans of 62 kB.
 const RECORDED_BYTES: usize = 62_000;
@@ -56,7 +59,7 @@ impl Case for PairBeside {
             warm_up: settings.count(WARM_UP),
             placement: Placement::TwoCores,
             scheduling: Scheduling::Fifo,
-            pace: None,
+            pace: Some(PAUSE),
             cap: CAP,
         };
         let contenders = [
@@ -69,11 +72,69 @@ impl Case for PairBeside {
     }
 }
 
+/// How often each end received, and gave its processor away meanwhile.
+#[repr(C)]
+struct PairTurn {
+    received: [AtomicU64; 2],
+    slept: [AtomicU64; 2],
+}
+
+// SAFETY: atomics only.
+unsafe impl Zeroable for PairTurn {}
+
+/// An end that tells at its end how often it slept.
+struct CountedEnd<'a> {
+    link: Mailboxes,
+    end: usize,
+    turn: &'a PairTurn,
+    /// Given away before it received anything.
+    before: Option<u64>,
+}
+
+impl<'a> CountedEnd<'a> {
+    fn open(node: &Path, end: End, turn: &'a PairTurn, meetings: &mut Meetings) -> Result<Self, Failure> {
+        let link = Mailboxes::open(node, end, BYTES, How::Blocking, meetings)?;
+        Ok(Self { link, end: usize::from(end == End::Pong), turn, before: None })
+    }
+}
+
+impl Link for CountedEnd<'_> {
+    fn send(&mut self, message: &[u8]) -> Result<(), Failure> {
+        self.link.send(message)
+    }
+
+    fn receive(&mut self, message: &mut [u8]) -> Result<(), Failure> {
+        if self.before.is_none() {
+            self.before = Some(given_away(own_pid())?);
+        }
+        self.turn.received[self.end].fetch_add(1, Ordering::Relaxed);
+        self.link.receive(message)
+    }
+}
+
+impl Drop for CountedEnd<'_> {
+    fn drop(&mut self) {
+        let now = given_away(own_pid()).unwrap_or_default();
+        self.turn.slept[self.end].store(now.saturating_sub(self.before.unwrap_or(now)), Ordering::Relaxed);
+    }
+}
+
+fn own_pid() -> i32 {
+    nix::unistd::getpid().as_raw()
+}
+
 /// One turn of the packages.
 fn pair(cell: &Cell) -> Result<Vec<f64>, Failure> {
-    let scratch = Scratch::new()?;
+    let (scratch, turn) = (Scratch::new()?, Shared::<PairTurn>::new()?);
     let node = scratch.directory().join("node");
-    time_two_processes(cell, |end, meetings| Mailboxes::open(&node, end, cell.bytes, How::Blocking, meetings))
+    let samples = time_two_processes(cell, |end, meetings| CountedEnd::open(&node, end, &turn, meetings))?;
+    let [received, slept] =
+        [&turn.received, &turn.slept].map(|counts| [0, 1].map(|end: usize| counts[end].load(Ordering::Relaxed)));
+    // The first one also pauses before each.
+    for (name, end, sleeps) in [("the first end", 0, 2), ("the second end", 1, 1)] {
+        require_asleep(name, received[end] * sleeps, slept[end])?;
+    }
+    Ok(samples)
 }
 
 /// Does it while a process of its own records.

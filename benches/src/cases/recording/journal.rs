@@ -1,8 +1,12 @@
-//! How long a command takes to a module that writes a journal, and to one that writes none.
+//! How long a command takes to a module that writes a journal, and to one that writes none. Module and caller sleep
+//! before each: modules of a robot wait for what comes. Awake, a command takes a fiftieth of the time, so which of both
+//! it is must be the same in all rounds; that is brought about, and counted.
 
 use super::super::Case;
 use super::super::case::{Done, as_failure};
-use crate::harness::{Child, End, Failure, Placement, Samples, Scheduling, Scratch, sample_in_child, settle};
+use crate::harness::{
+    Child, End, Failure, Placement, Samples, Scheduling, Scratch, given_away, require_asleep, sample_in_child, settle,
+};
 use crate::rounds::{Contender, Row, Subject, Target, Versus, compare};
 use crate::settings::Settings;
 use rohrpost_config::Installation;
@@ -21,8 +25,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Commands of a turn, and those before them that do not count.
-const COMMANDS: usize = 20_000;
-const WARM_UP: usize = 2_000;
+const COMMANDS: usize = 10_000;
+const WARM_UP: usize = 1_000;
+/// Before a command to a module on the other processor, which goes to sleep meanwhile.
+const PAUSE: Duration = Duration::from_micros(100);
 /// A module starts in milliseconds.
 const READY_WITHIN: Duration = Duration::from_secs(20);
 const LOOK_EACH: Duration = Duration::from_millis(2);
@@ -48,28 +54,47 @@ name = "motor.0"
 program = "motor"
 optional = true
 "#;
-/// Nobody records: it says which module writes a journal.
-const RECORDING: &str = r#"
-[[module]]
-name = "logd.0"
-builtin = "logd"
-[record]
-directory = "."
-exact = ["motor.0"]
-"#;
+/// That it writes a journal. Nobody records.
+const RECORDING: &str = include_str!("../../../../tests/testbed/journal.toml");
 
 /// A command to a module and its answer.
-pub(super) struct NotedEvent;
+pub(super) enum NotedEvent {
+    /// Both on one processor: the one runs only while the other sleeps. No processor is woken, so it takes the least
+    /// time, of which the journal's part is the largest.
+    OneProcessor,
+    /// Each on its own: a processor is woken for each.
+    Woken,
+}
+
+impl NotedEvent {
+    fn placement(&self) -> Placement {
+        match self {
+            Self::OneProcessor => Placement::OneCore,
+            Self::Woken => Placement::TwoCores,
+        }
+    }
+
+    fn before_each(&self) {
+        match self {
+            Self::OneProcessor => {}
+            Self::Woken => std::thread::sleep(PAUSE),
+        }
+    }
+}
 
 impl Case for NotedEvent {
     fn name(&self) -> String {
-        "event with journal".into()
+        match self {
+            Self::OneProcessor => "event with journal, on one processor",
+            Self::Woken => "event with journal, on two processors",
+        }
+        .into()
     }
 
     fn run(&self, settings: &Settings) -> Result<Vec<Row>, Failure> {
         let contenders = [
-            Contender::sampled("rohrpost", || turn(settings, true)),
-            Contender::sampled("without journal", || turn(settings, false)),
+            Contender::sampled("rohrpost", || turn(settings, self, true)),
+            Contender::sampled("without journal", || turn(settings, self, false)),
         ];
         let versus = Versus { name: contenders[1].name, p50: Some(Target::AtMost(1.15)), p99: None };
         let subject = Subject { case: self.name(), bytes: None, unit: "us" };
@@ -78,15 +103,16 @@ impl Case for NotedEvent {
 }
 
 /// Microseconds of each command.
-fn turn(settings: &Settings, has_journal: bool) -> Result<Vec<f64>, Failure> {
+fn turn(settings: &Settings, event: &NotedEvent, has_journal: bool) -> Result<Vec<f64>, Failure> {
     let scratch = Scratch::new()?;
     let config = scratch.directory().join("bench.toml");
-    let text = if has_journal { format!("{CONFIGURATION}{RECORDING}") } else { CONFIGURATION.into() };
-    fs::write(&config, text).map_err(|error| Failure::of("its configuration", error))?;
-    let mut module = start_module(&scratch.directory(), &config)?;
-    let commands = settings.count(COMMANDS);
+    let recording = if has_journal { RECORDING.replace("MODULE", "motor.0") } else { String::new() };
+    fs::write(&config, format!("{CONFIGURATION}{recording}"))
+        .map_err(|error| Failure::of("its configuration", error))?;
+    let mut module = start_module(&scratch.directory(), &config, event.placement())?;
+    let counts = [WARM_UP, COMMANDS].map(|count| settings.count(count));
     let samples = sample_in_child(PATIENCE, |samples| {
-        let commanded = command(&scratch.directory(), &config, settings.count(WARM_UP), commands, samples);
+        let commanded = command(&scratch.directory(), &config, (event, module.pid()), counts, samples);
         commanded.and_then(|node| check(&node, has_journal)).map_err(as_failure("commanding a module"))
     })?;
     if module.has_ended()? {
@@ -95,10 +121,10 @@ fn turn(settings: &Settings, has_journal: bool) -> Result<Vec<f64>, Failure> {
     Ok(samples)
 }
 
-/// The module: this program again, on the other processor.
-fn start_module(scratch: &Path, config: &Path) -> Result<Child, Failure> {
+/// The module: this program again.
+fn start_module(scratch: &Path, config: &Path, placement: Placement) -> Result<Child, Failure> {
     Child::start(|| {
-        settle(End::Pong, Placement::TwoCores, Scheduling::Fifo)?;
+        settle(End::Pong, placement, Scheduling::Fifo)?;
         let own = std::env::current_exe().map_err(|error| Failure::of("this program", error))?;
         let error = Command::new(own)
             .arg("--config")
@@ -113,9 +139,15 @@ fn start_module(scratch: &Path, config: &Path) -> Result<Child, Failure> {
     })
 }
 
-/// Gives the module its commands, one after the other.
-fn command(scratch: &Path, config: &Path, warm_up: usize, commands: usize, samples: &Samples) -> Done<Arc<Node>> {
-    settle(End::Ping, Placement::TwoCores, Scheduling::Fifo)?;
+/// Gives a module, which is that process, its commands, one after the other.
+fn command(
+    scratch: &Path,
+    config: &Path,
+    (event, module): (&NotedEvent, i32),
+    [warm_up, commands]: [usize; 2],
+    samples: &Samples,
+) -> Done<Arc<Node>> {
+    settle(End::Ping, event.placement(), Scheduling::Fifo)?;
     let installation = Installation::load(config)?;
     let node = await_node(&path_in(scratch, &installation))?;
     let tool = ToolLink::join(&installation, &node, NODE, ANSWER_WITHIN)?;
@@ -127,14 +159,18 @@ fn command(scratch: &Path, config: &Path, warm_up: usize, commands: usize, sampl
         }
         std::thread::sleep(LOOK_EACH);
     }
-    for number in 0..warm_up + commands {
+    for _ in 0..warm_up {
+        event.before_each();
+        motor.drive(0.5, 0.25)?;
+    }
+    let slept = given_away(module)?;
+    for _ in 0..commands {
+        event.before_each();
         let began = Instant::now();
         motor.drive(0.5, 0.25)?;
-        let took = began.elapsed();
-        if number >= warm_up {
-            samples.push(took.as_secs_f64() * 1e6);
-        }
+        samples.push(began.elapsed().as_secs_f64() * 1e6);
     }
+    require_asleep("the module", commands as u64, given_away(module)?.saturating_sub(slept))?;
     Ok(node)
 }
 

@@ -35,8 +35,13 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// All cases, in the order in which they are measured.
 pub fn all() -> Vec<Box<dyn Case>> {
     let cases = |figure| SIZES.map(|bytes| -> Box<dyn Case> { Box::new(Recorded { bytes, figure }) });
-    let others: [Box<dyn Case>; 4] =
-        [Box::new(PairBeside), Box::new(NotedEvent), Box::new(Replayed::Exact), Box::new(Replayed::Spacing)];
+    let others: [Box<dyn Case>; 5] = [
+        Box::new(PairBeside),
+        Box::new(NotedEvent::OneProcessor),
+        Box::new(NotedEvent::Woken),
+        Box::new(Replayed::Exact),
+        Box::new(Replayed::Spacing),
+    ];
     cases(TurnFigure::Rate).into_iter().chain(cases(TurnFigure::ProcessorTime)).chain(others).collect()
 }
 

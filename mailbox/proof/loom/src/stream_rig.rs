@@ -1,4 +1,5 @@
-//! A stream as the models see it: records of one number each, a writer's steps and a reader's. Compiled beside them.
+//! A stream as the models see it: records of one number each, and the steps of a writer and a reader. Compiled beside
+//! the models.
 
 use crate::step::reached;
 use crate::stream::ring::{About, IndexEntry, Line, Look, Ring, Seat, Stamp};

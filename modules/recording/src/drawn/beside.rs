@@ -66,3 +66,43 @@ impl DrawingBeside {
         drawn
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::{MESSAGE_ENCODING, SCHEMA_ENCODING};
+    use crate::read::definitions::SchemaText;
+    use rohrpost_modules::types::{Bytes, Image, ImageFormat};
+    use rohrpost_schema::Schema;
+    use std::sync::Arc;
+
+    const PERIOD_NS: u64 = 100;
+
+    /// Postcard of a picture with so many rows; with fewer bytes than it says, nothing is drawn of it.
+    fn picture(rows: u32, is_whole: bool) -> Vec<u8> {
+        let picture = Image::empty(100, rows, ImageFormat::Rgb8);
+        let bytes = picture.row_bytes * rows - u32::from(!is_whole);
+        postcard::to_stdvec(&Image { pixels: Bytes(vec![7; bytes as usize]), ..picture }).unwrap()
+    }
+
+    #[test]
+    fn a_long_message_of_which_nothing_comes_is_decoded_once_a_period() {
+        let mut drawing = DrawingBeside::new(&DrawnBeside { period_ns: PERIOD_NS, classes: BTreeMap::new() });
+        let schema = SchemaText { name: "its type".into(), encoding: SCHEMA_ENCODING.into(), data: Vec::new() };
+        let schema = Arc::new(SchemaText { data: Image::<Bytes>::schema().to_bytes(), ..schema });
+        let (topic, message_encoding) = ("eye.0/sight".into(), MESSAGE_ENCODING.into());
+        drawing.add(0, Definition { topic, message_encoding, texts: BTreeMap::new(), schema });
+        for (at_ns, rows, is_whole, is_drawn, why) in [
+            (0, 10, false, false, "a short one that contradicts itself"),
+            (1, 10, true, true, "and the next one"),
+            (2, 10, true, false, "one in a period"),
+            (100, 1_000, false, false, "a long one that contradicts itself"),
+            (101, 1_000, true, false, "was that of this period"),
+            (102, 10, true, false, "whatever comes"),
+            (200, 1_000, true, true, "and there is one in the next"),
+        ] {
+            let drawn = drawing.draw(0, at_ns, &picture(rows, is_whole));
+            assert_eq!(!drawn.is_empty(), is_drawn, "at {at_ns}: {why}");
+        }
+    }
+}

@@ -1,7 +1,8 @@
 //! Messages and metadata of a file, in its order.
 
 use crate::error::{Damage, ReadError, Shown};
-use crate::format::op;
+use crate::format::{is_our_word, op};
+use crate::read::ahead::{AheadRecord, ReadAhead};
 use crate::read::chunk;
 use crate::read::definitions::{Definition, Definitions};
 use crate::read::frames::{Frames, Step};
@@ -11,8 +12,6 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-/// So many records between two chunks are passed over while reading ahead.
-const AHEAD_MAX: usize = 1_000;
 /// What a message takes before its data.
 const MESSAGE_HEAD_BYTES: usize = 22;
 
@@ -31,17 +30,8 @@ pub(crate) struct Contents {
     /// Where the present record of the file begins.
     begins: u64,
     ending: Option<Ending>,
-    ahead: Option<Ahead>,
-    /// Records of a chunk that was read ahead.
-    spare: Vec<u8>,
-}
-
-/// What was read behind the present chunk, while there was time.
-enum Ahead {
-    /// The next chunk, unpacked; or it is damaged.
-    Chunk(u64, Result<(), Damage>),
-    /// Another record, which is in the frames.
-    Other(u64, Step),
+    /// What reads on, if that is a thread.
+    ahead: Option<ReadAhead>,
 }
 
 /// How a file ends.
@@ -96,7 +86,6 @@ impl Contents {
             begins: 0,
             ending: None,
             ahead: None,
-            spare: Vec::new(),
         }
     }
 
@@ -127,6 +116,11 @@ impl Contents {
     /// Which program wrote it.
     pub(crate) fn header(&self) -> Option<&Header> {
         self.header.as_ref()
+    }
+
+    /// Whether these metadata are to be heeded: in a file of another program, those under names of ours are not.
+    pub(crate) fn heeds(&self, metadata: &Metadata) -> bool {
+        !(self.definitions.are_others() && is_our_word(&metadata.name))
     }
 
     /// Chunks so far.
@@ -174,26 +168,12 @@ impl Contents {
         Ok(None)
     }
 
-    /// Reads and unpacks the next chunk, if there is none yet: later it takes no time.
+    /// From here on a thread reads the file, until it is to be read elsewhere.
     pub(crate) fn read_ahead(&mut self) -> Result<(), ReadError> {
-        // Outside of chunks the present message may be in the frames.
-        if self.in_chunk.is_none() || self.is_cut || self.ahead.is_some() {
-            return Ok(());
-        }
-        for _ in 0..AHEAD_MAX {
-            let begins = self.frames.at();
-            match self.frames.step()? {
-                Step::Record(op::MESSAGE_INDEX) => {}
-                Step::Record(op::CHUNK) => {
-                    let unpacked = chunk::unpack(self.frames.body(), &mut self.spare);
-                    self.ahead = Some(Ahead::Chunk(begins, unpacked));
-                    break;
-                }
-                step => {
-                    self.ahead = Some(Ahead::Other(begins, step));
-                    break;
-                }
-            }
+        if self.ahead.is_none() && self.ending.is_none() {
+            let mut frames = Frames::open(self.path())?;
+            frames.seek(self.frames.at())?;
+            self.ahead = ReadAhead::start(frames);
         }
         Ok(())
     }
@@ -265,17 +245,12 @@ impl Contents {
 
     /// The next record of the file; none if it is nothing of its own.
     fn next_outside(&mut self) -> Result<Option<Item>, ReadError> {
-        let (begins, step) = match self.ahead.take() {
-            Some(Ahead::Chunk(begins, unpacked)) => {
-                self.begins = begins;
-                std::mem::swap(&mut self.records, &mut self.spare);
-                return Ok(self.enter_chunk(unpacked).err().map(|damage| Item::Damaged(begins, damage)));
-            }
-            Some(Ahead::Other(begins, step)) => (begins, step),
-            None => (self.frames.at(), self.frames.step()?),
-        };
-        self.begins = begins;
+        let (step, unpacked) = self.step()?;
+        let begins = self.begins;
         let damaged = |damage| Some(Item::Damaged(begins, damage));
+        if let Some(unpacked) = unpacked {
+            return Ok(self.enter_chunk(unpacked).err().and_then(damaged));
+        }
         Ok(match step {
             Step::Record(op) => self.record(op)?,
             Step::Cut(Some(op::CHUNK)) => {
@@ -299,6 +274,27 @@ impl Contents {
         })
     }
 
+    /// What is next in the file, and whether it is a chunk that was unpacked or could not be.
+    fn step(&mut self) -> Result<(Step, Option<Result<(), Damage>>), ReadError> {
+        let Some(ahead) = &mut self.ahead else {
+            self.begins = self.frames.at();
+            return Ok((self.frames.step()?, None));
+        };
+        let Some(AheadRecord { begins, ends, step, mut body, unpacked }) = ahead.next() else {
+            self.ahead = None;
+            self.frames.seek(self.frames.at())?;
+            return self.step();
+        };
+        self.begins = begins;
+        self.frames.pass_to(ends);
+        match unpacked {
+            Some(_) => std::mem::swap(&mut self.records, &mut body),
+            None => self.frames.swap_body(&mut body),
+        }
+        ahead.give_back(body);
+        Ok((step?, unpacked))
+    }
+
     fn record(&mut self, op: u8) -> Result<Option<Item>, ReadError> {
         let told = match op {
             op::CHUNK => {
@@ -310,6 +306,7 @@ impl Contents {
             op::HEADER | op::METADATA => match mcap::parse_record(op, self.frames.body()) {
                 Ok(Record::Metadata(metadata)) => Ok(Some(Item::Metadata(metadata))),
                 Ok(Record::Header(header)) => {
+                    self.definitions.know(&header);
                     self.header = Some(header);
                     Ok(None)
                 }

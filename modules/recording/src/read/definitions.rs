@@ -1,8 +1,8 @@
 //! Channels and their types, as a file describes them.
 
 use crate::error::Damage;
-use crate::format::{SCHEMA_ENCODING, key};
-use mcap::records::Record;
+use crate::format::{SCHEMA_ENCODING, is_of_others, key};
+use mcap::records::{Header, Record};
 use rohrpost_schema::{Type, describe_type};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -61,9 +61,21 @@ impl Definition {
 pub(crate) struct Definitions {
     schemas: BTreeMap<u16, Arc<SchemaText>>,
     channels: BTreeMap<u16, Arc<Definition>>,
+    /// Of another program: texts under our keys mean nothing, and are left out.
+    are_others: bool,
 }
 
 impl Definitions {
+    /// Takes notice of what wrote the file. Before, it is taken for one of ours: its header may be damaged.
+    pub(crate) fn know(&mut self, header: &Header) {
+        self.are_others = is_of_others(header);
+    }
+
+    /// Whether they are of another program's file.
+    pub(crate) fn are_others(&self) -> bool {
+        self.are_others
+    }
+
     pub(crate) fn channel(&self, id: u16) -> Option<&Arc<Definition>> {
         self.channels.get(&id)
     }
@@ -84,7 +96,10 @@ impl Definitions {
                     0 => Arc::default(),
                     id => self.schemas.get(&id).cloned().ok_or(Damage::UnknownSchema(id))?,
                 };
-                let mcap::records::Channel { id, topic, message_encoding, metadata: texts, .. } = channel;
+                let mcap::records::Channel { id, topic, message_encoding, metadata: mut texts, .. } = channel;
+                if self.are_others {
+                    texts.retain(|key, _| !key::ALL.contains(&key.as_str()));
+                }
                 insert(&mut self.channels, id, Arc::new(Definition { topic, message_encoding, texts, schema }))
             }
             _ => Err(Damage::Record { op }),

@@ -76,20 +76,55 @@ impl Frames {
         Ok(())
     }
 
+    /// Exchanges the bytes of the last step for a buffer.
+    pub(crate) fn swap_body(&mut self, buffer: &mut Vec<u8>) {
+        std::mem::swap(&mut self.body, buffer);
+    }
+
+    /// The next record is there: what is before it was read by others.
+    pub(crate) fn pass_to(&mut self, at: u64) {
+        self.at = at;
+    }
+
     /// The next record.
     pub(crate) fn step(&mut self) -> Result<Step, ReadError> {
-        if self.fill(HEAD_BYTES as u64)? == 0 {
-            return Ok(Step::End);
+        match self.head()? {
+            Ok((op, len)) => self.record(op, len),
+            Err(step) => Ok(step),
         }
-        let Some((&op, len)) = self.body.split_first() else { return Ok(Step::End) };
+    }
+
+    /// The next record; a whole chunk is passed over, and has no bytes then.
+    pub(crate) fn step_over_chunks(&mut self) -> Result<Step, ReadError> {
+        let (op, len) = match self.head()? {
+            Ok(head) => head,
+            Err(step) => return Ok(step),
+        };
+        let end = self.at.checked_add(len).filter(|end| op == op::CHUNK && *end <= self.len);
+        let Some(end) = end else { return self.record(op, len) };
+        self.body.clear();
+        // Not beyond the file's end, so it is no more than a file may have.
+        self.input.seek_relative(len as i64).map_err(|error| self.failed(error))?;
+        self.at = end;
+        Ok(Step::Record(op))
+    }
+
+    /// Type and length of the next record; or what there is instead.
+    fn head(&mut self) -> Result<Result<(u8, u64), Step>, ReadError> {
+        if self.fill(HEAD_BYTES as u64)? == 0 {
+            return Ok(Err(Step::End));
+        }
+        let Some((&op, len)) = self.body.split_first() else { return Ok(Err(Step::End)) };
         let Ok(len) = <[u8; 8]>::try_from(len).map(u64::from_le_bytes) else {
             self.body.clear();
-            return Ok(Step::Cut(None));
+            return Ok(Err(Step::Cut(None)));
         };
         // What has power lost often ends in zeroes.
-        if op == 0 {
-            return Ok(Step::Damaged(Damage::NoRecord { op, len }));
-        }
+        Ok(if op == 0 { Err(Step::Damaged(Damage::NoRecord { op, len })) } else { Ok((op, len)) })
+    }
+
+    /// The record behind its head.
+    fn record(&mut self, op: u8, len: u64) -> Result<Step, ReadError> {
         if len > RECORD_BYTES_MAX as u64 {
             return self.skip(op, len);
         }
@@ -124,6 +159,7 @@ impl Frames {
 
     /// Whether the file goes on with the magic bytes, as it does at its end.
     pub(crate) fn is_at_end_magic(&mut self) -> Result<bool, ReadError> {
+        self.seek(self.at)?;
         self.fill(mcap::MAGIC.len() as u64)?;
         Ok(self.body == mcap::MAGIC)
     }

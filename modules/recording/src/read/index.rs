@@ -61,6 +61,12 @@ impl Index {
         let mut sum_end = head.to_vec();
         sum_end.extend_from_slice(&body[..FOOTER_BYTES - 4]);
         let mut read = Reading::default();
+        frames.seek(mcap::MAGIC.len() as u64)?;
+        if frames.step()? == Step::Record(op::HEADER)
+            && let Ok(Record::Header(header)) = mcap::parse_record(op::HEADER, frames.body())
+        {
+            read.definitions.know(&header);
+        }
         let told = read.summary(frames, footer.summary_start, footer_at)?;
         read.sum.update(&sum_end);
         let is_right = footer.summary_crc == 0 || footer.summary_crc == read.sum.clone().finalize();

@@ -90,6 +90,7 @@ impl Selected {
         for at in std::mem::take(&mut self.metadata) {
             let its = self.contents.metadata_at(at)?;
             let is_taken = match its.name.as_str() {
+                _ if !self.contents.heeds(&its) => false,
                 metadata::CLOSED => false,
                 metadata::MARK => {
                     Mark::of_texts(&its.metadata).is_none_or(|mark| self.selection.has_time(mark.time_ns, mark.time_ns))

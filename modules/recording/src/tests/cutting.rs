@@ -1,10 +1,16 @@
 //! A file cut anywhere is recovered to what was before the cut; a part is taken by time and name.
 
-use super::support::{Said, file_of, memory_folder, read, said};
+use super::support::{Said, file_of, memory_folder, options, read, said, session};
 use crate::{
-    CutError, ReadError, RecoverError, RewriteError, SelectError, Selection, cut, info, recover, recovered_path,
+    ChannelSpec, CutError, LastMessage, Mark, Message, ReadError, RecoverError, RewriteError, SelectError, Selection,
+    Writer, cut, info, last_message, recover, recovered_path,
 };
-use std::path::Path;
+use rohrpost_schema::Type;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Recovers bytes as a file, and reads it.
 fn recovered(folder: &Path, bytes: &[u8]) -> (crate::Recovered, Vec<Said>) {
@@ -35,6 +41,60 @@ fn a_file_cut_at_any_byte_is_recovered_to_what_was_before() {
         before = found.len();
     }
     assert_eq!(before, all.len());
+}
+
+/// A closed file with a chunk for each ten messages, since a mark is behind them.
+fn file_of_chunks(folder: &Path, all: &[Said]) -> PathBuf {
+    let mut writer = Writer::start(options(folder), session()).unwrap();
+    let mut channels = BTreeMap::new();
+    for said in all.chunks(10) {
+        for Said { topic, arrival_ns, stamp_ns, epoch, sequence, data } in said {
+            let channel = *channels.entry(topic).or_insert_with(|| {
+                let (name, item) = topic.split_once('/').unwrap();
+                writer.channel(&ChannelSpec { name, item, ty: &Type::Bytes, texts: BTreeMap::new() }).unwrap()
+            });
+            let [arrival_ns, stamp_ns, epoch] = [arrival_ns, stamp_ns, epoch].map(|number| *number);
+            let message = Message { arrival_ns, stamp_ns, epoch, sequence: *sequence, data };
+            writer.write(channel, &message).unwrap();
+        }
+        writer.mark(Mark { time_ns: 1, epoch: 1, text: "ten".into() }).unwrap().wait(PATIENCE).unwrap().unwrap();
+    }
+    writer.finish().1.unwrap();
+    folder.join("base-0001.mcap")
+}
+
+/// The last of these that are of a topic.
+fn last_of(all: &[Said], topic: &str) -> Option<LastMessage> {
+    let Said { epoch, stamp_ns, sequence, data, .. } = all.iter().rfind(|said| said.topic == topic)?.clone();
+    Some(LastMessage { epoch, stamp_ns, sequence, data })
+}
+
+#[test]
+fn the_last_message_of_a_file_cut_at_any_byte_is_that_which_is_recovered() {
+    let folder = memory_folder();
+    // The last channel has two messages, far from the end, and so has the second epoch of another.
+    let mut all = said(90, 40);
+    for said in &mut all[30..] {
+        said.topic = said.topic.replace("laser.2", "laser.1");
+    }
+    for said in all[60..].iter_mut().filter(|said| said.topic == "laser.0/scan") {
+        said.epoch = 2;
+    }
+    let path = file_of_chunks(folder.path(), &all);
+    let bytes = std::fs::read(&path).unwrap();
+    let cut = folder.path().join("cut.mcap");
+    let mut found = 0;
+    for len in (mcap::MAGIC.len()..=bytes.len()).rev() {
+        std::fs::write(&cut, &bytes[..len]).unwrap();
+        let whole = read(&cut).0;
+        for topic in ["laser.0/scan", "laser.1/scan", "laser.2/scan", "laser.3/scan"] {
+            let last = last_message(&cut, topic).unwrap();
+            assert_eq!(last, last_of(&whole, topic), "{topic}, cut at {len}");
+            found += usize::from(last.is_some());
+        }
+    }
+    assert!(found > 1_000, "{found}");
+    assert!(last_message(&folder.path().join("none.mcap"), "laser.0/scan").is_err());
 }
 
 #[test]

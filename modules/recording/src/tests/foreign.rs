@@ -1,10 +1,10 @@
 //! Files of other programs: listed, whatever they hold and however they are packed.
 
 use super::support::memory_folder;
-use crate::format::key;
+use crate::format::{key, metadata};
 use crate::read::chunk;
-use crate::{Damage, Info, Reader, Selection, cut, info};
-use mcap::records::MessageHeader;
+use crate::{Damage, Info, Reader, Selection, cut, info, merge, recover};
+use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -83,22 +83,31 @@ fn channels_types_encodings_counts_and_times_of_others_are_told() {
     }
 }
 
+/// A file of another program with a message on each of three channels that have words of ours, and metadata that do.
+fn with_our_words(path: &Path, profile: &str) {
+    let options = WriteOptions::new().profile(profile);
+    let mut writer = options.create(std::fs::File::create(path).unwrap()).unwrap();
+    let (epoch, most) = (key::EPOCH, u64::MAX.to_string());
+    for (number, word) in [(key::REPEATED, "true"), (key::DRAWN, "/scan"), (epoch, &most)].into_iter().enumerate() {
+        let texts = [word, ("colour", "red")].map(|(key, text)| (key.to_owned(), text.to_owned()));
+        let channel_id = writer.add_channel(0, &format!("/{number}"), "raw", &texts.into()).unwrap();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: 5, publish_time: 0 };
+        writer.write_to_known_channel(&header, &[7]).unwrap();
+    }
+    for name in [metadata::LOST, metadata::SESSION, "theirs"] {
+        let texts = BTreeMap::from([("/0".to_owned(), "9".to_owned())]);
+        writer.write_metadata(&Metadata { name: name.into(), metadata: texts }).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
 /// Other programs may mean anything by our words, and nothing is repeated, drawn, or of an epoch.
 #[test]
 fn our_words_in_files_of_others_mean_nothing() {
     let folder = memory_folder();
     for profile in ["ros2", ""] {
         let path = folder.path().join(format!("{profile}.mcap"));
-        let options = WriteOptions::new().profile(profile);
-        let mut writer = options.create(std::fs::File::create(&path).unwrap()).unwrap();
-        let (epoch, most) = (key::EPOCH, u64::MAX.to_string());
-        for (number, word) in [(key::REPEATED, "true"), (key::DRAWN, "/scan"), (epoch, &most)].into_iter().enumerate() {
-            let texts = BTreeMap::from([(word.0.to_owned(), word.1.to_owned())]);
-            let channel_id = writer.add_channel(0, &format!("/{number}"), "raw", &texts).unwrap();
-            let header = MessageHeader { channel_id, sequence: 0, log_time: 5, publish_time: 0 };
-            writer.write_to_known_channel(&header, &[7]).unwrap();
-        }
-        writer.finish().unwrap();
+        with_our_words(&path, profile);
         let mut readers =
             [Reader::open(&path).unwrap(), Reader::select(&path, &Selection::default()).unwrap()].into_iter();
         assert!(readers.all(|mut reader| {
@@ -110,8 +119,33 @@ fn our_words_in_files_of_others_mean_nothing() {
             messages == 3
         }));
         let info = info(&path).unwrap();
-        assert_eq!((info.messages, info.repeated, info.epochs.len()), (3, 0, 0));
-        assert!(info.channels.iter().all(|channel| channel.drawn_of.is_none()));
+        assert_eq!((info.messages, info.repeated, info.epochs.len(), info.lost), (3, 0, 0, 0));
+        assert!(info.channels.iter().all(|channel| channel.drawn_of.is_none()) && info.session.is_empty());
+    }
+}
+
+/// Else they would mean something in the new file, which is one of ours.
+#[test]
+fn our_words_in_files_of_others_are_left_out_of_files_that_are_made_of_these() {
+    let folder = memory_folder();
+    let [theirs, cut_out, before, merged, whole] =
+        ["theirs", "cut", "before", "merged", "whole"].map(|name| folder.path().join(name));
+    with_our_words(&theirs, "ros2");
+    let from = |from_ns| Selection { from_ns, ..Selection::default() };
+    assert_eq!(cut(&theirs, &cut_out, &from(None), &mut |_, _| {}).unwrap().0, 3);
+    assert_eq!(cut(&theirs, &before, &from(Some(6)), &mut |_, _| {}).unwrap().0, 0);
+    // Nothing of it is repeated, though it is there twice.
+    assert_eq!(merge(&[theirs.clone(), theirs.clone()], &merged, &mut |_, _| {}).unwrap().0, 6);
+    assert_eq!(recover(&theirs, &whole, &mut |_, _| {}).unwrap().messages, 3);
+    for (made, messages, repeated) in [(cut_out, 3, 0), (before, 0, 3), (merged, 6, 0), (whole, 3, 0)] {
+        let told = info(&made).unwrap();
+        assert_eq!((told.messages, told.repeated, told.lost), (messages, repeated, 0), "{}", made.display());
+        assert!(told.session.is_empty() && told.others.iter().any(|(name, _)| name == "theirs"), "{told:?}");
+        assert!(told.channels.iter().all(|channel| channel.drawn_of.is_none()) && told.epochs.is_empty(), "{told:?}");
+        let mut reader = Reader::open(&made).unwrap();
+        while let Some((channel, _)) = reader.next().unwrap() {
+            assert_eq!(channel.texts.get("colour").map(String::as_str), Some("red"), "theirs stay");
+        }
     }
 }
 

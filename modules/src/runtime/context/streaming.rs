@@ -240,7 +240,22 @@ impl Context {
     /// ```
     pub fn rewind<T>(&mut self, subscription: &StreamSubscription<T>) {
         self.journal.asked(Tag::Rewound, Question::Rewound(subscription.id()));
-        self.followed_streams.rewind(subscription);
+        self.followed_streams.rewind(subscription, None);
+    }
+
+    /// As [`Context::rewind`], to the record with this sequence, whichever writer it is of. What is kept no more counts
+    /// as lost.
+    ///
+    /// ```
+    /// # use rohrpost_modules::runtime::{Context, StreamSubscription};
+    /// # use rohrpost_modules::types::Pose;
+    /// fn go_on(context: &mut Context, poses: &StreamSubscription<Pose>, last_handled: u64) {
+    ///     context.rewind_to(poses, last_handled + 1);
+    /// }
+    /// ```
+    pub fn rewind_to<T>(&mut self, subscription: &StreamSubscription<T>, sequence: u64) {
+        self.journal.asked(Tag::Rewound, Question::RewoundTo(subscription.id(), sequence));
+        self.followed_streams.rewind(subscription, Some(sequence));
     }
 
     fn open_untyped(

@@ -85,8 +85,8 @@ struct Notices {
 pub(crate) struct FollowedStreams {
     /// Those that are not being worked off.
     pub(in crate::runtime) list: Vec<FollowedStream>,
-    /// To be rewound once they are not being worked off.
-    rewound: Vec<u16>,
+    /// To be rewound once they are not being worked off, and to which sequence.
+    rewound: Vec<(u16, Option<u64>)>,
     /// Ever made.
     made: u16,
 }
@@ -142,11 +142,11 @@ impl FollowedStreams {
         Some(StreamSubscription { id, data: PhantomData })
     }
 
-    /// Goes back to the oldest record that a stream keeps of its present writer.
-    pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>) {
+    /// Goes back to this sequence; without one, to the oldest record that a stream keeps of its present writer.
+    pub(in crate::runtime) fn rewind<T>(&mut self, of: &StreamSubscription<T>, to: Option<u64>) {
         match self.list.iter_mut().find(|stream| stream.id == of.id) {
-            Some(stream) => stream.rewind(),
-            None => self.rewound.push(of.id),
+            Some(stream) => stream.rewind(to),
+            None => self.rewound.push((of.id, to)),
         }
     }
 
@@ -159,8 +159,8 @@ impl FollowedStreams {
     pub(in crate::runtime) fn put_back(&mut self, mut worked: Vec<FollowedStream>) {
         worked.append(&mut self.list);
         self.list = worked;
-        for id in std::mem::take(&mut self.rewound) {
-            self.list.iter_mut().filter(|stream| stream.id == id).for_each(FollowedStream::rewind);
+        for (id, to) in std::mem::take(&mut self.rewound) {
+            self.list.iter_mut().filter(|stream| stream.id == id).for_each(|stream| stream.rewind(to));
         }
     }
 
@@ -210,9 +210,12 @@ impl FollowedStream {
         self.is_whole
     }
 
-    fn rewind(&mut self) {
+    fn rewind(&mut self, to: Option<u64>) {
         self.is_whole = true;
-        self.reader.rewind();
+        match to {
+            Some(sequence) => self.reader.reader.seek(sequence),
+            None => self.reader.rewind(),
+        }
     }
 
     /// The next record, or what there is instead.
