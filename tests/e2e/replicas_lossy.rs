@@ -291,11 +291,11 @@ impl Trial {
         }
         let last = [0, 1].map(|at: usize| self.streams[at].1 - 1);
         wait("the last of both has come", || {
-            for at in 0..2 {
+            for (at, last) in last.into_iter().enumerate() {
                 self.streams.iter_mut().for_each(|(.., follower)| follower.follow());
                 let (module, _, ref follower) = self.streams[at];
                 // A busy computer may have passed over the last one, and the description comes each second.
-                if follower.newest < Some(last[at]) && self.call(&[module, "--json", "is_fed"]).trim() == "true" {
+                if follower.newest < Some(last) && self.call(&[module, "--json", "is_fed"]).trim() == "true" {
                     self.call(&[module, "feed", "1"]);
                     self.streams[at].1 += 1;
                 }
