@@ -11,6 +11,8 @@ use std::time::Duration;
 pub const REPLICAS_MAX: usize = 64;
 /// A picture of a few hundred kilobytes takes about as long on a wire of 1 Gbit/s.
 const DELAY_ALARM: Duration = Duration::from_millis(5);
+/// Some round trips of a bad radio, or cycles of time slots; and what is older is of little use to a robot.
+const DEADLINE: Duration = Duration::from_millis(200);
 
 /// One `[[replica]]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +29,8 @@ pub struct Replica {
     pub changed: bool,
     /// A record that arrives later than this after it was written is told.
     pub delay_alarm: Duration,
+    /// Lost parts of a record are asked for until nothing came of it for so long; zero: never.
+    pub deadline: Duration,
     /// Line in the file.
     pub line: usize,
 }
@@ -57,11 +61,12 @@ impl Replica {
         });
         let changed = section.get("changed").and_then(|item| item.flag()).unwrap_or(false);
         let delay_alarm = section.get("delay-alarm").and_then(|item| item.duration_above_zero("5 ms"));
+        let deadline = section.get("deadline").and_then(|item| item.duration("200 ms"));
         let line = section.line;
         section.finish();
         let ((from, item, sampling), to) = (stream?, to?);
-        let delay_alarm = delay_alarm.unwrap_or(DELAY_ALARM);
-        Some(Self { from, item, to, sampling, changed, delay_alarm, line })
+        let (delay_alarm, deadline) = (delay_alarm.unwrap_or(DELAY_ALARM), deadline.unwrap_or(DEADLINE));
+        Some(Self { from, item, to, sampling, changed, delay_alarm, deadline, line })
     }
 
     /// Whether a node has by it the one stream that an entry of the recorder names.

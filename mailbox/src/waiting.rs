@@ -192,6 +192,41 @@ pub fn wait_above(
     slept
 }
 
+impl Participant {
+    /// Waits until another thread [rings](Participant::ring) and `other` says that there is something to do, or the
+    /// deadline has passed: for a thread that waits for no mailbox and no stream. May return early for no reason. Says
+    /// how long it slept.
+    ///
+    /// ```
+    /// use rohrpost_mailbox::{Name, Node, Participant};
+    /// use std::sync::atomic::{AtomicBool, Ordering};
+    /// use std::time::Duration;
+    /// # let dir = tempfile::tempdir()?;
+    /// let node = Node::create(&dir.path().join("node"), 0o700)?;
+    /// let participant = Participant::join(&node, Name::NONE)?;
+    /// let is_due = AtomicBool::new(false);
+    /// std::thread::scope(|scope| {
+    ///     scope.spawn(|| {
+    ///         is_due.store(true, Ordering::Release);
+    ///         participant.ring();
+    ///     });
+    ///     while !is_due.load(Ordering::Acquire) {
+    ///         participant.wait(Duration::from_secs(60), || is_due.load(Ordering::Acquire));
+    ///     }
+    /// });
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn wait(&self, waiting: impl Into<Waiting>, other: impl Fn() -> bool) -> Duration {
+        let waiting = waiting.into();
+        // Before the look: a thread that makes `other` true rings afterwards, and so changes this value.
+        let seen = self.entry().bell().seen();
+        if other() || waiting.is_over() {
+            return Duration::ZERO;
+        }
+        timed(|| _ = crate::doorbell::sleep(&self.entry().bell, seen, waiting.left()))
+    }
+}
+
 impl Receiver {
     /// The most important package; sleeps until there is one.
     pub fn receive(&mut self) -> Package<'_> {

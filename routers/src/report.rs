@@ -35,6 +35,11 @@ pub trait Deliver: Report {
         false
     }
 
+    /// Does what time alone makes due. Says whether more is due within milliseconds, though nothing comes.
+    fn poll(&mut self, _now_ns: u64) -> bool {
+        false
+    }
+
     /// Something happened that people want to know of, each once until it is over.
     fn event(&mut self, event: RouterEvent);
 }
@@ -46,6 +51,10 @@ impl<D: Deliver> Deliver for &mut D {
 
     fn replica(&mut self, head: &FrameHead, part: &ReplicaFrame<'_>) -> bool {
         (**self).replica(head, part)
+    }
+
+    fn poll(&mut self, now_ns: u64) -> bool {
+        (**self).poll(now_ns)
     }
 
     fn event(&mut self, event: RouterEvent) {

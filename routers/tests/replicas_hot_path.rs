@@ -1,5 +1,6 @@
-//! A part of a record on its way from ring to ring takes nothing from the heap, and gives nothing back to it: sealed or
-//! not, and with time slots too, where a thread reads the rings that must not wait for any.
+//! A part of a record on its way from ring to ring takes nothing from the heap, and gives nothing back to it; nor does
+//! one that was lost, and is asked for and sent again: sealed or not, and with time slots too, where a thread reads the
+//! rings that must not wait for any.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -39,7 +40,8 @@ impl Describe for Always {
     }
 }
 
-struct Parts(ReplicaReceiver);
+/// Takes parts at this time, ns.
+struct Parts(ReplicaReceiver, u64);
 
 impl Report for Parts {
     fn lost(&mut self, _: Option<NodeIndex>, _: &Head, _: &[u8], _: Cause) {}
@@ -51,7 +53,7 @@ impl Deliver for Parts {
     }
 
     fn replica(&mut self, head: &FrameHead, part: &ReplicaFrame<'_>) -> bool {
-        self.0.take(0, || time(1), head, part)
+        self.0.take(self.1, || time(self.1), head, part)
     }
 
     fn event(&mut self, _: RouterEvent) {}
@@ -80,58 +82,86 @@ fn slots() -> Tdma {
     }
 }
 
-/// The way from the router of node 0 to that of node 1.
-struct Wire {
-    settings: [Settings; 2],
+/// A node's router.
+struct End {
+    sender: ReplicaSender,
     outbound: Outbound,
     inbound: Inbound,
+    parts: Parts,
     seals: Option<(Sealing, Gate)>,
+    datagram: [u8; 1472],
 }
 
-impl Wire {
-    fn open() -> Self {
-        Self::of([0, 1].map(settings))
-    }
-
-    /// The two know each other.
-    fn sealed(tdma: Option<Tdma>) -> Self {
-        let (mut base, mut arm) = (SealedRouter::new(0), SealedRouter::new(1));
-        base.acquaint(&mut arm, 0);
-        let mut wire = Self::of([0, 1].map(|own| {
-            let mut settings = Settings { incarnation: 100 + u64::from(own), tdma: tdma.clone(), ..settings(own) };
-            settings.network.security = Security::Keys;
-            settings.network.datagram_bytes_max -= TAG_BYTES;
-            settings
-        }));
-        wire.outbound = wire.outbound.sealed(base.peer_sessions.clone());
-        let gate = Gate::without_hellos(&arm.peer_sessions, Port::Replicas);
-        wire.seals = Some((Sealing::new(&base.peer_sessions, Port::Replicas), gate));
-        wire
-    }
-
-    fn of(settings: [Settings; 2]) -> Self {
-        let [here, there] = settings.each_ref().map(|settings| Stats::new(settings, BEGIN_NS));
-        let (outbound, inbound) = (Outbound::new(&settings[0], here), Inbound::new(&settings[1], there));
-        Self { outbound, inbound, seals: None, settings }
-    }
-
-    /// Looks which peers there are, as routers do before each datagram.
-    fn look(&mut self, now_ns: u64, datagram: &mut [u8], parts: &mut Parts) {
-        while let OutboundStep::Send { bytes, .. } = self.outbound.poll(now_ns, datagram, parts) {
-            self.carry(now_ns, datagram, bytes, parts);
+impl End {
+    fn new(node: &Arc<Node>, settings: &Settings, replica: &ReplicaSettings) -> Self {
+        let replicas = std::slice::from_ref(replica);
+        let sender = ReplicaSender::new(settings, replicas);
+        let receiver = ReplicaReceiver::new(settings, replicas, join(node), Arc::new(Always));
+        Self {
+            parts: Parts(receiver.asking_by(sender.requests()), BEGIN_NS),
+            sender,
+            outbound: Outbound::new(settings, Stats::new(settings, BEGIN_NS)),
+            inbound: Inbound::new(settings, Stats::new(settings, BEGIN_NS)),
+            seals: None,
+            datagram: [0; 1472],
         }
     }
 
-    fn carry(&mut self, now_ns: u64, datagram: &mut [u8], bytes: usize, parts: &mut Parts) {
-        let (source, arrived_ns) = (address(0), now_ns);
-        let Some((sealing, gate)) = &mut self.seals else {
-            let came = Datagram { source, arrived_ns, bytes: &datagram[..bytes] };
-            return self.inbound.handle(now_ns, &came, parts);
+    /// Those of both nodes.
+    fn open(nodes: &[Arc<Node>; 2], replica: &ReplicaSettings) -> [Self; 2] {
+        [0, 1].map(|own| Self::new(&nodes[usize::from(own)], &settings(own), replica))
+    }
+
+    /// The same, and they know each other.
+    fn sealed(nodes: &[Arc<Node>; 2], replica: &ReplicaSettings, tdma: Option<&Tdma>) -> [Self; 2] {
+        let (mut base, mut arm) = (SealedRouter::new(0), SealedRouter::new(1));
+        base.acquaint(&mut arm, 0);
+        [(0, base), (1, arm)].map(|(own, SealedRouter { peer_sessions: all, .. })| {
+            let mut settings = Settings { incarnation: 100 + u64::from(own), tdma: tdma.cloned(), ..settings(own) };
+            settings.network.security = Security::Keys;
+            settings.network.datagram_bytes_max -= TAG_BYTES;
+            let mut end = Self::new(&nodes[usize::from(own)], &settings, replica);
+            end.outbound = end.outbound.sealed(all.clone());
+            end.seals = Some((Sealing::new(&all, Port::Replicas), Gate::without_hellos(&all, Port::Replicas)));
+            end
+        })
+    }
+
+    /// Writes and seals the next datagram; its length.
+    fn next(&mut self, now_ns: u64) -> Option<usize> {
+        let Self { sender, outbound, parts, datagram, .. } = self;
+        // Routers look which peers there are before each.
+        let bytes = match outbound.poll(now_ns, datagram, parts) {
+            OutboundStep::Send { bytes, .. } => bytes,
+            OutboundStep::Wait { .. } => match sender.poll(now_ns, time, outbound, datagram) {
+                ReplicaStep::Send { bytes, .. } => bytes,
+                ReplicaStep::Wait { .. } | ReplicaStep::Idle { .. } => return None,
+            },
         };
-        let datagram = &mut datagram[..bytes + TAG_BYTES];
-        sealing.close(datagram).unwrap();
+        let Some((sealing, _)) = &mut self.seals else { return Some(bytes) };
+        sealing.close(&mut self.datagram[..bytes + TAG_BYTES]).unwrap();
+        Some(bytes + TAG_BYTES)
+    }
+
+    /// All that leaves now arrives there, but each datagram of which `loses` says so.
+    fn send(&mut self, now_ns: u64, own: NodeIndex, there: &mut Self, mut loses: impl FnMut() -> bool) {
+        there.parts.1 = now_ns;
+        while let Some(bytes) = self.next(now_ns) {
+            if !loses() {
+                there.take(now_ns, own, &mut self.datagram[..bytes]);
+            }
+        }
+        there.parts.0.poll(now_ns, || time(now_ns));
+    }
+
+    fn take(&mut self, now_ns: u64, from: NodeIndex, datagram: &mut [u8]) {
+        let Self { inbound, parts, seals, .. } = self;
+        let (source, arrived_ns) = (address(from), now_ns);
+        let Some((_, gate)) = seals else {
+            return inbound.handle(now_ns, &Datagram { source, arrived_ns, bytes: datagram }, parts);
+        };
         let came = Envelope { source, arrived_ns, bytes: datagram.len() };
-        assert_eq!(gate.take(now_ns, &came, datagram, &mut self.inbound, parts, &mut []), None);
+        assert_eq!(gate.take(now_ns, &came, datagram, inbound, parts, &mut []), None);
     }
 }
 
@@ -149,38 +179,53 @@ fn parts_take_nothing_from_the_heap() {
             to: 1 << 1,
             sampling: Sampling::Each,
             changed: false,
-            delay_alarm_ns: 5 * MS,
+            delay_alarm_ns: 1000 * MS,
+            deadline_ns: 200 * MS,
             level: 18,
         };
         let folder = tempfile::tempdir().unwrap();
         let nodes = ["here", "there"].map(|name| Node::create(&folder.path().join(name), 0o700).unwrap());
-        let mut wire = if is_sealed { Wire::sealed(tdma) } else { Wire::open() };
-        let [base, arm] = wire.settings.clone();
-        let mut sender = ReplicaSender::new(&base, std::slice::from_ref(&replica));
-        let mut parts = Parts(ReplicaReceiver::new(&arm, &[replica], join(&nodes[1]), Arc::new(Always)));
+        let ends = if is_sealed { End::sealed(&nodes, &replica, tdma.as_ref()) } else { End::open(&nodes, &replica) };
+        let [mut origin, mut holder] = ends;
         join(&nodes[0]).describe_replicas(ID.name, b"of a camera").unwrap();
         let mut writer = join(&nodes[0]).stream_writer(ID, shape).unwrap();
-        sender.look(&join(&nodes[0]), &Always);
+        origin.sender.look(&join(&nodes[0]), &Always);
         let mut reader = join(&nodes[1]).stream_reader(ID).unwrap();
-        let (mut datagram, body, mut before) = ([0; 1472], vec![7; record_bytes as usize], 0);
+        let (body, mut before, mut left, mut now_ns) = (vec![7; record_bytes as usize], 0, 0, BEGIN_NS);
+        let (mut records, mut lost) = (0, 0);
         for number in 0..RECORDS {
             // The first ones make ring and description.
             if number == 3 {
                 before = heap_uses();
             }
             writer.write(Stamp { epoch: 1, ns: 1 + number }, &body).unwrap();
-            let mut now_ns = BEGIN_NS + number * MS;
+            for _ in 0..6 {
+                now_ns += MS / 2;
+                origin.send(now_ns, 0, &mut holder, || {
+                    left += 1;
+                    number >= 3 && left % 7 == 0
+                });
+                holder.send(now_ns, 1, &mut origin, || false);
+            }
             loop {
-                wire.look(now_ns, &mut datagram, &mut parts);
-                match sender.poll(now_ns, time, &mut wire.outbound, &mut datagram) {
-                    ReplicaStep::Send { bytes, .. } => wire.carry(now_ns, &mut datagram, bytes, &mut parts),
-                    ReplicaStep::Wait { .. } => now_ns += MS / 10,
-                    ReplicaStep::Idle { .. } => break,
+                match reader.try_next().unwrap() {
+                    Next::Record(record) => {
+                        assert_eq!(record.body(), body);
+                        records += 1;
+                    }
+                    Next::Lost(more) => lost += more,
+                    Next::Nothing => break,
                 }
             }
-            let Next::Record(record) = reader.try_next().unwrap() else { panic!("record {number} is not there") };
-            assert_eq!(record.body(), body);
         }
-        assert_eq!(heap_uses(), before, "records of {record_bytes} bytes, sealed: {is_sealed}");
+        assert_eq!(
+            heap_uses(),
+            before,
+            "records of {record_bytes} bytes, sealed: {is_sealed}, in slots: {}",
+            tdma.is_some()
+        );
+        let counts = holder.parts.0.counts()[0].clone();
+        assert!(records > RECORDS - 5 && lost == 0, "{records} records, {lost} lost");
+        assert!(counts.completed.get() > 20, "{} completed by asking", counts.completed.get());
     }
 }

@@ -1,4 +1,5 @@
-//! A stream of one node is read on two others in time slots, while declared flows keep what was computed for them.
+//! A stream of one node is read on two others in time slots, while declared flows keep what was computed for them. One
+//! in a hundred datagrams of replicas is lost, and asked for in slots.
 
 #![allow(clippy::unwrap_used, reason = "these are tests")]
 
@@ -48,13 +49,15 @@ fn replicate(segment: &mut Segment) -> (Writing, [Reading; 2]) {
         sampling: Sampling::Each,
         changed: false,
         delay_alarm_ns: PATIENCE.as_nanos() as u64,
+        deadline_ns: 200_000_000,
         level: 18,
     };
     let replicas = [replica];
     let Segment { stations, lab, .. } = segment;
     for station in stations {
         let _inside = lab.enter(&name(station.own)).unwrap();
-        let parts = ReplicaParts { replicas: &replicas, describe: Arc::new(Always), socket: None, impair: None };
+        let impair = Some("loss=1%,seed=22".parse().unwrap());
+        let parts = ReplicaParts { replicas: &replicas, describe: Arc::new(Always), socket: None, impair };
         station.shell.as_mut().unwrap().replicate(&station.node, parts).unwrap();
     }
     segment.wait_until("all send", |segment| segment.stations.iter().all(Station::is_ready));
@@ -133,8 +136,12 @@ fn records_cross_in_slots_and_declared_flows_keep_their_bounds() {
         for (node, reading) in [1, 2].into_iter().zip(&readings) {
             let counts = &segment.stations[node].shell().replicas().received[0];
             let incomplete = counts.lost.of(ReplicaLoss::Incomplete);
-            println!("node {node}: {} records whole, {} lost, {incomplete} incomplete", reading.whole, reading.lost);
-            assert!(counts.records.get() >= reading.whole, "{counts:?}");
+            let completed = counts.completed.get();
+            println!(
+                "node {node}: {} records whole, {completed} of these by asking, {} lost, {incomplete} incomplete",
+                reading.whole, reading.lost
+            );
+            assert!(counts.records.get() >= reading.whole && completed > 0, "{counts:?}");
         }
         let sent = &segment.stations[0].shell().replicas().sent;
         assert!(sent.iter().all(|sent| sent.records.get() >= RECORDS), "{sent:?}");
@@ -142,7 +149,7 @@ fn records_cross_in_slots_and_declared_flows_keep_their_bounds() {
     });
 }
 
-/// Parts are sealed by the thread of the slots, with keys of their own port, and opened at the others.
+/// Parts and requests are sealed by the thread of the slots, with keys of their own port, and opened at the others.
 #[test]
 fn records_cross_in_slots_where_datagrams_are_sealed() {
     let Some(mut segment) = Segment::at_rest(None) else { return };
@@ -161,6 +168,7 @@ fn records_cross_in_slots_where_datagrams_are_sealed() {
         let shell = segment.stations[node].shell();
         let counts = &shell.replicas().received[0];
         assert_eq!(counts.lost.of(ReplicaLoss::Unsound) + counts.lost.of(ReplicaLoss::Foreign), 0, "{counts:?}");
+        assert!(counts.completed.get() > 0, "{counts:?}");
         let rejections = shell.rejections(Port::Replicas).unwrap();
         assert_eq!(rejections.of(Some(0), Rejection::Forged) + rejections.of(Some(0), Rejection::Unsealed), 0);
     }

@@ -59,6 +59,7 @@ mod replayed;
 mod replayed_answers;
 mod replayed_others;
 mod replicas;
+mod replicas_lossy;
 mod replicas_sealed;
 mod restart;
 mod screen;

@@ -221,9 +221,11 @@ fn a_stream_of_another_node_is_read_as_if_written_here() {
 }
 
 /// Both nodes in namespaces, with these words for launch, until the recorder of one follows the replica of the other's
-/// stream; none where that cannot be made.
-fn followed(place: &Place, network: &str, words: &[&str]) -> Option<Running> {
+/// stream; none where that cannot be made. `replica`: further keys of it.
+fn followed(place: &Place, network: &str, replica: &str, words: &[&str]) -> Option<Running> {
     let config = config(place, &["10.77.0.1".into(), "10.77.0.2".into()], network);
+    // The file ends with the replica.
+    std::fs::write(&config, std::fs::read_to_string(&config).unwrap() + replica).unwrap();
     let launch = Running::start(place.command(&[&["launch", config.to_str().unwrap(), "--all"][..], words].concat()));
     // It ends at once where there are none.
     let begun = wait("both nodes run", || {
@@ -270,7 +272,8 @@ fn feed_and_count(place: &Place, mut launch: Running, count: u64) -> (u64, u64) 
 fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
     let place = Place::new();
     let bad = ["--impair", "loss=2%,delay=1ms,reorder=5%,seed=22"];
-    let Some(launch) = followed(&place, NETWORK, &bad) else { return };
+    // What is lost stays lost.
+    let Some(launch) = followed(&place, NETWORK, "deadline = \"0 ms\"\n", &bad) else { return };
     let (recorded, lost) = feed_and_count(&place, launch, 300);
     assert!(lost > 0 && recorded > 100, "{recorded} recorded, {lost} lost");
     place.assert_empty();
@@ -279,7 +282,7 @@ fn over_a_network_that_loses_datagrams_records_are_whole_or_told_as_lost() {
 #[test]
 fn in_time_slots_records_cross_as_well() {
     let place = Place::new();
-    let Some(launch) = followed(&place, SLOTS, &[]) else { return };
+    let Some(launch) = followed(&place, SLOTS, "", &[]) else { return };
     let (recorded, lost) = feed_and_count(&place, launch, 200);
     assert!(recorded > 100, "{recorded} recorded, {lost} lost");
     place.assert_empty();

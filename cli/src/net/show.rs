@@ -177,6 +177,7 @@ fn replicas(all: &[NodeReport]) -> String {
             bytes(state.bytes as f64),
             state.gaps.map_or("-".into(), |gaps| gaps.to_string()),
             state.delay_p99_ns.map_or("-".into(), |ns| fine(ns as f64 * 1e-9)),
+            again(state),
             if lost.is_empty() { "nothing".into() } else { lost.join(", ") },
         ]
     };
@@ -188,7 +189,16 @@ fn replicas(all: &[NodeReport]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    table(["node", "replica", "way", ">records", ">bytes", ">gaps", ">delay p99", "not in it"], rows)
+    table(["node", "replica", "way", ">records", ">bytes", ">gaps", ">delay p99", "again", "not in it"], rows)
+}
+
+/// Parts that were lost on their way: how many were sent again, or asked for, and how many records came whole by that.
+fn again(state: &ReplicaState) -> String {
+    match (state.again, state.asked, state.completed) {
+        (Some(again), _, _) => format!("{again} sent"),
+        (None, Some(asked), Some(completed)) => format!("{asked} asked for, {completed} completed"),
+        _ => "-".into(),
+    }
 }
 
 fn clocks(all: &[NodeReport]) -> String {

@@ -4,6 +4,7 @@ use super::Page;
 use crate::output::Level;
 use crate::record::{RecordedItems, Sampling};
 use crate::units::{duration_text, size_text};
+use std::time::Duration;
 
 impl Page<'_> {
     pub(super) fn record(&mut self) {
@@ -61,8 +62,13 @@ impl Page<'_> {
         self.line("");
         for replica in &self.installation.replicas {
             let node = self.installation.node_of(replica.from).unwrap_or_default();
+            let asks = match replica.deadline {
+                Duration::ZERO => "not asked for".into(),
+                deadline => format!("asked for during {}", duration_text(deadline)),
+            };
             let words = format!(
-                "{} of node {node} to {}: {} of its records{}, each of at most {}; told if later than {}",
+                "{} of node {node} to {}: {} of its records{}, each of at most {}; told if later than {}; what is lost \
+                 is {asks}",
                 replica.text(self.installation),
                 replica.to.join(", "),
                 replica.sampling,

@@ -134,7 +134,7 @@ pub enum WriteError {
     Damaged(StreamId),
 }
 
-/// Why a record of a replica was not begun. The stream is as it was.
+/// Why a record of a replica was not begun, or not finished. The stream is as it was.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ReplicaError {
     /// It has come to a later one already.
@@ -147,6 +147,9 @@ pub enum ReplicaError {
         /// The least that it may be.
         next: u64,
     },
+    /// There is no room for it beside what is begun: two records are, or readers hold all other frames.
+    #[error("stream {0}: there is no room for a record beside those that are begun; finish or give up one")]
+    Begun(StreamId),
     /// As for any stream.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -18,7 +18,7 @@ use crate::sync::{Ordering, fence, prefetch_to_write, seq_cst_accesses};
 pub(crate) struct Progress {
     /// Sequence of the next record.
     next: u64,
-    /// Frames that no entry names: at least one more than there are seats.
+    /// Frames that no entry names: at least one more than there are seats, less those that are being filled.
     free: Vec<u32>,
     /// The greatest stamp of the newest epoch; none before the first record.
     newest: Option<Stamp>,
@@ -76,7 +76,8 @@ impl Progress {
         self.newest
     }
 
-    /// A frame to fill. There always is one: a seat names one frame at most, and is looked at once.
+    /// A frame to fill. There always is one, if none is being filled: a seat names one frame at most, and is looked at
+    /// once.
     pub(crate) fn claim(&mut self, ring: &Ring<'_>) -> Option<Frame> {
         // ORDERING: Acquire (I); pairs with (H): a reader that held a frame has read it. SeqCst for (E).
         let held = |seat: &Seat| seat.hold.load(Ordering::SeqCst);

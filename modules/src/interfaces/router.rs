@@ -318,6 +318,12 @@ pub struct ReplicaState {
     pub bytes: u64,
     /// Records before the newest that are not in the replica, whatever the cause; none where it is sent.
     pub gaps: Option<u64>,
+    /// Parts that were asked for, since they were lost; none where it is sent.
+    pub asked: Option<u64>,
+    /// Records that are whole since parts of them were asked for; none where it is sent.
+    pub completed: Option<u64>,
+    /// Parts that were sent again, since the node asked for them; none where it comes.
+    pub again: Option<u64>,
     /// From writing to arrival, by system time, ns: 99 of 100 records were not slower; none where it is sent, or
     /// without a common time.
     pub delay_p99_ns: Option<u64>,
@@ -329,11 +335,13 @@ pub struct ReplicaState {
     pub lost: Vec<ReplicaCause>,
 }
 
-/// Records or parts that are not in a replica, for one cause.
+/// Records or parts that are not in a replica, or requests that were not answered, for one cause.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ReplicaCause {
     /// In a word. Of records: `sampled`, `passed`, `absent` where they are sent, `incomplete` where they come. Of parts
-    /// that were not taken: `duplicate`, `late`, `foreign`, `undescribed`, `too-large`, `unsound`, `unwritable`.
+    /// that were not taken: `duplicate`, `late`, `foreign`, `undescribed`, `too-large`, `unsound`, `unwritable`. Of
+    /// requests for parts: `overwritten`, `not-sent`, `out-of-range`; of parts that are asked for again and again
+    /// `exhausted`.
     pub cause: String,
     /// How many.
     pub times: u64,

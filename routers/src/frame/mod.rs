@@ -8,18 +8,20 @@
 //!  packages: (head 16, body) repeated     fragment: first u64, index u16, count u16, offset u32, package head, bytes
 //!  alive: incarnation u64 and next sequence u64 of the peer as heard here, datagrams of it that were missed u64
 //!  refusal: reason u8, 7 × 0, own digest u64              16 and above: time, see `time`
-//!  record part, description: see `replica`
+//!  record part, description: see `replica`; part request: see `part_request`
 //!  byte 7: key of the seal over the content, 0: none, see `security`; hello: always sealed
 //! ```
 //!
 //! Little-endian; a package head has the order of its options. The check is the CRC-32 of zlib over all other bytes.
 
 mod fields;
+mod part_request;
 mod refusal;
 mod replica;
 
 use fields::long;
 pub use fields::{BadFrame, VERSION};
+pub use part_request::{ASKED_PARTS_MAX, PART_REQUEST_BYTES_MAX, PartRequest};
 pub use refusal::{Refusal, RefusalReason};
 pub use replica::{DESCRIPTION_BYTES_MAX, DESCRIPTION_PART_HEAD_BYTES, DescriptionPart, RecordPart, ReplicaFrame};
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
@@ -55,6 +57,8 @@ pub enum FrameKind {
     RecordPart = 6,
     /// A part of the description of a stream's module.
     Description = 7,
+    /// Asks for parts of a record again.
+    PartRequest = 8,
     /// Time: the master's present time.
     Sync = 16,
     /// Time: warms the path for the next frame; empty.
@@ -66,7 +70,7 @@ pub enum FrameKind {
 }
 
 impl FrameKind {
-    pub(crate) const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Packages,
         Self::Fragment,
         Self::Alive,
@@ -74,6 +78,7 @@ impl FrameKind {
         Self::Hello,
         Self::RecordPart,
         Self::Description,
+        Self::PartRequest,
         Self::Sync,
         Self::WarmUp,
         Self::Request,
@@ -242,6 +247,7 @@ impl<'a> Frame<'a> {
             FrameKind::Refusal => Self::Refusal(Refusal::parse(version, rest)?),
             FrameKind::RecordPart => Self::Replica(ReplicaFrame::Record(RecordPart::parse(rest)?)),
             FrameKind::Description => Self::Replica(ReplicaFrame::Description(DescriptionPart::parse(rest)?)),
+            FrameKind::PartRequest => Self::Replica(ReplicaFrame::Request(PartRequest::parse(rest)?)),
             FrameKind::Hello => return Err(BadFrame::Damaged("a hello that is not sealed")),
             FrameKind::Sync | FrameKind::WarmUp | FrameKind::Request | FrameKind::Reply => Self::Time(rest),
         })

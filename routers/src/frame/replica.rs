@@ -1,6 +1,8 @@
-//! Parts of what a replica needs: of records, and of the description of the module that writes them.
+//! Parts of what a replica needs: of records, and of the description of the module that writes them. What a node asks
+//! for again says [`PartRequest`].
 
 use super::fields::{BadFrame, half, long, word};
+use super::part_request::PartRequest;
 use rohrpost_network::RECORD_PART_HEAD_BYTES;
 
 /// Bytes between the head of the datagram and a description's bytes.
@@ -8,13 +10,15 @@ pub const DESCRIPTION_PART_HEAD_BYTES: usize = 24;
 /// Longest description that is carried.
 pub const DESCRIPTION_BYTES_MAX: usize = 64 << 10;
 
-/// What a node sends to those that have a replica of a stream.
+/// What a node sends to those that have a replica of a stream, and they to it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ReplicaFrame<'a> {
     /// A part of a record.
     Record(RecordPart<'a>),
     /// A part of the description of the module that writes the stream.
     Description(DescriptionPart<'a>),
+    /// A node asks for parts of a record again.
+    Request(PartRequest),
 }
 
 impl ReplicaFrame<'_> {
@@ -23,6 +27,7 @@ impl ReplicaFrame<'_> {
         match self {
             Self::Record(part) => part.place,
             Self::Description(part) => part.place,
+            Self::Request(request) => request.place,
         }
     }
 }
@@ -52,6 +57,9 @@ pub struct RecordPart<'a> {
     pub written_ns: u64,
     /// How far off that is at most, ns.
     pub error_ns: u32,
+    /// How many sequences it is behind the record that was sent to the same node before; 0: none was, or this part is
+    /// sent again.
+    pub step: u32,
     /// Content of the part.
     pub bytes: &'a [u8],
 }
@@ -71,6 +79,7 @@ impl<'a> RecordPart<'a> {
         bytes[36..44].copy_from_slice(&self.stamp_ns.to_le_bytes());
         bytes[44..52].copy_from_slice(&self.written_ns.to_le_bytes());
         bytes[52..56].copy_from_slice(&self.error_ns.to_le_bytes());
+        bytes[56..60].copy_from_slice(&self.step.to_le_bytes());
         bytes
     }
 
@@ -90,6 +99,7 @@ impl<'a> RecordPart<'a> {
             stamp_ns: long(b, 36),
             written_ns: long(b, 44),
             error_ns: word(b, 52),
+            step: word(b, 56),
             bytes,
         };
         let is_some = !bytes.is_empty() || part.len == 0;
@@ -177,6 +187,7 @@ mod tests {
         stamp_ns: 8,
         written_ns: 9,
         error_ns: 10,
+        step: 11,
         bytes: b"part",
     };
     const DESCRIPTION: DescriptionPart<'static> =

@@ -14,7 +14,15 @@ rohrpost_mailbox::causes! {
         Passed = "passed",
         /// Sender, records: the node that has the replica was not there.
         Absent = "absent",
-        /// Receiver, records: begun, and a part of it never came.
+        /// Sender, requests: of a record that newer ones have overwritten.
+        Overwritten = "overwritten",
+        /// Sender, requests: of a record that was not sent to that node, or long ago.
+        NotSent = "not-sent",
+        /// Sender, requests: of parts that the record does not have.
+        OutOfRange = "out-of-range",
+        /// Sender, parts: asked for again and again.
+        Exhausted = "exhausted",
+        /// Receiver, records: a part of it, or all, never came.
         Incomplete = "incomplete",
         /// Receiver, parts: of a record that came before, whole.
         Duplicate = "duplicate",
@@ -59,14 +67,16 @@ pub struct SentReplica {
     pub records: Count,
     /// Bytes of these records.
     pub bytes: Count,
+    /// Parts that were sent again, since that node asked for them.
+    pub again: Count,
     /// What did not leave.
     pub lost: ReplicaLosses,
 }
 
 impl SentReplica {
     pub(super) fn new(place: u16, to: NodeIndex) -> Self {
-        let (records, bytes, lost) = <(Count, Count, ReplicaLosses)>::default();
-        Self { place, to, records, bytes, lost }
+        let (records, bytes, again, lost) = <(Count, Count, Count, ReplicaLosses)>::default();
+        Self { place, to, records, bytes, again, lost }
     }
 }
 
@@ -82,6 +92,10 @@ pub struct ReceivedReplica {
     /// Sequences that were passed over: with them the stream says to its readers what they lost. Causes of the sender
     /// and of the receiver are among them.
     pub gaps: Count,
+    /// Parts that were asked for, as often as they were.
+    pub asked: Count,
+    /// Records that are whole since parts were asked for.
+    pub completed: Count,
     /// From writing to arrival, by system time, where both ends know it.
     pub delay: Latencies,
     /// Records that came later than the delay alarm allows.
@@ -92,8 +106,9 @@ pub struct ReceivedReplica {
 
 impl ReceivedReplica {
     pub(super) fn new(place: u16) -> Self {
-        let (records, bytes, gaps, delayed) = <(Count, Count, Count, Count)>::default();
-        Self { place, records, bytes, gaps, delay: Latencies::default(), delayed, lost: ReplicaLosses::default() }
+        let (records, bytes, gaps, asked, completed, delayed) = Default::default();
+        let (delay, lost) = <(Latencies, ReplicaLosses)>::default();
+        Self { place, records, bytes, gaps, asked, completed, delay, delayed, lost }
     }
 }
 

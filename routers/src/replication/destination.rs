@@ -1,15 +1,19 @@
 //! A place in a stream: how far one node's replica has come.
 
+use super::again::Again;
 use super::counts::{ReplicaLoss, SentReplica};
 use super::fingerprint::{Fingerprint, Fingerprints};
-use crate::frame::NodeIndex;
+use crate::frame::{NodeIndex, PartRequest};
 use rohrpost_config::Sampling;
 use rohrpost_mailbox::{RecordInfo, StreamReader};
 use std::sync::Arc;
 
 /// Where only changes are sent, a record like the last one goes after this time nevertheless: that one may have been
-/// lost on its way, and nobody says so.
+/// lost for good, and nobody says so.
 pub(super) const UNCHANGED_EVERY_NS: u64 = 10_000_000_000;
+/// Parts of so many records, the last that were begun, may be asked for. Only of two at a time something is missing
+/// there; the others are on their way.
+const ASKED_MAX: usize = 32;
 
 /// A node that has the replica.
 pub(super) struct Destination {
@@ -28,6 +32,14 @@ pub(super) struct Destination {
     /// Where only changes are sent: the record that went last, or is under way, and when it was chosen, ns. None: the
     /// next one goes, whatever its bytes.
     pub(super) sent: Option<(Fingerprint, u64)>,
+    /// Sequence of the record of which all parts left last.
+    pub(super) before: Option<u64>,
+    /// Sequences of the records that were begun last, in any order.
+    begun: [Option<u64>; ASKED_MAX],
+    /// How many were.
+    begins: usize,
+    /// What it has asked for: of the record that arrives there, and of the one before.
+    again: [Again; 2],
     /// No further record is chosen before, ns.
     pub(super) sample_ns: u64,
     /// When the description is due, ns.
@@ -37,7 +49,8 @@ pub(super) struct Destination {
 }
 
 impl Destination {
-    pub(super) fn new(place: u16, peer: NodeIndex) -> Self {
+    /// `parts`: most of a record.
+    pub(super) fn new(place: u16, peer: NodeIndex, parts: usize) -> Self {
         Self {
             peer,
             counts: Arc::new(SentReplica::new(place, peer)),
@@ -47,6 +60,10 @@ impl Destination {
             has_none: true,
             under_way: None,
             sent: None,
+            before: None,
+            begun: [None; ASKED_MAX],
+            begins: 0,
+            again: std::array::from_fn(|_| Again::new(parts)),
             sample_ns: 0,
             describe_ns: 0,
             describing: None,
@@ -102,6 +119,8 @@ impl Destination {
                 self.sent = Some((fingerprint, now_ns));
             }
             (self.under_way, self.has_none) = (Some((record.info(), 0)), false);
+            self.begun[self.begins % ASKED_MAX] = Some(sequence);
+            self.begins = self.begins.wrapping_add(1);
             if let Sampling::Rate(rate_hz) = sampling {
                 self.sample_ns = now_ns.saturating_add((1e9 / rate_hz) as u64);
             }
@@ -117,9 +136,103 @@ impl Destination {
         }
     }
 
+    /// Nothing that was sent counts any more: its records are others, or the node has none of them.
+    pub(super) fn begin_anew(&mut self) {
+        (self.under_way, self.sent, self.before, self.begun) = (None, None, None, [None; ASKED_MAX]);
+        self.again.iter_mut().for_each(Again::clear);
+    }
+
+    /// Takes a request for parts of this stream, as it is now.
+    ///
+    /// # Errors
+    /// Why none of them is sent.
+    pub(super) fn ask(
+        &mut self,
+        reader: &mut StreamReader,
+        request: &PartRequest,
+        part_bytes: usize,
+    ) -> Result<(), ReplicaLoss> {
+        let sequence = request.sequence;
+        if !self.begun.contains(&Some(sequence)) {
+            return Err(ReplicaLoss::NotSent);
+        }
+        let of = |again: &Again| again.record().map(|record| record.sequence);
+        let at = match self.again.iter().position(|again| of(again) == Some(sequence)) {
+            Some(at) => at,
+            None => {
+                // A newer record takes the place of an older one, never the other way round: else the bound on what
+                // leaves again would begin anew.
+                let at = usize::from(of(&self.again[0]) > of(&self.again[1]));
+                if of(&self.again[at]) > Some(sequence) {
+                    return Err(ReplicaLoss::NotSent);
+                }
+                let Some(record) = reader.record(sequence) else {
+                    // It may not have what was sent last.
+                    self.sent = None;
+                    return Err(ReplicaLoss::Overwritten);
+                };
+                self.again[at].begin(record.info(), parts_of(&record.info(), part_bytes));
+                at
+            }
+        };
+        let again = &mut self.again[at];
+        let parts = again.record().map_or(0, |record| parts_of(record, part_bytes));
+        if request.asked().any(|index| index >= parts) {
+            return Err(ReplicaLoss::OutOfRange);
+        }
+        // What has not left yet comes by itself.
+        let under_way = self.under_way.filter(|(record, _)| record.sequence == sequence);
+        let sent = under_way.map_or(parts, |(_, offset)| offset / part_bytes);
+        let refused = request.asked().filter(|index| *index < sent && !again.want(*index)).count();
+        if refused > 0 {
+            self.counts.lost.add(ReplicaLoss::Exhausted, refused as u64);
+        }
+        Ok(())
+    }
+
+    /// The part to send again, and its record: of the older one first.
+    pub(super) fn next_again(&self) -> Option<(RecordInfo, usize)> {
+        self.again.iter().filter_map(Again::next).min_by_key(|(record, _)| record.sequence)
+    }
+
+    /// Whether something is to be sent again.
+    pub(super) fn is_asked(&self) -> bool {
+        self.again.iter().any(Again::is_wanted)
+    }
+
+    /// A part was sent again.
+    pub(super) fn sent_again(&mut self, sequence: u64, index: usize) {
+        if let Some(again) = self.again_of(sequence) {
+            again.left(index);
+            self.counts.again.add(1);
+        }
+    }
+
+    /// The record that is under way was overwritten, or one of which parts are to be sent again. Either way the node
+    /// may not have what was sent last.
+    pub(super) fn is_overwritten(&mut self, again: Option<u64>) {
+        self.sent = None;
+        let cause = match again {
+            Some(sequence) => {
+                self.again_of(sequence).into_iter().for_each(Again::drop_wanted);
+                ReplicaLoss::Overwritten
+            }
+            None => {
+                self.under_way = None;
+                ReplicaLoss::Passed
+            }
+        };
+        self.counts.lost.add(cause, 1);
+    }
+
+    fn again_of(&mut self, sequence: u64) -> Option<&mut Again> {
+        self.again.iter_mut().find(|again| again.record().is_some_and(|record| record.sequence == sequence))
+    }
+
     /// It is not there, so nothing waits for it but the newest record. Older ones, from its first one on, are counted.
     pub(super) fn pass_over(&mut self, newest: Option<&RecordInfo>) {
         (self.describing, self.is_absent) = (None, true);
+        self.again.iter_mut().for_each(Again::drop_wanted);
         let (Some(newest), Some(next)) = (newest, self.next) else { return };
         let given_up = self.under_way.take().is_some_and(|(record, _)| record.sequence < newest.sequence);
         let missed = newest.sequence.saturating_sub(next) + u64::from(given_up);
@@ -128,4 +241,9 @@ impl Destination {
             self.counts.lost.add(ReplicaLoss::Absent, missed);
         }
     }
+}
+
+/// Parts of a record.
+fn parts_of(record: &RecordInfo, part_bytes: usize) -> usize {
+    record.len_bytes.div_ceil(part_bytes).max(1)
 }

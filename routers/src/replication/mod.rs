@@ -2,22 +2,45 @@
 //!
 //! ```text
 //!  ring of the origin ─▶ ReplicaSender: by level, part by part ═ UDP ═▶ ReplicaReceiver ─▶ begun record ─▶ ring there
-//!        held while a part is copied            description, each second │        all parts came: it is a record
-//!                                                                        └ one is missing: left out, and told so
+//!        held while a part is copied   ▲        description, each second │        all parts came: it is a record
+//!                                      └══════ UDP: which are missing ◀══┤ one is missing: it is asked for
+//!                                                                        └ and never comes: left out, and told so
 //! ```
 //!
 //! The rings are the queues: nothing waits besides, on either end. A part is copied from the ring into its datagram
 //! when the wire has room, and from the datagram into the ring. Sequence, incarnation and stamp stay the origin's.
 //!
+//! Lost parts are asked for, within bounds on both ends:
+//!
+//! - The receiver has two records of a replica open at most: an older one that was asked for, and a newer one that
+//!   arrives. A third one, or the replica's deadline, ends the older one; a newer one that is whole waits for it as
+//!   long as an answer takes. Of a record of which nothing came it knows by the next one, since that says which was
+//!   sent before: what was left out on purpose is never asked for. This is worth it for small records, too: it costs
+//!   one request for a lost pose, and delays the next pose by one round trip.
+//! - It asks when the last part that is expected came, when a newer record begins, or when nothing came for the time
+//!   that an answer takes, measured; again after that time, then twice, then four times that time. At most 32 times for
+//!   a record, and at most 500 requests a second for a replica.
+//! - The sender sends asked parts before new ones of the same stream, at its level, and as all parts do. It takes them
+//!   from the ring, of the last 32 records that it sent to that node. All parts of a record in sum leave again at most
+//!   as often as it has parts, and eight times more. Parts that have not left yet are not sent twice. Of a record that
+//!   was overwritten nothing is sent: newer ones are under way, which end it at the receiver.
+//!
 //! No socket, thread or clock here, and no type: what a record means stands in the description of its module, which
 //! goes along unread. Rings are memory of this node; making one and laying down a description are system calls, a part
 //! is none.
 
-mod assembly;
+mod again;
 mod counts;
+mod delay;
+mod description;
 mod destination;
 mod fingerprint;
+mod gathering;
+mod incoming;
+mod outgoing;
+mod patience;
 mod receiving;
+mod requests;
 mod sending;
 mod settings;
 #[cfg(test)]
@@ -25,6 +48,7 @@ mod tests;
 
 pub use counts::{ReceivedReplica, ReplicaCounts, ReplicaLoss, ReplicaLosses, SentReplica};
 pub use receiving::ReplicaReceiver;
+pub use requests::PartRequests;
 pub use sending::{ReplicaSender, ReplicaStep};
 pub use settings::ReplicaSettings;
 
@@ -43,9 +67,4 @@ pub trait Describe: Send + Sync {
 /// Bytes of each part of a record but the last: what a datagram has room for. Equal on all nodes.
 fn part_bytes(settings: &Settings) -> usize {
     settings.network.datagram_bytes_max - frame::HEAD_BYTES - RECORD_PART_HEAD_BYTES
-}
-
-/// CRC-32 (of zlib) of a description.
-fn check(description: &[u8]) -> u32 {
-    crc32fast::hash(description)
 }

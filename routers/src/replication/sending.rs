@@ -2,20 +2,18 @@
 //!
 //! Each node that has a replica has a place of its own in the stream, so one without room in its socket delays no
 //! other. A place that is behind by more than half of the ring goes on with the newest record: older ones would be
-//! overwritten on their way.
+//! overwritten on their way. What such a node asks for again goes before what is new to it. Requests of this node for
+//! parts of others leave here as well, each at the level of its stream, and before parts of that level.
 
-use super::counts::{ReplicaLoss, SentReplica};
-use super::destination::Destination;
-use super::fingerprint::Fingerprints;
+use super::counts::SentReplica;
+use super::outgoing::OutgoingReplica;
+use super::requests::{OwnRequests, PartRequests};
 use super::settings::ReplicaSettings;
-use super::{DESCRIBE_EVERY_NS, Describe, check, part_bytes};
-use crate::frame::{
-    self, DESCRIPTION_BYTES_MAX, DESCRIPTION_PART_HEAD_BYTES, DescriptionPart, FrameKind, NodeIndex,
-    RECORD_PART_HEAD_BYTES, RecordPart,
-};
+use super::{Describe, part_bytes};
+use crate::frame::{self, NodeIndex, RECORD_PART_HEAD_BYTES};
 use crate::outbound::Outbound;
 use crate::settings::Settings;
-use rohrpost_mailbox::{Participant, RecordInfo, StreamId, StreamReader, SystemTime};
+use rohrpost_mailbox::{Participant, StreamReader, SystemTime};
 use rohrpost_network::LEVELS;
 use std::sync::Arc;
 
@@ -44,32 +42,15 @@ pub enum ReplicaStep {
 /// The sending half of all replicas of a node's streams. One thread has it.
 pub struct ReplicaSender {
     part_bytes: usize,
+    /// Incarnation of this router.
+    incarnation: u64,
+    own_requests: OwnRequests,
+    /// The nodes that such requests go to, one bit each.
+    origins: u64,
     /// The most important first.
     streams: Vec<OutgoingReplica>,
     /// Of each level, the first of its streams to be asked.
     turns: [usize; LEVELS],
-}
-
-struct OutgoingReplica {
-    place: u16,
-    settings: ReplicaSettings,
-    /// Of the module that writes it; empty until it is known.
-    description: Vec<u8>,
-    check: u32,
-    reader: Option<StreamReader>,
-    /// How often the stream was made anew.
-    generation: u16,
-    /// There is more to read, and it is not written to its end: its writer died.
-    is_stalled: bool,
-    /// The newest record, when it was looked at last.
-    newest: Option<RecordInfo>,
-    destinations: Vec<Destination>,
-    /// Where only changes are sent.
-    fingerprints: Option<Fingerprints>,
-    /// The destination that is asked first.
-    turn: usize,
-    /// What is wrong with it was told.
-    told: bool,
 }
 
 impl ReplicaSender {
@@ -78,18 +59,27 @@ impl ReplicaSender {
         let own = (0..).zip(replicas).filter(|(_, replica)| replica.node == settings.own);
         let mut streams: Vec<_> = own.map(|(place, replica)| OutgoingReplica::new(place, replica, settings)).collect();
         streams.sort_by_key(|stream| stream.settings.level);
-        Self { part_bytes: part_bytes(settings), streams, turns: [0; LEVELS] }
+        let here = replicas.iter().filter(|replica| replica.to & 1 << settings.own != 0);
+        let origins = here.fold(0, |all, replica| all | 1 << replica.node) & !(1 << settings.own);
+        let own_requests = OwnRequests::new(PartRequests::new(settings, replicas));
+        let (part_bytes, incarnation) = (part_bytes(settings), settings.incarnation);
+        Self { part_bytes, incarnation, own_requests, origins, streams, turns: [0; LEVELS] }
     }
 
-    /// Whether no stream of this node has a replica.
+    /// Whether no stream of this node has a replica, and this one has none.
     pub fn is_empty(&self) -> bool {
-        self.streams.is_empty()
+        self.streams.is_empty() && self.origins == 0
     }
 
-    /// The nodes that have a replica of a stream of this one, one bit each.
+    /// The queues between this half and [`ReplicaReceiver::asking_by`](super::ReplicaReceiver::asking_by).
+    pub fn requests(&self) -> &Arc<PartRequests> {
+        self.own_requests.queues()
+    }
+
+    /// The nodes that something goes to, one bit each.
     pub(crate) fn peers(&self) -> u64 {
         let all = self.streams.iter().flat_map(|stream| &stream.destinations);
-        all.fold(0, |peers, destination| peers | 1 << destination.peer)
+        all.fold(self.origins, |peers, destination| peers | 1 << destination.peer)
     }
 
     /// Counters of each replica and node.
@@ -128,9 +118,20 @@ impl ReplicaSender {
             stream.refresh();
             stream.meet(now_ns, outbound);
         }
+        for (from, request) in self.own_requests.queues().take_all() {
+            let stream = self.streams.iter_mut().find(|stream| stream.place == request.place);
+            stream.into_iter().for_each(|stream| stream.ask(from, &request, (self.incarnation, self.part_bytes)));
+        }
         loop {
             let ready = outbound.ready_peers();
-            let Some((at, to)) = self.choose(now_ns, ready) else { return self.wait(now_ns) };
+            let chosen = self.choose(now_ns, ready);
+            let level = chosen.map(|(at, _)| self.streams[at].settings.level);
+            match self.own_requests.next(now_ns, level, outbound, datagram) {
+                Some(Ok((to, bytes))) => return ReplicaStep::Send { to, bytes },
+                Some(Err(until_ns)) => return ReplicaStep::Wait { until_ns },
+                None => {}
+            }
+            let Some((at, to)) = chosen else { return self.wait(now_ns) };
             let stream = &mut self.streams[at];
             let level = stream.settings.level;
             if let Err(until_ns) = outbound.may_leave(now_ns, level) {
@@ -141,7 +142,7 @@ impl ReplicaSender {
             let content = &mut datagram[frame::HEAD_BYTES..][..RECORD_PART_HEAD_BYTES + self.part_bytes];
             let filled = stream.fill(now_ns, &system, (to, self.part_bytes), content);
             let Some((kind, bytes)) = filled else { continue };
-            if stream.destinations[to].under_way.is_none() {
+            if stream.destinations[to].under_way.is_none() && !stream.destinations[to].is_asked() {
                 self.turns[usize::from(level)] = at + 1;
             }
             stream.turn = to + 1;
@@ -177,207 +178,5 @@ impl ReplicaSender {
         // What is due and not under way is for a node that is not there.
         let due = all().map(|(_, to)| to.describe_ns).filter(|at_ns| *at_ns > now_ns);
         ReplicaStep::Idle { until_ns: due.min().unwrap_or(u64::MAX) }
-    }
-}
-
-impl OutgoingReplica {
-    fn new(place: u16, replica: &ReplicaSettings, settings: &Settings) -> Self {
-        let peers = settings.peers().filter(|peer| replica.to & 1 << peer != 0);
-        Self {
-            place,
-            destinations: peers.map(|peer| Destination::new(place, peer)).collect(),
-            fingerprints: replica.changed.then(Fingerprints::default),
-            settings: replica.clone(),
-            description: Vec::new(),
-            check: 0,
-            reader: None,
-            generation: 0,
-            is_stalled: false,
-            newest: None,
-            turn: 0,
-            told: false,
-        }
-    }
-
-    fn look(&mut self, participant: &Arc<Participant>, describe: &dyn Describe) {
-        let (from, item) = (self.settings.from, &self.settings.item);
-        let Some(words) = participant.node().about(from) else { return };
-        if self.reader.is_some() && words == self.description {
-            return;
-        }
-        let number = describe.number(&words, item).filter(|_| words.len() <= DESCRIPTION_BYTES_MAX);
-        let Some(number) = number else {
-            return self.tell(&format!(
-                "its description names no such stream, or has more than {DESCRIPTION_BYTES_MAX} bytes"
-            ));
-        };
-        // A seat is free again before the next one is taken.
-        self.reader = None;
-        match participant.stream_reader(StreamId { name: from, number }) {
-            Ok(reader) => self.reader = Some(reader),
-            Err(error) => return self.tell(&error.to_string()),
-        }
-        (self.check, self.description, self.told) = (check(&words), words, false);
-        for destination in &mut self.destinations {
-            (destination.describe_ns, destination.describing, destination.under_way) = (0, None, None);
-            destination.sent = None;
-        }
-        self.note_newest();
-    }
-
-    fn tell(&mut self, why: &str) {
-        if !std::mem::replace(&mut self.told, true) {
-            tracing::warn!("stream {} of {} has no replica for now: {why}", self.settings.item, self.settings.from);
-        }
-    }
-
-    /// Looks for a newer record. One load if there is none.
-    fn refresh(&mut self) {
-        self.is_stalled = false;
-        if self.reader.as_ref().is_some_and(StreamReader::has_next) {
-            let before = self.newest;
-            self.note_newest();
-            self.is_stalled = self.newest == before;
-        }
-    }
-
-    fn note_newest(&mut self) {
-        let Some(reader) = &mut self.reader else { return };
-        let newest = reader.newest().map(|newest| newest.map(|record| record.info()));
-        let newest = match newest {
-            Ok(newest) => newest,
-            Err(error) => {
-                // It is opened anew at the next look.
-                self.reader = None;
-                return self.tell(&error.to_string());
-            }
-        };
-        let Some(newest) = newest else { return };
-        reader.seek(newest.sequence + 1);
-        let is_older = |before: RecordInfo| newest.sequence <= before.sequence && newest != before;
-        if self.newest.is_some_and(is_older) {
-            // The stream was made anew.
-            self.generation = self.generation.wrapping_add(1);
-            for destination in &mut self.destinations {
-                (destination.next, destination.under_way, destination.sent) = (None, None, None);
-            }
-        }
-        self.newest = Some(newest);
-    }
-
-    /// Takes notice of nodes that have come, were restarted, or are gone.
-    fn meet(&mut self, now_ns: u64, outbound: &Outbound) {
-        let Self { reader, newest, destinations, .. } = self;
-        for destination in destinations {
-            let incarnation = outbound.incarnation_of(destination.peer);
-            if std::mem::replace(&mut destination.incarnation, incarnation) != incarnation {
-                // It may have nothing: the description and the newest record go to it at once.
-                (destination.describe_ns, destination.describing) = (0, None);
-                let under_way = destination.under_way.take().map(|(record, _)| record.sequence);
-                let again = under_way.or(newest.map(|newest| newest.sequence));
-                destination.next = destination.next.zip(again).map(|(next, again)| next.min(again));
-                destination.has_none = true;
-            }
-            if !outbound.is_there(now_ns, destination.peer) {
-                destination.pass_over(newest.as_ref());
-                continue;
-            }
-            destination.come();
-            if now_ns >= destination.describe_ns && destination.describing.is_none() && reader.is_some() {
-                destination.describing = Some(0);
-            }
-        }
-    }
-
-    /// The first destination with something to send, in turn.
-    fn choose(&mut self, now_ns: u64, ready: u64) -> Option<usize> {
-        let Self { reader, newest, destinations, fingerprints, settings, turn, .. } = self;
-        let (reader, count) = (reader.as_mut()?, destinations.len());
-        (0..count).map(|step| (*turn + step) % count).find(|at| {
-            let destination = &mut destinations[*at];
-            let is_ready = ready & 1 << destination.peer != 0 && !destination.is_absent;
-            let which = (settings.sampling, fingerprints.as_mut());
-            is_ready
-                && (destination.describing.is_some()
-                    || newest.is_some_and(|newest| destination.begin(now_ns, reader, &newest, which)))
-        })
-    }
-
-    /// Whether something waits for this destination.
-    fn waits_for(&self, to: &Destination) -> bool {
-        let is_behind = self.newest.zip(to.next).is_some_and(|(newest, next)| next <= newest.sequence);
-        let has_some = to.describing.is_some() || to.under_way.is_some() || is_behind;
-        self.reader.is_some() && !to.is_absent && has_some
-    }
-
-    /// Writes the next part for a destination behind the datagram's head: its kind and length. None: its record was
-    /// overwritten.
-    fn fill(
-        &mut self,
-        now_ns: u64,
-        system: impl Fn(u64) -> SystemTime,
-        (to, part_bytes): (usize, usize),
-        content: &mut [u8],
-    ) -> Option<(FrameKind, usize)> {
-        if let Some(offset) = self.destinations[to].describing {
-            return Some((FrameKind::Description, self.describe(now_ns, to, offset, content)));
-        }
-        let Self { place, generation, check: description, .. } = *self;
-        let destination = &mut self.destinations[to];
-        let (info, offset) = destination.under_way?;
-        let record = self.reader.as_mut().and_then(|reader| reader.record(info.sequence));
-        let Some(record) = record.filter(|record| record.info() == info) else {
-            (destination.under_way, destination.sent) = (None, None);
-            destination.counts.lost.add(ReplicaLoss::Passed, 1);
-            return None;
-        };
-        let written = system(info.written_ns);
-        let is_comparable = written.epoch == info.stamp.epoch;
-        let (len, end) = (info.len_bytes, (offset + part_bytes).min(info.len_bytes));
-        let part = RecordPart {
-            place,
-            generation,
-            description,
-            incarnation: info.incarnation,
-            len: len as u32,
-            offset: offset as u32,
-            sequence: info.sequence,
-            epoch: info.stamp.epoch,
-            stamp_ns: info.stamp.ns,
-            written_ns: if is_comparable { written.ns } else { 0 },
-            error_ns: u32::try_from(written.error.as_nanos()).unwrap_or(u32::MAX),
-            bytes: &record.body()[offset..end],
-        };
-        let bytes = RECORD_PART_HEAD_BYTES + part.bytes.len();
-        content[..RECORD_PART_HEAD_BYTES].copy_from_slice(&part.head_bytes());
-        content[RECORD_PART_HEAD_BYTES..bytes].copy_from_slice(part.bytes);
-        destination.under_way = (end < len).then_some((info, end));
-        if end == len {
-            destination.counts.records.add(1);
-            destination.counts.bytes.add(len as u64);
-        }
-        Some((FrameKind::RecordPart, bytes))
-    }
-
-    /// Writes a part of the description; its length.
-    fn describe(&mut self, now_ns: u64, to: usize, offset: usize, content: &mut [u8]) -> usize {
-        let room = content.len() - DESCRIPTION_PART_HEAD_BYTES;
-        let end = (offset + room).min(self.description.len());
-        let part = DescriptionPart {
-            place: self.place,
-            generation: self.generation,
-            check: self.check,
-            len: self.description.len() as u32,
-            offset: offset as u32,
-            written: self.newest.map_or(0, |newest| newest.sequence + 1),
-            bytes: &self.description[offset..end],
-        };
-        let bytes = DESCRIPTION_PART_HEAD_BYTES + part.bytes.len();
-        content[..DESCRIPTION_PART_HEAD_BYTES].copy_from_slice(&part.head_bytes());
-        content[DESCRIPTION_PART_HEAD_BYTES..bytes].copy_from_slice(part.bytes);
-        let destination = &mut self.destinations[to];
-        destination.describing = (end < self.description.len()).then_some(end);
-        destination.describe_ns = now_ns + DESCRIBE_EVERY_NS;
-        bytes
     }
 }

@@ -3,6 +3,7 @@
 use crate::frame::NodeIndex;
 use rohrpost_config::{Installation, Sampling};
 use rohrpost_mailbox::{Name, StreamShape};
+use std::time::Duration;
 
 /// One replica, as all routers of a system know it.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub struct ReplicaSettings {
     pub changed: bool,
     /// A record that arrives so much later than it was written is told, ns.
     pub delay_alarm_ns: u64,
+    /// Lost parts are asked for until nothing came of a record for so long, ns; 0: never.
+    pub deadline_ns: u64,
     /// The level on which they are sent: that of the writer's class.
     pub level: u8,
 }
@@ -37,6 +40,7 @@ impl ReplicaSettings {
         let of = |replica: &rohrpost_config::Replica| {
             // Configuration checks that these are nodes of the LAN.
             let node = index(installation.node_of(replica.from).unwrap_or_default()).unwrap_or(NodeIndex::MAX);
+            let ns = |time: Duration| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
             Self {
                 from: replica.from,
                 item: replica.item.clone(),
@@ -45,7 +49,8 @@ impl ReplicaSettings {
                 to: replica.to.iter().filter_map(|name| index(name)).fold(0, |all, node| all | 1 << node),
                 sampling: replica.sampling,
                 changed: replica.changed,
-                delay_alarm_ns: u64::try_from(replica.delay_alarm.as_nanos()).unwrap_or(u64::MAX),
+                delay_alarm_ns: ns(replica.delay_alarm),
+                deadline_ns: ns(replica.deadline),
                 level: replica.level(installation),
             }
         };

@@ -1,5 +1,6 @@
 //! The two threads of replicas: one reads this node's streams and sends their parts, the other writes what comes from
-//! other nodes into rings of this one.
+//! other nodes into rings of this one. Both ends have both: a part that is lost is asked for. Requests go from the
+//! thread that receives to the one that sends through queues, and wake it.
 //!
 //! They have sockets and a port of their own, so a flood of parts takes no room in a socket, and no time of a thread,
 //! from packages; where datagrams are sealed, they have keys and sequences of their own ([`Port::Replicas`]). One
@@ -30,7 +31,7 @@ use crate::stats::Stats;
 use rohrpost_mailbox::{Head, Name, Node, Participant, SystemClock, monotonic_ns, wait_any};
 use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Modules that have begun are looked for this often, ns.
 const LOOK_EVERY_NS: u64 = 500_000_000;
@@ -53,6 +54,17 @@ pub struct ReplicaParts<'a> {
 struct ReplicaDelivery {
     receiver: ReplicaReceiver,
     clock: SystemClock,
+    /// The thread that sends, with the bell that wakes it; none: it is that of the time slots, which nobody wakes.
+    sending: Option<Arc<Participant>>,
+}
+
+impl ReplicaDelivery {
+    /// Wakes the thread that sends, if there is something for it.
+    fn ring(&mut self) {
+        if self.receiver.must_ring() {
+            self.sending.iter().for_each(|sending| sending.ring());
+        }
+    }
 }
 
 impl Report for ReplicaDelivery {
@@ -65,7 +77,15 @@ impl Deliver for ReplicaDelivery {
     }
 
     fn replica(&mut self, head: &FrameHead, part: &ReplicaFrame<'_>) -> bool {
-        self.receiver.take(monotonic_ns(), || self.clock.now(), head, part)
+        let is_taken = self.receiver.take(monotonic_ns(), || self.clock.now(), head, part);
+        self.ring();
+        is_taken
+    }
+
+    fn poll(&mut self, now_ns: u64) -> bool {
+        let waits = self.receiver.poll(now_ns, || self.clock.now());
+        self.ring();
+        waits
     }
 
     fn event(&mut self, _: RouterEvent) {}
@@ -101,14 +121,15 @@ impl ReplicaTx {
         }
     }
 
-    /// Sleeps until there is a record; for how long it slept.
+    /// Sleeps until there is a record or a request; for how long it slept.
     fn wait(&mut self, time: Duration) -> Duration {
+        let (requests, shared) = (self.sender.requests().clone(), &self.shared);
+        let has_more = || shared.ends() || !requests.is_empty();
         let mut readers = self.sender.readers();
         if readers.is_empty() {
-            std::thread::sleep(time);
-            return time;
+            return self.participant.wait(time, has_more);
         }
-        wait_any(&mut readers, Some(Instant::now() + time), || self.shared.ends())
+        wait_any(&mut readers, time, has_more)
     }
 }
 
@@ -148,15 +169,16 @@ impl Shell {
         let [sending, receiving] = [Participant::join(node, Name::NONE)?, Participant::join(node, Name::NONE)?];
         let sender = ReplicaSender::new(&settings, parts.replicas);
         let receiver = ReplicaReceiver::new(&settings, parts.replicas, receiving, parts.describe.clone());
+        let receiver = receiver.asking_by(sender.requests());
         self.replicas = ReplicaCounts { sent: sender.counts(), received: receiver.counts() };
-        let stats = Stats::of_rest(&settings, &self.stats);
-        self.replica_stats = Some(stats.clone());
-        if !receiver.is_empty() {
-            self.receive_replicas((receiver, SystemClock::open(node)), &stats, parts.socket)?;
-        }
         if sender.is_empty() {
             return Ok(());
         }
+        let stats = Stats::of_rest(&settings, &self.stats);
+        self.replica_stats = Some(stats.clone());
+        let awaits = self.slot_parts.is_none().then(|| sending.clone());
+        let delivery = ReplicaDelivery { receiver, clock: SystemClock::open(node), sending: awaits };
+        self.receive_replicas(delivery, &stats, parts.socket)?;
         // No package waits in it, so it needs no room for those of modules.
         let alone = Settings { senders: Vec::new(), ..(*settings).clone() };
         let mut outbound = Outbound::new(&alone, stats).behind(&self.stats).only_to(sender.peers());
@@ -192,7 +214,7 @@ impl Shell {
     /// Opens the port, and starts the thread that writes what comes.
     fn receive_replicas(
         &mut self,
-        (receiver, clock): (ReplicaReceiver, SystemClock),
+        delivery: ReplicaDelivery,
         stats: &Arc<Stats>,
         kept: Option<OwnedFd>,
     ) -> Result<(), ShellError> {
@@ -204,13 +226,7 @@ impl Shell {
         let rx_thread = RxThread {
             driver: RxDriver::new(&settings, stats, gate).of_rest(),
             stats: stats.clone(),
-            system: RxSystem {
-                shared: self.shared.clone(),
-                socket,
-                delivery: ReplicaDelivery { receiver, clock },
-                settings,
-                answers: None,
-            },
+            system: RxSystem { shared: self.shared.clone(), socket, delivery, settings, answers: None },
         };
         self.begin("replicas-in", move || {
             schedule_below();

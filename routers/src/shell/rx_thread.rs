@@ -5,7 +5,7 @@ use super::ages::Ages;
 use super::answers::ErrorReplier;
 use super::peer_events::News;
 use super::sender_cache::SenderCache;
-use super::socket::{InSocket, Received};
+use super::socket::{InSocket, LISTEN, LISTEN_SHORTLY, Received};
 use super::threads::{Awake, Shared};
 use crate::counts::Cause;
 use crate::driver::{Answer, RxDriver, RxPlatform};
@@ -65,6 +65,7 @@ impl<D: Deliver> RxThread<D> {
     pub(super) fn run(mut self) {
         let mut datagram = vec![0; DATAGRAM_BYTES];
         let (mut awake, mut ring_ns, mut seen_dropped) = (Awake::default(), 0, 0);
+        let mut listens_shortly = false;
         let Self { driver, system, stats } = &mut self;
         loop {
             let began_ns = monotonic_ns();
@@ -87,6 +88,12 @@ impl<D: Deliver> RxThread<D> {
                 }
             }
             driver.poll(system, now_ns);
+            let is_due_soon = system.delivery.poll(now_ns);
+            // Back only when nothing comes: in a flood of records the socket is not told of each.
+            if is_due_soon != listens_shortly && (is_due_soon || received == Received::Nothing) {
+                listens_shortly = is_due_soon;
+                system.socket.listen_for(if is_due_soon { LISTEN_SHORTLY } else { LISTEN });
+            }
             if now_ns >= ring_ns && !driver.is_rest() {
                 ring_ns = now_ns + RING_EVERY_NS;
                 system.shared.ring_if_due(now_ns);

@@ -30,6 +30,8 @@ const TRAFFIC_CLASS: u32 = 46 << 2;
 const PRIORITY: u32 = 6;
 /// Reading ends after this long without a datagram. A timeout in the kernel costs less than a sleep.
 pub(super) const LISTEN: Duration = Duration::from_millis(100);
+/// The same while something is due that nothing may announce: the kernel makes a tick or two of it.
+pub(super) const LISTEN_SHORTLY: Duration = Duration::from_millis(1);
 /// Room for a stamp and a count, and the kernel's heads of them.
 const CONTROL_BYTES: usize = 64;
 /// Pause after a failed read.
@@ -181,6 +183,12 @@ impl InSocket {
             }
         }
         Received::Datagram { bytes: message.bytes, source, waited_ns, dropped }
+    }
+
+    /// From now on reading ends after this long without a datagram.
+    pub(super) fn listen_for(&self, time: Duration) {
+        // It is a socket of this process, and the time is not zero: that cannot fail.
+        let _ = self.socket.set_read_timeout(Some(time));
     }
 
     /// Sends a datagram to the router at an address; never waits.

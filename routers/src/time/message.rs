@@ -186,7 +186,8 @@ impl TimeMessage {
             | FrameKind::Refusal
             | FrameKind::Hello
             | FrameKind::RecordPart
-            | FrameKind::Description => return Err(BadFrame::Damaged("no frame of time")),
+            | FrameKind::Description
+            | FrameKind::PartRequest => return Err(BadFrame::Damaged("no frame of time")),
         };
         // Unused bytes must be 0: another version can use them.
         if message.to_bytes() != *rest {

@@ -15,7 +15,7 @@ from lan import DESCRIPTION, FOR_REPLICAS, RECORD_PART, REPLICA_PORT, Node
 def record_part(number):
     """A whole record of the first replica, far ahead of all that its writer has written."""
     bytes = os.urandom(40)
-    return struct.pack("<HHIIIIQQQQI", 0, 0, 1, 1, len(bytes), 0, 10**6 + number, 1, 1, 0, 0) + bytes
+    return struct.pack("<HHIIIIQQQQII", 0, 0, 1, 1, len(bytes), 0, 10**6 + number, 1, 1, 0, 0, 0) + bytes
 
 
 def description():

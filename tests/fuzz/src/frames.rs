@@ -1,7 +1,9 @@
 //! Datagrams of routers: their check covers the whole, so a datagram is written again as it was read, byte for byte.
 
 use rohrpost_mailbox::{HEAD_BYTES as PACKAGE_HEAD_BYTES, Head};
-use rohrpost_routers::frame::{Frame, FrameHead, HEAD_BYTES, PARTS_MAX, ReplicaFrame, VERSION};
+use rohrpost_routers::frame::{
+    ASKED_PARTS_MAX, Frame, FrameHead, HEAD_BYTES, PART_REQUEST_BYTES_MAX, PARTS_MAX, ReplicaFrame, VERSION,
+};
 use rohrpost_routers::time::message::TimeMessage;
 
 pub(crate) fn run(data: &[u8]) {
@@ -41,13 +43,18 @@ fn validate(datagram: &[u8]) {
         }
         Frame::Alive(alive) => assert_eq!(alive.to_bytes(), rest),
         Frame::Refusal(refusal) => assert_eq!(refusal.to_bytes(), rest),
-        Frame::Replica(replica) => {
-            let (head, bytes, offset, len) = match replica {
-                ReplicaFrame::Record(part) => (part.head_bytes().to_vec(), part.bytes, part.offset, part.len),
-                ReplicaFrame::Description(part) => (part.head_bytes().to_vec(), part.bytes, part.offset, part.len),
-            };
-            assert!(offset as usize + bytes.len() <= len as usize);
-            assert_eq!([&head[..], bytes].concat(), rest);
+        Frame::Replica(ReplicaFrame::Request(request)) => {
+            let mut bytes = [0; PART_REQUEST_BYTES_MAX];
+            let len = request.write(&mut bytes);
+            assert_eq!(bytes[..len], *rest);
+            let asked = request.asked();
+            assert!((1..=ASKED_PARTS_MAX).contains(&asked.count()));
+        }
+        Frame::Replica(ReplicaFrame::Record(part)) => {
+            is_part(rest, &part.head_bytes(), (part.bytes, part.offset, part.len))
+        }
+        Frame::Replica(ReplicaFrame::Description(part)) => {
+            is_part(rest, &part.head_bytes(), (part.bytes, part.offset, part.len));
         }
         Frame::Time(time) => {
             if let Ok(message) = TimeMessage::parse(head.kind, time) {
@@ -59,4 +66,9 @@ fn validate(datagram: &[u8]) {
         assert_eq!(head.to_bytes(&[rest]), datagram[..HEAD_BYTES]);
         assert_eq!(FrameHead::parse(datagram), Ok((head, rest)));
     }
+}
+
+fn is_part(rest: &[u8], head: &[u8], (bytes, offset, len): (&[u8], u32, u32)) {
+    assert!(offset as usize + bytes.len() <= len as usize);
+    assert_eq!([head, bytes].concat(), rest);
 }

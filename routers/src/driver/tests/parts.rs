@@ -80,6 +80,7 @@ impl Replicated {
             sampling: Sampling::Each,
             changed: false,
             delay_alarm_ns: 1000 * MS,
+            deadline_ns: 200_000_000,
             level: 18,
         };
         let folder = tempfile::tempdir().unwrap();

@@ -22,17 +22,22 @@ fn part(bytes: &[u8]) -> RecordPart<'_> {
         stamp_ns: 100,
         written_ns: 0,
         error_ns: 0,
+        step: 0,
         bytes,
     }
 }
 
 fn take(holder: &mut Holder, from: NodeIndex, part: RecordPart<'_>) -> bool {
-    holder.receiver.take(0, || time(START), &head(from), &ReplicaFrame::Record(part))
+    holder.router.receiver.take(START, || time(START), &head(from), &ReplicaFrame::Record(part))
 }
 
 /// A replica's node that knows the description.
 fn described() -> Holder {
-    let replicas = [image()];
+    described_by(image())
+}
+
+fn described_by(replica: ReplicaSettings) -> Holder {
+    let replicas = [replica];
     let (mut origin, mut holder) = (Origin::new(&replicas), Holder::new(&replicas));
     let mut now_ns = START;
     holder.take_all(now_ns, &origin.leave(&mut now_ns));
@@ -44,7 +49,7 @@ fn described() -> Holder {
 fn what_does_not_belong_here_is_refused_and_counted() {
     let mut holder = described();
     assert!(!take(&mut holder, ORIGIN, RecordPart { place: 1, ..part(b"picture") }), "there is no such replica");
-    let large = [0; 1380];
+    let large = [0; 1376];
     let cases: [(NodeIndex, RecordPart<'_>, ReplicaLoss); 8] = [
         (2, part(b"picture"), ReplicaLoss::Foreign),
         (ORIGIN, RecordPart { description: 1, ..part(b"picture") }, ReplicaLoss::Undescribed),
@@ -70,9 +75,9 @@ fn what_does_not_belong_here_is_refused_and_counted() {
 
 #[test]
 fn a_record_of_which_a_part_never_comes_is_left_out() {
-    let mut holder = described();
+    let mut holder = described_by(ReplicaSettings { deadline_ns: 0, ..image() });
     let mut reader = holder.reader();
-    let bytes = [4; 1380];
+    let bytes = [4; 1376];
     let first = |sequence| RecordPart { len: 2000, sequence, ..part(&bytes) };
     assert!(take(&mut holder, ORIGIN, RecordPart { sequence: 4, ..part(b"whole") }));
     assert!(take(&mut holder, ORIGIN, first(5)));
@@ -80,7 +85,7 @@ fn a_record_of_which_a_part_never_comes_is_left_out() {
     assert!(take(&mut holder, ORIGIN, RecordPart { sequence: 6, ..part(b"newer") }));
     assert_eq!(read(&mut reader), (vec![(4, 5), (6, 5)], 1));
     let lost = [ReplicaLoss::Incomplete, ReplicaLoss::Duplicate].map(|cause| holder.lost(cause));
-    assert_eq!((lost, holder.receiver.counts()[0].gaps.get()), ([1, 1], 1));
+    assert_eq!((lost, holder.counts().gaps.get()), ([1, 1], 1));
 }
 
 #[test]
@@ -88,12 +93,12 @@ fn no_part_does_harm() {
     let mut holder = described();
     let mut reader = holder.reader();
     let mut rng = ChaCha8Rng::seed_from_u64(22);
-    let bytes = [9; 1380];
+    let bytes = [9; 1376];
     for _ in 0..5000 {
         let one_of = |rng: &mut ChaCha8Rng, all: &[u32]| all[rng.random_range(0..all.len())];
-        let len = one_of(&mut rng, &[0, 1, 1380, 1381, 3000, 6000, 6001, u32::MAX]);
-        let offset = one_of(&mut rng, &[0, 0, 1, 1380, 2760, 5520, u32::MAX]);
-        let room = if rng.random_bool(0.9) { len.saturating_sub(offset).min(1380) } else { one_of(&mut rng, &[0, 7]) };
+        let len = one_of(&mut rng, &[0, 1, 1376, 1377, 3000, 6000, 6001, u32::MAX]);
+        let offset = one_of(&mut rng, &[0, 0, 1, 1376, 2752, 5504, u32::MAX]);
+        let room = if rng.random_bool(0.9) { len.saturating_sub(offset).min(1376) } else { one_of(&mut rng, &[0, 7]) };
         let part = RecordPart {
             place: rng.random_range(0..2),
             generation: one_of(&mut rng, &[0, 0, 0, 1, 0x8000]) as u16,
@@ -103,13 +108,14 @@ fn no_part_does_harm() {
             sequence: if rng.random_bool(0.98) { rng.random_range(0..400) } else { u64::MAX >> rng.random_range(0..9) },
             stamp_ns: if rng.random_bool(0.9) { 100 } else { rng.random_range(0..200) },
             epoch: one_of(&mut rng, &[1, 1, 1, 2]).into(),
+            step: one_of(&mut rng, &[0, 1, 1, 3, u32::MAX]),
             bytes: &bytes[..room as usize],
             ..part(b"")
         };
         let incarnation = 100 + u64::from(one_of(&mut rng, &[0, 0, 0, 0, 1]));
         let from = one_of(&mut rng, &[0, 0, 0, 2]) as NodeIndex;
-        let _ = holder.receiver.take(
-            0,
+        let _ = holder.router.receiver.take(
+            START,
             || time(START),
             &FrameHead { incarnation, ..head(from) },
             &ReplicaFrame::Record(part),
@@ -132,9 +138,9 @@ fn a_record_later_than_both_clocks_may_be_off_is_counted() {
     {
         let late = RecordPart { sequence, written_ns, epoch, error_ns: 100_000, ..part(b"picture") };
         assert!(take(&mut holder, ORIGIN, late));
-        assert_eq!(holder.receiver.counts()[0].delayed.get(), delayed, "record {sequence}");
+        assert_eq!(holder.counts().delayed.get(), delayed, "record {sequence}");
     }
-    let delay = holder.receiver.counts()[0].delay.get();
+    let delay = holder.counts().delay.get();
     assert_eq!((holder.records(), delay.count(), delay.max), (5, 3, Duration::from_millis(8)));
 }
 
@@ -148,7 +154,7 @@ fn a_description_in_pieces_of_two_is_none() {
         let bytes = &of[offset..offset + 2000];
         let (len, offset) = (of.len() as u32, offset as u32);
         let part = DescriptionPart { place: 0, generation: 0, check, len, offset, written: 0, bytes };
-        assert!(holder.receiver.take(0, || time(START), &head(ORIGIN), &ReplicaFrame::Description(part)));
+        assert!(holder.router.receiver.take(START, || time(START), &head(ORIGIN), &ReplicaFrame::Description(part)));
     }
     assert_eq!(holder.ground.node.about(CAMERA), None);
 }

@@ -1,4 +1,4 @@
-//! Seeds of a wire that loses, doubles and delays, and of ends that are started anew.
+//! Seeds of a wire that loses, doubles, delays and damages, both ways, and of ends that are started anew.
 //!
 //! Whatever happens: a record that is read is whole and as it was written, sequences do not go back within one life of
 //! the stream, and lives do not go back. When all is well again, the newest record arrives.
@@ -18,6 +18,23 @@ fn body(life: u64, sequence: u64) -> Vec<u8> {
     body
 }
 
+/// Puts a datagram on a wire.
+fn put(rng: &mut ChaCha8Rng, wire: &mut VecDeque<Vec<u8>>, mut datagram: Vec<u8>, harm: bool) {
+    if harm && rng.random_bool(0.03) {
+        return;
+    }
+    if harm && rng.random_bool(0.03) {
+        wire.push_back(datagram.clone());
+    }
+    if harm && rng.random_bool(0.01) {
+        let [one, other] = [0, 0].map(|_| rng.random_range(0..datagram.len()));
+        datagram.swap(one, other);
+    }
+    let late = if harm && rng.random_bool(0.1) { rng.random_range(0..8) } else { 0 };
+    let place = wire.len().saturating_sub(late);
+    wire.insert(place, datagram);
+}
+
 struct World {
     rng: ChaCha8Rng,
     now_ns: u64,
@@ -27,6 +44,8 @@ struct World {
     writer: Option<StreamWriter>,
     reader: StreamReader,
     wire: VecDeque<Vec<u8>>,
+    /// Requests on their way.
+    back: VecDeque<Vec<u8>>,
     incarnation: u64,
     life: u64,
     /// Life and sequence of what was read last.
@@ -40,8 +59,9 @@ impl World {
         let (origin, holder) = (Origin::new(&replicas), Holder::new(&replicas));
         let (writer, reader) = (Some(origin.writer(ID, SHAPE)), holder.reader());
         let rng = ChaCha8Rng::seed_from_u64(seed);
-        let (now_ns, wire, incarnation, life, last, read) = (START, VecDeque::new(), 100, 1, None, 0);
-        Self { rng, now_ns, replicas, origin, holder, writer, reader, wire, incarnation, life, last, read }
+        let (now_ns, wire, back) = (START, VecDeque::new(), VecDeque::new());
+        let (incarnation, life, last, read) = (200, 1, None, 0);
+        Self { rng, now_ns, replicas, origin, holder, writer, reader, wire, back, incarnation, life, last, read }
     }
 
     fn write(&mut self) {
@@ -53,23 +73,24 @@ impl World {
     /// Lets so many datagrams leave; `harm`: the wire is bad.
     fn send(&mut self, most: usize, harm: bool) {
         for _ in 0..most {
-            let Ok((_, datagram)) = self.origin.poll(self.now_ns) else { return };
-            if harm && self.rng.random_bool(0.03) {
-                continue;
-            }
-            if harm && self.rng.random_bool(0.03) {
-                self.wire.push_back(datagram.clone());
-            }
-            let late = if harm && self.rng.random_bool(0.1) { self.rng.random_range(0..8) } else { 0 };
-            let place = self.wire.len().saturating_sub(late);
-            self.wire.insert(place, datagram);
+            let Ok((_, datagram)) = self.origin.router.poll(self.now_ns) else { return };
+            put(&mut self.rng, &mut self.wire, datagram, harm);
         }
     }
 
-    fn deliver(&mut self, most: usize) {
-        for _ in 0..most {
+    /// Lets so many datagrams arrive, and all requests.
+    fn deliver(&mut self, most: usize, harm: bool) {
+        for _ in 0..most.min(self.wire.len()) {
             let Some(datagram) = self.wire.pop_front() else { return };
             self.holder.take(self.now_ns, &datagram);
+        }
+        self.holder.pass(self.now_ns);
+        while let Ok((to, datagram)) = self.holder.router.poll(self.now_ns) {
+            assert_eq!(to, ORIGIN);
+            put(&mut self.rng, &mut self.back, datagram, harm);
+        }
+        while let Some(datagram) = self.back.pop_front() {
+            self.origin.router.take(self.now_ns, HOLDER, &datagram);
         }
     }
 
@@ -115,11 +136,11 @@ impl World {
     fn begin_holder(&mut self) {
         let spare = Holder::new(&self.replicas);
         let old = std::mem::replace(&mut self.holder, spare);
-        let Holder { ground, receiver, .. } = old;
-        drop(receiver);
-        self.holder = Holder::on(ground, &self.replicas);
+        let Holder { ground, router } = old;
+        drop(router);
         self.incarnation += 1;
-        self.origin.stats.peer(HOLDER).link.incarnation.set(self.incarnation);
+        self.holder = Holder::on(ground, self.incarnation, &self.replicas);
+        self.origin.router.stats.peer(HOLDER).link.incarnation.set(self.incarnation);
     }
 
     /// That of the origin's node.
@@ -129,7 +150,7 @@ impl World {
         let Origin { ground, .. } = old;
         self.incarnation += 1;
         self.origin = Origin::on(ground, self.incarnation, &self.replicas);
-        self.origin.stats.peer(HOLDER).link.incarnation.set(self.incarnation);
+        self.origin.router.stats.peer(HOLDER).link.incarnation.set(self.incarnation);
         // What the router before has sent is through.
         self.wire.clear();
     }
@@ -137,7 +158,7 @@ impl World {
 
 #[test]
 fn what_is_read_is_whole_and_sequences_do_not_go_back() {
-    let (mut read, mut whole, mut incomplete) = (0, 0, 0);
+    let (mut read, mut whole, mut incomplete, mut completed) = (0, 0, 0, 0);
     for seed in 0..30 {
         let mut world = World::new(seed);
         for _ in 0..1500 {
@@ -147,7 +168,7 @@ fn what_is_read_is_whole_and_sequences_do_not_go_back() {
             }
             let (out, inn) = (world.rng.random_range(0..5), world.rng.random_range(0..6));
             world.send(out, true);
-            world.deliver(inn);
+            world.deliver(inn, true);
             world.check();
             world.happen();
             incomplete = incomplete.max(world.holder.lost(ReplicaLoss::Incomplete));
@@ -157,18 +178,23 @@ fn what_is_read_is_whole_and_sequences_do_not_go_back() {
         for _ in 0..2500 {
             world.now_ns += MS;
             world.send(50, false);
-            world.deliver(usize::MAX);
+            world.deliver(usize::MAX, false);
             world.check();
         }
         world.write();
-        world.send(50, false);
-        world.deliver(usize::MAX);
+        for _ in 0..100 {
+            world.now_ns += MS;
+            world.send(50, false);
+            world.deliver(usize::MAX, false);
+        }
         world.check();
         let newest = (world.life, world.writer.as_ref().unwrap().written() - 1);
         assert_eq!(world.holder.lost(ReplicaLoss::Unwritable), 0, "seed {seed}");
         assert_eq!(world.last, Some(newest), "seed {seed}: the newest did not arrive");
         read += world.read;
         whole = whole.max(world.holder.records());
+        completed += world.holder.counts().completed.get();
     }
-    assert!(read > 3000 && incomplete > 0 && whole > 0, "{read} read, {incomplete} incomplete, {whole} whole");
+    let is_all_seen = read > 3000 && incomplete > 0 && whole > 0 && completed > 0;
+    assert!(is_all_seen, "{read} read, {incomplete} incomplete, {whole} whole, {completed} completed by asking");
 }

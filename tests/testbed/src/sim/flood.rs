@@ -43,6 +43,7 @@ impl PartFlood {
             stamp_ns: 1,
             written_ns: 0,
             error_ns: 0,
+            step: 0,
             bytes,
         };
         head_of_part.copy_from_slice(&part.head_bytes());

@@ -49,9 +49,13 @@ pub(crate) fn act(role: &str, ground: &Ground, arm: impl Fn()) {
             arm();
             let sequence = WRITTEN + left_out;
             let record = OriginRecord { sequence, incarnation: 1, stamp: stamp(sequence), len_bytes: 16 };
-            replica.begin(record).unwrap();
-            assert!(replica.put(0, &bytes(sequence)));
-            assert_eq!(replica.finish(), Some(sequence));
+            // An older one is begun as well, and never whole.
+            let older = OriginRecord { sequence: WRITTEN, stamp: stamp(WRITTEN), ..record };
+            for begun in [older, record] {
+                replica.begin(begun).unwrap();
+                assert!(replica.put(begun.sequence, 0, &bytes(begun.sequence)));
+            }
+            replica.finish(sequence).unwrap();
             die_with(replica);
         }
         "read" => {

@@ -56,11 +56,19 @@ pub(crate) const REPLICAS: Group = Group {
             name: "TrustsWhatLeft",
             text: "Replication: a node that begins anew is taken to have what went there before.",
             shows_in: "replication::tests::changed::what_may_not_have_arrived_goes_again",
-            edits: &[edit(
-                "replication/sending.rs",
-                "destination.has_none = true;",
-                "destination.has_none = !broken!(TrustsWhatLeft);",
-            )],
+            edits: &[
+                edit(
+                    "replication/outgoing.rs",
+                    "destination.has_none = true;",
+                    "destination.has_none = !broken!(TrustsWhatLeft);",
+                ),
+                edit(
+                    "replication/destination.rs",
+                    "(self.under_way, self.sent, self.before, self.begun) = (None, None, None, [None; ASKED_MAX]);",
+                    r"self.sent = self.sent.filter(|_| broken!(TrustsWhatLeft));
+        (self.under_way, self.before, self.begun) = (None, None, [None; ASKED_MAX]);",
+                ),
+            ],
         },
     ],
 };

@@ -1,0 +1,213 @@
+//! Records of another node: in order, whole, two at a time, and what is not there is told.
+
+use super::*;
+use crate::node::Node;
+use crate::stream::error::WriteError;
+use crate::stream::reader::StreamReader;
+use crate::stream::record::{Around, Next};
+
+const SHAPE: StreamShape = StreamShape { record_bytes: 64, keep: 4, readers: 2, late: std::time::Duration::ZERO };
+const LARGE: StreamShape = StreamShape { record_bytes: 5000, ..SHAPE };
+
+fn ground() -> (tempfile::TempDir, Arc<Participant>, StreamId) {
+    let folder = tempfile::tempdir().unwrap();
+    let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+    let name = Name::new(1, 200, 0, 0);
+    let participant = Participant::join(&node, name).unwrap();
+    (folder, participant, StreamId { name, number: 1 })
+}
+
+fn write(replica: &mut ReplicaWriter, sequence: u64) -> Result<(), ReplicaError> {
+    let bytes = sequence.to_le_bytes();
+    let stamp = Stamp { epoch: 1, ns: 100 + sequence };
+    replica.begin(OriginRecord { sequence, incarnation: 7, stamp, len_bytes: bytes.len() })?;
+    assert!(replica.put(sequence, 4, &bytes[4..]) && replica.put(sequence, 0, &bytes[..4]));
+    replica.finish(sequence)
+}
+
+/// Sequences that are read, and how many are told as lost, until there is nothing.
+fn read(reader: &mut StreamReader) -> (Vec<u64>, u64) {
+    let (mut all, mut lost) = (Vec::new(), 0);
+    loop {
+        match reader.try_next().unwrap() {
+            Next::Record(record) => {
+                let sequence = record.info().sequence;
+                assert_eq!(record.body(), sequence.to_le_bytes());
+                assert_eq!((record.info().incarnation, record.info().stamp.ns), (7, 100 + sequence));
+                all.push(sequence);
+            }
+            Next::Lost(more) => lost += more,
+            Next::Nothing => return (all, lost),
+        }
+    }
+}
+
+#[test]
+fn each_sequence_is_read_or_told_as_lost() {
+    for shape in [SHAPE, LARGE] {
+        let (_folder, participant, id) = ground();
+        let mut replica = participant.replica_writer(id, shape, 3).unwrap();
+        let mut reader = participant.stream_reader(id).unwrap();
+        for sequence in [3, 4, 6, 7] {
+            write(&mut replica, sequence).unwrap();
+        }
+        assert_eq!(read(&mut reader), (vec![3 + 1, 6, 7], 2), "3 has lost its place to 7, 5 never came");
+        let mut later = participant.stream_reader(id).unwrap();
+        assert_eq!((later.position(), read(&mut later)), (8, (vec![], 0)));
+        drop(later);
+        for sequence in (9..11).chain((30..1000).step_by(97)) {
+            write(&mut replica, sequence).unwrap();
+            let (all, lost) = read(&mut reader);
+            assert_eq!((all, reader.position()), (vec![sequence], sequence + 1));
+            assert!(lost > 0 || sequence == 10);
+        }
+        let (read, lost) = reader.accounts();
+        assert_eq!((read, read + lost), (3 + 2 + 10, 904 - 3));
+        assert!(matches!(write(&mut replica, 32), Err(ReplicaError::Passed { next: 904, .. })));
+    }
+}
+
+fn begin(replica: &mut ReplicaWriter, sequence: u64, ns: u64) -> Result<(), ReplicaError> {
+    replica.begin(OriginRecord { sequence, incarnation: 7, stamp: Stamp { epoch: 1, ns }, len_bytes: 8 })
+}
+
+#[test]
+fn two_records_are_filled_at_once_and_finished_in_order() {
+    for shape in [SHAPE, LARGE] {
+        let (_folder, participant, id) = ground();
+        let mut replica = participant.replica_writer(id, shape, 0).unwrap();
+        let mut reader = participant.stream_reader(id).unwrap();
+        for older in (0..60).step_by(3) {
+            let newer = older + 1;
+            for sequence in [older, newer] {
+                begin(&mut replica, sequence, 100 + sequence).unwrap();
+            }
+            assert!(matches!(begin(&mut replica, newer + 1, 900), Err(ReplicaError::Begun(_))), "a third");
+            for half in [0, 4] {
+                for sequence in [newer, older] {
+                    assert!(replica.put(sequence, half, &sequence.to_le_bytes()[half..half + 4]));
+                }
+            }
+            assert!(matches!(reader.try_next().unwrap(), Next::Nothing), "nobody sees what is not finished");
+            if older % 2 == 0 {
+                replica.finish(older).unwrap();
+            }
+            replica.finish(newer).unwrap();
+            assert!(replica.begun(older).is_none() && replica.finish(older).is_err(), "a sequence does not go back");
+            let (all, lost) = read(&mut reader);
+            let before = u64::from(older > 0);
+            let expected = if older % 2 == 0 { (vec![older, newer], before) } else { (vec![newer], before + 1) };
+            assert_eq!((all, lost), expected);
+        }
+    }
+}
+
+#[test]
+fn a_stamp_behind_what_was_finished_meanwhile_is_refused() {
+    for shape in [SHAPE, LARGE] {
+        let (_folder, participant, id) = ground();
+        let mut replica = participant.replica_writer(id, shape, 0).unwrap();
+        begin(&mut replica, 0, 100).unwrap();
+        begin(&mut replica, 1, 99).unwrap();
+        replica.finish(0).unwrap();
+        assert!(matches!(replica.finish(1), Err(ReplicaError::Write(WriteError::Late { .. }))));
+        assert_eq!((replica.next(), replica.begun(1)), (1, None));
+    }
+}
+
+#[test]
+fn a_frame_that_no_reader_holds_is_there_for_one_record_always() {
+    let (_folder, participant, id) = ground();
+    let mut replica = participant.replica_writer(id, LARGE, 0).unwrap();
+    let mut readers = [participant.stream_reader(id).unwrap(), participant.stream_reader(id).unwrap()];
+    write(&mut replica, 0).unwrap();
+    write(&mut replica, 1).unwrap();
+    let [one, two] = &mut readers;
+    let _ = two.try_next().unwrap();
+    let held = [one, two].map(|reader| reader.try_next().unwrap());
+    (2..9).for_each(|sequence| write(&mut replica, sequence).unwrap());
+    begin(&mut replica, 9, 109).unwrap();
+    assert!(matches!(begin(&mut replica, 10, 110), Err(ReplicaError::Begun(_))), "readers hold all others");
+    replica.give_up(9);
+    begin(&mut replica, 10, 110).unwrap();
+    drop(held);
+    begin(&mut replica, 11, 111).unwrap();
+    for sequence in [10, 11_u64] {
+        assert!(replica.put(sequence, 0, &sequence.to_le_bytes()));
+        replica.finish(sequence).unwrap();
+    }
+}
+
+#[test]
+fn a_held_record_stays_whole_when_many_are_left_out() {
+    let (_folder, participant, id) = ground();
+    let mut replica = participant.replica_writer(id, LARGE, 0).unwrap();
+    let mut reader = participant.stream_reader(id).unwrap();
+    write(&mut replica, 0).unwrap();
+    let Next::Record(held) = reader.try_next().unwrap() else { panic!("it is there") };
+    for sequence in (10..200).step_by(7) {
+        write(&mut replica, sequence).unwrap();
+        assert_eq!(held.body(), 0_u64.to_le_bytes());
+    }
+}
+
+#[test]
+fn times_are_found_beside_what_was_left_out() {
+    let (_folder, participant, id) = ground();
+    let shape = StreamShape { keep: 64, ..SHAPE };
+    let mut replica = participant.replica_writer(id, shape, 0).unwrap();
+    let mut reader = participant.stream_reader(id).unwrap();
+    let written: Vec<u64> = (0..40_u64).filter(|sequence| sequence % 7 != 3 && !(20..31).contains(sequence)).collect();
+    for sequence in &written {
+        write(&mut replica, *sequence).unwrap();
+        for asked in 0..=*sequence {
+            let around = reader.around(Stamp { epoch: 1, ns: 100 + asked }).unwrap();
+            let before = written.iter().rfind(|there| **there <= asked);
+            let after = written.iter().find(|there| **there >= asked);
+            let Around::Records { before: found, after: next } = around else { panic!("{asked}: {around:?}") };
+            assert_eq!((Some(&found.sequence), Some(&next.sequence)), (before, after), "of {asked}");
+        }
+    }
+    assert_eq!(participant.node().inspect_stream(id).unwrap().unwrap().oldest.map(|oldest| oldest.sequence), Some(0));
+}
+
+#[test]
+fn the_next_writer_goes_on_and_an_origin_made_anew_begins_anew() {
+    let (_folder, participant, id) = ground();
+    let mut replica = participant.replica_writer(id, SHAPE, 0).unwrap();
+    let mut reader = participant.stream_reader(id).unwrap();
+    write(&mut replica, 0).unwrap();
+    write(&mut replica, 5).unwrap();
+    drop(replica);
+    let mut replica = participant.replica_writer(id, SHAPE, 6).unwrap();
+    assert_eq!((replica.next(), replica.newest().map(|info| info.sequence)), (6, Some(5)));
+    write(&mut replica, 6).unwrap();
+    assert_eq!(read(&mut reader).0.last(), Some(&6));
+    drop(replica);
+    let mut replica = participant.replica_writer(id, SHAPE, 2).unwrap();
+    assert_eq!((replica.next(), replica.newest()), (2, None));
+    write(&mut replica, 2).unwrap();
+    assert_eq!(read(&mut reader), (vec![2], 0));
+}
+
+#[test]
+fn what_does_not_fit_is_not_written() {
+    let (_folder, participant, id) = ground();
+    let mut replica = participant.replica_writer(id, SHAPE, 0).unwrap();
+    let stamp = Stamp { epoch: 1, ns: 1 };
+    let record = OriginRecord { sequence: 0, incarnation: 1, stamp, len_bytes: 65 };
+    assert!(matches!(replica.begin(record), Err(ReplicaError::Write(WriteError::TooLarge { .. }))));
+    assert!(!replica.put(0, 0, b"a") && replica.finish(0).is_err());
+    replica.begin(OriginRecord { len_bytes: 8, ..record }).unwrap();
+    for (offset, bytes) in [(8, &b"a"[..]), (1, b"12345678"), (usize::MAX, b"ab")] {
+        assert!(!replica.put(0, offset, bytes), "{offset}");
+    }
+    assert!(!replica.put(1, 0, b"a"), "another record");
+    assert!(matches!(replica.begin(OriginRecord { len_bytes: 8, ..record }), Err(ReplicaError::Passed { .. })));
+    replica.give_up(0);
+    assert!(replica.begun(0).is_none());
+    let unstamped = OriginRecord { stamp: Stamp { epoch: 1, ns: 0 }, len_bytes: 8, ..record };
+    assert!(matches!(replica.begin(unstamped), Err(ReplicaError::Write(WriteError::Unstamped(_)))));
+    let past = OriginRecord { sequence: SEQUENCE_MAX + 1, len_bytes: 8, ..record };
+    assert!(matches!(replica.begin(past), Err(ReplicaError::Passed { .. })));
+}

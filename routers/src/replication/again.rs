@@ -1,0 +1,77 @@
+//! Parts of a record that a node has asked for once more.
+
+use rohrpost_mailbox::RecordInfo;
+
+/// Parts of a record leave again at most as often as it has parts, and so many times more.
+const MORE: usize = 8;
+
+/// Room for one record at a time.
+pub(super) struct Again {
+    record: Option<RecordInfo>,
+    /// Parts that are to leave, one bit each.
+    wanted: Box<[u64]>,
+    /// How many.
+    left: usize,
+    /// How many more may be asked for.
+    budget: usize,
+}
+
+impl Again {
+    /// Room for a record of so many parts.
+    pub(super) fn new(parts: usize) -> Self {
+        Self { record: None, wanted: vec![0; parts.div_ceil(64)].into(), left: 0, budget: 0 }
+    }
+
+    /// Begins with a record.
+    pub(super) fn begin(&mut self, record: RecordInfo, parts: usize) {
+        self.clear();
+        (self.record, self.budget) = (Some(record), parts + MORE);
+    }
+
+    /// The record; none: there was none yet.
+    pub(super) fn record(&self) -> Option<&RecordInfo> {
+        self.record.as_ref()
+    }
+
+    /// Whether something is to leave.
+    pub(super) fn is_wanted(&self) -> bool {
+        self.left > 0
+    }
+
+    /// A part is asked for; false: too often.
+    pub(super) fn want(&mut self, index: usize) -> bool {
+        let (word, bit) = (&mut self.wanted[index / 64], 1 << (index % 64));
+        if *word & bit == 0 && self.budget > 0 {
+            *word |= bit;
+            (self.left, self.budget) = (self.left + 1, self.budget - 1);
+        }
+        *word & bit != 0
+    }
+
+    /// The first part that is to leave, and its record.
+    pub(super) fn next(&self) -> Option<(RecordInfo, usize)> {
+        let record = self.record.filter(|_| self.left > 0)?;
+        let at = self.wanted.iter().position(|word| *word != 0)?;
+        Some((record, 64 * at + self.wanted[at].trailing_zeros() as usize))
+    }
+
+    /// A part has left.
+    pub(super) fn left(&mut self, index: usize) {
+        self.wanted[index / 64] &= !(1 << (index % 64));
+        self.left -= 1;
+    }
+
+    /// Nothing is to leave any more.
+    pub(super) fn drop_wanted(&mut self) {
+        if self.left > 0 {
+            self.wanted.fill(0);
+            self.left = 0;
+        }
+    }
+
+    /// The same, and its record is forgotten.
+    pub(super) fn clear(&mut self) {
+        self.drop_wanted();
+        self.record = None;
+    }
+}

@@ -1,0 +1,221 @@
+//! A record of a replica of which not all is here: which parts came, and when it is time to ask for the others.
+//!
+//! ```text
+//!  the last part that is expected came ─┐
+//!  a part of a newer record came ───────┼─▶ ask ─▶ the last part that was asked for is expected now, and so on
+//!  nothing came for an answer's time ───┘          nothing: asked again after that time, twice, four times that time
+//! ```
+//!
+//! It ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
+
+use super::settings::ReplicaSettings;
+use crate::frame::{ASKED_PARTS_MAX, RecordPart};
+use rohrpost_mailbox::{OriginRecord, RecordInfo, Stamp};
+
+/// A record is asked for this often at most: a fifth of all datagrams may be lost, and the rest comes.
+pub(super) const ROUNDS_MAX: u32 = 32;
+const WORDS: usize = ASKED_PARTS_MAX / 64;
+
+/// What the sender of parts may count sequences from anew.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(super) struct Life {
+    /// Incarnation of the router.
+    pub(super) router: u64,
+    /// How often that has seen the stream made anew.
+    pub(super) generation: u16,
+}
+
+impl Life {
+    /// Whether the same router says that this ended. As it wraps: earlier by less than half of all numbers.
+    pub(super) fn is_before(self, other: Self) -> bool {
+        self.router == other.router && (other.generation.wrapping_sub(self.generation) as i16) > 0
+    }
+}
+
+/// What the parts of a record say of it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Arriving {
+    pub(super) record: OriginRecord,
+    /// When it was written, ns; 0: nobody knows.
+    pub(super) written_ns: u64,
+    /// How far off that is at most.
+    pub(super) error_ns: u32,
+}
+
+impl Arriving {
+    pub(super) fn of(part: &RecordPart<'_>) -> Self {
+        let record = OriginRecord {
+            sequence: part.sequence,
+            incarnation: part.incarnation,
+            stamp: Stamp { epoch: part.epoch, ns: part.stamp_ns },
+            len_bytes: part.len as usize,
+        };
+        Self { record, written_ns: part.written_ns, error_ns: part.error_ns }
+    }
+
+    /// Whether it is this record of the ring here.
+    pub(super) fn is(&self, there: &RecordInfo) -> bool {
+        let OriginRecord { sequence, incarnation, stamp, len_bytes } = self.record;
+        (sequence, incarnation, stamp, len_bytes) == (there.sequence, there.incarnation, there.stamp, there.len_bytes)
+    }
+}
+
+/// Room for one record at a time.
+pub(super) struct Gathering {
+    is_open: bool,
+    pub(super) sequence: u64,
+    pub(super) life: Life,
+    /// None: no part of it came, all that is known is that it was sent.
+    pub(super) arriving: Option<Arriving>,
+    /// Parts that came, one bit each.
+    came: Box<[u64]>,
+    parts: usize,
+    missing: usize,
+    /// The last part that is expected to come.
+    expected: usize,
+    /// When a part came that was missing, or it was opened, ns.
+    came_ns: u64,
+    /// Time between parts that come one after the other, smoothed, ns.
+    pace_ns: u64,
+    asked_ns: u64,
+    /// Requests so far, and of these since the last missing part came.
+    rounds: u32,
+    in_vain: u32,
+    /// It is time to ask.
+    is_due: bool,
+}
+
+impl Gathering {
+    pub(super) fn new(replica: &ReplicaSettings, part_bytes: usize) -> Self {
+        let parts = (replica.shape.record_bytes as usize).div_ceil(part_bytes);
+        Self {
+            is_open: false,
+            sequence: 0,
+            life: Life::default(),
+            arriving: None,
+            came: vec![0; parts.div_ceil(64)].into(),
+            parts: 0,
+            missing: 0,
+            expected: 0,
+            came_ns: 0,
+            pace_ns: 0,
+            asked_ns: 0,
+            rounds: 0,
+            in_vain: 0,
+            is_due: false,
+        }
+    }
+
+    /// Opens it for a record of which nothing is known: its first part is asked for.
+    pub(super) fn open_unseen(&mut self, now_ns: u64, sequence: u64, life: Life) {
+        self.open(now_ns, sequence, life, 1);
+        self.is_due = true;
+    }
+
+    /// Opens it for a record of which a part came. Requests for the same record count on.
+    pub(super) fn open_seen(&mut self, now_ns: u64, arriving: Arriving, life: Life, part_bytes: usize) {
+        let rounds = if self.is_unseen(arriving.record.sequence, life) { self.rounds } else { 0 };
+        let parts = arriving.record.len_bytes.div_ceil(part_bytes).max(1);
+        let asked = (self.asked_ns, self.in_vain);
+        self.open(now_ns, arriving.record.sequence, life, parts);
+        (self.arriving, self.rounds) = (Some(arriving), rounds);
+        if rounds > 0 {
+            // Of a record that was asked for nothing comes by itself.
+            ((self.asked_ns, self.in_vain), self.expected) = (asked, 0);
+        }
+    }
+
+    fn open(&mut self, now_ns: u64, sequence: u64, life: Life, parts: usize) {
+        (self.is_open, self.sequence, self.life, self.arriving) = (true, sequence, life, None);
+        self.came[..parts.div_ceil(64)].fill(0);
+        (self.parts, self.missing, self.expected) = (parts, parts, parts - 1);
+        (self.came_ns, self.pace_ns, self.asked_ns) = (now_ns, 0, 0);
+        (self.rounds, self.in_vain, self.is_due) = (0, 0, false);
+    }
+
+    pub(super) fn close(&mut self) {
+        self.is_open = false;
+    }
+
+    pub(super) fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    /// Whether it is open for this record.
+    pub(super) fn is_of(&self, record: &OriginRecord, life: Life) -> bool {
+        self.is_open && self.life == life && self.arriving.is_some_and(|arriving| arriving.record == *record)
+    }
+
+    /// Whether it is open for a record of this sequence, and no part of it came.
+    pub(super) fn is_unseen(&self, sequence: u64, life: Life) -> bool {
+        self.is_open && self.arriving.is_none() && (self.sequence, self.life) == (sequence, life)
+    }
+
+    /// Whether all is here.
+    pub(super) fn is_whole(&self) -> bool {
+        self.is_open && self.missing == 0
+    }
+
+    /// Whether parts of it were asked for.
+    pub(super) fn was_asked(&self) -> bool {
+        self.rounds > 0
+    }
+
+    /// Whether a part came before.
+    pub(super) fn has(&self, index: usize) -> bool {
+        self.came[index / 64] & 1 << (index % 64) != 0
+    }
+
+    /// A part came that was missing. How long that took since the only request for it, ns.
+    pub(super) fn note(&mut self, now_ns: u64, index: usize) -> Option<u64> {
+        self.came[index / 64] |= 1 << (index % 64);
+        self.missing -= 1;
+        self.is_due |= index == self.expected;
+        if self.in_vain == 0 {
+            self.pace_ns = (7 * self.pace_ns + now_ns.saturating_sub(self.came_ns)) / 8;
+        }
+        let took_ns = (self.in_vain == 1).then(|| now_ns.saturating_sub(self.asked_ns));
+        (self.came_ns, self.in_vain) = (now_ns, 0);
+        took_ns
+    }
+
+    /// A newer record arrives: what did not come of this one by now has been lost.
+    pub(super) fn is_passed(&mut self) {
+        self.is_due = true;
+    }
+
+    /// Whether there is no use in asking, or in asking again.
+    pub(super) fn is_given_up(&self, now_ns: u64, deadline_ns: u64) -> bool {
+        now_ns.saturating_sub(self.came_ns) >= deadline_ns || self.rounds >= ROUNDS_MAX
+    }
+
+    /// Whether it is time to ask. An answer takes `patience_ns`.
+    pub(super) fn is_due(&self, now_ns: u64, (deadline_ns, patience_ns): (u64, u64)) -> bool {
+        // On a slow wire parts come with pauses of their own.
+        let waited_ns = (patience_ns << self.in_vain.saturating_sub(1).min(8)) + 4 * self.pace_ns;
+        let is_quiet = now_ns.saturating_sub(self.came_ns.max(self.asked_ns)) >= waited_ns;
+        let is_missing = self.is_open && self.missing > 0;
+        is_missing && (self.is_due || is_quiet) && !self.is_given_up(now_ns, deadline_ns)
+    }
+
+    /// Parts that are missing, by request: the first that it can name, and a bit for each.
+    pub(super) fn missing(&self) -> impl Iterator<Item = (usize, [u64; WORDS])> {
+        let of_word = move |at: usize| {
+            let behind = (64 * (at + 1)).saturating_sub(self.parts);
+            !self.came[at] & u64::MAX >> behind
+        };
+        let words = self.parts.div_ceil(64);
+        let all = (0..words).step_by(WORDS).map(move |first| {
+            let named = |at: usize| if first + at < words { of_word(first + at) } else { 0 };
+            (64 * first, std::array::from_fn(named))
+        });
+        all.filter(|(_, named)| *named != [0; WORDS])
+    }
+
+    /// Parts up to this one were asked for.
+    pub(super) fn asked(&mut self, now_ns: u64, last: usize) {
+        (self.asked_ns, self.expected, self.is_due) = (now_ns, last, false);
+        self.rounds += 1;
+        self.in_vain += 1;
+    }
+}

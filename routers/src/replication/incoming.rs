@@ -1,0 +1,367 @@
+//! One replica of this node: its ring, and the two records that may be open at a time.
+//!
+//! ```text
+//!  part ─▶ of an open record? ─┬─ yes ─────────────▶ put ─▶ whole: published, the older one first
+//!                              ├─ newer than both ─▶ the older is given up: incomplete; the newer is the older now, and
+//!                              │                     its missing parts are asked for; this one is opened
+//!                              └─ between, before ─▶ opened as the older one, or late, duplicate; or made anew
+//! ```
+//!
+//! A newer record that is whole waits for the older one as long as an answer takes: a pose is late by one round trip
+//! when the one before it was lost, and never by more. A record of which no part came is known by the next one, which
+//! says how far behind it is: so what the sender left out on purpose is never asked for.
+
+mod due;
+
+use super::counts::{ReceivedReplica, ReplicaLoss};
+use super::delay::DelayAlarm;
+use super::description::{DescriptionAssembly, KnownOrigin};
+use super::gathering::{Arriving, Gathering, Life};
+use super::patience::Patience;
+use super::requests::PartRequests;
+use super::settings::ReplicaSettings;
+use crate::frame::RecordPart;
+use rohrpost_mailbox::{
+    OriginRecord, Participant, ReplicaError, ReplicaWriter, STREAM_SEQUENCE_MAX, StreamId, SystemTime,
+};
+use std::sync::Arc;
+
+/// Places of open records. There is an older one only beside a newer one.
+const OLDER: usize = 0;
+const NEWER: usize = 1;
+
+/// A ring that cannot be opened or made is tried again after this, ns.
+const RETRY_NS: u64 = 1_000_000_000;
+
+/// Where and when a part is taken.
+#[derive(Clone, Copy)]
+pub(super) struct Now<'a> {
+    pub(super) ns: u64,
+    pub(super) participant: &'a Arc<Participant>,
+    /// System time now.
+    pub(super) system: &'a dyn Fn() -> SystemTime,
+}
+
+pub(super) struct IncomingReplica {
+    place: u16,
+    pub(super) settings: ReplicaSettings,
+    part_bytes: usize,
+    pub(super) counts: Arc<ReceivedReplica>,
+    pub(super) assembly: DescriptionAssembly,
+    pub(super) known: Option<KnownOrigin>,
+    /// What the description that came last says: of which life, and how many records were written.
+    pub(super) announced: Option<(Life, u64)>,
+    writer: Option<ReplicaWriter>,
+    /// Of the newest record; none: it was written before this router began.
+    life: Option<Life>,
+    open: [Gathering; 2],
+    /// The newest record that was given up: what still comes of it, or of older ones, is late.
+    given_up: Option<(Life, u64)>,
+    /// When the newer one was whole, ns.
+    whole_ns: u64,
+    patience: Patience,
+    /// The ring could not be opened or made, and is not tried again before, ns.
+    retry_ns: u64,
+    /// None: nothing is asked for.
+    requests: Option<Arc<PartRequests>>,
+    /// A request waits to be sent.
+    pub(super) has_asked: bool,
+    /// What is wrong with it was told.
+    told: bool,
+    delays: DelayAlarm,
+}
+
+impl IncomingReplica {
+    pub(super) fn new(place: u16, replica: &ReplicaSettings, part_bytes: usize) -> Self {
+        Self {
+            place,
+            settings: replica.clone(),
+            part_bytes,
+            counts: Arc::new(ReceivedReplica::new(place)),
+            assembly: DescriptionAssembly::default(),
+            known: None,
+            announced: None,
+            writer: None,
+            life: None,
+            open: std::array::from_fn(|_| Gathering::new(replica, part_bytes)),
+            given_up: None,
+            whole_ns: 0,
+            patience: Patience::default(),
+            retry_ns: 0,
+            requests: None,
+            has_asked: false,
+            told: false,
+            delays: DelayAlarm::default(),
+        }
+    }
+
+    /// From now on missing parts are asked for, unless the configuration says never.
+    pub(super) fn ask_by(&mut self, requests: &Arc<PartRequests>) {
+        self.requests = Some(requests.clone()).filter(|_| self.settings.deadline_ns > 0);
+    }
+
+    pub(super) fn tell(&mut self, why: &str) {
+        if !std::mem::replace(&mut self.told, true) {
+            tracing::warn!(
+                "the replica of {} of {} is not written for now: {why}",
+                self.settings.item,
+                self.settings.from
+            );
+        }
+    }
+
+    /// Counts a part or record that is not taken.
+    pub(super) fn lose(&self, cause: ReplicaLoss) {
+        self.counts.lost.add(cause, 1);
+    }
+
+    /// The stream is described, anew or for the first time.
+    pub(super) fn is_described(&mut self, known: KnownOrigin) {
+        self.forget();
+        (self.known, self.told) = (Some(known), false);
+    }
+
+    /// Its ring is left as it is, and opened again when a record comes.
+    pub(super) fn forget(&mut self) {
+        [OLDER, NEWER].into_iter().for_each(|at| self.give_up(at));
+        (self.writer, self.known) = (None, None);
+    }
+
+    /// Takes a part.
+    pub(super) fn take(&mut self, now: Now<'_>, life: Life, part: &RecordPart<'_>) {
+        let Some(known) = self.known.filter(|known| known.check == part.description) else {
+            return self.lose(ReplicaLoss::Undescribed);
+        };
+        if part.len > self.settings.shape.record_bytes {
+            return self.lose(ReplicaLoss::TooLarge);
+        }
+        let offset = part.offset as usize;
+        let whole = self.part_bytes.min((part.len as usize).saturating_sub(offset));
+        if !offset.is_multiple_of(self.part_bytes)
+            || part.bytes.len() != whole
+            || part.stamp_ns == 0
+            || part.sequence > STREAM_SEQUENCE_MAX
+        {
+            return self.lose(ReplicaLoss::Unsound);
+        }
+        if now.ns < self.retry_ns {
+            return self.lose(ReplicaLoss::Unwritable);
+        }
+        if self.is_over(life) {
+            return self.lose(ReplicaLoss::Late);
+        }
+        let arriving = Arriving::of(part);
+        let open = self.open.iter().position(|open| open.is_of(&arriving.record, life));
+        let opened = open.or_else(|| self.begin(now, known.id, life, (arriving, part.step)));
+        if let Some(at) = opened {
+            self.put(now, at, offset, part.bytes);
+        }
+        [OLDER, NEWER].into_iter().for_each(|at| self.ask_if_due(now.ns, at));
+    }
+
+    /// Whether the stream was made anew since, as its router has said.
+    pub(super) fn is_over(&self, life: Life) -> bool {
+        let announced = self.announced.map(|(life, _)| life);
+        let open = self.open.iter().filter(|open| open.is_open()).map(|open| open.life);
+        open.chain(announced).chain(self.life).any(|known| life.is_before(known))
+    }
+
+    /// Opens a record, if it may still be published; at which place. `step`: see [`RecordPart::step`].
+    fn begin(&mut self, now: Now<'_>, id: StreamId, life: Life, (arriving, step): (Arriving, u32)) -> Option<usize> {
+        let record = arriving.record;
+        let newer = &self.open[NEWER];
+        let is_behind = newer.is_open() && newer.life == life && record.sequence <= newer.sequence;
+        let (next, newest) = match &self.writer {
+            Some(writer) => (writer.next(), writer.newest()),
+            None => now
+                .participant
+                .node()
+                .inspect_stream(id)
+                .ok()
+                .flatten()
+                .map_or((0, None), |there| (there.written, there.newest)),
+        };
+        if record.sequence < next {
+            if newest.is_some_and(|newest| arriving.is(&newest)) {
+                self.life = Some(life);
+                self.lose(ReplicaLoss::Duplicate);
+                return None;
+            }
+            if is_behind || !self.is_anew(life, record.sequence, next) {
+                self.lose(ReplicaLoss::Late);
+                return None;
+            }
+        }
+        if is_behind {
+            return self.begin_older(now, id, life, arriving);
+        }
+        if self.open[NEWER].is_open() {
+            if self.open[NEWER].life != life {
+                // What is open is of a time that has ended. By then the ring may be further.
+                self.settle(now);
+                return self.begin(now, id, life, (arriving, step));
+            }
+            self.make_room(now);
+        }
+        if record.sequence < next {
+            self.writer = None;
+        }
+        let mut written = self.write(now.participant, id, record);
+        if matches!(written, Err(Some(_))) && self.writer.is_some() && self.life != Some(life) {
+            // Its time may have begun anew, too: what is there then fits no more.
+            self.writer = None;
+            let _ = now.participant.node().remove_orphan_stream(id);
+            written = self.write(now.participant, id, record);
+        }
+        if let Err(why) = written {
+            if self.writer.is_none() {
+                self.retry_ns = now.ns + RETRY_NS;
+            }
+            // The older one is behind nothing now.
+            self.settle(now);
+            return self.refuse(why);
+        }
+        self.open[NEWER].open_seen(now.ns, arriving, life, self.part_bytes);
+        let before = record.sequence.saturating_sub(step.into());
+        let is_lost = step > 0 && self.writer.as_ref().is_some_and(|writer| before >= writer.next());
+        if is_lost && self.requests.is_some() && !self.open[OLDER].is_open() {
+            self.open[OLDER].open_unseen(now.ns, before, life);
+        }
+        Some(NEWER)
+    }
+
+    /// Opens a record that is behind the one that arrives: it was asked for, or has come by a longer way.
+    fn begin_older(&mut self, now: Now<'_>, id: StreamId, life: Life, arriving: Arriving) -> Option<usize> {
+        let (record, older) = (arriving.record, &self.open[OLDER]);
+        let has_room = !older.is_open() || older.is_unseen(record.sequence, life);
+        let is_over = self.given_up.is_some_and(|(of, newest)| of == life && record.sequence <= newest);
+        if !has_room || is_over || record.sequence == self.open[NEWER].sequence || self.requests.is_none() {
+            self.lose(ReplicaLoss::Late);
+            return None;
+        }
+        if let Err(why) = self.write(now.participant, id, record) {
+            return self.refuse(why);
+        }
+        self.open[OLDER].open_seen(now.ns, arriving, life, self.part_bytes);
+        Some(OLDER)
+    }
+
+    /// A record was not begun; why, if not for lack of room.
+    fn refuse(&mut self, why: Option<String>) -> Option<usize> {
+        self.lose(if why.is_some() { ReplicaLoss::Unwritable } else { ReplicaLoss::Late });
+        why.into_iter().for_each(|why| self.tell(&why));
+        None
+    }
+
+    /// A third record begins: the older is given up, and the newer is the older one from now on.
+    fn make_room(&mut self, now: Now<'_>) {
+        self.give_up(OLDER);
+        if self.open[NEWER].is_whole() {
+            self.publish(now, NEWER);
+        } else if self.requests.is_some() {
+            self.open.swap(OLDER, NEWER);
+            self.open[OLDER].is_passed();
+        } else {
+            self.give_up(NEWER);
+        }
+    }
+
+    /// Nothing is waited for any more.
+    fn settle(&mut self, now: Now<'_>) {
+        self.give_up(OLDER);
+        if self.open[NEWER].is_whole() {
+            self.publish(now, NEWER);
+        }
+        self.give_up(NEWER);
+    }
+
+    /// Begins a record in the ring, which is opened if it is not yet; or why that is not possible, with no writer if it
+    /// is not open. Without room beside the older one that is given up; none: there is no room for an older one.
+    fn write(
+        &mut self,
+        participant: &Arc<Participant>,
+        id: StreamId,
+        record: OriginRecord,
+    ) -> Result<(), Option<String>> {
+        let mut writer = match self.writer.take() {
+            Some(writer) => writer,
+            None => {
+                let opened = participant.replica_writer(id, self.settings.shape, record.sequence);
+                opened.map_err(|error| Some(error.to_string()))?
+            }
+        };
+        let mut begun = writer.begin(record);
+        let older = &mut self.open[OLDER];
+        if matches!(begun, Err(ReplicaError::Begun(_))) && older.is_open() && older.sequence < record.sequence {
+            writer.give_up(older.sequence);
+            older.close();
+            self.given_up = Some((older.life, older.sequence));
+            self.counts.lost.add(ReplicaLoss::Incomplete, 1);
+            begun = writer.begin(record);
+        }
+        self.writer = Some(writer);
+        begun.map_err(|why| if matches!(why, ReplicaError::Begun(_)) { None } else { Some(why.to_string()) })
+    }
+
+    /// Whether a record that is not newer says that its stream was made anew.
+    fn is_anew(&self, life: Life, sequence: u64, next: u64) -> bool {
+        match self.life {
+            Some(newest) => newest.is_before(life) || newest.router != life.router,
+            None => {
+                let written = self.announced.filter(|(announced, _)| *announced == life).map(|(_, written)| written);
+                sequence + 1 == next || written.is_some_and(|written| written < next)
+            }
+        }
+    }
+
+    /// Puts a part into an open record, and publishes what is whole by it.
+    fn put(&mut self, now: Now<'_>, at: usize, offset: usize, bytes: &[u8]) {
+        let (open, index) = (&mut self.open[at], offset / self.part_bytes);
+        let Some(writer) = &mut self.writer else { return };
+        if open.has(index) || !writer.put(open.sequence, offset, bytes) {
+            return self.lose(ReplicaLoss::Duplicate);
+        }
+        open.note(now.ns, index).into_iter().for_each(|took_ns| self.patience.answered(took_ns));
+        if !open.is_whole() {
+            return;
+        }
+        if at == NEWER && self.open[OLDER].is_open() {
+            self.whole_ns = now.ns;
+            return;
+        }
+        self.publish(now, at);
+        if at == OLDER && self.open[NEWER].is_whole() {
+            self.publish(now, NEWER);
+        }
+    }
+
+    /// Makes a record that is whole the newest of the ring.
+    fn publish(&mut self, now: Now<'_>, at: usize) {
+        let open = &mut self.open[at];
+        let (Some(arriving), Some(writer)) = (open.arriving, &mut self.writer) else { return open.close() };
+        let (record, next) = (arriving.record, writer.next());
+        open.close();
+        if let Err(why) = writer.finish(record.sequence) {
+            self.tell(&why.to_string());
+            return self.lose(ReplicaLoss::Unwritable);
+        }
+        let (open, counts) = (&self.open[at], &*self.counts);
+        counts.gaps.add(record.sequence.saturating_sub(next));
+        counts.records.add(1);
+        counts.bytes.add(record.len_bytes as u64);
+        counts.completed.add(open.was_asked().into());
+        self.life = Some(open.life);
+        self.delays.note(now.ns, &(now.system)(), &arriving, (&self.settings, counts));
+    }
+
+    /// Gives up what is open at a place: it is left out.
+    fn give_up(&mut self, at: usize) {
+        let open = &mut self.open[at];
+        if open.is_open() {
+            self.writer.iter_mut().for_each(|writer| writer.give_up(open.sequence));
+            open.close();
+            self.given_up = Some((open.life, open.sequence));
+            self.lose(ReplicaLoss::Incomplete);
+        }
+    }
+}
