@@ -28,6 +28,11 @@ impl Again {
         (self.record, self.budget) = (Some(record), parts + MORE);
     }
 
+    /// Parts that there is room for: more than a record of the configured size has.
+    pub(super) fn room(&self) -> usize {
+        64 * self.wanted.len()
+    }
+
     /// The record; none: there was none yet.
     pub(super) fn record(&self) -> Option<&RecordInfo> {
         self.record.as_ref()

@@ -20,6 +20,8 @@ use std::sync::Arc;
 const OUTGOING_MAX: usize = 32;
 /// Requests of one other node that wait.
 const INCOMING_MAX: usize = 32;
+/// So many of them are looked at before a part leaves: more than are asked for at a time.
+const TAKEN_MAX: usize = 4;
 
 /// A request of this node.
 #[derive(Clone, Copy, Debug)]
@@ -62,11 +64,11 @@ impl PartRequests {
         queue.and_then(Option::as_ref).is_some_and(|queue| queue.push(*request).is_ok())
     }
 
-    /// What other nodes ask for: as much as there is room for, though more may come meanwhile.
-    pub(super) fn take_all(&self) -> impl Iterator<Item = (NodeIndex, PartRequest)> {
+    /// What other nodes ask for: a few requests of each at a time, so none of them delays a part for long.
+    pub(super) fn take_next(&self) -> impl Iterator<Item = (NodeIndex, PartRequest)> {
         let all = (0..).zip(&self.incoming).filter_map(|(node, queue)| Some((node, queue.as_ref()?)));
         all.flat_map(|(node, queue)| {
-            std::iter::from_fn(move || queue.pop()).take(INCOMING_MAX).map(move |request| (node, request))
+            std::iter::from_fn(move || queue.pop()).take(TAKEN_MAX).map(move |request| (node, request))
         })
     }
 

@@ -118,7 +118,7 @@ impl ReplicaSender {
             stream.refresh();
             stream.meet(now_ns, outbound);
         }
-        for (from, request) in self.own_requests.queues().take_all() {
+        for (from, request) in self.own_requests.queues().take_next() {
             let stream = self.streams.iter_mut().find(|stream| stream.place == request.place);
             stream.into_iter().for_each(|stream| stream.ask(from, &request, (self.incarnation, self.part_bytes)));
         }
