@@ -85,6 +85,8 @@ fn all_of_a_demo_is_in_one_file() {
     assert!(said.contains("new.mcap.part: another demo records there, or was killed"), "{said}");
     recorded(&place, &["--overwrite"]);
     assert!(info(&file).unwrap().first_ns > told.last_ns, "it is another one");
+    let said = place.say(&["replay", "out.mcap", "--rate", "20", "--no-gui", "--quiet"]).ok();
+    assert!(said.starts_with("played "), "what is drawn is left out without a word: {said}");
     place.assert_empty();
 }
 

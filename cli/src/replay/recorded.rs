@@ -98,10 +98,13 @@ impl RecordedFiles {
         topics.filter(|topic| !other.contains(topic.as_str())).cloned().collect()
     }
 
-    /// All topics with messages.
+    /// All topics with messages, but for what was drawn of others.
     pub(super) fn all_topics(&self) -> BTreeSet<&str> {
         let channels = self.infos.iter().flat_map(|info| &info.channels);
-        channels.filter(|channel| channel.messages > 0).map(|channel| channel.topic.as_str()).collect()
+        channels
+            .filter(|channel| channel.messages > 0 && channel.drawn_of.is_none())
+            .map(|channel| channel.topic.as_str())
+            .collect()
     }
 
     /// Modules with a journal.
