@@ -94,7 +94,8 @@ impl Installation {
         self.modules.iter().filter(move |module| module.node == node)
     }
 
-    /// Bytes of shared memory that the mailboxes, streams and journals of a node take, as far as the file names them.
+    /// Bytes of shared memory that the mailboxes, streams, replicas and journals of a node take, as far as the file
+    /// names them.
     pub fn memory_on(&self, node: &str) -> u64 {
         let others = self.replica_memory_on(node).chain([self.journals_on(node)]);
         saturating_sum(self.modules_on(node).map(Module::memory).chain(others))

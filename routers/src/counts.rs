@@ -181,7 +181,8 @@ pub struct PeerReceived {
     pub reordered: Count,
     /// Datagrams with its address that are wrong in themselves; dropped.
     pub damaged: Count,
-    /// Datagrams of another version or digest, or of an address that is not its; dropped.
+    /// Datagrams of another version or digest, of an address that is not its, or with what has no place here, such as
+    /// too many requests for parts; dropped.
     pub refused: Count,
     /// Incarnations of it that were heard, without the first.
     pub restarts: Count,

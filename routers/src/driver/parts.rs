@@ -10,7 +10,7 @@
 //! and opened by another thread, which has the lock for that; meanwhile no part leaves, and nothing waits for it.
 //!
 //! Parts have a port and sequences of their own. No bound counts them: none leaves while a package could, so they delay
-//! only what comes during the slot, by one datagram, and bounds promise that the next slot.
+//! only what comes during the slot, by one datagram; and to that the bounds promise the next slot.
 
 use super::platform::Platform;
 use crate::frame::NodeIndex;

@@ -311,7 +311,7 @@ impl Outbound {
         self.reached & !self.full & self.hearing
     }
 
-    /// Accounts for the rate that real time uses, and copies which peers hear this node.
+    /// Accounts for the rate that others use which go before it, and copies which peers hear this node.
     fn look_at_what_is_real_time(&mut self, now_ns: u64) {
         for (others, counted) in &mut self.shares_with {
             let bytes = others.on_wire_bytes.get();

@@ -26,15 +26,16 @@ rohrpost_mailbox::causes! {
         Incomplete = "incomplete",
         /// Receiver, parts: of a record that came before, whole.
         Duplicate = "duplicate",
-        /// Receiver, parts: of a record that is older than the newest.
+        /// Receiver, parts: of a record that is older than the newest and not waited for any more.
         Late = "late",
-        /// Receiver, parts: no replica of this node, or from a node that does not write the stream.
+        /// Receiver, parts: from a node that does not write the stream.
         Foreign = "foreign",
         /// Receiver, parts: the description of the module is not known yet, or names no such stream.
         Undescribed = "undescribed",
         /// Receiver, parts: of a record larger than the stream's records.
         TooLarge = "too-large",
-        /// Receiver, parts: not where a part of the record begins, or of another length, or without a stamp.
+        /// Receiver, parts: not where a part of the record begins, of another length, or without a stamp, or of a
+        /// sequence that no stream comes to.
         Unsound = "unsound",
         /// Receiver, parts: the replica cannot be written here.
         Unwritable = "unwritable",

@@ -83,9 +83,9 @@ pub(super) enum Received {
 
 /// Sockets of a node's router for a process that keeps them while routers come and go
 /// ([`Parts::sockets`](super::Parts)): of this port, of the port for what is not real time, and of that for replicas.
-/// Datagrams that come
-/// meanwhile wait in the kernel, with their time of arrival; those that wait too long are dropped. From the first
-/// socket on that cannot be opened now the rest is missing: each router opens these itself, or reports why it cannot.
+/// Datagrams that come meanwhile wait in the kernel, with their time of arrival; those that wait too long are dropped.
+/// From the first socket on that cannot be opened now the rest is missing: each router opens these itself, or reports
+/// why it cannot.
 pub fn listen(own: IpAddr, (port, others): (u16, [Option<u16>; 2]), peers: &[IpAddr]) -> Vec<OwnedFd> {
     let others = others.into_iter().zip([REST_BYTES, REPLICA_BYTES]).filter_map(|(port, bytes)| Some((port?, bytes)));
     let ports = std::iter::once((port, RECEIVE_BYTES)).chain(others);
