@@ -30,8 +30,8 @@ pub trait Deliver: Report {
     /// [`NotDelivered`]
     fn deliver(&mut self, from: NodeIndex, head: &Head, body: &[u8]) -> Result<(), NotDelivered>;
 
-    /// Takes a part of what a replica needs, or a request for parts; false: not at this port, of no replica of this node,
-    /// or a request for which there is no room.
+    /// Takes a part of what a replica needs, or a request for parts; false: not at this port, of no replica of this
+    /// node, or a request for which there is no room.
     fn replica(&mut self, _head: &FrameHead, _part: &ReplicaFrame<'_>) -> bool {
         false
     }
