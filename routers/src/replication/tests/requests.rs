@@ -141,3 +141,17 @@ fn no_request_does_harm() {
     let causes = [ReplicaLoss::NotSent, ReplicaLoss::OutOfRange];
     assert!(causes.iter().all(|cause| origin.lost(*cause) > 50), "{:?}", causes.map(|cause| origin.lost(cause)));
 }
+
+/// The module was started anew with larger records than the router's configuration has.
+#[test]
+fn of_a_record_larger_than_its_replica_no_part_is_sent_again_for_which_there_is_no_room() {
+    let shape = StreamShape { record_bytes: 200_000, ..SHAPE };
+    let mut origin = Origin::new(&[image()]);
+    let (mut writer, mut now_ns) = (origin.writer(ID, shape), START);
+    writer.write(at(100), &[7; 200_000]).unwrap();
+    assert!(origin.leave(&mut now_ns).len() >= 200_000_usize.div_ceil(1376), "the description, and all parts");
+    assert!(ask(&mut origin, HOLDER, request(0, &[1, 100])));
+    assert!(origin.leave(&mut now_ns).is_empty());
+    assert_eq!((origin.lost(ReplicaLoss::OutOfRange), again(&origin)), (1, 0));
+    assert!(ask(&mut origin, HOLDER, request(0, &[1])) && origin.leave(&mut now_ns).len() == 1);
+}
