@@ -6,8 +6,8 @@
 //!  nothing came for an answer's time ───┘          nothing: asked again after that time, twice, four times that time
 //! ```
 //!
-//! While parts come by themselves, with whatever pauses, requests are of no account: with time slots a record takes many
-//! cycles. Else it ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
+//! While parts come by themselves, with whatever pauses, requests do not count: with time slots a record takes many cycles.
+//! Else it ends after [`ROUNDS_MAX`] requests, and when nothing came for the replica's deadline.
 
 use super::settings::ReplicaSettings;
 use crate::frame::{ASKED_PARTS_MAX, RecordPart};
@@ -78,7 +78,7 @@ pub(super) struct Gathering {
     expected: usize,
     /// Behind the last part that came.
     reached: usize,
-    /// The longest time between two parts that came, ns, while new ones come by themselves: with time slots about a cycle.
+    /// The longest time between two parts, ns, while new ones come by themselves: with time slots about a cycle.
     gap_ns: u64,
     /// A newer record arrives, so nothing more comes of this one by itself.
     is_passed: bool,

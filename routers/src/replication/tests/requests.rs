@@ -98,8 +98,8 @@ fn a_record_leaves_twice_and_some_parts_at_most_however_often_it_is_asked_for() 
     assert_eq!(origin.leave(&mut now_ns).len(), 5);
 }
 
-/// What this node asks for of a less important stream waits for its own records; what it asks for of a more important one
-/// does not wait behind that.
+/// What this node asks for of a less important stream waits for its own records; what it asks for of a more important
+/// one does not wait behind that.
 #[test]
 fn a_request_that_waits_holds_up_no_other() {
     const POSE: Name = Name::new(1, 240, 0, 0);
