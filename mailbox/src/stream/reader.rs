@@ -1,5 +1,7 @@
 //! The reading side of a stream: records copied out, or read in place.
 
+mod kept;
+
 use crate::participant::Participant;
 use crate::stream::error::StreamError;
 use crate::stream::lookup::{self, Answer};
@@ -21,6 +23,8 @@ pub struct StreamReader {
     read: u64,
     lost: u64,
     eager: bool,
+    /// The record that stays held: the seat names its frame.
+    kept: Option<Line>,
 }
 
 impl Participant {
@@ -32,8 +36,17 @@ impl Participant {
     pub fn stream_reader(self: &Arc<Self>, id: StreamId) -> Result<StreamReader, StreamError> {
         let participant = self.clone();
         let (next, read, lost) = (0, 0, 0);
-        let mut reader =
-            StreamReader { participant, id, place: None, registry_epoch: None, next, read, lost, eager: false };
+        let mut reader = StreamReader {
+            participant,
+            id,
+            place: None,
+            registry_epoch: None,
+            next,
+            read,
+            lost,
+            eager: false,
+            kept: None,
+        };
         reader.follow()?;
         reader.next = reader.ring().map_or(0, |ring| ring.written());
         Ok(reader)
@@ -109,6 +122,7 @@ impl StreamReader {
     /// # Errors
     /// When the stream was replaced or made, and cannot be opened. What was read before stays read.
     pub fn try_next(&mut self) -> Result<Next<HeldRecord<'_>>, StreamError> {
+        self.let_go();
         let next = self.advance(|place, line| place.ring().hold(place.seat, line))?;
         Ok(self.held(next))
     }
@@ -118,6 +132,7 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn try_next_into(&mut self, body: &mut Vec<u8>) -> Result<Next<RecordInfo>, StreamError> {
+        self.let_go();
         let next = self.advance(|place, line| place.segment.copy(place.seat, line, body))?;
         Ok(self.told(next))
     }
@@ -128,6 +143,7 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn next_timeout(&mut self, waiting: impl Into<Waiting>) -> Result<Next<HeldRecord<'_>>, StreamError> {
+        self.let_go();
         let next = self.await_next(waiting.into(), |place, line| place.ring().hold(place.seat, line))?;
         Ok(self.held(next))
     }
@@ -141,6 +157,7 @@ impl StreamReader {
         body: &mut Vec<u8>,
         waiting: impl Into<Waiting>,
     ) -> Result<Next<RecordInfo>, StreamError> {
+        self.let_go();
         let next = self.await_next(waiting.into(), |place, line| place.segment.copy(place.seat, line, body))?;
         Ok(self.told(next))
     }
@@ -151,6 +168,7 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn newest(&mut self) -> Result<Option<HeldRecord<'_>>, StreamError> {
+        self.let_go();
         let line = self.take_newest(|place, line| place.ring().hold(place.seat, line))?;
         Ok(line.and_then(|line| self.hand_out(line)))
     }
@@ -160,12 +178,17 @@ impl StreamReader {
     /// # Errors
     /// As for [`StreamReader::try_next`].
     pub fn newest_into(&mut self, body: &mut Vec<u8>) -> Result<Option<RecordInfo>, StreamError> {
+        self.let_go();
         let line = self.take_newest(|place, line| place.segment.copy(place.seat, line, body))?;
         Ok(line.and_then(|line| Some(self.place.as_ref()?.info(&line))))
     }
 
     /// The record of this sequence, to read in place; none when it is there no more, or not yet. The position stays.
     pub fn record(&mut self, sequence: u64) -> Option<HeldRecord<'_>> {
+        if let Some(line) = self.kept.filter(|line| line.sequence == sequence) {
+            return self.place.as_ref().map(|place| HeldRecord { place, line, is_kept: true });
+        }
+        self.let_go();
         let place = self.place.as_ref()?;
         let Look::There(line) = place.ring().look(sequence) else { return None };
         if place.ring().hold(place.seat, &line) { self.hand_out(line) } else { None }
@@ -173,6 +196,7 @@ impl StreamReader {
 
     /// The same, copied into `body`, which is cleared first.
     pub fn record_into(&mut self, sequence: u64, body: &mut Vec<u8>) -> Option<RecordInfo> {
+        self.let_go();
         let place = self.place.as_ref()?;
         let Look::There(line) = place.ring().look(sequence) else { return None };
         place.segment.copy(place.seat, &line, body).then(|| place.info(&line))
@@ -257,12 +281,12 @@ impl StreamReader {
 
     /// A record that is held since just now.
     fn hand_out(&self, line: Line) -> Option<HeldRecord<'_>> {
-        self.place.as_ref().map(|place| HeldRecord { place, line })
+        self.place.as_ref().map(|place| HeldRecord { place, line, is_kept: false })
     }
 
     fn held(&self, next: Next<Line>) -> Next<HeldRecord<'_>> {
         match (next, &self.place) {
-            (Next::Record(line), Some(place)) => Next::Record(HeldRecord { place, line }),
+            (Next::Record(line), Some(place)) => Next::Record(HeldRecord { place, line, is_kept: false }),
             (Next::Lost(lost), _) => Next::Lost(lost),
             _ => Next::Nothing,
         }
@@ -305,7 +329,8 @@ impl StreamReader {
         if is_anew || is_first {
             self.next = place.ring().first();
         }
-        self.place = Some(place);
+        // The seat that held it is left.
+        (self.place, self.kept) = (Some(place), None);
         Ok(true)
     }
 }

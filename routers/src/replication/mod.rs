@@ -30,6 +30,7 @@
 //! is none.
 
 mod again;
+mod by_level;
 mod counts;
 mod delay;
 mod description;
@@ -37,6 +38,7 @@ mod destination;
 mod fingerprint;
 mod gathering;
 mod incoming;
+mod line;
 mod outgoing;
 mod patience;
 mod receiving;
@@ -47,10 +49,11 @@ mod settings;
 mod tests;
 
 pub use counts::{ReceivedReplica, ReplicaCounts, ReplicaLoss, ReplicaLosses, SentReplica};
+pub use line::{LINE_PART_BYTES, LINE_PART_ROOM, LineReplicas, TellsTime};
 pub use receiving::ReplicaReceiver;
 pub use requests::PartRequests;
 pub use sending::{ReplicaSender, ReplicaStep};
-pub use settings::ReplicaSettings;
+pub use settings::{LineSettings, ReplicaSettings};
 
 use crate::frame::{self, RECORD_PART_HEAD_BYTES};
 use crate::settings::Settings;

@@ -2,6 +2,7 @@
 
 mod asked;
 mod changed;
+mod hops;
 mod hostile;
 mod joining;
 mod lossy;

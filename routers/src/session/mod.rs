@@ -14,6 +14,9 @@
 //! lost. Packages of one sender, receiver and priority stay in their order. No client can make the server wait, and
 //! nobody can use more than its share of places, ranges, memory or line by connecting more often: shares go by
 //! principal.
+//!
+//! Replicas go by the same streams: a part is made ready when nothing else is, and no package waits. So a package waits
+//! for one part at most, and no queue holds records: see [`LineReplicas`].
 
 pub mod client;
 mod counts;
@@ -30,6 +33,10 @@ pub use estimate::{Bounded, ServerClockEstimate};
 pub use outgoing::BATCH_BYTES;
 pub use table::{Conflict, ENTRIES_MAX, RoutingTable};
 
+use crate::frame::{FrameKind, NodeIndex};
+use crate::replication::{LINE_PART_ROOM, LineReplicas};
+use frame::SessionFrameKind;
+use outgoing::Outgoing;
 use rohrpost_mailbox::{Head, Kind, Name, Options, Type};
 
 /// A client by its place at the server; free again when its connection has been closed.
@@ -56,6 +63,24 @@ pub const HANDSHAKE_MAX_NS: u64 = 5_000_000_000;
 pub const FRAME_MAX_NS: u64 = 30_000_000_000;
 /// Interval between two looks for what only the passing of time changes.
 pub const LOOK_EVERY_NS: u64 = 100_000_000;
+
+/// The replicas of an end of sessions.
+pub trait ReplicaEnd {
+    /// They; none: it has none, and what comes of such is not counted.
+    fn replicas(&mut self) -> Option<&mut LineReplicas> {
+        None
+    }
+}
+
+/// Makes the next part for a node ready, if the line has room and there is one. Whether one was made.
+fn add_part(outgoing: &mut Outgoing, now_ns: u64, node: NodeIndex, end: &mut impl ReplicaEnd) -> bool {
+    let Some(replicas) = end.replicas() else { return false };
+    outgoing.add_part(LINE_PART_ROOM, |content| {
+        let (kind, length) = replicas.next(now_ns, node, content)?;
+        let is_record = kind == FrameKind::RecordPart;
+        Some((if is_record { SessionFrameKind::RecordPart } else { SessionFrameKind::Description }, length))
+    })
+}
 
 /// Writes the error replies to commands that go no further. The routers do not know how an error is encoded.
 pub trait ErrorReplies {
