@@ -88,7 +88,7 @@ impl LineReplicas {
             participant,
             describe,
             time,
-            destinations: (0..64).filter(to).map(destination).collect(),
+            destinations: (0..rohrpost_network::NODES_MAX as NodeIndex).filter(to).map(destination).collect(),
             receiver,
             connections: 0,
             look_ns: 0,
