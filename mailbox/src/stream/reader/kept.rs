@@ -5,7 +5,7 @@
 
 use super::StreamReader;
 use crate::stream::error::StreamError;
-use crate::stream::record::RecordInfo;
+use crate::stream::record::{HeldRecord, RecordInfo};
 use crate::stream::ring::Look;
 
 impl StreamReader {
@@ -54,5 +54,16 @@ impl StreamReader {
         if let Some((place, _)) = self.place.as_ref().zip(self.kept.take()) {
             place.ring().release(place.seat);
         }
+    }
+
+    /// The record of this sequence, to read in place; none when it is there no more, or not yet. The position stays.
+    pub fn record(&mut self, sequence: u64) -> Option<HeldRecord<'_>> {
+        if let Some(line) = self.kept.filter(|line| line.sequence == sequence) {
+            return self.place.as_ref().map(|place| HeldRecord { place, line, is_kept: true });
+        }
+        self.let_go();
+        let place = self.place.as_ref()?;
+        let Look::There(line) = place.ring().look(sequence) else { return None };
+        if place.ring().hold(place.seat, &line) { self.hand_out(line) } else { None }
     }
 }

@@ -29,6 +29,7 @@ const RECORD: RecordPart<'static> = RecordPart {
     written_ns: 9,
     error_ns: 10,
     step: 11,
+    sampled: 12,
     bytes: b"part",
 };
 const DESCRIPTION: DescriptionPart<'static> =

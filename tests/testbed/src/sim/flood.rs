@@ -44,6 +44,7 @@ impl PartFlood {
             written_ns: 0,
             error_ns: 0,
             step: 0,
+            sampled: 0,
             bytes,
         };
         head_of_part.copy_from_slice(&part.head_bytes());

@@ -33,6 +33,7 @@ fn part(bytes: &[u8]) -> RecordPart<'_> {
         written_ns: 0,
         error_ns: 0,
         step: 0,
+        sampled: 0,
         bytes,
     }
 }
