@@ -67,3 +67,45 @@ impl StreamReader {
         if place.ring().hold(place.seat, &line) { self.hand_out(line) } else { None }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::name::Name;
+    use crate::node::Node;
+    use crate::participant::Participant;
+    use crate::stream::record::Next;
+    use crate::stream::ring::Stamp;
+    use crate::stream::shape::{StreamId, StreamShape};
+    use std::time::Duration;
+
+    /// Records of both kinds of memory: of words, and of plain bytes.
+    #[test]
+    fn what_is_kept_is_whole_however_often_the_ring_turns_until_another_is_taken() {
+        for record_bytes in [64, 10_000] {
+            let folder = tempfile::tempdir().unwrap();
+            let node = Node::create(&folder.path().join("node"), 0o700).unwrap();
+            let participant = Participant::join(&node, Name::new(1, 200, 0, 0)).unwrap();
+            let id = StreamId { name: Name::new(1, 200, 0, 0), number: 1 };
+            let shape = StreamShape { record_bytes, keep: 2, readers: 1, late: Duration::ZERO };
+            let mut writer = participant.stream_writer(id, shape).unwrap();
+            let mut reader = participant.stream_reader(id).unwrap();
+            let body = |number: u64| vec![number as u8; record_bytes as usize];
+            let mut write = |number: u64| writer.write(Stamp { epoch: 1, ns: 1 + number }, &body(number)).unwrap();
+            write(0);
+            let kept = reader.keep(0).unwrap();
+            for number in 1..20 {
+                write(number);
+                let newest = reader.newest_info().unwrap().unwrap();
+                assert_eq!((newest.sequence, newest.len_bytes), (number, record_bytes as usize));
+                let record = reader.record(0).unwrap();
+                assert_eq!((record.info(), record.body()), (kept, &body(0)[..]), "{number}");
+            }
+            assert!(reader.keep(5).is_none() && reader.record(0).is_none(), "nothing is kept then");
+            assert!(reader.keep(19).is_some());
+            assert!(matches!(reader.try_next().unwrap(), Next::Lost(_)), "reading on lets it go");
+            write(20);
+            write(21);
+            assert!(reader.record(19).is_none());
+        }
+    }
+}
