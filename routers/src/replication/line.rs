@@ -10,23 +10,18 @@
 //! of its own for that. Nothing is asked for again: what was under way when a connection ends is given up at both ends,
 //! and the next connection begins with the description and the newest record.
 
-use super::by_level::{Peers, StreamsByLevel};
+use super::by_level::StreamsByLevel;
 use super::counts::{ReplicaCounts, SentReplica};
 use super::outgoing::OutgoingReplica;
+use super::peers::Peers;
 use super::receiving::ReplicaReceiver;
 use super::settings::LineSettings;
-use super::{Describe, ReplicaSettings};
+use super::{Describe, LINE_PART_BYTES, LINE_PART_ROOM, ReplicaSettings};
 use crate::counts::Count;
-use crate::frame::{FrameKind, NodeIndex, RECORD_PART_HEAD_BYTES, ReplicaFrame};
+use crate::frame::{FrameKind, NodeIndex, ReplicaFrame};
 use rohrpost_mailbox::{Name, Participant, StreamReader, SystemTime};
 use std::sync::Arc;
 
-/// Bytes of each part of a record but the last. An important package waits for no more than one part that is ready.
-pub const LINE_PART_BYTES: usize = 4096;
-/// A part with its head, at most.
-pub const LINE_PART_ROOM: usize = RECORD_PART_HEAD_BYTES + LINE_PART_BYTES;
-/// Descriptions are sent when a node comes and when they change; and this often, if the other end could not use one.
-pub(super) const LINE_DESCRIBE_EVERY_NS: u64 = 10_000_000_000;
 /// Modules that have begun are looked for this often, ns.
 const LOOK_EVERY_NS: u64 = 500_000_000;
 

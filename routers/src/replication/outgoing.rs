@@ -1,13 +1,12 @@
 //! One stream of this node that others have: how far each of them has come, and what a part of it says.
 
-use super::by_level::Peers;
 use super::counts::ReplicaLoss;
 use super::description::OwnDescription;
 use super::destination::Destination;
 use super::fingerprint::Fingerprints;
-use super::line::{LINE_DESCRIBE_EVERY_NS, LINE_PART_BYTES};
+use super::peers::Peers;
 use super::settings::ReplicaSettings;
-use super::{DESCRIBE_EVERY_NS, Describe};
+use super::{DESCRIBE_EVERY_NS, Describe, LINE_DESCRIBE_EVERY_NS, LINE_PART_BYTES};
 use crate::frame::{DESCRIPTION_BYTES_MAX, FrameKind, NodeIndex, PartRequest, RECORD_PART_HEAD_BYTES, RecordPart};
 use rohrpost_mailbox::{Participant, RecordInfo, StreamId, StreamReader, SystemTime};
 use std::sync::Arc;

@@ -1,6 +1,7 @@
 //! Both halves, over a wire in memory: with the outbound and the inbound that ship, and rings of two nodes.
 
 mod asked;
+mod by_line;
 mod changed;
 mod hops;
 mod hostile;
